@@ -158,7 +158,7 @@ pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Other
         let mut minimum = problem.polish_near(&x, &jacobian, until).ok()?;
         let is_out = until.is_hopeless(minimum.cost, minimum.decrement);
         if !minimum.converged() && !is_out && minimum.cost < most {
-            minimum = problem.polish(&minimum.x, Some(&minimum.jacobian), ROUNDS).ok()?;
+            minimum = problem.polish_on(&minimum, ROUNDS).ok()?;
         }
         let delay = delay(&problem, &minimum.x, &minimum.covariance);
         let left = if minimum.decrement < FORESEEN { minimum.decrement.powi(2) } else { 0.0 };

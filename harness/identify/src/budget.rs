@@ -35,9 +35,11 @@ pub struct Effect {
 
 /// Relative change by which the answer is differenced: of a long recording, less than a tenth of a standard deviation.
 const STEP: f64 = 5e-6;
-/// Rounds of [`modes`]; each leaves a few tenths of the error before it.
+/// Rounds of [`modes`].
 const ROUNDS: usize = 5;
-/// Step, in standard deviations, after which the estimates stay.
+/// What a round is taken to leave of the error before it, at least.
+const LEAVES: f64 = 0.3;
+/// Step, in standard deviations, that is not taken any more.
 const SETTLED: f64 = 0.1;
 
 /// What an error of something that is known within a tolerance does to the innovations.
@@ -151,8 +153,9 @@ fn modes(
         if !length.is_finite() || length > 2.0 * last {
             return None;
         }
+        let next = if last.is_finite() { length * (length / last).max(LEAVES) } else { length };
         last = length;
-        if length < SETTLED {
+        if next < SETTLED {
             return Some(DVector::from_iterator(x.len(), there.iter().zip(x).map(|(a, b)| a - b)));
         }
     }

@@ -71,7 +71,7 @@ pub struct Fitted<'a> {
     pub polished: Polished,
     /// In numbers for the reader.
     pub fit: ModelFit,
-    /// Stribeck speeds that were tried, rad/s, with the sum of squares above the least.
+    /// Stribeck speeds that were tried, rad/s, with what they add to the sum of squares at least.
     pub speeds: Vec<(f64, f64)>,
     /// What the torque may be between rows instead, if that was asked.
     pub others: Option<Others>,

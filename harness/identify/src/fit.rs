@@ -64,6 +64,8 @@ const DECREMENT: f64 = 0.01;
 const MINIMUM: f64 = 0.1;
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 pub const ROUNDS: usize = 6;
+/// Part of a step below which its sensitivities serve no more: a set of others leads further for as many simulations.
+const SHORT: f64 = 0.05;
 /// A change of one variable there by more than this of one here is no valley's bend.
 const SHARPEST: f64 = 1e3;
 
@@ -200,9 +202,14 @@ impl Until {
         Until { decrement, rounds, cost, trust: f64::INFINITY, far: f64::INFINITY }
     }
 
-    /// Whether the sum of squares will not come below the one that counts: to second order it falls by the decrement's square.
+    /// Whether the sum of squares will not come below the one that counts.
     pub fn is_hopeless(&self, cost: f64, decrement: f64) -> bool {
-        decrement < self.trust && cost - 1.5 * decrement * decrement > self.cost
+        decrement < self.trust && Until::foreseen(cost, decrement) > self.cost
+    }
+
+    /// What steps leave of a sum of squares at least: to second order it falls by the decrement's square, and here by half as much again.
+    pub fn foreseen(cost: f64, decrement: f64) -> f64 {
+        cost - 1.5 * decrement * decrement
     }
 }
 
@@ -538,7 +545,7 @@ impl<'a> Problem<'a> {
 
     /// Sensitivities at x to the variables `free`. The differences' directions come from sensitivities `known` to all
     /// variables, of this or a similar problem; if there are none, rough ones are found first.
-    fn sensitivities(
+    pub fn sensitivities(
         &self,
         x: &[f64],
         free: &[usize],
@@ -686,10 +693,24 @@ impl<'a> Problem<'a> {
         known: Option<&DMatrix<f64>>,
         rounds: usize,
     ) -> Result<Polished> {
-        let all: Vec<usize> = (0..x.len()).collect();
+        self.polish_from((x, self.answer(x)?), known, rounds)
+    }
+
+    /// The same where the FMU's answer at x is known.
+    pub fn polish_from(
+        &self,
+        at: (&[f64], Answer),
+        known: Option<&DMatrix<f64>>,
+        rounds: usize,
+    ) -> Result<Polished> {
+        let all: Vec<usize> = (0..at.0.len()).collect();
         let known = known.map_or(Known::Nothing, Known::Directions);
-        let answer = self.answer(x)?;
-        self.polish_some((x, answer), &all, known, Until::minimum(rounds))
+        self.polish_some(at, &all, known, Until::minimum(rounds))
+    }
+
+    /// The same from where a search has ended.
+    pub fn polish_on(&self, from: &Polished, rounds: usize) -> Result<Polished> {
+        self.polish_from((&from.x, from.answer.clone()), Some(&from.jacobian), rounds)
     }
 
     /// The same from sensitivities of a problem that differs by next to nothing: they serve until they no longer do, and others
@@ -734,8 +755,8 @@ impl<'a> Problem<'a> {
                 let gradient = jacobian.tr_mul(&e);
                 let step = -(&covariance.x * &gradient);
                 let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
-                // the same sensitivities serve as long as they come closer by half of what they foresee
-                let serve = decrement <= (1.0 - 0.5 * part) * before;
+                // the same sensitivities serve as long as they come closer by half of what they foresee, in steps worth a simulation
+                let serve = part > SHORT && decrement <= (1.0 - 0.5 * part) * before;
                 let cost = e.norm_squared();
                 let is_far = before.is_finite() && cost > until.far;
                 let hopeless = is_far || until.is_hopeless(cost, decrement);

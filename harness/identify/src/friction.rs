@@ -20,12 +20,15 @@
 //! distribution of one's own width (Davies, Biometrika 74, 1987). Its interval is that about its own least, and all are joined. What holds an unknown only vaguely beforehand does not count in C. An end that the speeds of the
 //! recording do not reach is open: the unknown is not determined there.
 
+use analysis::innovations::Tests;
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::evidence::DECIDES;
 use crate::fit::{self, Differences, Known, Polished, Problem, Until};
+use crate::goodness::tests;
+use crate::recording::Recording;
 use crate::stribeck::Indices;
 use crate::uncertainty::spread_out;
 
@@ -44,12 +47,17 @@ const NEAR: f64 = 9.0;
 const FAR: f64 = 30.0;
 /// By how much less the sum of squares must grow from one speed to the next grid speed for it to be no wall.
 const FLAT: f64 = 1.0;
+/// Longest extrapolation beyond the last point, over the way to that from the one before.
+const FURTHER: f64 = 0.5;
 /// Longest step along ln ω_s.
 const LONGEST: f64 = 0.7;
+/// Where the next point is aimed: root of what it adds to the sum of squares, over that at the end of the interval.
+const AIM: f64 = 1.03;
 /// Points on either side of the minimum.
 const POINTS: usize = 7;
-/// Part by which the sum of squares at an end may differ from [`LIMIT`].
-const ENOUGH: f64 = 0.15;
+/// Part by which what the last point adds to the sum of squares may differ from [`LIMIT`]. Its root is then an eighth off, and the end is
+/// where the line through it and the point before leads.
+const ENOUGH: f64 = 0.25;
 
 /// Standard deviation of the unknown at an index over its value.
 fn relative(problem: &Problem, found: &Polished, index: usize) -> f64 {
@@ -66,28 +74,103 @@ pub fn is_vague(problem: &Problem, found: &Polished, indices: Indices) -> bool {
 
 /// The best fit at one Stribeck speed.
 #[derive(Clone, Debug)]
-pub struct Point {
+struct Point {
     /// ω_s, rad/s.
-    pub speed: f64,
+    speed: f64,
     /// All unknowns' variables.
-    pub x: Vec<f64>,
+    x: Vec<f64>,
     /// Sum of squares.
-    pub cost: f64,
-    /// The same without what is known vaguely beforehand.
+    cost: f64,
+    /// What further steps would leave of it at least, as foreseen to second order.
+    least: f64,
+    /// Sum of squares without what is known vaguely beforehand.
     data: f64,
     /// Covariance of x at this ω_s; its own row and column are 0.
     covariance: DMatrix<f64>,
+    /// Sensitivities there; the column of ω_s is 0.
     jacobian: DMatrix<f64>,
 }
 
-/// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`.
-pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Vec<Point> {
+impl Point {
+    /// Root of what it adds to the `least` sum of squares, which a quadratic makes a line.
+    fn root(&self, least: f64) -> f64 {
+        (self.data - least).max(0.0).sqrt()
+    }
+
+    /// How far from here the end of the interval is, over the way to another point, as the line through both roots has it.
+    fn to_end(&self, other: &Point, least: f64) -> f64 {
+        (LIMIT.sqrt() - self.root(least)) / (other.root(least) - self.root(least))
+    }
+}
+
+/// A Stribeck speed that was tried.
+#[derive(Clone, Debug)]
+pub struct Tried {
+    /// ω_s, rad/s.
+    pub speed: f64,
+    /// What it adds to the sum of squares; at least, where the loudest part alone says so.
+    pub more: f64,
+    /// All unknowns' variables there; `None` where the loudest part alone speaks against it.
+    pub x: Option<Vec<f64>>,
+}
+
+/// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`. Where that explains a long recording, the
+/// loudest part is asked first, which costs little: what it has against a speed no other part makes up for.
+pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Vec<Tried> {
     let fastest = fit::fastest(&from.answer.motion);
+    let is_explained = from.converged() && tests(problem, &from.answer).iter().all(Tests::passed);
+    let part = problem.loudest().filter(|_| is_explained);
+    let loudest = part.as_ref().and_then(|part| Loudest::of(problem, part, from));
     let one = |part: &f64| {
         let x = on_its_curve(problem, &from.x, from, indices, part * fastest);
-        point(problem, &x, &from.jacobian, indices, from.cost)
+        if let Some(found) = loudest.as_ref().and_then(|loudest| loudest.refutes(&x, indices)) {
+            return Some(found);
+        }
+        let found = point(problem, &x, &from.jacobian, indices, from.cost)?;
+        Some(Tried { speed: found.speed, more: found.cost - from.cost, x: Some(found.x) })
     };
     GRID.par_iter().filter_map(one).collect()
+}
+
+/// The loudest part of long recordings. With C_p the sum of squares over it, C_r over the rest, and x the minimum over all,
+///
+/// ```text
+/// C(ω_s) − C(x) ≥ [min C_p(ω_s) − C_p(x)] − [C_r(x) − min C_r]
+/// ```
+///
+/// where the last, if the model holds, is no more than χ² with as many degrees of freedom as there are unknowns.
+struct Loudest<'a> {
+    /// Of that part alone.
+    problem: Problem<'a>,
+    /// C_p(x).
+    cost: f64,
+    /// Sensitivities at x.
+    jacobian: DMatrix<f64>,
+}
+
+/// Beyond which multiple of its degrees of freedom no χ² is taken to be: of 8, 32 has a chance of 1e-4.
+const RARE: f64 = 4.0;
+
+impl<'a> Loudest<'a> {
+    /// What it says of the minimum `from`; `None` where the FMU refuses.
+    fn of(problem: &Problem<'a>, part: &'a [Recording], from: &Polished) -> Option<Self> {
+        let problem = Problem { recordings: part, ..problem.clone() };
+        let answer = problem.answer(&from.x).ok()?;
+        let cost = problem.stacked(&answer, &from.x).norm_squared();
+        let all: Vec<usize> = (0..from.x.len()).collect();
+        // the whole's steps, which are shorter than those the part would take
+        let known = Some(&from.jacobian);
+        let jacobian = problem.sensitivities(&from.x, &all, &answer.motion, known).ok()?;
+        Some(Loudest { problem, cost, jacobian })
+    }
+
+    /// The ω_s of x, where the part alone has more than [`FAR`] against it.
+    fn refutes(&self, x: &[f64], indices: Indices) -> Option<Tried> {
+        let rest = RARE * x.len() as f64;
+        let found = point(&self.problem, x, &self.jacobian, indices, self.cost + rest + FAR)?;
+        let more = found.least - self.cost - rest;
+        (more > FAR).then_some(Tried { speed: found.speed, more, x: None })
+    }
 }
 
 /// Sets of sensitivities at one speed, the first of them mostly that of another one.
@@ -149,12 +232,14 @@ fn point(
     let until = Until { decrement: CLOSE, rounds: STEPS, ..Until::at_most(most) };
     let known = Known::Sensitivities(&jacobian);
     let found = problem.polish_some((x, answer), &others, known, until).ok()?;
+    let least = Until::foreseen(found.cost, found.decrement);
     // what further steps would win to second order, where that can be told
-    let far = found.decrement > 1.0 && !until.is_hopeless(found.cost, found.decrement);
+    let far = found.decrement > 1.0 && least <= most;
     let left = if far { 0.0 } else { found.decrement.powi(2) };
     Some(Point {
         speed: problem.unknowns[indices.speed].scale.value(x[indices.speed]),
         cost: found.cost,
+        least,
         data: found.cost - left - problem.vague_cost(&found.x),
         covariance: spread_out(&found.covariance.x, &others, found.x.len()),
         jacobian: found.jacobian.insert_column(indices.speed, 0.0),
@@ -224,6 +309,7 @@ pub fn profile(
         speed: problem.unknowns[indices.speed].scale.value(minimum.x[indices.speed]),
         x: minimum.x.clone(),
         cost: minimum.cost,
+        least: minimum.cost,
         data: minimum.cost - problem.vague_cost(&minimum.x),
         covariance: spread_out(&held.x, &others, minimum.x.len()),
         jacobian: minimum.jacobian.clone(),
@@ -285,8 +371,8 @@ pub fn profile(
     }))
 }
 
-/// Fits from the middle outwards until the sum of squares is beyond [`LIMIT`] over `least`, then nearer to it; whether even at the last speed, `end`, it
-/// is not.
+/// Fits from the middle outwards until the sum of squares is near [`LIMIT`] over `least`, and between points once there are some on both
+/// sides of it; whether even at the last speed, `end`, it is not.
 fn outwards(
     problem: &Problem,
     minimum: &Polished,
@@ -295,17 +381,14 @@ fn outwards(
     (side, end, deviation): (f64, f64, f64),
 ) -> (Vec<Point>, bool) {
     let mut points: Vec<Point> = Vec::new();
-    let mut step = (1.96 * deviation).clamp(0.02, LONGEST);
-    // root of the sum of squares above the least
-    let root = |p: &Point| (p.data - least).max(0.0).sqrt();
+    let mut step = (AIM * LIMIT.sqrt() * deviation).clamp(0.02, LONGEST);
     // the last within and the first beyond
     let (mut inside, mut outside) = (middle.clone(), None::<Point>);
     while points.len() < POINTS {
         let (from, to) = (inside.speed.ln(), outside.as_ref().map(|p| p.speed.ln()));
         let at = match (&outside, to) {
             (Some(beyond), Some(to)) => {
-                let part = (LIMIT.sqrt() - root(&inside)) / (root(beyond) - root(&inside));
-                from + (to - from) * part.clamp(0.1, 0.9)
+                from + (to - from) * inside.to_end(beyond, least).clamp(0.1, 0.9)
             }
             _ => from + side * step,
         };
@@ -333,28 +416,51 @@ fn outwards(
                 break;
             }
         } else {
-            let near_enough = above > LIMIT * (1.0 - ENOUGH);
-            inside = found;
-            step = (2.0 * step).min(LONGEST);
+            let before = std::mem::replace(&mut inside, found);
             if last {
                 return (points, true);
             }
-            if near_enough && outside.is_some() {
-                break;
+            if above > LIMIT * (1.0 - ENOUGH) {
+                if outside.is_some() {
+                    break;
+                }
+                if let Some(at_end) = end_beyond(&before, &inside, least)
+                    && side * (at_end.speed / end).ln() < 0.0
+                {
+                    points.push(at_end);
+                    return (points, false);
+                }
             }
+            // as if the root went on growing as it has from the point before
+            let way = (inside.speed / before.speed).ln().abs();
+            let growth = inside.root(least) - before.root(least);
+            let to_aim = way * (AIM * LIMIT.sqrt() - inside.root(least)) / growth;
+            step = if growth > 0.0 { to_aim.min(2.0 * step) } else { 2.0 * step }.min(LONGEST);
         }
     }
     (points, outside.is_none())
 }
 
+/// The end of the interval where it is little beyond the last point, on the line through that and the one before.
+fn end_beyond(before: &Point, last: &Point, least: f64) -> Option<Point> {
+    let part = before.to_end(last, least) - 1.0;
+    let further = |before: f64, last: f64| last + part * (last - before);
+    (0.0..FURTHER).contains(&part).then(|| Point {
+        speed: further(before.speed.ln(), last.speed.ln()).exp(),
+        x: before.x.iter().zip(&last.x).map(|(a, b)| further(*a, *b)).collect(),
+        // within, whatever the last digit
+        data: least + LIMIT * (1.0 - 1e-9),
+        ..last.clone()
+    })
+}
+
 /// The 95 % interval of ω_s.
 fn speeds(points: &[Point], least: f64, open: [bool; 2]) -> [f64; 2] {
-    let root = |p: &Point| (p.data - least).max(0.0).sqrt();
     let is_in = |p: &Point| p.data - least <= LIMIT;
-    // between one within and its neighbour beyond, or from the last within with the slope there
+    // between one within and its neighbour beyond
     let between = |inside: &Point, beyond: &Point| {
-        let part = (LIMIT.sqrt() - root(inside)) / (root(beyond) - root(inside));
-        (inside.speed.ln() + (beyond.speed / inside.speed).ln() * part.clamp(0.0, 1.0)).exp()
+        let part = inside.to_end(beyond, least).clamp(0.0, 1.0);
+        (inside.speed.ln() + (beyond.speed / inside.speed).ln() * part).exp()
     };
     let (Some(first), Some(last)) = (points.iter().position(is_in), points.iter().rposition(is_in))
     else {
@@ -394,7 +500,7 @@ const BETWEEN: usize = 8;
 fn places(points: &[Point], least: f64) -> Vec<Place> {
     let lowest = points.iter().position(|p| p.data == least).unwrap_or(0);
     let root = |k: usize| {
-        let root = (points[k].data - least).max(0.0).sqrt();
+        let root = points[k].root(least);
         if k < lowest { -root } else { root }
     };
     let place = |k: usize, part: f64| {
@@ -455,6 +561,33 @@ fn covariance(problem: &Problem, minimum: &Polished, places: &[Place]) -> DMatri
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A point of a parabola about ω_s = 1 rad/s with a standard deviation of 2 %, and with it x = 3 ln ω_s.
+    fn on_a_parabola(deviations: f64) -> Point {
+        let ln = 0.02 * deviations;
+        let (x, cost) = (vec![3.0 * ln], 100.0 + deviations.powi(2));
+        let nothing = DMatrix::zeros(1, 1);
+        let (covariance, jacobian) = (nothing.clone(), nothing);
+        Point { speed: ln.exp(), x, cost, least: cost, data: cost, covariance, jacobian }
+    }
+
+    #[test]
+    fn the_end_of_an_interval_beyond_its_last_point_is_that_of_the_parabola() {
+        let middle = on_a_parabola(0.0);
+        for side in [-1.0, 1.0] {
+            let end = end_beyond(&middle, &on_a_parabola(1.75 * side), 100.0).unwrap();
+            // 1.96 standard deviations, of which LIMIT has five digits
+            assert!((end.speed.ln() / (0.02 * 1.96 * side) - 1.0).abs() < 1e-4, "{end:?}");
+            assert!((end.x[0] / (0.06 * 1.96 * side) - 1.0).abs() < 1e-4, "{end:?}");
+            let ends = speeds(&[middle.clone(), end.clone()], 100.0, [false; 2]);
+            assert!(ends.contains(&end.speed), "{ends:?}");
+        }
+        // too far, the wrong way, and where nothing has grown since the point before
+        let nearer = on_a_parabola(1.0);
+        assert!(end_beyond(&middle, &nearer, 100.0).is_none());
+        assert!(end_beyond(&on_a_parabola(1.75), &nearer, 100.0).is_none());
+        assert!(end_beyond(&middle, &middle, 100.0).is_none());
+    }
 
     #[test]
     fn the_nearest_curve_is_the_curve_itself_at_its_own_speed() {

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use nalgebra::DMatrix;
 
 use crate::between;
-use crate::fit::{Estimate, Polished, Problem, ROUNDS, WINDOWS};
+use crate::fit::{Answer, Estimate, Polished, Problem, ROUNDS, WINDOWS};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::news::Since;
@@ -37,7 +37,7 @@ pub struct Search<'a, 'h> {
     pub alone: bool,
     /// Name of the model.
     pub model: &'h str,
-    /// What other Stribeck speeds make of the sum of squares, once that was asked: speed, rad/s, and how much more.
+    /// What other Stribeck speeds make of the sum of squares, once that was asked: speed, rad/s, and how much more at least.
     pub speeds: Vec<(f64, f64)>,
     /// What the torque may be between rows instead, once that was asked.
     pub others: Option<between::Others>,
@@ -193,7 +193,18 @@ impl<'a> Search<'a, '_> {
         known: Option<&DMatrix<f64>>,
         rounds: usize,
     ) -> Result<Polished> {
-        let polished = self.problem.polish(x, known, rounds)?;
+        let answer = self.problem.answer(x)?;
+        self.polish_from((x, answer), known, rounds)
+    }
+
+    /// The same where the FMU's answer at x is known.
+    fn polish_from(
+        &mut self,
+        at: (&[f64], Answer),
+        known: Option<&DMatrix<f64>>,
+        rounds: usize,
+    ) -> Result<Polished> {
+        let polished = self.problem.polish_from(at, known, rounds)?;
         self.say(format!(
             "{}: {:.4} standard deviations from the minimum",
             self.model, polished.decrement
@@ -250,25 +261,22 @@ impl<'a> Search<'a, '_> {
 
     /// On from a rough estimate, over the whole recordings; the noise is estimated on the way.
     fn on(&mut self, rough: Estimate) -> Result<Polished> {
-        let answer = self.problem.answer(&rough.x)?;
+        let (mut x, mut known) = (rough.x, rough.jacobian);
+        let mut answer = self.problem.answer(&x)?;
         self.problem.estimate_noise(&answer);
-        let (mut x, mut known, mut poor) =
-            (rough.x, rough.jacobian, is_poor(&self.problem, &answer));
         let mut before = f64::INFINITY;
-        while poor {
+        while is_poor(&self.problem, &answer) {
             // a model that does not fit has no minimum worth the search, unless single steps lead far
-            let near = self.polish(&x, known.as_ref(), 1)?;
-            poor = is_poor(&self.problem, &near.answer);
-            if poor && near.cost > LEADS * before {
+            let near = self.polish_from((&x, answer), known.as_ref(), 1)?;
+            if !is_poor(&self.problem, &near.answer) {
+                self.problem.estimate_noise(&near.answer);
+            } else if near.cost > LEADS * before {
                 return Ok(near);
             }
             before = near.cost;
-            if !poor {
-                self.problem.estimate_noise(&near.answer);
-            }
-            (x, known) = (near.x, Some(near.jacobian));
+            (x, known, answer) = (near.x, Some(near.jacobian), near.answer);
         }
-        let near = self.polish(&x, known.as_ref(), ROUNDS)?;
+        let near = self.polish_from((&x, answer), known.as_ref(), ROUNDS)?;
         let near = self.joined(near)?;
         let mut best = self.friction(near)?;
         if !best.converged() {
@@ -284,7 +292,7 @@ impl<'a> Search<'a, '_> {
         }
         // the noise from the residual and, if it is another one, the minimum with its filter
         if self.problem.renew_noise(&mut best) {
-            let again = self.polish(&best.x, Some(&best.jacobian), ROUNDS)?;
+            let again = self.polish_from((&best.x, best.answer), Some(&best.jacobian), ROUNDS)?;
             best = self.friction(again)?;
         }
         Ok(best)
@@ -307,7 +315,8 @@ impl<'a> Search<'a, '_> {
             return Ok(near);
         };
         let before = std::mem::replace(&mut self.problem.setup.intersample, best.behaviour);
-        let other = self.polish(&best.minimum.x, Some(&best.minimum.jacobian), ROUNDS)?;
+        let Polished { x, answer, jacobian, .. } = best.minimum;
+        let other = self.polish_from((&x, answer), Some(&jacobian), ROUNDS)?;
         if other.cost > near.cost {
             self.problem.setup.intersample = before;
             return Ok(near);
@@ -328,17 +337,25 @@ impl<'a> Search<'a, '_> {
             return Ok(near);
         };
         let points = friction::grid(&self.problem, &near, indices);
-        for point in &points {
+        for tried in &points {
+            let (speed, more) = (tried.speed, tried.more);
+            let adds = match tried.x {
+                Some(_) => format!("adds {more:.1} to the sum of squares"),
+                None => format!(
+                    "adds at least {more:.1} to the sum of squares by the loudest part alone"
+                ),
+            };
             self.say(format!(
-                "{}: friction.omega_s held at {:.3e} rad/s, all else free: sum of squares {:.1}, all free {:.1}",
-                self.model, point.speed, point.cost, near.cost
+                "{}: friction.omega_s held at {speed:.3e} rad/s, all else free, {adds}",
+                self.model
             ));
         }
-        self.speeds = points.iter().map(|p| (p.speed, p.cost - near.cost)).collect();
-        let lowest = points.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        self.speeds = points.iter().map(|tried| (tried.speed, tried.more)).collect();
+        let lowest = points.iter().min_by(|a, b| a.more.total_cmp(&b.more));
         let mut best = near;
-        if let Some(point) = lowest.filter(|p| p.cost < best.cost) {
-            let other = self.polish(&point.x, Some(&best.jacobian), ROUNDS)?;
+        if let Some(x) = lowest.filter(|tried| tried.more < 0.0).and_then(|tried| tried.x.as_ref())
+        {
+            let other = self.polish(x, Some(&best.jacobian), ROUNDS)?;
             if other.cost < best.cost {
                 best = other;
             }

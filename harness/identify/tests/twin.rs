@@ -191,6 +191,34 @@ fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
     }
 }
 
+/// Of a long recording whose friction shows little of its Stribeck effect, other speeds are tried; where the loudest part alone speaks against
+/// one the whole is not asked. What it says is less than the whole would: a fit that is told the speed it has least against has a sum of squares
+/// that is larger by more.
+#[test]
+fn what_the_loudest_part_has_against_a_stribeck_speed_the_whole_has_too() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [sweep(&fmu, "lin-sweep:amplitude=0.1,duration=1000,f0=1.8,f1=3", &[])];
+    let mut lines = Vec::new();
+    let free = identify(&fmu, &recordings, &options(), &mut |news| lines.push(news.line().into()))
+        .unwrap();
+    let lines: Vec<String> = lines;
+    let said = lines.iter().filter_map(|line| {
+        let (before, more) = line.split_once("adds at least ")?;
+        let number = |text: &str| text.split_whitespace().next()?.parse::<f64>().ok();
+        let (_, speed) = before.split_once("held at ")?;
+        Some((number(speed)?, number(more)?))
+    });
+    let (speed, more) =
+        said.min_by(|a, b| a.1.total_cmp(&b.1)).expect("a speed that it is against");
+    let settings = vec![("friction.omega_s".to_string(), speed.to_string())];
+    let told = Options { settings, ..options() };
+    let told = identify(&fmu, &recordings, &told, &mut |_| {}).unwrap();
+    // −2 ln L from the criterion, which has ln n for the unknown more
+    let rows = recordings[0].time.len() as f64;
+    let whole = told.details.fit.bic - free.details.fit.bic + rows.ln();
+    assert!(whole > more, "{speed}: {whole} {more}");
+}
+
 /// Tank, hub, friction and the gyro's scale stand for one another along a valley that bends. Spherical slosh shows the scale, and the
 /// minimum is two hundredths away from where the fit begins to seek it.
 #[test]

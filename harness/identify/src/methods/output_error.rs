@@ -261,15 +261,17 @@ fn finish(
         let last = known.ncols();
         known = known.insert_column(last, 0.0);
     }
-    // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
-    problem.differences = Differences::Central;
-    let mut polished = problem.polish(&x, Some(&known), ROUNDS)?;
+    if place(&problem).is_some() {
+        // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
+        problem.differences = Differences::Central;
+    }
+    let mut polished = problem.polish_from((&x, polished.answer), Some(&known), ROUNDS)?;
     // a search that ended elsewhere has taken what it left for noise
     if problem.renew_noise(&mut polished) {
-        polished = problem.polish(&polished.x, Some(&polished.jacobian), ROUNDS)?;
+        polished = problem.polish_on(&polished, ROUNDS)?;
     }
     polished = problem.polish_at_kink(polished, ROUNDS)?;
-    say("central differences at the minimum", &problem);
+    say("the last steps", &problem);
     let between_rows = torque_between_rows(&mut problem, &mut polished, others.as_ref(), options)?;
     say("other torques between rows", &problem);
     fit.fit_pct = fit_pct(&problem, &polished.answer);
@@ -503,7 +505,7 @@ fn torque_between_rows(
     let mut others = between::alternatives(problem, found, before).all;
     if let Some(best) = between::better(found.cost, step, acausal, &others) {
         let before = std::mem::replace(&mut problem.setup.intersample, best.behaviour);
-        let other = problem.polish(&best.minimum.x, Some(&best.minimum.jacobian), ROUNDS)?;
+        let other = problem.polish_on(&best.minimum, ROUNDS)?;
         if other.cost < found.cost {
             *found = other;
             others = between::alternatives(problem, found, None).all;
