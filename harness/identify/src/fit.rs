@@ -64,8 +64,6 @@ const DECREMENT: f64 = 0.01;
 const MINIMUM: f64 = 0.1;
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 pub const ROUNDS: usize = 6;
-/// Part of a step below which its sensitivities serve no more: a set of others leads further for as many simulations.
-const SHORT: f64 = 0.05;
 /// A change of one variable there by more than this of one here is no valley's bend.
 const SHARPEST: f64 = 1e3;
 
@@ -755,8 +753,8 @@ impl<'a> Problem<'a> {
                 let gradient = jacobian.tr_mul(&e);
                 let step = -(&covariance.x * &gradient);
                 let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
-                // the same sensitivities serve as long as they come closer by half of what they foresee, in steps worth a simulation
-                let serve = part > SHORT && decrement <= (1.0 - 0.5 * part) * before;
+                // the same sensitivities serve as long as they come closer by half of what they foresee
+                let serve = decrement <= (1.0 - 0.5 * part) * before;
                 let cost = e.norm_squared();
                 let is_far = before.is_finite() && cost > until.far;
                 let hopeless = is_far || until.is_hopeless(cost, decrement);
