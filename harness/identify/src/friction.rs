@@ -397,13 +397,24 @@ fn outwards(
         if side * (speed / inside.speed).ln() <= 0.0 {
             return (points, true);
         }
-        let near = [Some(&inside), outside.as_ref()].into_iter().flatten();
-        let near = near
-            .min_by(|a, b| (a.speed / speed).ln().abs().total_cmp(&(b.speed / speed).ln().abs()));
-        let near = near.unwrap_or(middle);
-        let most = minimum.cost + NEAR;
-        let x = foreseen(problem, &near.x, minimum, indices, speed);
-        let Some(found) = point(problem, &x, &near.jacobian, indices, most) else {
+        let way = |p: &Point| (p.speed / speed).ln().abs();
+        let mut from = vec![&inside];
+        from.extend(&outside);
+        from.sort_by(|a, b| way(a).total_cmp(&way(b)));
+        let fit = |near: &&Point| {
+            let x = foreseen(problem, &near.x, minimum, indices, speed);
+            point(problem, &x, &near.jacobian, indices, minimum.cost + NEAR)
+        };
+        // a sum of squares larger than beyond is that of a search gone astray, and the other neighbour may lead
+        let is_astray = |p: &Point| outside.as_ref().is_some_and(|beyond| p.data > beyond.data);
+        let mut found = fit(&from[0]);
+        if let Some(other) = from.get(1)
+            && found.as_ref().is_none_or(is_astray)
+        {
+            let both = [found, fit(other)].into_iter().flatten();
+            found = both.min_by(|a, b| a.data.total_cmp(&b.data));
+        }
+        let Some(found) = found else {
             // nor is the end then, unless it is known from beyond
             return (points, outside.is_none());
         };
