@@ -191,7 +191,9 @@ def _in_threads(
                     under_way[pool.submit(_one, outcome, job[1])] = job
                 if not under_way:
                     return
-                for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                done = wait(under_way, return_when=FIRST_COMPLETED).done
+                # A run that raised ends the study: after those that were done with it.
+                for future in sorted(done, key=lambda future: future.exception() is not None):
                     run, values = under_way.pop(future)
                     yield run, _checked(future.result(), values)
         finally:
