@@ -41,7 +41,7 @@ use rayon::prelude::*;
 
 use crate::nominal::{Bench, Nominal};
 use crate::recording::Recording;
-use crate::simulate::{Motion, Setup};
+use crate::simulate::{Motion, Read, Setup};
 use crate::stribeck;
 use crate::tank;
 use crate::uncertainty::{self, Covariance};
@@ -272,11 +272,13 @@ impl<'a> Problem<'a> {
         index.map_or(otherwise, |i| self.unknowns[i].scale.value(x[i]))
     }
 
-    fn motion(&self, x: &[f64], recording: usize) -> Result<Motion> {
-        self.motion_under(x, recording, None)
-    }
-
-    fn motion_under(&self, x: &[f64], recording: usize, besides: Option<&[f64]>) -> Result<Motion> {
+    fn motion(
+        &self,
+        x: &[f64],
+        recording: usize,
+        besides: Option<&[f64]>,
+        read: Read,
+    ) -> Result<Motion> {
         let values: Vec<(&str, f64)> = self
             .unknowns
             .iter()
@@ -292,16 +294,16 @@ impl<'a> Problem<'a> {
         let delay = self.value_of(x, &Quantity::Delay, 0.0);
         let recording = &self.recordings[recording];
         self.driven.fetch_add(recording.time.len(), Relaxed);
-        self.setup.run_under(self.fmu, &values, recording, delay, besides)
+        self.setup.run_under(self.fmu, &values, recording, delay, besides, read)
     }
 
-    fn motions(&self, x: &[f64]) -> Result<Vec<Motion>> {
-        (0..self.recordings.len()).into_par_iter().map(|i| self.motion(x, i)).collect()
+    fn motions(&self, x: &[f64], read: Read) -> Result<Vec<Motion>> {
+        (0..self.recordings.len()).into_par_iter().map(|i| self.motion(x, i, None, read)).collect()
     }
 
     /// The FMU's answer and the residual of the recordings.
     pub fn answer(&self, x: &[f64]) -> Result<Answer> {
-        let motion = self.motions(x)?;
+        let motion = self.motions(x, Read::All)?;
         let residual = self.channels.iter().map(|c| self.residual(x, *c, &motion)).collect();
         Ok(Answer { motion, residual })
     }
@@ -456,7 +458,7 @@ impl<'a> Problem<'a> {
                 let each = (0..self.recordings.len()).into_par_iter();
                 each.map(|i| match quantity {
                     Quantity::Initial(of, _) if *of != i => Ok(base[i].clone()),
-                    _ => self.motion(&moved, i),
+                    _ => self.motion(&moved, i, None, Read::States),
                 })
                 .collect()
             };
@@ -499,7 +501,7 @@ impl<'a> Problem<'a> {
             let each = (0..self.recordings.len()).into_par_iter();
             each.map(|i| {
                 let scaled: Vec<f64> = torque[i].iter().map(|phi| by * phi).collect();
-                self.motion_under(x, i, Some(&scaled))
+                self.motion(x, i, Some(&scaled), Read::States)
             })
             .collect()
         };
@@ -582,7 +584,7 @@ impl<'a> Problem<'a> {
             let moved = |by: f64| {
                 let mut part = vec![0.0; x.len()];
                 mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
-                self.motions(&self.moved(x, &part, fastest))
+                self.motions(&self.moved(x, &part, fastest), Read::States)
             };
             self.differenced(x, base, step, &moved)
         };
@@ -850,7 +852,7 @@ impl<'a> Problem<'a> {
     /// The covariance of estimates at x, where the recordings are what the FMU does: the Cramér–Rao bound; and the
     /// sensitivities.
     pub fn information(&self, x: &[f64]) -> Result<(Covariance, DMatrix<f64>)> {
-        let motion = self.motions(x)?;
+        let motion = self.motions(x, Read::All)?;
         let all: Vec<usize> = (0..x.len()).collect();
         let jacobian = self.sensitivities(x, &all, &motion, None)?;
         Ok((self.covariance(&jacobian)?, jacobian))

@@ -25,6 +25,15 @@ pub struct Motion {
     pub slosh_angle: Vec<f64>,
 }
 
+/// What of a [`Motion`] is read at every row; the rest stays empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Read {
+    /// All of it.
+    All,
+    /// Angle and rate, for the differences: they are states, and the FMU has no outputs to compute.
+    States,
+}
+
 /// Intersample behaviour: what the torque does between the rows of a recording (Ljung; Pintelon & Schoukens).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Intersample {
@@ -97,7 +106,7 @@ impl Setup {
         recording: &Recording,
         delay: f64,
     ) -> Result<Motion> {
-        self.run_under(fmu, values, recording, delay, None)
+        self.run_under(fmu, values, recording, delay, None, Read::All)
     }
 
     /// The same with a torque on the hub besides the recorded one, N·m, at the recording's rows.
@@ -108,6 +117,7 @@ impl Setup {
         recording: &Recording,
         delay: f64,
         besides: Option<&[f64]>,
+        read: Read,
     ) -> Result<Motion> {
         let reference =
             |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
@@ -142,6 +152,10 @@ impl Setup {
             reference("omega_dot")?,
             reference("slosh_angle")?,
         ];
+        let outputs = match read {
+            Read::All => &outputs[..],
+            Read::States => &outputs[..2],
+        };
         let mut motion = Motion::default();
         // the row that is read next; the row from which on the signals go to the one after it
         let (mut row, mut knot) = (0, 0);
@@ -153,11 +167,13 @@ impl Setup {
                     break target;
                 }
                 let mut values = [0.0; 4];
-                instance.get_real(&outputs, &mut values)?;
+                instance.get_real(outputs, &mut values[..outputs.len()])?;
                 motion.angle.push(values[0]);
                 motion.rate.push(values[1]);
-                motion.acceleration.push(values[2]);
-                motion.slosh_angle.push(values[3]);
+                if read == Read::All {
+                    motion.acceleration.push(values[2]);
+                    motion.slosh_angle.push(values[3]);
+                }
                 row += 1;
             };
             if time.get(knot + 1).is_some_and(|end| t >= *end) {
