@@ -114,7 +114,7 @@ def test_every_method_gives_the_same_kind_of_answer(
     program = option(request, "--hubslosh")
     found = hubslosh.identify(run, method="acceleration", fmu=fmu, program=program)
     inertia = found.parameters["hub.I"]
-    # how exact the method is, its own tests say (harness/identify/tests/methods.rs)
+    # how exact the method is, its own tests say (harness/identify/tests/all/methods.rs)
     assert abs(inertia.value / 0.322414 - 1) < 0.01 and inertia.std > 0 and found.fits
     assert found.model == "frozen" and found.all["condition"] > 1
     found = hubslosh.identify(run, method="black-box", fmu=fmu, program=program)

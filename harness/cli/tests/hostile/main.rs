@@ -299,68 +299,76 @@ const HARMS: [&str; 12] = [
 /// Those that do no harm but to print, so that a run succeeds.
 const LOUD: &str = "prints 1 GB";
 
-#[test]
-fn a_harmful_binary_ends_its_own_process_and_every_command_says_so() {
+/// Runs every harmful binary, which does harm in a call (`when`), by every command.
+fn ends_its_own_process(when: &str) {
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("plan.toml"), "title = \"a\"\nprofile = \"zero:duration=1\"\n")
         .unwrap();
     for (harm, name) in HARMS.iter().enumerate() {
-        for when in ["AT_LOAD", "AT_STEP"] {
-            let fmu = format!("{harm}{when}.fmu");
-            std::fs::write(sandbox.path(&fmu), harmful(harm as u32 + 1, when)).unwrap();
-            let what = format!("{name}, {when}");
-            let run = [
-                "run",
-                "--call-limit",
-                "0.5",
-                "--profile",
-                "zero",
-                "--stop",
-                "0.02",
-                "--fmu",
-                &fmu,
-                "--out",
-                "a.csv",
-            ];
-            let campaign = [
-                "campaign",
-                "--call-limit",
-                "0.5",
-                "--plan",
-                "plan.toml",
-                "--fmu",
-                &fmu,
-                "--out",
-                "campaign",
-                "--force",
-            ];
-            let output = sandbox.hubslosh(&["variables", "--fmu", &fmu]);
-            assert!(output.status.success(), "{what}: a description is no binary");
-            if *name == LOUD {
-                // a gigabyte through a pipe may take longer than the limit of the others
-                let patient: Vec<&str> =
-                    run.iter().copied().filter(|a| !matches!(*a, "--call-limit" | "0.5")).collect();
-                let output = sandbox.hubslosh(&patient);
-                let said = String::from_utf8_lossy(&output.stderr).into_owned();
-                assert!(output.status.success(), "{what}: {said}");
-            } else {
-                for command in [&run[..], &campaign[..]] {
-                    let said = sandbox.fails(command);
-                    let told = said.contains("the FMU has ended the process")
-                        || said.contains("has not returned within 0.5 s");
-                    assert!(told, "{what}: {said}");
-                }
+        let fmu = format!("{harm}{when}.fmu");
+        std::fs::write(sandbox.path(&fmu), harmful(harm as u32 + 1, when)).unwrap();
+        let what = format!("{name}, {when}");
+        let run = [
+            "run",
+            "--call-limit",
+            "0.5",
+            "--profile",
+            "zero",
+            "--stop",
+            "0.02",
+            "--fmu",
+            &fmu,
+            "--out",
+            "a.csv",
+        ];
+        let campaign = [
+            "campaign",
+            "--call-limit",
+            "0.5",
+            "--plan",
+            "plan.toml",
+            "--fmu",
+            &fmu,
+            "--out",
+            "campaign",
+            "--force",
+        ];
+        let output = sandbox.hubslosh(&["variables", "--fmu", &fmu]);
+        assert!(output.status.success(), "{what}: a description is no binary");
+        if *name == LOUD {
+            // a gigabyte through a pipe may take longer than the limit of the others
+            let patient: Vec<&str> =
+                run.iter().copied().filter(|a| !matches!(*a, "--call-limit" | "0.5")).collect();
+            let output = sandbox.hubslosh(&patient);
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(output.status.success(), "{what}: {said}");
+        } else {
+            for command in [&run[..], &campaign[..]] {
+                let said = sandbox.fails(command);
+                let told = said.contains("the FMU has ended the process")
+                    || said.contains("has not returned within 0.5 s");
+                assert!(told, "{what}: {said}");
             }
-            // the rules that see it; all of them would make every step of every rule wait
-            let only = if when == "AT_LOAD" { "load" } else { "load,host.silent,steps.run" };
-            let output = sandbox.hubslosh(&["check", &fmu, "--limit", "1", "--only", only]);
-            let report = String::from_utf8_lossy(&output.stdout).into_owned();
-            assert_eq!(output.status.code(), Some(1), "{what}: {report}");
-            let told = ["the process ended", "no end after 1 s", "it prints"];
-            assert!(told.iter().any(|words| report.contains(words)), "{what}: {report}");
         }
+        // the rules that see it; all of them would make every step of every rule wait
+        let only = if when == "AT_LOAD" { "load" } else { "load,host.silent,steps.run" };
+        let output = sandbox.hubslosh(&["check", &fmu, "--limit", "1", "--only", only]);
+        let report = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{what}: {report}");
+        let told = ["the process ended", "no end after 1 s", "it prints"];
+        assert!(told.iter().any(|words| report.contains(words)), "{what}: {report}");
     }
     memory_was_enough();
+}
+
+#[test]
+fn a_binary_that_does_harm_when_loaded_ends_its_own_process_and_every_command_says_so() {
+    ends_its_own_process("AT_LOAD");
+}
+
+#[test]
+fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says_so() {
+    ends_its_own_process("AT_STEP");
 }
 
 #[test]

@@ -1,15 +1,9 @@
 //! Twins of a bench that is not the FMU (`examples/twins`) which were refused, or of which something wrong was stated as sure.
 
-#[path = "../examples/twins/bench.rs"]
-#[allow(dead_code, reason = "other tests look at more of it")]
-mod bench;
-#[path = "../examples/twins/draw.rs"]
-#[allow(dead_code, reason = "the example says more of it")]
-mod draw;
-
-use draw::Twin;
 use host::fmu::Fmu;
 use pack::packed_for_tests;
+
+use crate::draw::Twin;
 
 /// Identified as a user would, it is described, nothing is further off than five standard deviations, and the intervals of `held` hold the truth.
 fn is_described(seed: u64, held: &[&str]) {

@@ -1,15 +1,12 @@
 //! The bench that is not the FMU, held against the FMU and against closed forms. What it finds, the FMU's own fit cannot
 //! have put there.
 
-#[path = "../examples/twins/bench.rs"]
-#[allow(dead_code, reason = "the twins look at more of it")]
-mod bench;
-
-use bench::{Bearing, Bench, Drive, Liquid};
 use host::fmu::Fmu;
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
 use pack::packed_for_tests;
+
+use crate::bench::{Bearing, Bench, Drive, Liquid};
 
 /// Rows every 20 ms, s.
 fn rows(seconds: f64) -> Vec<f64> {

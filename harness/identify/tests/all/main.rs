@@ -1,0 +1,14 @@
+//! Recordings of simulated benches, identified: what is found, with what uncertainty, and what is said of it.
+
+mod any_fmu;
+#[path = "../../examples/twins/bench.rs"]
+#[allow(dead_code, reason = "the example looks at more of it")]
+mod bench;
+#[path = "../../examples/twins/draw.rs"]
+#[allow(dead_code, reason = "the example says more of it")]
+mod draw;
+mod methods;
+mod other_bench;
+mod sensors;
+mod twin;
+mod twins;
