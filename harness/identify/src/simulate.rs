@@ -109,7 +109,7 @@ impl Setup {
         self.run_under(fmu, values, recording, delay, None, Read::All)
     }
 
-    /// The same with a torque on the hub besides the recorded one, N·m, at the recording's rows.
+    /// The same with a torque on the hub besides the recorded one, N·m, at the recording's rows; of the motion `read` is read.
     pub fn run_under(
         &self,
         fmu: &Fmu,

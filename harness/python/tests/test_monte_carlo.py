@@ -57,7 +57,7 @@ def test_a_study_gives_what_single_runs_give_however_it_is_made(fmu: Path, tmp_p
     def stops(values: dict) -> dict[str, float]:
         with lock:
             count[0] += 1
-            if count[0] == 6:
+            if count[0] > 5:
                 raise StoppedError
         return outcome(values)
 
@@ -65,8 +65,8 @@ def test_a_study_gives_what_single_runs_give_however_it_is_made(fmu: Path, tmp_p
         monte_carlo(RANGES, 12, 1, stops, folder=tmp_path, workers=2)
     file = tmp_path / "runs.csv"
     there = pd.read_csv(file)
-    # Of five calls before the one that raises, one may be under way; the other worker may go on.
-    assert 4 <= len(there) < 12
+    # Of the five calls before the one that raises, the other worker may have one under way.
+    assert 4 <= len(there) <= 5
     with file.open("a") as cut:  # as a full disk leaves it
         cut.write("11,0.0")
     called: list[dict] = []
