@@ -1,4 +1,4 @@
-"""Compares the motion of two builds of HubSlosh.fmu: the release 0.1.0 and the present one.
+"""Compares the motion of two builds of HubSlosh.fmu: the newest release and the present one.
 
     python3 harness/python/compare_releases.py [--before FMU] [--now FMU] [--short]
 
@@ -106,7 +106,7 @@ def sensitivity(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: 
 def main() -> int:
     """Compare, print a table in Markdown, return 1 if something is too far apart."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--before", type=Path, default=ROOT / "dist/release/HubSlosh-0.1.0.fmu")
+    parser.add_argument("--before", type=Path, default=ROOT / "dist/release/HubSlosh-0.5.0.fmu")
     parser.add_argument("--now", type=Path, default=ROOT / "dist/HubSlosh.fmu")
     parser.add_argument("--short", action="store_true", help="sweeps of 300 s")
     given = parser.parse_args()

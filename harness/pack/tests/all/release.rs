@@ -60,6 +60,24 @@ fn hash_and_sbom_beside_the_release_are_its_own() {
     }
 }
 
+/// The tree keeps the files of one version; of the older ones it keeps the hashes.
+#[test]
+fn release_folder_holds_one_version_and_the_hashes_of_all() {
+    let folder = pack::root().join("dist").join("release");
+    let sums = std::fs::read_to_string(folder.join("SHA256SUMS")).unwrap();
+    let mut versions = std::collections::BTreeSet::new();
+    for entry in folder.read_dir().unwrap().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.ends_with(".fmu") || name.ends_with(".whl") {
+            versions.extend(name.trim_end_matches(".fmu").split('-').nth(1).map(String::from));
+            let line = format!("{}  {name}\n", sha256(&std::fs::read(entry.path()).unwrap()));
+            assert!(sums.contains(&line), "SHA256SUMS has no line {line}");
+        }
+    }
+    assert_eq!(versions.len(), 1, "{versions:?}");
+    assert!(sums.contains("  HubSlosh-0.1.0.fmu\n"));
+}
+
 #[test]
 fn wheel_beside_the_release_is_the_only_one_and_has_its_hash() {
     let folder = pack::root().join("dist").join("release");
