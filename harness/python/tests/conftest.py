@@ -3,7 +3,7 @@ r"""What the tests share: the packed FMU and the harness's binary.
     cargo run --release -- pack
     cargo run --release -- pack --python
     pytest harness/python --fmu dist/HubSlosh.fmu --hubslosh target/release/hubslosh \
-        --wheel dist/hubslosh-0.5.0-py3-none-….whl
+        --wheel dist/hubslosh-0.6.0-py3-none-….whl
 
 ``cargo test --release`` calls it so, with FMU and wheel that it packs itself.
 """
