@@ -13,4 +13,3 @@ mod report;
 mod step_cost;
 mod tank;
 mod view;
-mod words;
