@@ -1,5 +1,5 @@
-//! What is linked into the FMU's binaries, found in the lock file and in the binaries themselves:
-//! as the note on licences and as a software bill of materials, SBOM (CycloneDX 1.6).
+//! Third-party components of the FMU's binaries, from the lock file and from the binaries:
+//! the note on licences and the software bill of materials, SBOM (CycloneDX 1.6).
 //!
 //! Licence texts are committed in modelDescription/licenses; their sources are named in
 //! [`licence_note`].
@@ -39,7 +39,7 @@ pub struct Component {
     pub purl: String,
     /// SHA-256 of the package, if Cargo.lock has it.
     pub sha256: Option<String>,
-    /// Where it comes from and what it is for.
+    /// Source and purpose of the component.
     pub origin: String,
     /// Folders under `binaries/` whose binary has it.
     pub platforms: BTreeSet<&'static str>,
@@ -62,7 +62,7 @@ const STANDARD: [(&str, &str); 11] = [
 ];
 const STANDARD_TEXT: &str = "rust-standard-library.txt";
 
-/// What a linker adds, and a text by which the binary shows it.
+/// A run-time library that a linker adds, and a text that reveals it in a binary.
 struct RunTime {
     mark: &'static str,
     name: &'static str,

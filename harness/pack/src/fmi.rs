@@ -1,4 +1,4 @@
-//! What differs between FMUs of FMI 2.0 and 3.0 in the archive: names of files and folders.
+//! File and folder names that differ between archives of FMI 2.0 and 3.0.
 
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ impl Fmi {
         }
     }
 
-    /// What stands behind an FMU's name in the name of its file.
+    /// Suffix of the FMU's file name.
     pub fn suffix(self) -> &'static str {
         match self {
             Fmi::V2 => "",

@@ -85,7 +85,7 @@ pub fn packed_model_for_tests(model: &Model) -> &'static Path {
     packed_version_for_tests(model, Fmi::V2)
 }
 
-/// As [`packed_model_for_tests`], for a version of FMI: `test-fmu/<name>-fmi3.fmu` for 3.0, and with arrays
+/// Like [`packed_model_for_tests`] for one version of FMI: `test-fmu/<name>-fmi3.fmu` for 3.0, with arrays
 /// `test-fmu/<name>-fmi3-arrays.fmu`.
 ///
 /// # Panics
@@ -122,7 +122,7 @@ fn references(model: &Model) -> String {
     )
 }
 
-/// What is in the FMU.
+/// Files of the FMU.
 fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
     let source = model.folder();
     let xml = model.description(fmi)?;

@@ -15,7 +15,7 @@ use crate::root;
 pub const PACKAGE: &str = "hubslosh";
 /// Its version.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Where the project's source is published.
+/// Address of the project's source.
 pub const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 /// Texts of the project's licence.
 pub const LICENSES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];

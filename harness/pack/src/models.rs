@@ -22,11 +22,11 @@ pub struct Model {
     pub name: &'static str,
     /// Cargo package whose cdylib is the binary.
     pub package: &'static str,
-    /// Of a variant for fewer tanks and modes.
+    /// Sizes of a variant for fewer tanks and modes.
     pub sizes: Option<Sizes>,
 }
 
-/// How many tanks and modes per tank a variant of Spacecraft has; those of the FMU without variant are the most.
+/// Numbers of tanks and of modes per tank in a variant of Spacecraft; those of the full FMU are the largest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
     /// 1 to 4.
@@ -93,8 +93,7 @@ impl Model {
         }
     }
 
-    /// What Cargo finds in its environment when it builds this one: a variant its sizes, and a folder where what
-    /// is compiled for it does not replace the other.
+    /// Environment for Cargo: the sizes of a variant, and a target folder of its own.
     pub(crate) fn environment(&self) -> Vec<(&'static str, OsString)> {
         let Some(Sizes { tanks, modes }) = self.sizes else { return Vec::new() };
         vec![

@@ -27,7 +27,7 @@ pub struct Platform {
     pub folder: &'static str,
     /// Ending of the binary's name there.
     pub ending: &'static str,
-    /// What is built; several are joined into one universal binary.
+    /// Build targets; several are joined into one universal binary.
     pub targets: &'static [Target],
     /// Programs that building needs beside Rust.
     tools: &'static [Tool],
@@ -40,11 +40,11 @@ pub struct Platform {
 /// One system on one processor.
 #[derive(Debug)]
 pub struct Target {
-    /// As rustc knows it.
+    /// Target triple of rustc.
     pub triple: &'static str,
     /// Appended for `cargo-zigbuild`: the oldest glibc.
     suffix: &'static str,
-    /// As [`Binary::architectures`] has it.
+    /// Name in [`Binary::architectures`].
     pub architecture: &'static str,
 }
 
@@ -156,7 +156,7 @@ pub struct Built {
     pub ending: &'static str,
     /// The file.
     pub bytes: Vec<u8>,
-    /// What it needs and offers.
+    /// Imports and exports of the binary.
     pub binary: Binary,
 }
 
@@ -222,7 +222,7 @@ pub fn refuse(faults: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// What is built for other platforms.
+/// Product of a cross-build.
 pub enum Product<'a> {
     /// The library of an FMU.
     Fmu(&'a Model),
@@ -232,7 +232,7 @@ pub enum Product<'a> {
     Command,
 }
 
-/// Where this machine keeps what building needs.
+/// Paths of the build tools on this machine.
 pub struct Toolchain {
     root: PathBuf,
     /// PATH with `target/tools/bin` in front.
@@ -294,7 +294,7 @@ impl Toolchain {
         std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
     }
 
-    /// What is wrong with a binary: what was `found`, and what it tells of this machine.
+    /// Lists the faults of a binary: those `found`, and references to this machine.
     pub fn faults(&self, platform: &Platform, bytes: &[u8], found: Vec<String>) -> Vec<String> {
         let private = self.private().into_iter();
         let named = private
@@ -353,7 +353,7 @@ impl Toolchain {
         )
     }
 
-    /// What builds the binary for one target.
+    /// Command that builds the binary for one target.
     fn command(&self, product: &Product, platform: &Platform, target: &Target) -> Command {
         let mut command = match platform.cargo {
             Cargo::Plain => project::cargo(),

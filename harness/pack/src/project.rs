@@ -21,7 +21,7 @@ pub fn root() -> PathBuf {
     crate_root.ancestors().nth(2).unwrap_or(crate_root).to_path_buf()
 }
 
-/// Whether the project's source is there.
+/// Returns true if the project's source is present.
 pub fn has_source() -> bool {
     root().join("Cargo.toml").is_file()
 }
@@ -61,7 +61,7 @@ pub(crate) fn build_in(
     cargo_build(command, quiet)
 }
 
-/// What a program of this workspace prints.
+/// Runs a program of this workspace and returns its output.
 pub(crate) fn output(
     cargo_arguments: &[&str],
     arguments: &[&str],

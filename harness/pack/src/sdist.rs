@@ -14,7 +14,7 @@ use crate::archive::{Files, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::root;
 
-/// Where the build backend is, seen from pyproject.toml's own folder, and from the sdist's root.
+/// Path of the build backend from pyproject.toml's own folder, and from the sdist's root.
 const BACKEND: [&str; 2] = ["backend-path = [\".\"]", "backend-path = [\"harness/python\"]"];
 
 /// Writes the sdist to `folder` and returns where it is.
@@ -42,8 +42,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// What git knows of, but releases and what is for a checkout alone; pyproject.toml and the metadata
-/// at the root.
+/// Files under version control, without releases and without files that only a checkout needs; pyproject.toml and the metadata
+/// stand at the root.
 fn files() -> Result<Files> {
     let said = Command::new("git")
         .current_dir(root())

@@ -196,7 +196,7 @@ fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
     })
 }
 
-/// What is in the wheel; its metadata last, as the standard recommends, RECORD at the very end.
+/// Files of the wheel: metadata last, as the standard recommends, and RECORD at the very end.
 fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     let package = below(&root().join("harness").join("python").join(PACKAGE))?.into_iter();
     let mut files: Files = package

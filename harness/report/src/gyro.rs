@@ -1,4 +1,4 @@
-//! What a gyro shows at rest, as pictures: its Allan deviation, and of a recording the tests of its noise.
+//! Pictures of a gyro at rest: its Allan deviation, and the noise tests of a recording.
 
 use analysis::allan::Point;
 use analysis::rest::Rest;

@@ -1,4 +1,4 @@
-//! What people look at: the page about a campaign ([`campaign::page`]), about one run ([`view::page`]), charts in SVG.
+//! Pages and charts: the page about a campaign ([`campaign::page`]), about one run ([`view::page`]), charts in SVG.
 
 pub mod campaign;
 pub mod gyro;

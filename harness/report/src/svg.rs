@@ -8,7 +8,7 @@ use maud::{Markup, html};
 /// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What is along it, with its unit.
+    /// Label with unit.
     pub label: String,
     /// Value at the left or lower end.
     pub from: f64,
@@ -83,7 +83,7 @@ fn round_step(step: f64) -> f64 {
         .unwrap_or(step)
 }
 
-/// How a series is drawn.
+/// Drawing style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// A line.
@@ -105,7 +105,7 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// CSS colour.
     pub color: String,
-    /// How it is drawn.
+    /// Drawing style.
     pub style: Style,
     /// Shown when the pointer rests on it.
     pub title: String,
@@ -114,7 +114,7 @@ pub struct Series {
 /// A chart.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// What it shows; also its description for those who do not see it.
+    /// Title; also the text alternative for screen readers.
     pub title: String,
     /// Width and height of the drawing, px.
     pub size: (f64, f64),
@@ -124,11 +124,11 @@ pub struct Chart {
     pub y: Axis,
     /// The curves, the first one lowest.
     pub series: Vec<Series>,
-    /// Whether the curves' titles are written into the upper right corner.
+    /// Draws the curves' titles in the upper right corner.
     pub legend: bool,
 }
 
-/// Of a file of its own: white paper.
+/// Style of a stand-alone file: white background.
 const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif }\
     text { fill: #1d2733 } .title { font-size: 12.5px; font-weight: 600 }\
     .grid { stroke: #dde3ea; stroke-width: .7; fill: none }\

@@ -9,7 +9,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::page::{Gathered, Layout, Page};
 
-/// What the FMU holds below `documentation/`.
+/// Files below `documentation/` in an FMU.
 pub struct Documentation {
     /// `index.html`.
     pub page: String,

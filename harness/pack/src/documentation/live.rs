@@ -14,7 +14,7 @@ use crate::archive;
 use crate::fmi::Fmi;
 use crate::platforms;
 
-/// What a live page computes with.
+/// WebAssembly module of a live page.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Needed {
     /// The FMU of that name.
@@ -35,7 +35,7 @@ impl Needed {
 
 /// A module for WebAssembly that a live page computes with.
 pub struct Module {
-    /// What it is.
+    /// FMU or tank solver in the module.
     pub needed: Needed,
     /// The module.
     pub bytes: Vec<u8>,
@@ -59,7 +59,7 @@ const LIVE: [Live; 3] = [
     Live { page: "your_tank", needed: Needed::Tank, scripts: &[("your_tank.js", web::YOUR_TANK)] },
 ];
 
-/// What the live pages compute with.
+/// WebAssembly modules of all live pages.
 pub fn needed() -> impl Iterator<Item = Needed> {
     LIVE.iter().map(|live| live.needed)
 }
@@ -79,7 +79,7 @@ pub fn build() -> Result<Vec<Module>> {
     needed().map(built).collect()
 }
 
-/// What the head of a page has besides, if it is live and there is a module for it.
+/// Additional head of a live page whose module is present.
 pub fn head(page: &Page, modules: &[Module]) -> Markup {
     let live = LIVE.iter().find(|live| live.page == page.name);
     let live = live.filter(|live| modules.iter().any(|module| module.needed == live.needed));

@@ -13,5 +13,5 @@ pub mod page;
 /// The book before it is written: name and content of each file.
 pub type Files = Vec<(String, Vec<u8>)>;
 
-/// What both outputs look like.
+/// Style sheet of book and FMU documentation.
 const CSS: &str = include_str!("page.css");

@@ -12,7 +12,7 @@ use pulldown_latex::config::{DisplayMode, RenderConfig};
 /// One Markdown file.
 #[derive(Debug)]
 pub struct Page {
-    /// Where it is, from the project's root, with `/`.
+    /// Path from the project's root, with `/`.
     pub path: String,
     /// Its name in addresses, such as `hubslosh-model` for
     /// `modelDescription/HubSlosh/documentation/model.md`.
@@ -31,11 +31,11 @@ pub struct Heading {
     pub level: usize,
     /// Its text.
     pub title: String,
-    /// What GitHub makes of it in an address.
+    /// Anchor that GitHub derives from the heading.
     pub slug: String,
 }
 
-/// How a link of an output is written.
+/// Form of links in one kind of output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// All pages in one file.
@@ -64,7 +64,7 @@ impl Layout {
     }
 }
 
-/// What pages need and what is wrong with them, gathered while they are written.
+/// Requirements and errors of the pages, collected while they are written.
 #[derive(Debug, Default)]
 pub struct Gathered {
     /// File name and content of each figure.
@@ -187,7 +187,7 @@ impl Page {
         PreEscaped(page)
     }
 
-    /// Where a link leads; `None` out of the documentation.
+    /// Target of a link; `None` if it leaves the documentation.
     fn address(
         &self,
         root: &Path,
@@ -274,7 +274,7 @@ impl Page {
     }
 }
 
-/// What the Markdown says.
+/// Parses Markdown with the extensions that the pages use.
 fn events(text: &str) -> impl Iterator<Item = Event<'_>> {
     Parser::new_ext(text, Options::ENABLE_TABLES | Options::ENABLE_MATH)
 }

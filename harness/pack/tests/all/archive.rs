@@ -1,4 +1,4 @@
-//! What travels in the FMU beside description and binaries.
+//! Files of the FMU other than description and binaries.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! What is said of the project outside of Cargo.toml is what Cargo.toml says.
+//! Statements about the project outside of Cargo.toml agree with Cargo.toml.
 
 use pack::metadata::{self, REPOSITORY, VERSION};
 use pack::root;

@@ -114,7 +114,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
 /// are too many to be read.
 fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     const MOST: usize = 12;
-    /// What counts as together, of the span of all.
+    /// Labels closer than this share of the axis's span are merged.
     const TOGETHER: f64 = 0.03;
     ends.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
     let span = ends.iter().map(|end| end.0).fold(f64::MIN, f64::max)
@@ -146,7 +146,7 @@ pub(super) fn at_the_end(run: &Outcome, signal: &str) -> Option<f64> {
     Some(late.fold(0.0, |most: f64, (_, value)| most.max(value.abs())))
 }
 
-/// What a manoeuvre leaves behind: rate and slosh angle after its torque.
+/// Draws rate and slosh angle after the end of a manoeuvre's torque.
 pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
     let rate = |run: &Outcome| Some(1e3 * at_the_end(run, "omega_imu")?);
     let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());

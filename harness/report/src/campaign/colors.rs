@@ -17,7 +17,7 @@ const VIRIDIS: [[f64; 3]; 8] = [
     [170.0, 205.0, 40.0],
 ];
 
-/// Of the i-th of several things that have no order; beyond eight they repeat.
+/// Color of the i-th item of an unordered set; colors repeat after eight.
 pub(super) fn category(i: usize) -> &'static str {
     CATEGORIES[i % CATEGORIES.len()]
 }
@@ -44,7 +44,7 @@ pub(super) fn dash(i: usize) -> &'static str {
     ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"][i / CATEGORIES.len() % 6]
 }
 
-/// Of the i-th of `count` ordered things.
+/// Color of the i-th of `count` ordered items.
 pub(super) fn ordered(i: usize, count: usize) -> String {
     let place = if count > 1 { i as f64 / (count - 1) as f64 } else { 0.3 } * 7.0;
     let (low, mix) = ((place as usize).min(6), place - (place as usize).min(6) as f64);

@@ -10,7 +10,7 @@ use super::colors;
 use super::figure::{Figure, Panel, numbers};
 use super::page::{Page, list_of};
 
-/// What is compared: column of `runs.csv`, label, factor.
+/// Compared quantities: column of `runs.csv`, label, factor.
 const COMPARED: [(&str, &str, f64); 4] = [
     ("f_dip_hz", "antiresonance / mHz", 1e3),
     ("f_res_hz", "resonance / mHz", 1e3),

@@ -11,7 +11,7 @@ use experiments::rounding::significant;
 /// A figure of one or more panels with a common legend.
 pub(super) struct Figure {
     pub title: String,
-    /// What to see.
+    /// Caption: the point that the figure makes.
     pub caption: Markup,
     /// Panels beside each other on a wide screen.
     pub columns: usize,
@@ -43,7 +43,7 @@ pub(super) struct Panel {
     pub log_y: bool,
     /// The same scale both ways.
     pub equal: bool,
-    /// Where x begins and ends at first, if not at the data's ends.
+    /// Initial range of x; `None` shows all data.
     pub range: Option<(f64, f64)>,
 }
 

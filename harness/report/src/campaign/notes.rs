@@ -73,8 +73,8 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     }
 }
 
-/// What the last run of a group, that with the largest torque where runs differ in it, shows of the
-/// sweep's shift; `None` if no resonance is seen.
+/// Describes the shift by the sweep of the last run of a group (the largest torque, if torques differ);
+/// `None` without a resonance.
 fn swept_row(group: &Group) -> Option<Markup> {
     let run = group.runs.last()?;
     let (mode, exact) = (run.linear.modes.first()?, group.exact.last()?.f_res?);
@@ -177,7 +177,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
     }
 }
 
-/// What an estimate says of a run's features.
+/// Table cells for one estimate of a run's features.
 fn cells(estimate: Option<&Estimate>) -> Markup {
     let features = estimate.map_or(Features::default(), |estimate| estimate.features);
     let columns = [

@@ -1,4 +1,4 @@
-//! What every figure of a page about a campaign looks at: the runs in groups, the axis along which they
+//! Data that the figures of a campaign's page share: the runs in groups, and the axis along which they
 //! are drawn.
 
 use analysis::features::Features;
@@ -15,14 +15,14 @@ pub(super) struct Group<'a> {
     pub model: &'a str,
     /// m; `None` if it is drawn at random, or what the runs are drawn along.
     pub fill: Option<f64>,
-    /// What else tells it from the other groups, such as `tank.d 111 mm`.
+    /// Further differences from the other groups, such as `tank.d 111 mm`.
     pub others: Vec<String>,
     pub runs: Vec<&'a Outcome>,
     /// The sweep of its first run.
     pub sweep: Option<&'a Sweep>,
     /// Features of each run's exact linear response on the grid of its band.
     pub exact: Vec<Features>,
-    /// That response of the first run.
+    /// Exact linear response of the first run.
     pub exact_response: FrequencyResponse,
 }
 
@@ -34,7 +34,7 @@ impl Group<'_> {
         }
     }
 
-    /// What tells it from other groups of its model: `10 cm fill, tank.d 111 mm`.
+    /// Differences from other groups of the same model: `10 cm fill, tank.d 111 mm`.
     pub fn plant(&self) -> String {
         let fill = self.fill.map(|fill| format!("{} cm fill", cm(fill)));
         fill.into_iter().chain(self.others.iter().cloned()).collect::<Vec<_>>().join(", ")
@@ -52,7 +52,7 @@ pub(super) struct Axis {
     pub name: String,
     /// With its unit.
     pub label: String,
-    /// What a value is multiplied by.
+    /// Factor from SI to the displayed unit.
     pub scale: f64,
 }
 
@@ -62,13 +62,13 @@ impl Axis {
         Some((value * self.scale * 1e9).round() / 1e9)
     }
 
-    /// What stands behind a value: a space and the unit, or nothing.
+    /// Suffix of a value: a space and the unit, or nothing.
     pub fn unit(&self) -> &str {
         self.label.find(" / ").map_or("", |at| &self.label[at + 2..])
     }
 }
 
-/// What every figure may look at.
+/// Campaign, groups and axis, shared by all figures.
 pub(super) struct Page<'a> {
     pub plan: &'a Plan,
     pub groups: Vec<Group<'a>>,
@@ -137,12 +137,12 @@ pub(crate) fn printed(unit: &str) -> String {
     unit.replace('.', "·").replace("m2", "m²").replace("s2", "s²")
 }
 
-/// What a plan varies, for readers: a profile's parameter by what it is, a variable by its name.
+/// A quantity that a plan varies, as readers see it: a parameter of the profile by its meaning, a variable by its name.
 pub(super) struct Varied {
     pub name: String,
-    /// As it is printed; empty if it has none.
+    /// Displayed unit; empty for a dimensionless quantity.
     pub unit: String,
-    /// What a value is multiplied by.
+    /// Factor from SI to the displayed unit.
     pub scale: f64,
 }
 
@@ -253,7 +253,7 @@ pub(super) fn runs(count: usize) -> String {
     format!("{count} run{}", if count == 1 { "" } else { "s" })
 }
 
-/// When the torque of a run ends for good, s, if the run goes on after that: a manoeuvre.
+/// End time of the torque, s, if the run continues afterwards (a manoeuvre).
 pub(super) fn manoeuvre(run: &Outcome) -> Option<f64> {
     let torque = run.history.curve("tau_cmd");
     let last = torque.iter().rposition(|(_, torque)| *torque != 0.0)?;

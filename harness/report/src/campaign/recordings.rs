@@ -81,7 +81,7 @@ const FEATURES: [Feature; 9] = [
     },
 ];
 
-/// Whether two runs are of the same torque and fill, and whatever else is varied but the slosh model.
+/// Returns true if two runs differ in nothing but the slosh model.
 fn same_run(a: &Outcome, b: &Outcome) -> bool {
     let close = |a: Option<f64>, b: Option<f64>| match (a, b) {
         (Some(a), Some(b)) => (a - b).abs() < 1e-9,
@@ -90,7 +90,7 @@ fn same_run(a: &Outcome, b: &Outcome) -> bool {
     close(a.case.amplitude, b.case.amplitude) && close(a.case.fill, b.case.fill)
 }
 
-/// How far the models are off the recordings at most, in a sentence each.
+/// States the largest deviation of each model from the recordings, one sentence each.
 pub(super) fn result(results: &Results) -> String {
     let (recorded, simulated): (Vec<&Outcome>, Vec<&Outcome>) =
         results.outcomes.iter().partition(|run| run.is_recording());

@@ -7,14 +7,14 @@ use super::draws::moments;
 use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre};
 use super::recordings;
 
-/// What one run shows of its frequency response.
+/// Features of one run's frequency response.
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    /// What the runs are drawn along, in the axis's unit.
+    /// Position of the run on the axis, in the axis's unit.
     x: f64,
     antiresonance: Option<f64>,
     resonance: Option<f64>,
-    /// Of the exact linear plant.
+    /// Antiresonance and resonance of the exact linear plant, Hz.
     exact: [Option<f64>; 2],
     /// The slosh was rotary for some time.
     swirls: bool,
@@ -30,7 +30,7 @@ impl Point {
 #[derive(Clone, Debug)]
 struct Series {
     model: String,
-    /// What tells the group from others beside its model: `10 cm fill`.
+    /// Differences from other groups apart from the model: `10 cm fill`.
     plant: String,
     points: Vec<Point>,
 }
@@ -57,8 +57,7 @@ impl Series {
         ["linear", "frozen"].contains(&&*self.model)
     }
 
-    /// Where the slosh is rotary: the first and the last such place, and whether it stays so up to
-    /// the end.
+    /// First and last position with rotary slosh, and true if it continues to the end of the axis.
     fn swirl(&self) -> Option<(f64, f64, bool)> {
         let first = self.points.iter().position(|p| p.swirls)?;
         let last = self.points.iter().rposition(|p| p.swirls)?;
@@ -203,8 +202,8 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
     finished(&sentences)
 }
 
-/// How antiresonance and resonance of the linear models, or of all if there are none, go along an
-/// axis; at most three series.
+/// Describes how antiresonance and resonance move along an axis: linear models first, else all; at most
+/// three series.
 fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String> {
     let linear = series.iter().any(|s| s.model == "linear");
     let these: Vec<&Series> =
@@ -304,7 +303,7 @@ fn scatter(page: &Page) -> String {
     finished(&page.groups.iter().take(3).filter_map(of).collect::<Vec<_>>())
 }
 
-/// What tells groups apart in a sentence: the model, and the rest where it differs.
+/// Short names of the groups: the model, and further differences if there are any.
 fn names(page: &Page) -> Vec<String> {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let name = |group: &Group| match plants.len() {
@@ -314,7 +313,7 @@ fn names(page: &Page) -> Vec<String> {
     page.groups.iter().map(name).collect()
 }
 
-/// What a manoeuvre leaves of the hub's rate, by group.
+/// States the residual hub rate of each group after a manoeuvre.
 fn left_behind(page: &Page) -> String {
     let of = |group: &Group| {
         let rates = group.runs.iter().filter_map(|run| {

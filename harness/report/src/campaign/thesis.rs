@@ -1,4 +1,4 @@
-//! What the thesis says its bench and its synthetic data did, compared with the campaign's runs.
+//! Comparison of the thesis's statements about its bench and synthetic data with the campaign's runs.
 //!
 //! The thesis prints few numbers; its statements are quoted in our words, each with a rule that
 //! decides from the runs whether a model does the same. A number in a statement is a number in its
@@ -11,14 +11,14 @@ use maud::{Markup, html};
 
 use super::page::{Group, cm, distinct, torque_of};
 
-/// What each fill shows, and whether the statement holds for all; `None` where runs are missing.
+/// Findings for each fill, and true if the statement holds for all of them; `None` if runs are missing.
 type Cell = Option<(Vec<String>, bool)>;
 
 /// The smallest and the largest torque of the thesis, N·m.
 const LEAST: f64 = 0.0125;
 const MOST: f64 = 0.25;
 
-/// What the thesis saw doing it.
+/// Source of a statement in the thesis.
 #[derive(Clone, Copy, PartialEq)]
 enum Who {
     /// The bench, whose liquid is water.
@@ -27,19 +27,19 @@ enum Who {
     Synthetic,
 }
 
-/// What a group of runs shows of a statement: its figures, and whether the statement holds.
+/// Figures of a group of runs for one statement, and true if the statement holds.
 type Shown = (String, bool);
 
 struct Statement {
     section: &'static str,
     who: Who,
-    /// What the thesis says.
+    /// The thesis's statement in our words.
     says: &'static str,
     /// The rule, for the reader.
     rule: &'static str,
     /// The rule; `None` where the runs it needs are not there.
     shows: fn(&Group) -> Option<Shown>,
-    /// What is known of a difference.
+    /// Known reason for a difference.
     why: &'static str,
 }
 
@@ -496,7 +496,7 @@ fn notch_trend(group: &Group, sign: f64) -> Option<Shown> {
     Some((text, (high - low) * sign > 0.5))
 }
 
-/// Whether the largest acceleration at a torque, N·m, is the measured one, rad/s², to 15 %.
+/// Compares the largest acceleration at a torque (N·m) with the measured one (rad/s²), to 15 %.
 fn peak_acceleration(group: &Group, torque: f64, measured: f64) -> Option<Shown> {
     let totals = &at(group, torque)?.totals;
     let (peak, rate) = (totals.peak_acceleration, totals.peak_rate);
@@ -628,8 +628,8 @@ fn alike(rows: &[(&Statement, Vec<Cell>)], model: usize, recorded: usize) -> Str
     format!("{} of {}", pairs.iter().filter(|same| **same).count(), pairs.len())
 }
 
-/// What the groups of a model show together: what each fill shows; it holds if it holds for all.
-/// `None` if there is none, or one lacks the runs.
+/// Combines the groups of a model: the statement holds if it holds for every fill.
+/// `None` without groups, or if one lacks the runs.
 fn shown(statement: &Statement, groups: &[&Group]) -> Cell {
     let each: Vec<Shown> =
         groups.iter().map(|group| (statement.shows)(group)).collect::<Option<_>>()?;

@@ -12,7 +12,7 @@ const INTERVALS: usize = 4_000;
 /// Fewest frames an oscillation may have to be drawn as it is.
 const FEWEST_FRAMES: f64 = 8.0;
 
-/// How rows are thinned.
+/// Rule by which rows are thinned.
 pub(super) struct Thinning {
     /// Every how many rows one is kept.
     pub every: usize,

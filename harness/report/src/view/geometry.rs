@@ -1,4 +1,4 @@
-//! What is drawn of a run's bench or craft, from its parameters.
+//! Geometry of a run's bench or craft, from its parameters.
 //!
 //! A tank's outline is no parameter of an FMU; where nobody names it, an upright cylinder stands for it:
 //!
@@ -77,7 +77,7 @@ pub type Surfaces = dyn Fn(f64, usize) -> anyhow::Result<Vec<Vec<f64>>>;
 
 /// A tank as somebody has drawn it.
 pub struct Drawing {
-    /// What it is called.
+    /// Name of the tank in the page.
     pub name: String,
     /// Its outline.
     pub outline: Outline,
@@ -111,7 +111,7 @@ pub(super) struct Pendulum {
     pub length: f64,
     pub hinge: f64,
     pub wave: f64,
-    /// Which mode of its direction it is, from 0.
+    /// Index of the mode among those of its direction, from 0.
     pub order: usize,
 }
 
@@ -122,28 +122,28 @@ impl Pendulum {
     }
 }
 
-/// Which mode of its direction mode n is, from 0.
+/// Index of mode n among those of its direction, from 0.
 fn order<T: PartialEq>(n: usize, direction: impl Fn(usize) -> T) -> usize {
     (0..n).filter(|m| direction(*m) == direction(n)).count()
 }
 
-/// What is drawn of a tank.
+/// A tank as the page draws it.
 pub(super) struct Tank {
     /// `tank[1]`, `tank`, or of the bench nothing.
     pub prefix: String,
     pub position: [f64; 3],
     pub q: [f64; 4],
     pub outline: Outline,
-    /// Of the surface at rest, at the start.
+    /// Height of the surface at rest at the start, m.
     pub level: f64,
     /// Its liquid at the start, kg.
     pub liquid: f64,
     pub modes: Vec<Pendulum>,
     /// Their surfaces where somebody has drawn the tank and it does not drain, as of [`Surfaces`].
     pub shapes: Vec<Vec<f64>>,
-    /// How it drains.
+    /// Table of a tank that drains.
     pub fill: Option<Fill>,
-    /// What the outline is taken from, as a sentence.
+    /// Source of the outline, as a sentence.
     pub note: String,
 }
 

@@ -23,7 +23,7 @@ use crate::campaign::{PLOTLY, PLOTLY_LICENSE};
 
 /// A run and what is known of it.
 pub struct Run<'a> {
-    /// What stands above the page.
+    /// Title of the page.
     pub title: String,
     /// Its file, for messages.
     pub source: String,
@@ -31,7 +31,7 @@ pub struct Run<'a> {
     pub description: &'a ModelDescription,
     /// Parameters that differ from the FMU's start values, or all, by name, as text.
     pub parameters: &'a BTreeMap<String, String>,
-    /// Whether the parameters come with the run; else they are the FMU's start values and what the user says.
+    /// True if the parameters come with the run; otherwise they are the FMU's start values and the user's settings.
     pub parameters_known: bool,
     /// Tanks that somebody has drawn, by number from 1.
     pub drawings: &'a BTreeMap<usize, Drawing>,
@@ -278,7 +278,7 @@ struct Draft<'a> {
     columns: Columns<'a>,
     /// Columns that follow from others.
     derived: Vec<(String, Vec<f64>)>,
-    /// What the page says of how it is drawn.
+    /// Remarks on the drawing, shown on the page.
     notes: Vec<String>,
     warnings: Vec<String>,
 }
@@ -295,7 +295,7 @@ impl Draft<'_> {
         value
     }
 
-    /// What moves the body.
+    /// Columns that move the body.
     fn body(&mut self) -> Value {
         let table = self.run.table;
         let mut motion = json!({});
@@ -351,7 +351,7 @@ impl Draft<'_> {
         Ok(tanks)
     }
 
-    /// What moves the liquid of a tank; modes that the run does not have are taken from it.
+    /// Columns that move the liquid of a tank. Modes that the run did not record are removed from the tank.
     fn tank(&mut self, i: usize, tank: &mut Tank) -> Result<Value> {
         let modes = match self.kind {
             Kind::Bench => self.modes_of_bench(tank),
@@ -462,7 +462,7 @@ impl Draft<'_> {
         Ok(())
     }
 
-    /// Whether the table has what has been asked for, and time runs.
+    /// Refuses a table without the requested columns, or whose time does not increase.
     fn check(&self) -> Result<()> {
         let (run, source, time) = (self.run, &self.run.source, self.time());
         let (missing, has_time) = (&self.columns.missing, self.columns.has("time"));

@@ -1,4 +1,4 @@
-//! What is drawn, as the scene's `geometry` (harness/web/scene/README.md): bodies, tanks and arrows.
+//! The scene's `geometry` (harness/web/scene/README.md): bodies, tanks and arrows.
 
 use std::collections::BTreeMap;
 
@@ -62,7 +62,7 @@ impl Arrows<'_, '_, '_> {
     }
 }
 
-/// What is drawn and which columns move it.
+/// Returns the drawn objects and the columns that move them.
 pub fn scene(
     kind: Kind,
     parameters: &Parameters,
