@@ -1,12 +1,12 @@
 """Monte Carlo: parameters drawn at random, one run each, resumable; quantiles of what comes out."""
 
-import csv
 import hashlib
 import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from .arguments import check_numbers, check_table, names_of
 from .fmu import FmuError
+from .store import Store, encoded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,9 +24,6 @@ Outcome = Callable[[dict[str, Any]], Mapping[str, float]]
 
 Range = Any
 """(low, high): uniform; a list: one of its items; a frozen distribution of ``scipy.stats``."""
-
-DRAWS, STUDY = "runs.csv", "study.json"
-"""Files of a study's folder."""
 
 FAILED = "refused"
 """Column that says what the FMU refused."""
@@ -100,12 +98,15 @@ def monte_carlo(
 
     ranges: by name, (low, high) for a uniform distribution, a list of values, or a frozen
     distribution of ``scipy.stats``. A run's values depend on seed and run alone: 400 runs begin
-    with the 200 that there were.
+    with the 200 that there were. An item of a list is drawn as it is, with its type.
     outcome: a function of the values (by name) that makes the run and returns numbers by name.
     Without it the draws alone are returned.
-    folder: for a study that can be stopped: each run's row is written there at once, ``runs.csv``.
-    The same call goes on where it was stopped; another study is refused there. The function may
-    not be compared: name the folder anew when you change it.
+    folder: for a study that can be stopped. Each run is stored there as soon as it is done, and the
+    same call goes on where the study was stopped, after kill -9 too. Every stored run is verified:
+    by its SHA-256 in ``manifest.sha256``, and its values by the seed. A run that was changed from
+    outside raises FmuError with its name and what differs. ``runs.csv`` is written at the end. One
+    process at a time holds the folder; others, and other studies, are refused. The function is not
+    compared: give another folder when you change it.
     client: of dask.distributed; its workers need this package. Otherwise ``workers`` threads, by
     default one per core: closed loops with a linear controller and `simulate` run in compiled code
     side by side, a controller in Python runs on one core at a time.
@@ -127,11 +128,12 @@ def monte_carlo(
         problems.append(f"outcome must be a function of the drawn values, not {outcome!r}")
     if problems:
         raise FmuError("; ".join(problems))
+    runs, seed = int(runs), int(seed)  # numpy's integers too
     draws = [draw(ranges, run, seed) for run in range(runs)]
     if outcome is None:
         return pd.DataFrame([{"run": run} | values for run, values in enumerate(draws)])
-    with _Store(folder, ranges, seed) as store:
-        rows = {run: row for run, row in store.rows.items() if run < runs}
+    with _opened(folder, seed, ranges) as store:
+        rows = {run: {"run": run} | draws[run] | row for run, row in store.rows(draws).items()}
         missing = [run for run in range(runs) if run not in rows]
         shown = sys.stderr.isatty() if progress is None else progress
         bar = _Progress(len(missing), runs - len(missing), shown)
@@ -140,14 +142,18 @@ def monte_carlo(
         try:
             for run, found in made:
                 rows[run] = {"run": run} | draws[run] | found
-                store.add(rows[run])
+                refused = {FAILED: found[FAILED]} if FAILED in found else {}
+                numbers = {name: value for name, value in found.items() if name != FAILED}
+                store.add(run, draws[run], numbers, **refused)
                 bar.step(FAILED in found)
         finally:
             bar.close()
             made.close()
-    table = pd.DataFrame([rows[run] for run in sorted(rows)])
+        table = pd.DataFrame([rows[run] for run in sorted(rows)])
+        if FAILED in table:
+            table[FAILED] = table[FAILED].fillna("")
+        store.finish(table.to_csv(index=False, lineterminator="\n"))
     if FAILED in table:
-        table[FAILED] = table[FAILED].fillna("")
         failed = (table[FAILED] != "").sum()
         if failed == len(table):
             raise FmuError(f"every run failed; the first: {table[FAILED].iloc[0]}")
@@ -161,7 +167,7 @@ def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
     except FmuError as error:
         return {FAILED: str(error)}
     try:
-        numbers = {str(name): float(value) for name, value in dict(found).items()}
+        numbers = {str(name): _result(value) for name, value in dict(found).items()}
     except (TypeError, ValueError):
         raise FmuError(
             f'outcome must return numbers by name, such as {{"error": 0.1}}, not {found!r}'
@@ -169,6 +175,13 @@ def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
     if FAILED in numbers:
         raise FmuError(f"outcome returns {FAILED}, the column for what the FMU says")
     return numbers
+
+
+def _result(value: Any) -> float:
+    """Return a number that an outcome gives; a text is not one, even if it reads like one."""
+    if isinstance(value, str | bytes | bytearray):
+        raise TypeError
+    return float(value)
 
 
 def _checked(found: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
@@ -219,116 +232,44 @@ def _on_dask(
         client.cancel(list(under_way))
 
 
-class _Store:
-    """The folder of a study: what it is, and a row for each run that is done."""
+class _InMemory:
+    """A study without a folder."""
 
-    def __init__(self, folder: str | Path | None, ranges: Mapping[str, Range], seed: int) -> None:
-        self.rows: dict[int, dict[str, Any]] = {}
-        self.file: Any = None
-        self.columns: list[str] | None = None
-        self.waiting: list[dict[str, Any]] = []
-        self.path = None if folder is None else Path(folder)
-        self.study = {"seed": seed, "ranges": {name: _text(of) for name, of in ranges.items()}}
+    def rows(self, _draws: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
+        """Return what is stored: nothing."""
+        return {}
 
-    def __enter__(self) -> "_Store":
-        if self.path is None:
-            return self
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            study, table = self.path / STUDY, self.path / DRAWS
-            if study.exists():
-                self._compare(json.loads(study.read_text(encoding="utf-8")))
-            else:
-                if table.exists():
-                    raise FmuError(f"{self.path} has a {DRAWS} but no {STUDY}: not a study of ours")
-                text = json.dumps(self.study, indent=2) + "\n"
-                study.write_text(text, encoding="utf-8")
-            self._read(table)
-            self.file = table.open("a", newline="", encoding="utf-8")
-        except (OSError, ValueError) as error:
-            raise FmuError(f"the study's folder {self.path}: {error}") from None
-        return self
+    def add(self, *_: Any, **__: Any) -> None:
+        """Store nothing."""
 
-    def __exit__(self, *_: object) -> None:
-        if self.file is not None:
-            self.file.close()
-
-    def _compare(self, there: Any) -> None:
-        if there != self.study:
-            names = ["seed"] if there.get("seed") != self.study["seed"] else []
-            mine, other = self.study["ranges"], there.get("ranges", {})
-            names += [n for n in (*mine, *other) if mine.get(n) != other.get(n)]
-            if not names:
-                names = ["the order of the names"]
-            raise FmuError(
-                f"{self.path} holds another study, different in {', '.join(dict.fromkeys(names))}; "
-                "give another folder"
-            )
-
-    def _read(self, path: Path) -> None:
-        """Take the rows that are there; a last line that was cut off is dropped."""
-        if not path.exists():
-            return
-        text = path.read_text(encoding="utf-8")
-        whole = text[: text.rfind("\n") + 1]
-        if whole != text:
-            path.write_text(whole, encoding="utf-8")
-        lines = list(csv.reader(whole.splitlines()))
-        if not lines:
-            return
-        self.columns = lines[0]
-        kinds = self.study["ranges"]
-        for line in lines[1:]:
-            row: dict[str, Any] = {}
-            for name, text in zip(self.columns, line, strict=True):
-                if name == FAILED:
-                    if text:
-                        row[name] = text
-                elif name == "run":
-                    row[name] = int(text)
-                elif text:
-                    row[name] = _number(text) if name in kinds else float(text)
-            self.rows[row["run"]] = row
-
-    def add(self, row: dict[str, Any]) -> None:
-        """Write a row; it is on the disk when this returns."""
-        if self.file is None:
-            return
-        names = [name for name in row if name != FAILED]
-        if self.columns is None and FAILED in row and len(names) == 1 + len(self.study["ranges"]):
-            self.waiting.append(row)  # until a run says what it finds
-            return
-        try:
-            writer = csv.writer(self.file, lineterminator="\n")
-            if self.columns is None:
-                self.columns = [*names, FAILED]
-                writer.writerow(self.columns)
-            if more := [name for name in names if name not in self.columns]:
-                raise FmuError(f"outcome returns {', '.join(more)}, which earlier runs have not")
-            for one in (*self.waiting, row):
-                cells = [one.get(name, "") for name in self.columns]
-                writer.writerow([repr(c) if isinstance(c, float) else c for c in cells])
-            self.waiting.clear()
-            self.file.flush()
-        except OSError as error:
-            raise FmuError(f"{self.path}: {error}") from None
+    def finish(self, _table: str) -> None:
+        """Store nothing."""
 
 
-def _number(text: str) -> Any:
-    try:
-        return float(text)
-    except ValueError:
-        return text
+def _opened(
+    folder: str | Path | None, seed: int, ranges: Mapping[str, Range]
+) -> AbstractContextManager[Store | _InMemory]:
+    """Return where a study keeps its runs."""
+    if folder is None:
+        return nullcontext(_InMemory())
+    return Store(folder, seed, {name: _text(name, of) for name, of in ranges.items()})
 
 
-def _text(of: Range) -> str:
-    """Return what tells one range from another."""
+def _text(name: str, of: Range) -> str:
+    """Return a text that differs between ranges."""
     if hasattr(of, "ppf"):
         shape = ", ".join(f"{of.ppf(share):.17g}" for share in (0.01, 0.2, 0.5, 0.8, 0.99))
-        name = getattr(getattr(of, "dist", None), "name", type(of).__name__)
-        return f"{name} with quantiles {shape}"
+        kind = getattr(getattr(of, "dist", None), "name", type(of).__name__)
+        return f"{kind} with quantiles {shape}"
     if isinstance(of, list):
-        text = json.dumps(of, default=str)
+        try:
+            text = json.dumps(encoded(of))
+        except TypeError as error:
+            raise FmuError(
+                f"{name} has {error}, which a study's folder cannot store (allowed: numbers, "
+                "numpy's too, Booleans, texts, paths, and lists, tuples and dictionaries of them); "
+                "draw a number or a text instead and look the value up in outcome"
+            ) from None
         return text if len(text) < 200 else hashlib.sha256(text.encode()).hexdigest()
     low, high = of
     return f"{float(low)!r} to {float(high)!r}"
