@@ -14,6 +14,7 @@
 //! only, by its centripetal force: no leakage. A circling wave has the fraction 1/2 on the average.
 
 use crate::FrequencyResponse;
+use crate::statistics::about_mean;
 
 /// Off-axis figures of a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,6 +57,10 @@ impl OffAxis {
 /// The same of a platform that may tilt, from its rates (rad/s) about the hub's axis and about others, each with its
 /// response to the torque: the thesis's own, CEF = Σω_i²/(Σω_i² + ω²) and L = √(Σ|H_i|²)/|H|. The leakage at the
 /// responses' frequencies first; nothing without another rate.
+///
+/// Each rate is taken about its mean. A gyro's bias would else count as energy: a bias of 1 deg/s about x is larger
+/// than the rate of a bench about that axis. [`OffAxis::of`] keeps the means of the forces: no sensor measures them, and the
+/// centripetal force of a wave has a mean.
 pub fn of_rates(
     response: &FrequencyResponse,
     rate: &[f64],
@@ -70,10 +75,11 @@ pub fn of_rates(
             squares.sqrt() / h.norm()
         })
         .collect();
+    let centred: Vec<Vec<f64>> = others.iter().map(|(_, other)| about_mean(other)).collect();
     let off: Vec<f64> = (0..rate.len())
-        .map(|k| others.iter().map(|(_, other)| other[k] * other[k]).sum::<f64>().sqrt())
+        .map(|k| centred.iter().map(|other| other[k] * other[k]).sum::<f64>().sqrt())
         .collect();
-    let off_axis = OffAxis::of(&off, rate, &leakage);
+    let off_axis = OffAxis::of(&off, &about_mean(rate), &leakage);
     (leakage, Some(off_axis))
 }
 
@@ -95,7 +101,7 @@ mod tests {
             response: vec![Complex64::new(0.0, size); 4],
         };
         let (all, x) = (response(2.0), response(0.2));
-        let (rate, tenth) = ([1.0, -2.0, 3.0, 0.0], [0.1, 0.2, -0.3, 0.0]);
+        let (rate, tenth) = ([1.0, -2.0, -1.0, 2.0], [0.1, 0.2, -0.1, -0.2]);
         let (leakage, found) = of_rates(&all, &rate, &[(&x, &tenth), (&x, &tenth)]);
         let found = found.unwrap();
         assert!(
@@ -104,6 +110,36 @@ mod tests {
         );
         assert!(leakage.iter().all(|l| (l - 0.02f64.sqrt()).abs() < 1e-15));
         assert_eq!(of_rates(&all, &rate, &[]), (Vec::new(), None));
+    }
+
+    /// 0.1 rad/s about the axis and a twentieth about x and y, with a gyro's bias of up to 5 deg/s on each axis.
+    #[test]
+    fn a_bias_of_up_to_5_deg_s_on_any_axis_does_not_change_the_cross_axis_energy_fraction() {
+        let wave = |size: f64, phase: f64| -> Vec<f64> {
+            (0..3000).map(|k| size * (0.3 * f64::from(k) + phase).sin()).collect()
+        };
+        let (rate, x, y) = (wave(0.1, 0.0), wave(0.005, 1.0), wave(0.005, 2.0));
+        let none = FrequencyResponse::default();
+        let found = |biases: [f64; 3]| {
+            let biased = |signal: &[f64], bias: f64| -> Vec<f64> {
+                signal.iter().map(|w| w + bias.to_radians()).collect()
+            };
+            let [rate, x, y] = [(&rate, 0), (&x, 1), (&y, 2)].map(|(w, k)| biased(w, biases[k]));
+            of_rates(&none, &rate, &[(&none, &x), (&none, &y)]).1.unwrap()
+        };
+        let without = found([0.0; 3]);
+        // 2 * 0.05^2 over all three
+        assert!((without.energy - 0.005 / 1.005).abs() < 1e-4, "{}", without.energy);
+        for axis in 0..3 {
+            for bias in [-5.0, 0.1, 1.0, 5.0] {
+                let mut biases = [0.0; 3];
+                biases[axis] = bias;
+                let with = found(biases);
+                // rounding of a bias 17 times the rate is 1e-14
+                assert!((with.energy / without.energy - 1.0).abs() < 1e-9, "{biases:?}: {with:?}");
+                assert!((with.median / without.median - 1.0).abs() < 1e-9, "{biases:?}: {with:?}");
+            }
+        }
     }
 
     #[test]

@@ -5,6 +5,12 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// Values less their arithmetic mean.
+pub fn about_mean(values: &[f64]) -> Vec<f64> {
+    let mean = mean(values);
+    values.iter().map(|v| v - mean).collect()
+}
+
 /// Mean square about the mean.
 pub fn variance(values: &[f64]) -> f64 {
     let mean = mean(values);

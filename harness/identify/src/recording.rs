@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use analysis::innovations;
-use analysis::statistics::{correlation, deviation, mean, median, noise_level, peak};
+use analysis::statistics::{about_mean, correlation, deviation, mean, median, noise_level, peak};
 use anyhow::{Context, Result, bail, ensure};
 use signals::recording::{self as files, Between, Columns, Signal, Wanted};
 
@@ -136,9 +136,10 @@ impl Recording {
         }
         let rows = |time: f64| (time / self.step()) as usize;
         let (run_in, length) = (rows(run_in), rows(seconds));
-        let power = |from: usize| {
-            self.rate[from..from + length].iter().map(|rate| rate * rate).sum::<f64>()
-        };
+        // about the mean: a gyro's bias is no motion
+        let moving = about_mean(&self.rate);
+        let power =
+            |from: usize| moving[from..from + length].iter().map(|rate| rate * rate).sum::<f64>();
         let starts = (0..self.time.len() - length).step_by((length / 20).max(1));
         let from = starts.max_by(|a, b| power(*a).total_cmp(&power(*b)))?;
         let first = from.saturating_sub(run_in);

@@ -101,6 +101,40 @@ fn a_twin_shows_the_features_of_its_run_to_the_last_digit_and_other_forms_of_it_
             assert_eq!(of[1][name], from[0][name], "{table}: {name} of the model");
         }
     }
+    // the same with a gyro's bias on each axis, the largest of them 20 times the largest rate about that axis
+    let with = |values: &[f64], bias: f64| -> Vec<f64> {
+        values.iter().map(|w| w + f64::to_radians(bias)).collect()
+    };
+    let names = ["time", "tau_cmd", "omega", "omega_x", "omega_y"].map(String::from).to_vec();
+    let biased = vec![
+        time.clone(),
+        torque.clone(),
+        with(&rate, 1.0),
+        with(&part(0.1), 5.0),
+        with(&part(-0.2), -2.0),
+    ];
+    let biased = Table::new(names, biased);
+    biased.write(&directory.join("biased.csv"), &BTreeMap::new()).unwrap();
+    let (of_biased, said) = analyse("biased.csv", &[]);
+    for name in ["omega_x", "omega_y"] {
+        assert!(said.contains(&format!("{name} has a mean of")), "{said}");
+    }
+    for name in [
+        "off_axis_median",
+        "off_axis_energy",
+        "leakage",
+        "peak_rate_rad_s",
+        "peak_acceleration_rad_s2",
+        "f_res_hz",
+        "f_dip_hz",
+        "notch_db",
+        "fit_time_pct",
+    ] {
+        let [with, without] =
+            [&of_biased[0], &found[0]].map(|row| row[name].parse::<f64>().unwrap());
+        // rounding of a bias 20 times the rate is 1e-13; a search for a fit ends within 1e-8
+        assert!((with / without - 1.0).abs() < 1e-6, "{name}: {with} for {without}");
+    }
     // CEF of rates in proportion: (0.01 + 0.04)/1.05; leakage √0.05
     let number = |row: &HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
     assert!((number(recording, "off_axis_median") - 0.05 / 1.05).abs() < 1e-12);

@@ -320,6 +320,9 @@ impl Campaign {
         warn: &(dyn Fn(&Case, String) + Sync),
     ) -> Result<Done> {
         let run = case.run();
+        let tell = |outcome: &Outcome| {
+            outcome.warnings.iter().for_each(|warning| warn(case, warning.clone()));
+        };
         let columns = stored_columns(fmu.description(), run.input.as_deref());
         let recipe = store::recipe(fmu, case, &columns);
         let mut instance = match run.initialise(fmu) {
@@ -340,6 +343,7 @@ impl Campaign {
                 let run = Run { step, ..run };
                 Outcome::of(case, &run, &mut instance, &table, false)
             });
+            let analysed = analysed.inspect(|outcome| tell(outcome));
             return Ok(
                 analysed.map_or_else(Done::Failed, |outcome| Done::Analysed(Box::new(outcome)))
             );
@@ -404,7 +408,10 @@ impl Campaign {
             return Ok(Done::Unanalysed(Box::new(run)));
         }
         Ok(match Outcome::of(case, &run, &mut instance, &table, reused) {
-            Ok(outcome) => Done::Analysed(Box::new(outcome)),
+            Ok(outcome) => {
+                tell(&outcome);
+                Done::Analysed(Box::new(outcome))
+            }
             Err(error) => Done::Failed(error),
         })
     }

@@ -22,7 +22,7 @@ use analysis::residual::ModelFit;
 use analysis::rotary::{self, Rotary};
 use analysis::sweep::Sweep;
 use analysis::welch::{self, Spectra};
-use analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa};
+use analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa, statistics};
 use formulas::similarity::Liquid;
 use signals::table::Table;
 
@@ -52,7 +52,7 @@ pub struct Totals {
     pub peak_radial_angle: f64,
     /// Largest wave height, m.
     pub peak_wave_height: f64,
-    /// Largest |rate| that the gyro reads, rad/s.
+    /// Largest |rate| that the gyro reads less its bias: its mean under a sweep or noise, rad/s.
     pub peak_rate: f64,
     /// Largest |angular acceleration|, rad/s²: central differences of the gyro's rate from row to row,
     /// as Rubaga's thesis takes them (7.2.2).
@@ -67,7 +67,7 @@ pub struct Totals {
 
 impl Totals {
     /// Of a recording.
-    fn of_recording(table: &Table) -> Self {
+    fn of_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
             peak_radial_angle: f64::NAN,
@@ -75,11 +75,11 @@ impl Totals {
             gyro_errors: true,
             max_energy_residual: f64::NAN,
             stuck: f64::NAN,
-            ..Totals::of(table)
+            ..Totals::of(table, rates)
         }
     }
 
-    fn of(table: &Table) -> Self {
+    fn of(table: &Table, rates: &Rates) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let peak = |name| column(name).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let (energy, work, heat) = (column("energy"), column("work"), column("heat"));
@@ -92,13 +92,85 @@ impl Totals {
             peak_slosh_angle: peak("slosh_angle"),
             peak_radial_angle: peak("slosh_angle_radial"),
             peak_wave_height: peak("wave_height"),
-            peak_rate: peak("omega_imu"),
+            peak_rate: statistics::peak(&rates.about_axis),
             peak_acceleration: peak_slope(column("time"), column("omega_imu")),
             gyro_errors: column("omega_imu") != column("omega"),
             max_energy_residual: if throughput > 0.0 { residual / throughput } else { 0.0 },
             stuck: column("stuck_time").last().copied().unwrap_or(0.0),
         }
     }
+}
+
+/// Rates that a gyro read, less its biases, rad/s.
+struct Rates {
+    /// About the hub's axis.
+    about_axis: Vec<f64>,
+    /// About x and y, where a recording has them.
+    others: [Option<Vec<f64>>; 2],
+    /// Bias about the hub's axis, rad/s; 0 of a gyro without errors.
+    bias: f64,
+    /// What of the means is to be known.
+    warnings: Vec<String>,
+}
+
+/// Mean of a rate over its deviation beyond which it is reported: it would add 1 % to the energy of the rate.
+const NOTABLE_MEAN: f64 = 0.1;
+/// Parts of a record whose means are compared.
+const PARTS: usize = 8;
+
+impl Rates {
+    /// The bias is the mean of the record where the torque is a sweep or noise, which turn the hub to and fro. Under another
+    /// torque the mean is motion too: the bias of a simulated gyro is then the mean difference from the true rate, and
+    /// that of a recorded one is not known and kept.
+    fn of(table: &Table, alternates: bool, is_recording: bool) -> Rates {
+        let column = |name| table.column(name).unwrap_or_default();
+        let (rate, truth) = (column("omega_imu"), column("omega"));
+        let has_errors = is_recording || rate != truth;
+        let bias = match (has_errors, alternates) {
+            (false, _) => 0.0,
+            (true, true) => statistics::mean(rate),
+            (true, false) => statistics::mean(rate) - statistics::mean(truth),
+        };
+        let mut warnings = Vec::new();
+        if has_errors && alternates {
+            let names =
+                [("omega_imu", "the gyro's rate"), ("omega_x", "omega_x"), ("omega_y", "omega_y")];
+            for (column, name) in names {
+                warnings.extend(table.column(column).and_then(|rate| notable_mean(name, rate)));
+            }
+        }
+        let centred = |name: &str| table.column(name).map(statistics::about_mean);
+        Rates {
+            about_axis: rate.iter().map(|w| w - bias).collect(),
+            others: if is_recording { ["omega_x", "omega_y"].map(centred) } else { [None, None] },
+            bias,
+            warnings,
+        }
+    }
+}
+
+/// What is to be known of a rate's mean over a record, and of how the mean drifts along it.
+fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
+    let (mean, deviation) = (statistics::mean(rate), statistics::deviation(rate));
+    let parts: Vec<f64> =
+        rate.chunks(rate.len().div_ceil(PARTS).max(1)).map(statistics::mean).collect();
+    let drift = statistics::deviation(&parts);
+    let degrees = |rate: f64| rate.to_degrees();
+    if drift > NOTABLE_MEAN * deviation {
+        return Some(format!(
+            "the mean of {name} drifts by {:.3} deg/s rms between eighths of the record, {:.0} % of its deviation; only the mean              of the whole record, {:.3} deg/s, is removed as the gyro's bias, and the drift counts as motion in peak_rate and              in the cross-axis figures",
+            degrees(drift),
+            100.0 * drift / deviation,
+            degrees(mean)
+        ));
+    }
+    (mean.abs() > NOTABLE_MEAN * deviation).then(|| {
+        format!(
+            "{name} has a mean of {:.3} deg/s, {:.0} % of its deviation; it is removed as the gyro's bias",
+            degrees(mean),
+            100.0 * mean.abs() / deviation
+        )
+    })
 }
 
 /// Largest slope of a signal by central differences.
@@ -206,7 +278,7 @@ pub struct Outcome {
     pub record: Option<Record>,
     /// What is seen while a sweep passes; `None` if the torque is no sweep.
     pub passing: Option<Passing>,
-    /// Torque, rate, slosh angles, and the residual: the rate less that of the exact linear
+    /// Torque, rate, slosh angles, and the residual: the rate less its bias and less that of the exact linear
     /// counterpart under the same torque.
     pub history: History,
     /// The crest's path seen from above.
@@ -215,6 +287,8 @@ pub struct Outcome {
     pub weightless: Option<String>,
     /// It was not simulated but read.
     pub reused: bool,
+    /// What is to be known of the rates that a gyro read.
+    pub warnings: Vec<String>,
 }
 
 /// A frequency response and its features.
@@ -416,23 +490,26 @@ impl Record {
 
 impl Passing {
     /// `unexplained`: as for [`Record`].
-    fn of(sweep: &Sweep, table: &Table, arm: f64, unexplained: &[f64]) -> Passing {
+    fn of(sweep: &Sweep, table: &Table, rates: &Rates, arm: f64, unexplained: &[f64]) -> Passing {
         let column = |name| table.column(name).unwrap_or_default();
         let is_recording = table.column("F_radial").is_none();
+        let about_axis = &rates.about_axis[..];
         // where a recording has no such rate, another stands in its place, and is not looked at
-        let rates = ["omega_x", "omega_y"].map(|name| table.column(name).map(|_| name));
+        let other = |k: usize| rates.others[k].as_deref().unwrap_or(about_axis);
         let signals = match is_recording {
-            false => ["omega_imu", "slosh_angle_radial", "slosh_angle", "F_radial"],
-            true => {
-                ["omega_imu", rates[0].unwrap_or("omega"), rates[1].unwrap_or("omega"), "omega"]
+            false => {
+                let [radial, tangential, force] =
+                    ["slosh_angle_radial", "slosh_angle", "F_radial"].map(column);
+                [about_axis, radial, tangential, force]
             }
+            true => [about_axis, other(0), other(1), about_axis],
         };
         let grid = logarithmic_grid(sweep.band(), GRID_POINTS);
         let demodulation::Demodulated { responses, noise_gain } = demodulation::frequency_responses(
             sweep,
             column("time"),
             column("tau_cmd"),
-            signals.map(column),
+            signals,
             &grid,
         );
         let [rate, second, third, fourth] = responses;
@@ -448,12 +525,12 @@ impl Passing {
             Rotary::of(passed, &times, &swirl)
         });
         let (leakage, off_axis) = if is_recording {
-            let [x, y] = rates.map(|name| name.map(column));
+            let [x, y] = rates.others.each_ref().map(Option::as_deref);
             let others: Vec<(&FrequencyResponse, &[f64])> = [(&second, x), (&third, y)]
                 .into_iter()
                 .filter_map(|(h, w)| Some((h, w?)))
                 .collect();
-            off_axis::of_rates(&rate, column("omega_imu"), &others)
+            off_axis::of_rates(&rate, about_axis, &others)
         } else {
             let leakage = off_axis::leakage(&fourth, arm);
             let off_axis = OffAxis::of(column("F_radial"), column("F_tangential"), &leakage);
@@ -498,10 +575,16 @@ impl Outcome {
             range.model = RECORDING.into();
         }
         let column = |name| table.column(name).unwrap_or_default();
+        let is_recording = case.recording.is_some();
+        let alternates = match &run.torque {
+            Torque::Profile(profile) => profile.band().is_some(),
+            Torque::Rows { .. } => false,
+        };
+        let rates = Rates::of(table, alternates, is_recording);
         let (record, passing) = match &run.torque {
             Torque::Rows { .. } => (None, None),
             Torque::Profile(profile) => {
-                let (tau, omega) = (column("tau_cmd"), column("omega_imu"));
+                let (tau, omega) = (column("tau_cmd"), &rates.about_axis[..]);
                 // in every fourth of the frequencies: it changes little between them
                 let unexplained = profile.band().map_or(Vec::new(), |band| {
                     let grid = logarithmic_grid(band, GRID_POINTS);
@@ -511,13 +594,14 @@ impl Outcome {
                 });
                 let passing = profile
                     .sweep()
-                    .map(|sweep| Passing::of(sweep, table, linear.arm, &unexplained));
+                    .map(|sweep| Passing::of(sweep, table, &rates, linear.arm, &unexplained));
                 let enough = passing.as_ref().is_some_and(|passing| passing.rate.doubt.is_none());
                 (Record::of(profile, run.step, tau, omega, &unexplained, enough), passing)
             }
         };
-        let (rate, start) = (column("omega_imu"), column("omega").first().copied());
-        let start = start.unwrap_or(0.0);
+        // of a recording, the true rate at the start is the measured one less the bias
+        let start = column("omega").first().copied().unwrap_or(0.0)
+            - if is_recording { rates.bias } else { 0.0 };
         let modelled = match &run.torque {
             Torque::Profile(profile) if profile.sweep().is_some() && !run.hold => {
                 linear.simulate(run.step, column("tau_cmd"), start)
@@ -529,7 +613,8 @@ impl Outcome {
                 linear.simulate_ramps(run.step, column(TORQUE), column("tau_slope"), start)
             }
         };
-        let residual: Vec<f64> = rate.iter().zip(&modelled).map(|(y, m)| y - m).collect();
+        let residual: Vec<f64> =
+            rates.about_axis.iter().zip(&modelled).map(|(y, m)| y - m).collect();
         let signals =
             ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial", "omega_x", "omega_y"];
         let signals = signals.into_iter().filter_map(|name| Some((name, table.column(name)?)));
@@ -546,9 +631,10 @@ impl Outcome {
                 None => SloshPath::of(table, onset, frequency),
             },
             totals: match case.recording {
-                Some(_) => Totals::of_recording(table),
-                None => Totals::of(table),
+                Some(_) => Totals::of_recording(table, &rates),
+                None => Totals::of(table, &rates),
             },
+            warnings: rates.warnings,
             case: case.clone(),
             weightless: range.without_weight(column(WAVE), table.column("g_axial")),
             range,
