@@ -72,7 +72,7 @@ pub struct Outputs {
     pub discrete: Discrete,
 }
 
-/// The outputs that have no derivative.
+/// The outputs that are constant between events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Discrete {
     /// Does dry friction hold the hub at rest?
@@ -85,7 +85,7 @@ pub struct Discrete {
     pub friction_mode: i32,
     /// How often `friction_mode` has changed since the start.
     pub event_count: i32,
-    /// When it changed last, s.
+    /// When it changed last, s; 0 in a derivative.
     pub event_time: f64,
 }
 
@@ -193,7 +193,7 @@ impl Plant {
                 baffle_in_range: state.ranges.baffle,
                 friction_mode: state.contact as i32,
                 event_count: state.event_count,
-                event_time: state.event_time,
+                event_time: T::constant(state.event_time).result(),
             },
         }
     }
