@@ -56,7 +56,8 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) model: Option<M>,
     /// The outputs now, if somebody has asked.
     pub(crate) outputs: Option<M::Outputs>,
-    /// What the host is shown of what is discrete where it is told of events, at the outputs' slots.
+    /// Values of the discrete outputs as the host last saw them in event mode, by slot ([`Events::Reported`]). Empty until
+    /// initialization has ended: before, discrete outputs are computed as all others are.
     pub(crate) shown: Vec<i32>,
     /// The last event, behind which a host that integrates itself may not go back, s.
     pub(crate) last_event: f64,
@@ -132,10 +133,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             past_slopes: false,
             model: None,
             outputs: None,
-            shown: match events {
-                Events::Reported => vec![0; M::table().discrete().count()],
-                _ => Vec::new(),
-            },
+            shown: Vec::new(),
             last_event: f64::NEG_INFINITY,
             scratch: [vec![0.0; states], vec![0.0; states]],
         }
@@ -323,12 +321,12 @@ impl<M: Model, V: Version> Instance<M, V> {
             }
             Access::Output(get) => Value::Real(get(self.outputs(call)?, element)),
             Access::OutputInteger(_) | Access::OutputBoolean(_)
-                if self.events == Events::Reported && self.is_running() =>
+                if let Some(shown) = self.shown.get(scalar.slot)
+                    && self.is_running() =>
             {
-                let shown = self.shown.get(scalar.slot).copied().unwrap_or_default();
                 match scalar.access {
-                    Access::OutputBoolean(_) => Value::Boolean(shown != 0),
-                    _ => Value::Integer(shown),
+                    Access::OutputBoolean(_) => Value::Boolean(*shown != 0),
+                    _ => Value::Integer(*shown),
                 }
             }
             Access::OutputInteger(get) => Value::Integer(get(self.outputs(call)?, element)),
@@ -395,9 +393,8 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Brings what the host is shown of what is discrete up to date.
     fn show_discrete(&mut self, call: &Call) -> Result<(), Fault> {
         let outputs = *self.outputs(call)?;
-        for (scalar, shown) in M::table().discrete().zip(&mut self.shown) {
-            *shown = discrete(scalar, &outputs);
-        }
+        self.shown.clear();
+        self.shown.extend(M::table().discrete().map(|scalar| discrete(scalar, &outputs)));
         Ok(())
     }
 

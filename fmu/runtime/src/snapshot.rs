@@ -9,7 +9,7 @@
 //! | version of this format | 4 |
 //! | length of the whole | 4 |
 //! | GUID or token of the variable table | 38 |
-//! | instance state, flags (1: stop time, 2: model, 4: slopes, 8: slopes of the step before) | 1 + 1 |
+//! | instance state, flags (1: stop time, 2: model, 4: slopes, 8: slopes of the step before, 16: values of discrete outputs) | 1 + 1 |
 //! | interface, who handles events | 1 + 1 |
 //! | start, stop, tolerance, time, last event | 5 x 8 |
 //! | parameters in the table's order: number, or 0/1 | 8 each |
@@ -34,6 +34,7 @@ const HAS_STOP: u8 = 1;
 const HAS_MODEL: u8 = 2;
 const HAS_SLOPES: u8 = 4;
 const HAS_PAST_SLOPES: u8 = 8;
+const HAS_SHOWN: u8 = 16;
 
 /// The number of bytes; the same for every state of a model.
 pub fn size<M: Model>() -> usize {
@@ -56,7 +57,8 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     let flags = flag(saved.stop.is_some(), HAS_STOP)
         | flag(saved.model.is_some(), HAS_MODEL)
         | flag(saved.sloped, HAS_SLOPES)
-        | flag(saved.past_slopes, HAS_PAST_SLOPES);
+        | flag(saved.past_slopes, HAS_PAST_SLOPES)
+        | flag(!saved.shown.is_empty(), HAS_SHOWN);
     bytes.extend([saved.state as u8, flags, saved.interface as u8, saved.events as u8]);
     // Until there is one, any finite number serves.
     let last_event = saved.last_event.max(f64::MIN);
@@ -172,10 +174,10 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
             }
         }
     }
-    for n in 0..table.discrete().count() {
+    for _ in table.discrete() {
         let shown = i32::from_le_bytes(rest.take()?);
-        if let Some(place) = saved.shown.get_mut(n) {
-            *place = shown;
+        if flags & HAS_SHOWN != 0 && saved.events == Events::Reported {
+            saved.shown.push(shown);
         }
     }
     let mut words = vec![0; table.about.saved_words];

@@ -4,6 +4,7 @@
 use super::*;
 use crate::call::{Events, InstanceState};
 use crate::instance::{EventInfo, StepInfo};
+use crate::snapshot::from_bytes;
 use crate::table::Layout;
 use crate::v3::{ENTER_STEP, Fmi3, GET_BOOLEAN, GET_FLOAT64, GET_INT32, GET_INT64, SET_FLOAT64};
 use crate::version::Version;
@@ -68,6 +69,34 @@ fn what_is_discrete_is_shown_as_it_was_until_the_host_handles_the_event() {
     host.enter_step_mode(&ENTER_STEP).unwrap();
     assert_eq!(host.step_to_event(1.001, 0.5, false), Ok(quiet));
     assert_eq!(shown(&mut host), OPENED);
+}
+
+/// An error terminates an instance of FMI 3.0. Its variables can still be read.
+#[test]
+fn after_an_error_before_initialization_discrete_outputs_have_their_start_values() {
+    let mut host = Host::with_events(CS, Events::Reported);
+    assert!(host.exit_initialization_mode().is_err());
+    host.after_error();
+    assert_eq!(host.state(), InstanceState::Terminated);
+    assert_eq!(shown(&mut host), CLOSED);
+    // Saved states keep the difference between a value and none.
+    let bytes = to_bytes(&host);
+    let mut other = from_bytes::<Vessels, Fmi3>(&bytes).unwrap();
+    assert_eq!(shown(&mut other), CLOSED);
+    assert!(to_bytes(&other) == bytes);
+}
+
+#[test]
+fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value() {
+    let mut host = Host::with_events(CS, Events::Reported);
+    host.set(&SET_FLOAT64, &[number("inspection")], |_| Value::Real(f64::NAN)).unwrap();
+    host.enter_initialization_mode().unwrap();
+    assert!(host.exit_initialization_mode().is_err());
+    host.after_error();
+    assert!(host.get(&GET_BOOLEAN, number("open")).is_err());
+    assert!(host.get(&GET_INT32, number("events")).is_err());
+    assert!(host.get(&GET_INT64, number("valve")).is_err());
+    assert!(host.get(&GET_FLOAT64, number("level[1]")).is_err());
 }
 
 /// The platform rises by w = 0.25 m/s, from 0 at t = 1.
