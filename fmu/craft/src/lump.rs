@@ -149,6 +149,8 @@ pub(crate) struct Lump {
     turned: Vector,
     /// w x u
     u_turned: Vec3,
+    /// Derivative of the shape's inertia J_a along the seeded direction, kg m2, body axes; 0 in an expansion over time.
+    pub shape_slope: Mat3,
     /// Of the order at hand: what does not depend on [a; w'] of this order.
     known_pull: f64,
     known_force: Vec3,
@@ -233,6 +235,7 @@ impl Lump {
             sum: ZERO_VECTOR,
             turned: ZERO_VECTOR,
             u_turned: [0.0; 3],
+            shape_slope: [[0.0; 3]; 3],
             known_pull: 0.0,
             known_force: [0.0; 3],
             known_specific: [0.0; 3],
@@ -287,6 +290,25 @@ impl Lump {
         Rigid { mass: 0.0, moment: [0.0; 3], inertia }
     }
 
+    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre moves, too, but the first moment
+    /// about it is 0: its velocity drops out.
+    pub fn seed_shape(&mut self, p: &Directions, dp: &Directions) {
+        let center = self.center_of(p);
+        let mut slope = [[0.0; 3]; 3];
+        for n in 0..self.modes {
+            let arm = sub(self.bob_at(n, times(&self.axes, p[n])), center);
+            let moved = scale(self.masses[n] * self.lengths[n], times(&self.axes, dp[n]));
+            let both = 2.0 * dot(arm, moved);
+            for i in 0..3 {
+                for j in 0..3 {
+                    let one = if i == j { both } else { 0.0 };
+                    slope[i][j] += one - arm[i] * moved[j] - moved[i] * arm[j];
+                }
+            }
+        }
+        self.shape_slope = slope;
+    }
+
     /// Its six numbers when its centre is `rho` from O and moves with `rate` against the tank.
     pub fn numbers(&self, rho: Vec3, rate: Vec3) -> [f64; 6] {
         let at = transposed_times(&self.axes, sub(rho, self.origin));
@@ -312,6 +334,7 @@ impl Lump {
         self.x_0 = times(&self.axes, [x[0], x[1], x[2] - self.height]);
         self.rho[0] = add(self.center, self.x_0);
         self.x_d[0] = times(&self.axes, part(&x, 3));
+        self.shape_slope = [[0.0; 3]; 3];
         self.u[0] = add(self.x_d[0], cross(w, self.rho[0]));
     }
 

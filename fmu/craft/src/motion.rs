@@ -354,6 +354,7 @@ impl CraftMotion {
         for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
             let at = index::ball(lump.tank);
             lump.seed_direction(dx[at..at + 6].try_into().unwrap(), self.w[0], dw);
+            lump.seed_shape(&directions(x, lump.tank), &directions(dx, lump.tank));
         }
         self.rates_of::<1>();
     }
@@ -665,6 +666,12 @@ impl CraftMotion {
             let [f, tau] = lump.reaction(n, &self.w, &self.w_d);
             force = add(force, f);
             torque = add(torque, tau);
+            if n == 1 {
+                // What the inertia's derivative takes: dJ w' + w x (dJ w).
+                let (w, slope) = (self.w[0], &lump.shape_slope);
+                let turned = vector::cross(w, times(slope, w));
+                torque = sub(torque, add(times(slope, self.w_d[0]), turned));
+            }
         }
         [force, torque]
     }

@@ -234,7 +234,8 @@ impl CraftMotion {
         let [q, dq] = [self.q.get(0), self.q.get(1)];
         let mut tanks = [(); TANKS].map(|()| None);
         for (i, liquid) in self.liquids.iter().enumerate() {
-            let rigid = liquid.lift::<T>();
+            let lump = self.lumps.iter().find(|lump| lump.tank == i && lump.is_loose());
+            let rigid = lump.map_or_else(|| liquid.lift(), |lump| liquid.along(&lump.shape_slope));
             let mut wrench = rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x));
             let mut bobs = [(); MODES].map(|()| None);
             for bob in self.bobs.iter().filter(|bob| bob.tank == i) {
@@ -251,7 +252,7 @@ impl CraftMotion {
                 lump: None,
                 ball_state: BallState::Settled,
             };
-            if let Some(lump) = self.lumps.iter().find(|lump| lump.tank == i && lump.is_loose()) {
+            if let Some(lump) = lump {
                 let [f, tau] = lump.wrench::<T>();
                 now.wrench = [add(now.wrench[0], f), add(now.wrench[1], tau)];
                 (now.lump, now.ball_state) = (Some(lump.now()), lump.state);

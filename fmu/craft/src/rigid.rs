@@ -45,6 +45,12 @@ impl Rigid {
             inertia: self.inertia.map(constant),
         }
     }
+
+    /// The same with an inertia whose derivative is `slope`, kg m2.
+    pub fn along<T: Number>(&self, slope: &Mat3) -> Rigid<T> {
+        let element = |i: usize, j: usize| T::of(self.inertia[i][j], slope[i][j]);
+        Rigid { inertia: [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j))), ..self.lift() }
+    }
 }
 
 impl<T: Number> Rigid<T> {

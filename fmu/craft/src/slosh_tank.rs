@@ -565,6 +565,7 @@ impl TankMotion {
         }
         if let Some(lump) = loose(&mut self.ball) {
             lump.seed_direction(dx[BALL..].try_into().unwrap(), self.w[0], dw);
+            lump.seed_shape(&directions(&self.state.x), &directions(dx));
         }
         self.rates_of::<1>();
     }
@@ -619,12 +620,14 @@ impl TankMotion {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
         let zero = constant::<T>([0.0; 3]);
-        let rigid = self.rigid.lift::<T>();
+        let lump = self.ball.as_ref().map(|ball| &ball.lump).filter(|lump| lump.is_loose());
+        let rigid =
+            lump.map_or_else(|| self.rigid.lift::<T>(), |lump| self.rigid.along(&lump.shape_slope));
         let mut parts = Parts {
             motion: [a, w, w_d],
             wrench: rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x)),
             loads: [zero; 2],
-            matrix: self.rigid.mass_matrix().map(|row| row.map(T::constant)),
+            matrix: rigid.mass_matrix(),
             rigid,
             bobs: [(); MODES].map(|()| None),
             lump: None,
@@ -636,9 +639,7 @@ impl TankMotion {
             add_added_mass(&mut parts.matrix, bob);
             parts.bobs[bob.mode] = Some(bob.now::<T>());
         }
-        if let Some(Loose { lump, .. }) = &self.ball
-            && lump.is_loose()
-        {
+        if let Some(lump) = lump {
             parts.wrench = plus(parts.wrench, lump.wrench());
             parts.loads = plus(parts.loads, lump.bias(w));
             if let Some((m, u)) = lump.added_mass() {

@@ -488,13 +488,8 @@ fn derivatives_along_a_direction_are_those_of_the_rates_and_outputs() {
         let (_, mut craft) = loose(&mut random, CASES[seed as usize % 3]);
         let u = random.inputs();
         let x = craft.continuous_states();
-        let mut dx = [0.0; STATES];
-        for (i, dx) in dx.iter_mut().enumerate() {
-            // The directions of bobs that are not in use stay what they were.
-            if !(index::BOBS..index::LIQUID).contains(&i) {
-                *dx = random.between(-0.1, 0.1);
-            }
-        }
+        // The directions with which the liquid has left belong to it: they make the inertia of its shape.
+        let dx: [f64; STATES] = random.vector(0.1);
         let du: [f64; INPUTS] = random.vector(1.0);
         let list = |rates: &[f64; STATES], out: &Outputs| {
             let vectors = [

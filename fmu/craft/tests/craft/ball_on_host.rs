@@ -507,15 +507,19 @@ fn derivatives_along_a_direction_are_those_of_the_rates_and_outputs() {
             let (mut dx, mut du) = ([0.0; TANK_STATES], [0.0; TANK_INPUTS]);
             dx.copy_from_slice(&random.vector::<TANK_STATES>(1.0));
             du[..9].copy_from_slice(&random.vector::<9>(1.0));
-            if ball != BallState::Settled {
-                // The shape of a lump is that of the directions with which it has left.
-                dx[..6 * craft::MODES].fill(0.0);
-            }
             let x = tank.continuous_states();
             let shown = |out: &SloshTankOutputs| -> Vec<f64> {
                 let tank = &out.tank;
                 let vectors = [tank.force, tank.torque, out.center_of_mass, tank.ball_velocity];
-                vectors.iter().flatten().chain(&out.bias).chain(&out.added_mass).copied().collect()
+                let inertia = out.inertia.as_flattened();
+                vectors
+                    .iter()
+                    .flatten()
+                    .chain(inertia)
+                    .chain(&out.bias)
+                    .chain(&out.added_mass)
+                    .copied()
+                    .collect()
             };
             let mut at = |s: f64| {
                 tank.set_continuous_states(&std::array::from_fn(|i| x[i] + s * dx[i]));
