@@ -156,7 +156,7 @@ mod tests {
         }
     }
 
-    /// Of modes beyond the first, R = 1 m, h = 1 m: by hand with tanh(xi_2) = 0.99995313, its half 0.99037.
+    /// Values of mode 2 for R = 1 m, h = 1 m by hand, with tanh(xi_2) = 0.99995313 and its half 0.99037.
     #[test]
     fn the_second_mode_has_its_mass_length_and_hinge() {
         let second = pendulum(1, 2.0, 1.0, 3.0);
@@ -179,7 +179,7 @@ mod tests {
         assert!((moment / (m_liq * h / 2.0) - 1.0).abs() < 1e-14);
     }
 
-    /// What the surface does is told by the depth of a few radii: below, nothing changes, and nothing
+    /// Only the uppermost few radii of liquid matter: below, nothing changes, and nothing
     /// overflows.
     #[test]
     fn a_deep_tank_s_pendulum_hangs_below_the_surface_as_in_any_deep_tank() {

@@ -22,7 +22,7 @@ use crate::cylinder::XI;
 /// (Mikishev and Dorozhkin).
 pub const UNMEASURED: f64 = 1.45;
 
-/// By how much measured tanks scatter around a correlation.
+/// Relative scatter of measured tanks around a correlation.
 pub const SCATTER: f64 = 0.3;
 
 /// One mode of a liquid, as its damping sees it.
@@ -77,12 +77,12 @@ pub enum Shape {
     Other,
 }
 
-/// What a correlation says of a first mode.
+/// Estimate of a first mode's damping from a correlation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correlation {
     /// Damping ratio.
     pub zeta: f64,
-    /// Whether it was measured there.
+    /// True within the range of the measurements.
     pub in_range: bool,
 }
 
@@ -113,7 +113,7 @@ impl Shape {
     }
 }
 
-/// Which of two estimates was taken.
+/// Basis of the damping estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
     /// The shape's correlation: it was measured there.
@@ -135,11 +135,11 @@ pub struct Estimate {
     pub interval: [f64; 2],
     /// The laminar layer alone.
     pub laminar: f64,
-    /// What the correlation says of the first mode, where there is one.
+    /// Estimate from the correlation of the first mode, if there is one.
     pub correlation: Option<f64>,
-    /// Which was taken.
+    /// Basis of the estimate.
     pub basis: Basis,
-    /// Whether correlation and [`UNMEASURED`] laminar layers differ by more than measured tanks scatter.
+    /// True if correlation and [`UNMEASURED`] laminar layers differ by more than the scatter of measured tanks.
     pub disagree: bool,
 }
 
@@ -281,7 +281,7 @@ pub fn covered(radius: f64, width: f64) -> f64 {
     w * (2.0 - w)
 }
 
-/// How much of the surface's motion is left at a ring `depth` below it in an upright cylinder.
+/// Share of the surface's motion that remains at a ring `depth` below it in an upright cylinder.
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
     // Deeper there is none; what is divided by it stays finite.
     exp(-f64::min(1.84 * depth / radius, 100.0))
@@ -342,7 +342,7 @@ mod tests {
         assert_eq!(mikishev_dorozhkin(r, 1e4 * r, nu, g), 0.79 * sqrt(inverse_reynolds(r, nu, g)));
     }
 
-    /// As twice the bottom's share where x is small: 2 (1 - x)/sinh 3.68 x.
+    /// The bottom contributes twice its share for small x: 2 (1 - x)/sinh 3.68 x.
     #[test]
     fn stephens_s_bottom_counts_in_shallow_liquid() {
         let deep = stephens(1.0, 5.0, 1e-6, 9.81);
@@ -354,7 +354,7 @@ mod tests {
         near(stephens(1.0, 1e4, 1e-6, 9.81) / deep, 1.0);
     }
 
-    /// Where a correlation has no end it is held: a sphere at 0.1 and 1.9 radii, a cone at 0 and 45 degrees.
+    /// A correlation without a stated end is constant beyond its data: a sphere at 0.1 and 1.9 radii, a cone at 0 and 45 degrees.
     #[test]
     fn correlations_without_bound_are_held_at_their_ends() {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
@@ -550,7 +550,7 @@ mod tests {
         }
     }
 
-    /// By more than 30 %, the correlation above the 1.45 layers, or below.
+    /// The test covers differences above 30 % in both directions.
     #[test]
     fn two_estimates_disagree_by_more_than_the_scatter() {
         let (nu, omega) = (1e-6, 4.0);

@@ -1,4 +1,4 @@
-//! How far linear theory of sloshing reaches: by the height of the wave at the wall over the radius R of
+//! Range of linear slosh theory, by the height of the wave at the wall over the radius R of
 //! the free surface (Rubaga's thesis, 2.3.5, after Dodge).
 
 /// A range of wave heights.
@@ -14,7 +14,7 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// That of a wave height over R; NaN is nonlinear.
+    /// Regime of a ratio of wave height to R; NaN counts as nonlinear.
     pub fn of(ratio: f64) -> Regime {
         match ratio {
             ratio if ratio < 0.15 => Regime::Linear,

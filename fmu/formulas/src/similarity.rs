@@ -37,7 +37,7 @@ impl Liquid {
         self.density * velocity * velocity * length / self.tension
     }
 
-    /// How long surface tension takes to move liquid over a length, m, in s (2.29): a time, not a period.
+    /// Time scale of surface tension over a length (m), s (2.29); not a period.
     pub fn capillary_time(&self, length: f64) -> f64 {
         sqrt(self.density * length * length * length / self.tension)
     }
@@ -63,13 +63,13 @@ pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
     velocity * velocity / (acceleration * length)
 }
 
-/// How long gravity takes to move liquid over a length, m, in s (2.28).
+/// Time scale of gravity over a length (m), s (2.28).
 pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
     sqrt(length / acceleration)
 }
 
-/// Which of gravity, surface tension and inertia rules (the thesis's 2.5): the largest of Bo, 1 and We. An inertia
-/// that beats both carries the liquid across the tank: no pendulum stands for it.
+/// Names the dominant force among gravity, surface tension and inertia (the thesis's 2.5): the largest of Bo, 1 and We. If inertia
+/// dominates, the liquid crosses the tank and no pendulum represents it.
 pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     match (bond > 1.0, weber > 1.0) {
         (_, true) if weber > bond => {
@@ -80,7 +80,7 @@ pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     }
 }
 
-/// How a liquid behaves at a Bond number; the thesis's 2.5, its limits are no sharp ones.
+/// Describes the behaviour of a liquid at a Bond number (the thesis's 2.5); the limits are approximate.
 pub fn regime(bond: f64) -> &'static str {
     match bond {
         b if b > 1000.0 => "high g: flat surface, linear and weakly nonlinear models hold",
@@ -99,9 +99,9 @@ pub fn agility(alpha: f64) -> &'static str {
     }
 }
 
-/// What multiplies a model's figure to give the full size's: name, unit, factor. `lambda` is
-/// full size over model, `density` the ratio of the densities in the same sense, `gravity` that of
-/// the accelerations; the thesis's Table 2.3 with gravity = 1, where accelerations are equal.
+/// Scale factors from model to full size: name, unit, factor. `lambda` is
+/// the ratio of lengths, `density` of densities, `gravity` of accelerations, each full size over model. The thesis's
+/// Table 2.3 has gravity = 1.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'static str, f64); 10] {
     let volume = lambda * lambda * lambda;
     let force = volume * density * gravity;
@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(agilities, ["low agility", "medium agility", "medium agility", "high agility"]);
     }
 
-    /// Of powers of two, so that roots are exact: lambda 4, densities 2, gravity 1/4.
+    /// Powers of two keep the roots exact: lambda 4, densities 2, gravity 1/4.
     #[test]
     fn froude_s_factors_are_those_of_the_table() {
         let factors = froude(4.0, 2.0, 0.25).map(|(name, _, factor)| (name, factor));

@@ -57,8 +57,8 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
     ],
 ];
 
-/// Where 2 omega_1 is closer than this to the frequency of an excited mode, relatively, the third
-/// order is not to be trusted.
+/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third
+/// order is not valid.
 const DETUNING: f64 = 0.01;
 
 /// s and kappa at h/R = `fill`.

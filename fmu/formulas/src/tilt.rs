@@ -28,7 +28,7 @@
 
 use crate::cylinder::XI;
 
-/// How many modes of either azimuthal number are summed: of mode 1 what is left out is below 1e-6 of c, of mode 10
+/// Number of modes of either azimuthal number in the sums: the truncation error of mode 1 is below 1e-6 of c, that of mode 10
 /// 0.003 (from h/R 0.2 on).
 const ZEROS: usize = 16;
 
@@ -104,7 +104,7 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     ]
 }
 
-/// By which omega^2 of mode n at h/R = `fill` changes when the surface has the slope s and g along the axis stays: along the slope and
+/// Factors on omega^2 of mode n at h/R = `fill` for a surface of slope s with unchanged g along the axis: along the slope and
 /// across it.
 ///
 /// 1 + c s^2, of a negative c 1/(1 - c s^2): the same to the second order, nearer beyond it, and never negative.

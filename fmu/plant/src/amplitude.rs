@@ -24,12 +24,12 @@ const FLOOR: f64 = 1e-4;
 /// W is kept from 0 by this part of 1/l times 1 m/s2: drag without restoring force is none.
 const WEIGHTLESS: f64 = 1e-6;
 
-/// What one mode's drag grows by.
+/// Growth of one mode's drag with amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
     /// zeta_A, 1/rad; 0: the drag does not depend on the amplitude.
     pub zeta: f64,
-    /// What is added to W, 1/s2.
+    /// Constant added to W, 1/s2.
     w_floor: f64,
     /// W and its rate.
     w: [f64; 2],
@@ -61,7 +61,7 @@ impl Default for Growth {
 }
 
 impl Growth {
-    /// Of a mode whose length is `l`, m.
+    /// Growth for a mode of length `l`, m.
     pub fn new(zeta: f64, l: f64) -> Growth {
         Growth { zeta, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }

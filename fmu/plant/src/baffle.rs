@@ -31,7 +31,7 @@ use taylor::series::{Series, ZERO, mul_ramp};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
 
-/// What the ring's range begins with, over its width: the wave times exp(-1.84 d/R).
+/// Bounds of the wave times exp(-1.84 d/R) over the ring's width, within which the law is known.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
 /// A_0 over the amplitude at which the range begins: makes 2e-4 of the damping there.
@@ -47,7 +47,7 @@ pub struct Baffle {
     pub zeta: f64,
     /// A_0^2
     floor2: f64,
-    /// What is added to W, 1/s2.
+    /// Constant added to W, 1/s2.
     w_floor: f64,
     /// W and its rate.
     w: [f64; 2],
@@ -83,7 +83,7 @@ impl Default for Baffle {
     }
 }
 
-/// What is wrong with the parameters of the baffle.
+/// Lists errors in the parameters of the baffle.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (width, depth) = (p.baffle.width, p.baffle.depth);
     let mut problems = Vec::new();
@@ -105,7 +105,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// What is to be said about the baffle.
+/// Lists warnings about the baffle.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     if p.baffle.width <= 0.0 {
@@ -127,7 +127,7 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     warnings
 }
 
-/// Where the ring's law holds.
+/// Range of the ring's law.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
     /// Stroke over the ring's width per wave amplitude, 1/m.
@@ -149,7 +149,7 @@ impl Range {
         (width > 0.0).then(range)
     }
 
-    /// Whether it holds for a wave of this amplitude at the wall, m.
+    /// Returns true for a wave of this amplitude at the wall, m.
     pub fn contains(&self, amplitude: f64) -> bool {
         STROKE.contains(&(amplitude * self.stroke))
             // The case of d = eta is inside, however it is rounded.

@@ -1,6 +1,6 @@
 //! Stick and slip.
 
-/// How the hub stands to the bearing under a law that switches at rest.
+/// Contact between hub and bearing under a law that switches at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i8)]
 pub enum Contact {

@@ -20,8 +20,8 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Axial, INDICATORS, STATES, indicator, x};
 
-/// How many of the gyro's samples may fall due at once: a host that has passed more of
-/// them by does not look at the time events.
+/// Largest number of gyro samples due at once: a host that has passed more of
+/// them ignores time events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
 impl Plant {
@@ -190,7 +190,7 @@ impl Plant {
         self.state.record_contact(contact, time);
     }
 
-    /// Whether an event is overdue that no indicator of the host's last step has shown: the
+    /// Returns true if an event is overdue that no indicator showed in the host's last step: the
     /// host has integrated past a change of the contact, or the wave has reached another
     /// regime.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
@@ -201,8 +201,8 @@ impl Plant {
             || self.present_ranges(inputs) != self.state.ranges
     }
 
-    /// How often the contact has changed since the start, when last, s, and what it is
-    /// (-1 turning backwards, 0 stuck, 1 turning forwards).
+    /// Number of contact changes since the start, time of the last one (s), and the contact
+    /// (-1 slipping backwards, 0 stuck, 1 slipping forwards).
     pub fn last_contact(&self) -> (i32, f64, i32) {
         (self.state.event_count, self.state.event_time, self.state.contact as i32)
     }
@@ -243,7 +243,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Whether the states that the host has set are within the models' range.
+    /// Refuses states set by the host that are outside the models' range.
     ///
     /// # Errors
     /// [`StepError::Model`]
@@ -259,7 +259,7 @@ impl Plant {
         Ok(())
     }
 
-    /// When the gyro takes its next sample, s; `None` without a gyro.
+    /// Time of the gyro's next sample, s; `None` without a gyro.
     pub fn next_time_event(&self) -> Option<f64> {
         let next = self.state.gyro.next as f64 / self.imu.rate;
         self.imu.enabled.then_some(self.state.start_time + next)
@@ -272,7 +272,7 @@ mod tests {
     use crate::outputs::Outputs;
     use crate::parameters::{FrictionModel, Parameters, SloshModel, SloshSource};
 
-    /// Whether the model's coordinates are lengths, not angles.
+    /// Returns true if the model's coordinates are lengths, not angles.
     fn is_a_length(slosh: SloshModel) -> bool {
         matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)
     }

@@ -16,7 +16,7 @@ pub struct HubMotion {
     pub omega_dot: Series,
     /// Specific force along the tank's axis, m/s2, and its rate.
     pub g: [f64; 2],
-    /// How far ahead the course of the damping holds, s.
+    /// Time over which the series of the damping is valid, s.
     pub damping_reach: f64,
     pub tilt: Tilt,
 }

@@ -51,13 +51,13 @@ impl Imu {
         allowed + 1
     }
 
-    /// When sample k falls due after `since_start`, both s.
+    /// Delay until sample k, s, when `since_start` seconds have passed since the start.
     #[inline(always)]
     pub(crate) fn due(&self, k: u64, since_start: f64) -> f64 {
         k as f64 / self.rate - since_start
     }
 
-    /// Whether a sample falls within `length`, s, or but for rounding.
+    /// Returns true if a sample is due within `length`, s, up to rounding.
     #[inline(always)]
     pub(crate) fn falls_within(&self, due: f64, length: f64) -> bool {
         due <= length + SLACK / self.rate

@@ -1,9 +1,9 @@
-//! What acts on the plant from outside, as ramps in time.
+//! Inputs of the plant, as ramps in time.
 
 /// A quantity that is linear in time: `value + slope t`.
 pub type Ramp = taylor::ramp::Ramp;
 
-/// What acts on the plant from outside, over one step.
+/// Inputs of the plant over one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inputs {
     /// Torque command to the actuator, N m.

@@ -38,7 +38,7 @@ use formulas::tilt::{factors, largest_slope};
 
 use crate::parameters::{Parameters, SloshModel, SloshSource};
 
-/// How gravity leans from the axis of an upright cylinder.
+/// Direction of gravity relative to the axis of an upright cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Leaning {
     /// s
@@ -47,7 +47,7 @@ pub(crate) struct Leaning {
     tangential: f64,
 }
 
-/// How a pendulum that hangs obliquely swings: F and M above.
+/// Dynamics of a pendulum that hangs obliquely: F and M above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Oblique {
     stiffness: f64,
@@ -63,7 +63,7 @@ pub(crate) struct Mode {
 }
 
 impl Leaning {
-    /// Of the bench at the start; `None` where it is upright or the tank is no cylinder by its dimensions.
+    /// Tilt of the bench at the start; `None` for an upright bench or a tank given by a table.
     pub fn of(p: &Parameters) -> Option<Leaning> {
         let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
         leans.then(|| {
@@ -156,7 +156,7 @@ fn rest(spring: f64, slope: f64) -> f64 {
     u
 }
 
-/// What can't be under this tilt.
+/// Lists errors in the parameters under this tilt.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let mut problems = Vec::new();
     let (Some(Leaning { slope, .. }), true) = (Leaning::of(p), p.slosh.model != SloshModel::Frozen)
@@ -189,10 +189,10 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// By what share a pendulum for both directions may be off radially, before it is said.
+/// Relative error of a common frequency in the radial direction above which a warning follows.
 const APART: f64 = 0.01;
 
-/// What is to be said of the modes under this tilt, if anything.
+/// Lists warnings about the modes under this tilt.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     let Some(leaning) = Leaning::of(p) else { return warnings };

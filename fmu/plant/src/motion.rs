@@ -21,11 +21,11 @@ use crate::slosh::SloshMode;
 use crate::state::{State, x};
 use crate::suspension::Suspension;
 
-/// Where the steps of a call do not suffice.
+/// Remedy if the internal steps of a call do not suffice.
 const ADVICE: &str = ", with stribeck_smooth a larger friction.eps, with the gyro (its samples count as \
                       steps) a lower imu.rate";
 
-/// Why a mode that has left its range at `time` refuses the step; `mode` from 0.
+/// Error for a mode that has left its range at `time`; `mode` counts from 0.
 pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     let number = mode + 1;
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
@@ -34,21 +34,21 @@ pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
 /// At which events a step stops.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
-    /// How much of the step lies behind the stretch that is advanced, s.
+    /// Part of the step before the present stretch, s.
     pub offset: f64,
     /// Events are passed over up to here, s from the step's start; with infinity all are.
     pub passed: f64,
 }
 
 impl Stop {
-    /// Whether the step stops at an event `t` after the stretch's start.
+    /// Returns true if the step stops at an event `t` after the stretch's start.
     #[inline(always)]
     pub fn is_at(self, t: f64) -> bool {
         self.offset + t > self.passed
     }
 
-    /// When, at most `h` after `t` in the stretch, which is `since_start` after the gyro's start, the gyro takes the
-    /// first sample at which the step stops, of `allowed` samples from number `next` on.
+    /// Time, at most `h` after `t` in the stretch, of the first gyro sample at which the step stops. The stretch is `since_start`
+    /// after the gyro's start; `allowed` samples from number `next` on may be passed.
     // By value: an address of what a stretch keeps would keep all of it in memory.
     #[cold]
     fn at_sample(
@@ -74,10 +74,10 @@ pub(crate) struct Motion {
     pub law: Law,
     pub suspension: Suspension,
     pub damping: Damping,
-    /// Whether drag or weight change along an expansion though g is held: with drag by amplitude, or
-    /// on a bench that leans; or modes move along other directions than the tangent.
+    /// True if drag or weight change along an expansion at constant g: drag that depends on amplitude, a
+    /// tilted bench, or modes along other directions than the tangent.
     pub varies: bool,
-    /// Whether drag depends on the amplitude: by a baffle, or growing with it.
+    /// True if drag depends on amplitude: a baffle, or amplitude damping.
     with_amplitude: bool,
     /// Mass moments of the dry hub, radially and tangentially, and of the rigid liquid, kg m.
     imbalance: [f64; 2],
@@ -292,12 +292,12 @@ impl Motion {
         self.law.contact_at_rest(net, state.x[x::THETA], state.contact)
     }
 
-    /// What a call that begins may take.
+    /// Internal steps that a new call may take.
     pub fn steps(&self) -> Steps {
         Steps::new(self.max_steps, ADVICE)
     }
 
-    /// When, within `h`, the hub comes to rest, from the series of order n.
+    /// Time within `h` at which the hub comes to rest, from the series of order n.
     fn time_of_rest(&self, n: usize, h: f64, contact: Contact) -> Option<f64> {
         let omega = &self.hub.omega;
         let change = omega[1..=n].iter().rev().fold(0.0, |sum, x| (sum + x.abs()) * h);
@@ -313,7 +313,7 @@ impl Motion {
         first_root(&rate[behind..=n], h)
     }
 
-    /// When, within `h`, the torque exceeds what the bearing holds, and to which side.
+    /// Time within `h` at which the torque exceeds the bearing's static friction, and the direction.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
         let (against_backward, against_forward) = self.law.holds(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
@@ -353,12 +353,12 @@ impl Motion {
         }
     }
 
-    /// Whether drag and weight change with g alone, and there is no suspension line.
+    /// Returns true if drag and weight change with g alone, and there is no suspension line.
     fn is_plain(&self) -> bool {
         !self.varies && !self.suspension.exists
     }
 
-    /// As [`Motion::advance`]; `UNROLLED` only where the specific force is held and the motion is plain.
+    /// [`Motion::advance`] for one slosh model; `UNROLLED` only for a constant specific force and plain motion.
     #[inline(always)]
     fn advance_along<const UNROLLED: bool, M: SloshMode>(
         &mut self,
@@ -426,9 +426,9 @@ struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
     acting: (Ramp, Ramp),
     imu: &'a Imu,
     stop: Stop,
-    /// Whether the specific force, the drag or the weight changes.
+    /// True if the specific force, the drag or the weight changes.
     varies: bool,
-    /// When the stretch begins, and the expansion after it, s.
+    /// Start of the stretch, and of the expansion after it, s.
     begin: f64,
     t: f64,
     /// The contact that the event at the expansion's end makes.

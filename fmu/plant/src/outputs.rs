@@ -1,4 +1,4 @@
-//! What can be read of the plant at an instant, and its time derivatives along a direction.
+//! Outputs of the plant at an instant, and their time derivatives along a direction.
 
 use formulas::regime::Regime;
 use taylor::number::{Dual, Number};
@@ -68,7 +68,7 @@ pub struct Outputs {
     pub stuck_time: f64,
     /// Damping ratio of the first mode by the baffle, at the present motion.
     pub baffle_zeta: f64,
-    /// What changes at events alone.
+    /// Outputs that change only at events.
     pub discrete: Discrete,
 }
 
@@ -79,13 +79,13 @@ pub struct Discrete {
     pub stuck: bool,
     /// Range of sloshing by wave height.
     pub regime: Regime,
-    /// Whether the law of the baffle's drag holds; true without a baffle.
+    /// True within the range of the baffle's drag law, and without a baffle.
     pub baffle_in_range: bool,
     /// Set-valued friction: -1 turning backwards, 0 stuck, 1 forwards; else 1.
     pub friction_mode: i32,
-    /// How often `friction_mode` has changed since the start.
+    /// Number of changes of `friction_mode` since the start.
     pub event_count: i32,
-    /// When it changed last, s; 0 in a derivative.
+    /// Time of the last change, s; 0 in a derivative.
     pub event_time: f64,
 }
 
@@ -104,7 +104,7 @@ impl Plant {
         outputs
     }
 
-    /// As [`Plant::outputs`], with contact and regime that the last event has left.
+    /// [`Plant::outputs`] with contact and regime as the last event left them.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);

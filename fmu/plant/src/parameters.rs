@@ -1,4 +1,4 @@
-//! What the plant is made of: its parameters with the bench's values, SI units throughout.
+//! Parameters of the plant with the bench's values, in SI units.
 //!
 //! `Parameters::default()` is the thesis's bench (TRACTOR, 24 degC, 10 cm of
 //! water). Fields are named like the FMU's parameters (`tank.d` is `tank.d` there, `hub.inertia`
@@ -83,7 +83,7 @@ impl SloshModel {
     ];
 }
 
-/// Where the modal parameters come from.
+/// Source of the modal parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SloshSource {
@@ -101,7 +101,7 @@ impl SloshSource {
 /// The largest number of slosh modes.
 pub const MODES: usize = 10;
 
-/// How a mode's viscous coefficient c follows its natural frequency omega_n.
+/// Dependence of a mode's viscous coefficient c on its natural frequency omega_n.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum DampingLaw {
@@ -180,7 +180,7 @@ pub struct Ring {
     pub depth: f64,
 }
 
-/// How the bench stands: its axis leans by `tilt`; gravity's part across the axis points to
+/// Attitude of the bench: its axis is tilted by `tilt`; the component of gravity across the axis points to
 /// `tilt_azimuth`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
@@ -234,7 +234,7 @@ pub struct Friction {
     pub harmonics_backward: [f64; 4],
 }
 
-/// Where the motion starts; the slosh quantities are mode 1's.
+/// Initial motion; the slosh quantities are mode 1's.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Init {

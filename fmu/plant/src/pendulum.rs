@@ -86,7 +86,7 @@ impl Pendulum {
         self.course = course;
     }
 
-    /// Whether the drag depends on the amplitude of the motion.
+    /// Returns true if the drag depends on the amplitude of the motion.
     #[inline(always)]
     pub fn follows_amplitude(&self) -> bool {
         self.baffle.zeta > 0.0 || self.growth.zeta > 0.0
@@ -113,7 +113,7 @@ impl Pendulum {
         self.course[n] = if growth.zeta > 0.0 { growth.expand(n, at, other) } else { other };
     }
 
-    /// Whether the bob moves along another direction than the tangent.
+    /// Returns true if the bob moves along another direction than the tangent.
     #[inline(always)]
     pub fn is_askew(&self) -> bool {
         self.along[0] != 0.0

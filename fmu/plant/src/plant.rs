@@ -48,12 +48,12 @@ pub struct Plant {
     pub(crate) stopped: Option<StoppedStep>,
 }
 
-/// What two ways to compute a time may differ by, s.
+/// Tolerance for comparing times, s.
 fn rounding(time: f64) -> f64 {
     4.0 * f64::EPSILON * time.abs()
 }
 
-/// How a step has ended that stops at events.
+/// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepEnd {
     /// At its end.
@@ -81,7 +81,7 @@ pub struct StoppedStep {
 }
 
 impl StoppedStep {
-    /// How many words it takes.
+    /// Number of words of a saved state.
     pub const WORDS: usize = State::WORDS + 6 + STATES;
 
     /// It as words, for saving.
@@ -116,7 +116,7 @@ impl StoppedStep {
         })
     }
 
-    /// Whether a step of length `h` from the present state goes on with it: to the same end, with the same inputs.
+    /// Returns true if a step of length `h` from the present state continues the stopped step: same end, same inputs.
     fn goes_on(&self, state: &State, inputs: &Inputs, h: f64) -> bool {
         let ends = [state.time + h, self.start.time + self.h];
         let held = [inputs.tau_cmd, inputs.tau_ext, inputs.g_axial];
@@ -193,7 +193,7 @@ impl Plant {
         Ok(plant)
     }
 
-    /// What parameters and specific force leave of the range in which the models are known, one
+    /// Lists where parameters and specific force leave the known range of the models, one
     /// sentence each.
     pub fn warnings(p: &Parameters, inputs: &Inputs) -> Vec<String> {
         tank::warnings(p, inputs.g_axial.value)
@@ -248,7 +248,7 @@ impl Plant {
         self.state.x[x::OMEGA]
     }
 
-    /// What follows from the parameters.
+    /// Values calculated from the parameters.
     pub fn calculated(&self) -> &Calculated {
         &self.calculated
     }
@@ -286,8 +286,8 @@ impl Plant {
         done.map(|_| ())
     }
 
-    /// As [`Plant::step`], but stops at the first event: the hub sticks or slips, the wheel reaches a limit, the gyro
-    /// takes a sample. A step from there to the same end, with the same inputs, goes on as if it had not stopped.
+    /// Like [`Plant::step`], but stops at the first event: the hub sticks or slips, the wheel reaches a limit, the gyro
+    /// takes a sample. A step from there to the same end with the same inputs continues as if it had not stopped.
     ///
     /// # Errors
     /// As [`Plant::step`].
@@ -324,8 +324,8 @@ impl Plant {
         Ok(StepEnd::Event(time))
     }
 
-    /// As [`Plant::step`], but an error leaves the state unusable, and it stops at the first event more than
-    /// `passed` seconds after its start; then it returns how many.
+    /// Like [`Plant::step`], but an error leaves the state unusable, and the step stops at the first event later than
+    /// `passed` seconds after its start. Returns the time of that event after the start, s.
     #[inline(always)]
     fn advance(
         &mut self,
@@ -450,7 +450,7 @@ impl Plant {
         before
     }
 
-    /// As [`Plant::apply_present_contact`], for good: as the next step would begin.
+    /// Like [`Plant::apply_present_contact`], but permanent: the contact with which the next step begins.
     pub fn take_present_contact(&mut self, inputs: &Inputs) {
         if self.omega() == 0.0 {
             let (contact, time) = (self.present_contact(inputs), self.state.time);

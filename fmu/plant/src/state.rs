@@ -28,7 +28,7 @@ pub mod x {
     /// The first of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, …
     /// Their unit is the slosh model's; modes that are not used stay at 0.
     pub const SLOSH: usize = 7;
-    /// How many there are.
+    /// Number of continuous states.
     pub const COUNT: usize = SLOSH + 4 * MODES;
 }
 
@@ -54,7 +54,7 @@ pub mod indicator {
     pub const SPEED_MAX: usize = 6;
     /// The rotor reaches its lowest speed.
     pub const SPEED_MIN: usize = 7;
-    /// How many there are.
+    /// Number of event indicators.
     pub const COUNT: usize = 8;
 }
 
@@ -86,7 +86,7 @@ pub struct State {
     pub(crate) gyro: Gyro,
 }
 
-/// Where the work through a changing g_axial stands.
+/// Work done through a changing g_axial.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
     /// The work up to `time`, since the start, J, and the g_axial of that instant, m/s2.
@@ -100,7 +100,7 @@ pub(crate) struct Axial {
 }
 
 impl Axial {
-    /// Whether all of it, and its squares, are finite.
+    /// Returns true if all values and their squares are finite.
     pub(crate) fn is_finite(&self) -> bool {
         let Axial { work, time, g, mass_height, rate } = *self;
         [work, time, g, mass_height, rate].iter().all(|x| x.abs() < MAX_MAGNITUDE)
@@ -111,7 +111,7 @@ impl State {
     /// Length of the flat form.
     pub const WORDS: usize = 2 + Self::REALS;
 
-    /// How many of the words are real numbers, the last of them x.
+    /// Number of words that are real numbers; the last of them are x.
     const REALS: usize = 11 + STATES;
 
     /// The state as plain words, for saving.
@@ -213,7 +213,7 @@ impl State {
         changes
     }
 
-    /// Whether hub and so many modes, and their squares, are finite.
+    /// Returns true if the states of the hub and of this many modes, and their squares, are finite.
     pub(crate) fn is_finite(&self, modes: usize) -> bool {
         let within = |x: &f64| x.abs() < MAX_MAGNITUDE; // NaN is not
         let hub = [x::THETA, x::OMEGA, x::WORK, x::HEAT];

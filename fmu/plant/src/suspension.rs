@@ -19,7 +19,7 @@ pub(crate) struct Suspension {
     k: f64,
     theta_0: f64,
     c: f64,
-    /// Whether there is one.
+    /// True if the hub hangs from a line.
     pub exists: bool,
 }
 

@@ -26,7 +26,7 @@ use crate::leaning::{self, Leaning};
 use crate::parameters::{MODES, ModeTable, Parameters, SloshModel, SloshSource};
 use crate::pendulum::Pendulum;
 
-/// What follows from the parameters; 0 for modes that are not used.
+/// Values calculated from the parameters; 0 for unused modes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Calculated {
     /// Mass of the liquid, kg.
@@ -43,11 +43,11 @@ pub struct Calculated {
     pub frequency: [f64; MODES],
     /// Damping ratios.
     pub damping: [f64; MODES],
-    /// By how much the centring stiffness makes g look larger, a_n, m/s2.
+    /// Apparent increase of g by the centring stiffness, a_n, m/s2.
     pub centring: [f64; MODES],
 }
 
-/// What is wrong with a table of modes.
+/// Lists errors in a table of modes.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (slosh, table) = (&p.slosh, &p.slosh.table);
     let mut problems = baffle::problems(p);
@@ -144,7 +144,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
 }
 
 impl ModeTable {
-    /// Whether a mode moves along another direction than the tangent.
+    /// Returns true if a mode moves along another direction than the tangent.
     pub(crate) fn is_askew(&self, modes: usize) -> bool {
         self.direction[..modes].iter().any(|direction| *direction != 0.0)
     }
@@ -176,7 +176,7 @@ impl ModeTable {
     }
 }
 
-/// What is to be said about the parameters at the specific force `g`, if anything.
+/// Lists warnings about the parameters at the specific force `g`.
 pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     let (slosh, radius) = (&p.slosh, p.tank.d / 2.0);
     let geometry = slosh.source == SloshSource::Geometry;
@@ -242,7 +242,7 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
 /// Below this h/R waves are shallow: s turns negative and both coefficients grow without bound.
 const SHALLOW: f64 = 0.4;
 
-/// Where the coefficients of the third order at h/R = `fill` are not to be trusted, if there.
+/// Warning if the third-order coefficients at h/R = `fill` are not valid.
 fn third_order_warning(fill: f64) -> Option<String> {
     let (s, kappa) = coefficients(fill);
     if fill < SHALLOW {

@@ -14,7 +14,7 @@ use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 
 impl Wheel {
-    /// What is wrong with the parameters together.
+    /// Lists errors in the parameters together.
     pub(crate) fn problems(&self) -> Vec<String> {
         if self.speed_min <= self.speed_0 && self.speed_0 <= self.speed_max {
             return Vec::new();

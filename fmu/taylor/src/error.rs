@@ -1,8 +1,8 @@
-//! Why a step was refused.
+//! Reasons for refusing a step.
 
 use alloc::string::String;
 
-/// Why a step was refused; its text is for the user. The state is as before the step.
+/// Reason for refusing a step; its text is for the user. The state is as before the step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepError {
     /// The step's length is not a finite number above 0.
@@ -12,24 +12,24 @@ pub enum StepError {
     },
     /// The motion grew beyond all numbers, or the inputs are not finite.
     NotFinite {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
     },
     /// The step needs more internal steps than `solver.max_steps`.
     TooManySteps {
-        /// How far the integrator came, s.
+        /// Time that the integrator reached, s.
         time: f64,
         /// `solver.max_steps`.
         max_steps: usize,
-        /// What to do about it in this model, besides shorter steps and a larger `solver.max_steps`.
+        /// Remedy in this model, other than shorter steps and a larger `solver.max_steps`.
         advice: &'static str,
     },
-    /// What the model says, in its words: the motion left the range in which it holds.
+    /// The motion left the range of the model; the text is the model's.
     Model(String),
 }
 
 impl StepError {
-    /// Whether a shorter step may succeed: the motion itself has not left the range in which its model holds.
+    /// Returns true if a shorter step may succeed: the motion itself is still within the model's range.
     pub fn shorter_may_succeed(&self) -> bool {
         matches!(self, StepError::TooManySteps { .. } | StepError::NotFinite { .. })
     }

@@ -11,7 +11,7 @@ pub trait System<const D: usize> {
     /// The rates of the states, `t` after the start of the call.
     fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
 
-    /// What the errors of a step are compared with, from states and rates at its start t; `h`: how far there is to go.
+    /// Scale of the errors of a step, from states and rates at its start t; `h` is the rest of the stretch.
     fn error_scale(&self, t: f64, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
 }
 
@@ -22,7 +22,7 @@ const COLUMNS: usize = 8;
 /// cancel in the rates that are not small themselves.
 const ROUNDING: f64 = 2e-14;
 
-/// How much longer or shorter a step may be than the one before.
+/// Largest ratio of a step to the step before.
 const LONGER: f64 = 4.0;
 const SHORTER: f64 = 0.1;
 
@@ -111,7 +111,7 @@ fn extrapolate<const D: usize>(
     Trial { end: None, best }
 }
 
-/// How an extrapolation goes on from one stretch of a call to the next.
+/// State that an extrapolation carries from one stretch of a call to the next.
 pub struct Pace {
     /// The steps that the call has tried.
     steps: Steps,
@@ -290,7 +290,7 @@ mod tests {
         }
     }
 
-    /// Where hardly any error is seen, 1, 4, 16, ... milliseconds: the sixth reaches the end.
+    /// With hardly any error the steps are 1, 4, 16, ... milliseconds long: the sixth reaches the end.
     #[test]
     fn a_step_is_at_most_four_times_as_long_as_the_one_before() {
         let system = Growth { scale: 1e6, starts: Cell::new(0) };

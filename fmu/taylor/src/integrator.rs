@@ -30,10 +30,10 @@ const LONGEST: f64 = 1e9;
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
 
-/// What two orders must take off a term for its decay to be relied on.
+/// Two orders must reduce a term to this share before its decay is relied on.
 const DECAY: f64 = 0.1;
 
-/// What is allowed of a term that is foretold, of what is allowed of one that is known.
+/// Tolerance of a predicted term over that of a computed term.
 const FORETOLD: f64 = 0.25;
 
 /// The integrator's steps that one call may take, and those that it has taken.
@@ -65,24 +65,24 @@ impl Steps {
         StepError::TooManySteps { time, max_steps: self.max, advice: self.advice }
     }
 
-    /// How many are left.
+    /// Number of steps left.
     pub fn left(&self) -> usize {
         self.max - self.taken
     }
 }
 
-/// When a motion's series have converged. A motion that starts at rest is even in time, every second term of it is
+/// Convergence criterion of a motion's series. A motion that starts at rest is even in time, so every second term is
 /// zero: at least two terms in succession must be negligible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Convergence {
-    /// When so many terms in succession are negligible.
+    /// This many terms in succession are negligible.
     Terms(usize),
-    /// When two are, the second of them as the decay of the terms before foretells.
+    /// Two terms in succession are negligible, the second as predicted from the decay of the terms before.
     Decay,
 }
 
-/// What two terms in succession, n + 1 and n, over what is allowed of them, have to be: negligible, the second of them
-/// as foretold, for terms n, n - 1, n - 2, n - 3.
+/// Returns true if terms n + 1 and n are negligible, the former as predicted; arguments are the ratios of terms n, n - 1, n - 2,
+/// n - 3 to their tolerance.
 ///
 /// t_(n+1) is foretold from n - 1 by what two orders have taken off n - 2 and n - 3:
 /// t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)).
@@ -96,7 +96,7 @@ fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
 
 /// A motion that can be expanded in a power series.
 pub trait Motion {
-    /// Whether expansions are compiled with the sums of every order written out: about twice as fast,
+    /// Compiles expansions with the sums of every order written out: about twice as fast,
     /// more code.
     const UNROLLED: bool = true;
 
@@ -114,13 +114,13 @@ pub trait Motion {
     /// The largest of the states' coefficients n over what is allowed of it.
     fn coefficient_norm(&self, n: usize) -> f64;
 
-    /// Whether coefficient n times `power` is within what is allowed.
+    /// Returns true if coefficient n times `power` is within its tolerance.
     #[inline(always)]
     fn is_negligible(&self, n: usize, power: f64) -> bool {
         self.coefficient_norm(n) * power <= 1.0
     }
 
-    /// When the series have converged.
+    /// Convergence criterion of the series.
     #[inline(always)]
     fn convergence(&self) -> Convergence {
         Convergence::Decay
@@ -132,7 +132,7 @@ pub trait Motion {
         ORDER
     }
 
-    /// When, within `h` after the start of the expansion, an event ends it, by the series cut after
+    /// Time of the first event within `h` after the start of the expansion, from the series cut after
     /// order n.
     #[inline(always)]
     fn event(&mut self, _n: usize, _h: f64) -> Option<f64> {
@@ -154,7 +154,7 @@ pub trait Motion {
     ) -> Result<ControlFlow<f64>, StepError>;
 }
 
-/// How far an expansion has come.
+/// Progress of an expansion.
 struct Reach {
     /// Its length, s.
     h: f64,
@@ -162,7 +162,7 @@ struct Reach {
     power: f64,
     /// The last terms over what is allowed of them, the newest first.
     terms: [f64; 4],
-    /// How many of the last terms in succession were negligible.
+    /// Number of negligible terms in succession at the end.
     negligible: usize,
 }
 
@@ -406,7 +406,7 @@ mod tests {
         }
     }
 
-    /// What stops an expansion after n = 4, 5, ... is read off the terms 0.1^n/n! themselves.
+    /// The test reads the end of an expansion after n = 4, 5, ... from the terms 0.1^n/n!.
     #[test]
     fn an_expansion_ends_when_its_terms_say_so() {
         let order = |convergence, tolerance: f64| {

@@ -2,7 +2,7 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What a formula is evaluated with: [`f64`] for its value, [`Dual`] for its derivative along a
+/// Number type of a formula: [`f64`] evaluates its value, [`Dual`] its derivative along a
 /// direction.
 pub trait Number:
     Copy
@@ -17,7 +17,7 @@ pub trait Number:
     fn constant(value: f64) -> Self;
     /// A quantity from coefficients 0 and 1 of its series.
     fn of(value: f64, slope: f64) -> Self;
-    /// What is looked for: the value or the derivative.
+    /// The value, or the derivative.
     fn result(self) -> f64;
     /// The value.
     fn value(self) -> f64;

@@ -1,4 +1,4 @@
-//! What acts from outside: quantities that are linear in time.
+//! Inputs that are linear in time.
 
 use crate::vector::Vec3;
 

@@ -54,8 +54,8 @@ pub fn next(n: usize, rate: f64) -> f64 {
 // order, and a processor adds up the rest while it waits for them. Where a rule is a loop, its
 // slices spare the processor a check of every index.
 
-/// What a sum begins with: -0 changes nothing that is added to it, +0 would make a +0 of -0, for which a
-/// processor has to add.
+/// Start value of a sum: adding -0 never changes a value, so the compiler can drop the addition. Adding +0 turns -0
+/// into +0.
 pub(crate) const EMPTY: f64 = -0.0;
 
 /// Sum of `term(j)` over 0 <= j <= n, ends last.

@@ -33,7 +33,7 @@ impl StribeckCurve {
         StribeckCurve { c: p.c, d: p.d, inv_omega_s2, u_d: ZERO, e: ZERO, torque: ZERO }
     }
 
-    /// How far ahead a series of T_C shows what it holds, s, from w, w' and w''.
+    /// Time over which a series of T_C in w shows all its terms, s, from w, w' and w''.
     ///
     /// Far from rest exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, which grow before they decay:
     /// over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve is still flat at the

@@ -78,7 +78,7 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// What is wrong with the parameters together: dry friction may not drive.
+    /// Lists errors in the parameters together: dry friction must not drive the hub.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];

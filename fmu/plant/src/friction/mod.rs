@@ -22,21 +22,21 @@ use directional::DirectionalFactor;
 /// A law of friction as a set of power series in time. It may have one state of its own; w = 0 may be a
 /// place where it switches.
 pub trait FrictionLaw {
-    /// Whether the law switches where w = 0, so that this instant has to be located; if not,
+    /// True if the law switches at w = 0, so that this instant has to be located; otherwise
     /// the contact is always [`Contact::Forward`].
     const SWITCHES_AT_REST: bool = false;
 
-    /// Whether it can hold the hub exactly at rest.
+    /// True if the law can hold the hub exactly at rest.
     const STICKS: bool = false;
 
-    /// How many negligible terms in succession show that the series has converged. One term
+    /// Number of negligible terms in succession that show convergence. One term
     /// may vanish by symmetry.
     const NEGLIGIBLE_TERMS: usize = 2;
 
     /// The law that the parameters describe.
     fn new(p: &Friction) -> Self;
 
-    /// What is wrong with the law's parameters together.
+    /// Lists errors in the law's parameters together.
     fn problems(_p: &Friction) -> Vec<String> {
         Vec::new()
     }
@@ -74,8 +74,8 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// How far ahead the series of tau_f can converge, s, from w, w' and w'', where its
-    /// coefficients do not tell.
+    /// Time over which the series of tau_f can converge, s, from w, w' and w'', for laws whose
+    /// coefficients do not show it.
     fn convergence_radius(&self, _omega: &Series) -> f64 {
         f64::INFINITY
     }
@@ -111,7 +111,7 @@ macro_rules! laws {
                 }
             }
 
-            /// What is wrong with the parameters together.
+            /// Lists errors in the parameters together.
             pub fn problems(p: &Friction) -> Vec<String> {
                 let mut problems = DirectionalFactor::problems(p);
                 problems.extend(match p.model {

@@ -69,7 +69,7 @@ impl Liquid {
         }
     }
 
-    /// Why the motion can't start as the parameters say, if it can't.
+    /// Reason why the motion cannot start with these parameters, if there is one.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         fn of<M: SloshMode>(_: &[M], init: &Init) -> Option<String> {
             M::start_problem(init)
@@ -97,7 +97,7 @@ pub struct Angles<T = f64> {
 }
 
 impl<T: Number> Angles<T> {
-    /// Of a mode at rest.
+    /// Angles of a mode at rest.
     pub fn zero() -> Angles<T> {
         let zero = [T::constant(0.0); 2];
         Angles { angle: zero, rate: zero }
@@ -109,20 +109,20 @@ impl<T: Number> Angles<T> {
 /// What is given over [`Number`] holds at the start of an expansion: the value, or the derivative along the
 /// direction that was seeded.
 pub trait SloshMode {
-    /// Whether steps with a single mode and g held are compiled with the sums of every order
+    /// Compiles steps with a single mode and constant g with the sums of every order
     /// written out: twice as fast, 40 to 100 KB of code.
     const UNROLLED: bool = false;
-    /// Whether J has coefficients beyond order 0.
+    /// True if J has coefficients beyond order 0.
     const MOVES_INERTIA: bool = true;
     /// The mode at rest; `start` puts it somewhere.
     fn new(pendulum: &Pendulum) -> Self;
-    /// Why the motion can't start as the parameters say, if it can't.
+    /// Reason why the motion cannot start with these parameters, if there is one.
     fn start_problem(_init: &Init) -> Option<String> {
         None
     }
     /// The pendulum that it is made of.
     fn pendulum(&self) -> &Pendulum;
-    /// As [`SloshMode::pendulum`], to set it.
+    /// Mutable [`SloshMode::pendulum`].
     fn pendulum_mut(&mut self) -> &mut Pendulum;
     /// Squares of displacement over length and of its rate, after `start`, rad2, rad2/s2.
     fn amplitude2<T: Number>(&self) -> [T; 2];
@@ -164,7 +164,7 @@ pub trait SloshMode {
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
     /// Angular momentum about the bearing's axis, kg m2/s.
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
-    /// What makes the coordinates meaningless, if anything does.
+    /// Reason why the coordinates are outside the model's range, if they are.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None
     }

@@ -14,7 +14,7 @@ pub const SLOSHING: [SloshModel; 5] = [
     SloshModel::Liquid,
 ];
 
-/// Whether the model ends at a rim, which a violent motion reaches.
+/// Returns true if the model ends at a rim, which a violent motion reaches.
 pub fn has_rim(slosh: SloshModel) -> bool {
     matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)
 }

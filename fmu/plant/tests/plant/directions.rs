@@ -80,7 +80,7 @@ struct Newton<'a> {
 }
 
 impl Newton<'_> {
-    /// What is left of the equations of hub and bobs with w' and al'' = `unknown`.
+    /// Residual of the equations of hub and bobs with w' and al'' = `unknown`.
     fn residual(&self, x: &[f64], unknown: &[f64]) -> Vec<f64> {
         let (p, table) = (self.p, &self.p.slosh.table);
         let (r, w, w_d) = (p.tank.r, x[1], unknown[0]);

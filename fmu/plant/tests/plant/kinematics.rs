@@ -1,5 +1,5 @@
-//! What the outputs say of forces, momentum and energy is what follows from where the masses are: the
-//! bobs' places from the states, their velocities and accelerations by differences of the places.
+//! Forces, momentum and energy in the outputs follow from the positions of the masses: the
+//! bobs' positions come from the states, velocities and accelerations from differences of the positions.
 
 use super::common::bench;
 use plant::{Calculated, FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, x};
@@ -171,7 +171,7 @@ fn liquid_that_turns_with_the_hub_pushes_outwards() {
     }
 }
 
-/// Where a torque makes the hub speed up from rest, the liquid pushes it back.
+/// A torque accelerates the hub from rest.
 #[test]
 fn liquid_pushes_back_against_an_acceleration() {
     for slosh in SloshModel::ALL {

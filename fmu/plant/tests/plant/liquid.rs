@@ -1,11 +1,11 @@
-//! How the frequency of free oscillations depends on their amplitude: that of a pendulum, and of a liquid
+//! Dependence of the frequency of free oscillations on amplitude: a pendulum, and a liquid
 //! to third order.
 
 use super::free_oscillation::shifts;
 use formulas::third_order::coefficients;
 use plant::SloshModel;
 
-/// How often motions are sampled, s.
+/// Sampling interval of motions, s.
 const SAMPLE: f64 = 1e-3;
 
 #[test]

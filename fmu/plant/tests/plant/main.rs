@@ -1,4 +1,4 @@
-//! What must hold of the plant.
+//! Tests of the plant.
 
 mod balances;
 mod changing_g;

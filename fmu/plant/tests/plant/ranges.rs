@@ -106,7 +106,7 @@ fn a_ring_wider_than_the_tank_or_below_its_bottom_is_refused() {
     assert_eq!(problems(|p| (p.baffle.width, p.baffle.depth) = (0.0, 0.2)), 0, "there is none");
 }
 
-/// What a table gives is taken as it stands down to the last digit of the sum of its masses.
+/// The sum of the table's masses is compared to the last digit.
 #[test]
 fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);

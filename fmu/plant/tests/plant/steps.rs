@@ -1,4 +1,4 @@
-//! What a step costs and how exact it is.
+//! Cost and accuracy of a step.
 
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, STATES, SloshModel, StepError};
@@ -61,7 +61,7 @@ fn where_series_end_a_long_step_takes_as_many_internal_ones_as_a_short_one() {
     assert_eq!(long, short);
 }
 
-/// By slosh model and friction law, each in the order of its numbers; at the tolerances 1e-5 and 1e-10. More would be slower, fewer
+/// Internal steps by slosh model and friction law, each in the order of its numbers, at the tolerances 1e-5 and 1e-10. More would be slower, fewer
 /// less exact; one in twenty is rounding.
 const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[2, 2], [2, 2], [7, 11], [4, 5], [121, 129]],
