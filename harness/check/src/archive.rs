@@ -42,6 +42,8 @@ pub struct Archive {
     pub entries: Vec<Entry>,
     /// Why the directory could not be read to its end, or is beyond what anybody should unpack.
     broken: Option<String>,
+    /// Why no command opens the archive.
+    refusal: Option<String>,
     directory: temporary::Folder,
 }
 
@@ -59,7 +61,9 @@ impl Archive {
     pub fn read(path: &Path) -> Result<Archive> {
         let from = host::archive::Archive::open(path)?;
         let directory = temporary::Folder::new()?;
-        let mut archive = Archive { entries: Vec::new(), broken: from.fault.clone(), directory };
+        let refusal = from.check().err().map(|why| format!("{why:#}"));
+        let broken = from.fault.clone();
+        let mut archive = Archive { entries: Vec::new(), broken, refusal, directory };
         for entry in &from.entries {
             let mut unpacked = Entry {
                 name: entry.name.clone(),
@@ -99,7 +103,8 @@ impl Archive {
         let folder = path.parent().unwrap_or(self.directory.path());
         // A file where another entry wants a folder: hosts could not unpack it either.
         let place = match is_placed && std::fs::create_dir_all(folder).is_ok() {
-            true => File::create(&path).ok(),
+            // of files in the same place the first, which rules read, too
+            true => File::create_new(&path).ok(),
             false => None,
         };
         match place {
@@ -118,6 +123,11 @@ impl Archive {
     pub fn below<'a>(&'a self, folder: &'a str) -> impl Iterator<Item = &'a str> {
         let files = self.entries.iter().filter(|entry| !entry.name.ends_with('/'));
         files.map(|entry| entry.name.as_str()).filter(move |name| name.starts_with(folder))
+    }
+
+    /// Why no command opens the archive, if none does.
+    pub fn refusal(&self) -> Option<String> {
+        self.refusal.clone()
     }
 
     /// Where it is unpacked.
@@ -213,22 +223,21 @@ pub fn links(archive: &Archive, findings: &mut Findings) {
 /// `zip.duplicates`
 pub fn duplicates(archive: &Archive, findings: &mut Findings) {
     let mut seen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
-    // of folders that are there twice none hides what is in the other
-    let folders: std::collections::BTreeSet<&str> = archive
-        .entries
-        .iter()
-        .filter(|entry| entry.name.ends_with('/'))
-        .map(|entry| entry.name.as_str())
-        .collect();
-    let files = archive.entries.iter().filter(|entry| !entry.name.ends_with('/'));
-    for name in files.map(|entry| entry.name.as_str()).chain(folders) {
-        seen.entry(name.to_lowercase()).or_default().push(name);
+    for name in archive.entries.iter().map(|entry| entry.name.as_str()) {
+        // that a file is a folder is a rule of its own
+        let folder = if name.ends_with('/') { "/" } else { "" };
+        let names = seen.entry(host::archive::place(name) + folder).or_default();
+        // a folder that is there twice hides nothing
+        if !(name.ends_with('/') && names.contains(&name)) {
+            names.push(name);
+        }
     }
     for names in seen.into_values().filter(|names| names.len() > 1) {
         findings.add(
             names[0],
             format!(
-                "{} entries have this name, capitals aside: {} (allowed: one)",
+                "{} entries have this place on Windows or macOS: {} (allowed: names that differ in more than \
+                 capitals, full stops and spaces at the end, and what follows a colon)",
                 names.len(),
                 names.join(", ")
             ),

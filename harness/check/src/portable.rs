@@ -104,13 +104,13 @@ pub fn path_length(archive: &Archive, findings: &mut Findings) {
 
 /// `zip.file_and_folder`
 pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
-    // Windows and macOS do not tell capitals apart
     let files: BTreeMap<String, &str> =
-        archive.below("").map(|name| (name.trim_end_matches('/').to_lowercase(), name)).collect();
+        archive.below("").map(|name| (host::archive::place(name), name)).collect();
     let mut told = std::collections::BTreeSet::new();
     for entry in &archive.entries {
-        let name = entry.name.to_lowercase();
-        let mut folders: Vec<&str> = name.match_indices('/').map(|(at, _)| &name[..at]).collect();
+        let place =
+            host::archive::place(&entry.name) + if entry.name.ends_with('/') { "/" } else { "" };
+        let mut folders: Vec<&str> = place.match_indices('/').map(|(at, _)| &place[..at]).collect();
         folders.dedup();
         for folder in folders {
             if let Some(file) = files.get(folder)

@@ -20,7 +20,7 @@ pub static RULES: &[Rule] = &[
     rule("zip.capitals", Error, "files and folders of FMI 2.0 are written with its capitals: binaries/linux64", "2.3; hosts on Linux", Archive(portable::capitals)),
     rule("zip.file_and_folder", Error, "no file is a folder as well", "no host can unpack both", Archive(portable::file_and_folder)),
     rule("zip.links", Error, "no symbolic links", "2.3; hosts that unpack on Windows", Archive(archive::links)),
-    rule("zip.duplicates", Error, "no name twice, capitals aside", "Windows and macOS keep one of them", Archive(archive::duplicates)),
+    rule("zip.duplicates", Error, "no two files have the same name, apart from capitals, full stops and spaces at the end, and what follows a colon", "Windows and macOS keep one of them", Archive(archive::duplicates)),
     rule("zip.description", Error, "modelDescription.xml is at the root", "2.3", Archive(archive::description)),
     rule("zip.description_first", Warning, "modelDescription.xml is the first entry", "hosts that read archives as streams", Archive(archive::description_first)),
     rule("zip.documentation", Warning, "documentation/index.html is there", "2.3", Archive(archive::documentation)),

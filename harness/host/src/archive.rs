@@ -4,7 +4,7 @@
 //! Everything that opens an FMU does it here; `book/foreign.md` lists the budgets for users, and
 //! `harness/python/hubslosh/opening.py` has the same for Python.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -57,12 +57,27 @@ impl Entry {
             Some("its name leads out of the archive by \"..\"")
         } else if name.is_empty() || name.contains(['\\', '\0']) {
             Some("its name is empty, or has a backslash or a zero")
+        } else if name.trim_end_matches('/').split('/').any(|part| matches!(part, "" | ".")) {
+            Some("its name has an empty part or \".\"")
         } else if self.link {
             Some("it is a symbolic link")
         } else {
             None
         }
     }
+}
+
+/// The place that a file system can take for that of a name: Windows and macOS ignore capitals, Windows drops full
+/// stops and spaces at the end of a part and takes what follows a colon for a stream of the file.
+///
+/// Two entries with the same place overwrite each other on some system. An archive with such entries is refused on
+/// every system, so that an FMU has the same files everywhere.
+pub fn place(name: &str) -> String {
+    let part = |part: &str| {
+        let file = part.split(':').next().unwrap_or_default();
+        file.trim_end_matches(['.', ' ']).to_lowercase()
+    };
+    name.trim_end_matches('/').split('/').map(part).collect::<Vec<_>>().join("/")
 }
 
 /// An archive whose directory was read.
@@ -118,21 +133,29 @@ impl Archive {
         Ok(())
     }
 
-    /// Fails unless the archive can be unpacked: whole, within the budgets, every name once and
-    /// inside.
+    /// Fails unless the archive can be unpacked: whole, within the budgets, every name inside, and each with a
+    /// [`place`] of its own.
     pub fn check(&self) -> Result<()> {
         if let Some(why) = &self.fault {
             bail!("it is not a zip archive that can be unpacked: {why}");
         }
-        let mut names = BTreeSet::new();
+        let mut places: BTreeMap<String, &Entry> = BTreeMap::new();
         for entry in &self.entries {
             let name = entry.name.escape_debug();
             if let Some(why) = entry.way_out() {
                 bail!("{name}: {why} (allowed: files and folders with relative names)");
             }
-            // a folder has nothing in it that one of the two could hide
-            let is_new = names.insert(&entry.name) || entry.is_folder();
-            ensure!(is_new, "two entries are called {name} (allowed: one)");
+            let Some(other) = places.insert(place(&entry.name), entry) else { continue };
+            // two entries of one folder overwrite nothing
+            if entry.is_folder() && other.is_folder() {
+                continue;
+            }
+            ensure!(entry.name != other.name, "two entries are called {name} (allowed: one)");
+            bail!(
+                "{name} and {} have the same place on Windows or macOS (allowed: names that differ in more than \
+                 capitals, full stops and spaces at the end, and what follows a colon)",
+                other.name.escape_debug()
+            );
         }
         Ok(())
     }
@@ -170,7 +193,8 @@ impl Archive {
             made.map_err(anyhow::Error::from)
                 .and_then(|()| match entry.is_folder() {
                     true => Ok(()),
-                    false => self.copy(entry, &mut File::create(&path)?),
+                    // a file system may know further names for a file that is there: never overwrite it
+                    false => self.copy(entry, &mut File::create_new(&path)?),
                 })
                 .with_context(|| format!("{} cannot be unpacked", entry.name.escape_debug()))?;
         }
@@ -230,12 +254,26 @@ mod tests {
         let file = archive(files, lie);
         let done = Archive::open(file.path()).unwrap().unpack(&inner);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        if let Err(why) = &done
+            && why.to_string().contains("place")
+        {
+            assert_eq!(std::fs::read_dir(&inner).unwrap().count(), 0, "{why}");
+        }
         done.map_err(|error| format!("{error:#}"))
     }
 
     #[test]
     fn an_ordinary_archive_is_unpacked() {
         assert_eq!(unpacked(&[("a", b"1"), ("b/", b""), ("b/c", b"2")], 0), Ok(()));
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_never_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a"), "1").unwrap();
+        let file = archive(&[("a", b"2")], 0);
+        assert!(Archive::open(file.path()).unwrap().unpack(folder.path()).is_err());
+        assert_eq!(std::fs::read(folder.path().join("a")).unwrap(), b"1");
     }
 
     #[test]
@@ -253,6 +291,15 @@ mod tests {
             (&[("/out", b"")], 0, "its name is absolute"),
             (&[("c:out", b"")], 0, "its name is absolute"),
             (&[("..\\out", b"")], 0, "backslash"),
+            (&[("b/../a", b"")], 0, "leads out of the archive"),
+            (&[("./a", b"")], 0, "its name has an empty part or \".\""),
+            (&[("b/./a", b"")], 0, "its name has an empty part or \".\""),
+            (&[("b//a", b"")], 0, "its name has an empty part or \".\""),
+            (&[("b/a", b"1"), ("B/A", b"2")], 0, "B/A and b/a have the same place"),
+            (&[("b/a", b"1"), ("b/a.", b"2")], 0, "b/a. and b/a have the same place"),
+            (&[("b/a", b"1"), ("b. /a", b"2")], 0, "b. /a and b/a have the same place"),
+            (&[("b/a", b"1"), ("b/a::$DATA", b"2")], 0, "b/a::$DATA and b/a have the same place"),
+            (&[("a", b"1"), ("a/", b"")], 0, "a/ and a have the same place"),
             (&[("a", b"17000 bytes")], 4_000_000_000, "which has 4000000011 bytes by its header"),
             (&[("a", b"17000 bytes")], 3, "it has fewer bytes than its header says (14)"),
             (&[("a", b"17000 bytes")], -3, "larger than its declared uncompressed size"),

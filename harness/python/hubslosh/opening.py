@@ -50,6 +50,7 @@ def _of_archive(archive: zipfile.ZipFile, size: int) -> Iterator[str]:
     if len(entries) > ENTRIES:
         yield f"it has {len(entries)} entries (allowed: {ENTRIES})"
         return
+    places: dict[str, zipfile.ZipInfo] = {}
     for entry in entries:
         # zipfile changes what stands in `filename`
         name = entry.orig_filename
@@ -57,8 +58,13 @@ def _of_archive(archive: zipfile.ZipFile, size: int) -> Iterator[str]:
             yield f"a name in it has {len(name)} characters (allowed: {NAME} bytes)"
         elif way := _way_out(name, entry):
             yield f"{name!r}: {way} (allowed: files and folders with relative names)"
-    if len({entry.filename for entry in entries}) < len(entries):
-        yield "it has two entries of one name (allowed: one)"
+        other = places.setdefault(_place(name), entry)
+        # two entries of one folder overwrite nothing
+        if other is not entry and not (entry.is_dir() and other.is_dir()):
+            yield (
+                f"{name!r} and {other.orig_filename!r} have the same place on Windows or macOS (allowed: names that "
+                "differ in more than capitals, full stops and spaces at the end, and what follows a colon)"
+            )
     most = UNPACKED + UNPACKED_PER_BYTE * size
     unpacked = sum(entry.file_size for entry in entries)
     if unpacked > most:
@@ -73,6 +79,12 @@ def _of_archive(archive: zipfile.ZipFile, size: int) -> Iterator[str]:
         yield from _of_description(archive.read(described[0]))
 
 
+def _place(name: str) -> str:
+    """Return the place that a file system can take for that of a name (`place` in ``archive.rs``)."""
+    parts = name.rstrip("/").split("/")
+    return "/".join(part.split(":")[0].rstrip(". ").lower() for part in parts)
+
+
 def _way_out(name: str, entry: zipfile.ZipInfo) -> str | None:
     if name.startswith("/") or name[1:2] == ":":
         return "its name is absolute"
@@ -80,6 +92,8 @@ def _way_out(name: str, entry: zipfile.ZipInfo) -> str | None:
         return 'its name leads out of the archive by ".."'
     if not name or "\\" in name or "\0" in name:
         return "its name is empty, or has a backslash or a zero"
+    if {"", "."} & set(name.rstrip("/").split("/")):
+        return 'its name has an empty part or "."'
     if stat.S_ISLNK(entry.external_attr >> 16):
         return "it is a symbolic link"
     return None

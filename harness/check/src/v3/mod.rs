@@ -28,7 +28,7 @@ pub static RULES: &[Rule] = &[
     rule("zip.path_length", Warning, "paths have at most 160 characters, their parts at most 255 bytes", "Windows opens 259 characters, temporary folder included", Archive(portable::path_length)),
     rule("zip.file_and_folder", Error, "no file is a folder as well", "no host can unpack both", Archive(portable::file_and_folder)),
     rule("zip.links", Error, "no symbolic links", "2.5", Archive(crate::archive::links)),
-    rule("zip.duplicates", Error, "no file's name twice, capitals aside", "Windows and macOS keep one of them", Archive(crate::archive::duplicates)),
+    rule("zip.duplicates", Error, "no two files have the same name, apart from capitals, full stops and spaces at the end, and what follows a colon", "Windows and macOS keep one of them", Archive(crate::archive::duplicates)),
     rule("zip.description", Error, "modelDescription.xml is at the root", "2.5.1", Archive(crate::archive::description)),
     rule("zip.folders", Warning, "only files and folders of FMI 3.0 at the top", "2.5.1", Archive(archive::folders)),
     rule("zip.licenses", Error, "documentation/licenses has license.spdx, license.txt or license.html", "2.5.1.1.1", Archive(archive::licenses)),

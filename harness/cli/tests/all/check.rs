@@ -184,6 +184,24 @@ fn archives_that_hosts_stumble_over_are_told() {
             ("a link", link, &["zip.links"]),
             ("a name twice", twice, &["zip.duplicates"]),
             ("capitals", plus("documentation/INDEX.html"), &["zip.duplicates"]),
+            (
+                "a full stop that Windows drops",
+                plus("documentation/index.html."),
+                &["zip.duplicates", "zip.windows_names"],
+            ),
+            (
+                "a stream of a file",
+                plus("documentation/index.html::$DATA"),
+                &["zip.duplicates", "zip.windows_names"],
+            ),
+            ("an empty part", plus("documentation//index.html"), &["zip.names"]),
+            ("a part that is .", plus("documentation/./index.html"), &["zip.names"]),
+            (
+                "a name that begins with .",
+                plus("./documentation/index.html"),
+                &["zip.names", "zip.folders"],
+            ),
+            ("a detour", plus("documentation/x/../index.html"), &["zip.names"]),
             ("description missing", without(XML), &["zip.description"]),
             (
                 "description in a folder",
