@@ -16,6 +16,8 @@ struct File<'r> {
     errors: usize,
     /// How many are warnings.
     warnings: usize,
+    /// The error that no selected rule was checked; null if one was.
+    unchecked: Option<&'r str>,
     /// One for each rule that was looked at or skipped, in the table's order.
     rules: Vec<Rule<'r>>,
 }
@@ -55,6 +57,7 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
         fmu: report.path.display().to_string(),
         errors: report.count(Severity::Error),
         warnings: report.count(Severity::Warning),
+        unchecked: report.unchecked.as_deref(),
         rules,
     };
     serde_json::to_writer_pretty(&mut *out, &file)?;

@@ -46,6 +46,7 @@ struct TestCase {
     class: &'static str,
     #[serde(rename = "@time")]
     time: String,
+    error: Option<Text>,
     failure: Option<Text>,
     skipped: Option<Text>,
     #[serde(rename = "system-out")]
@@ -63,13 +64,15 @@ struct Text {
 /// Writes the report. Rules are test cases, classed by their group; errors fail them, warnings are
 /// their output.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
-    let cases: Vec<_> = report.outcomes.iter().map(case).collect();
+    let mut cases: Vec<_> = report.outcomes.iter().map(case).collect();
+    cases.extend(report.unchecked.as_deref().map(unchecked));
+    let errors = cases.iter().filter(|case| case.error.is_some()).count();
     let tests = cases.len();
     let failures = cases.iter().filter(|case| case.failure.is_some()).count();
     let skipped = cases.iter().filter(|case| case.skipped.is_some()).count();
     let name = legal(&report.path.display().to_string());
-    let suite = TestSuite { name, tests, skipped, errors: 0, failures, cases };
-    let suites = TestSuites { name: "hubslosh check", tests, failures, errors: 0, suite };
+    let suite = TestSuite { name, tests, skipped, errors, failures, cases };
+    let suites = TestSuites { name: "hubslosh check", tests, failures, errors, suite };
     let layout = xml::EmitterConfig::new().perform_indent(true).indent_string("  ");
     serde_xml_rs::SerdeXml::new().emitter(layout).to_writer(&mut *out, &suites)?;
     Ok(writeln!(out)?)
@@ -87,6 +90,7 @@ fn case(outcome: &Outcome) -> TestCase {
         name: rule.id,
         class: rule.id.split('.').next().unwrap_or_default(),
         time: format!("{:.3}", outcome.time.as_secs_f64()),
+        error: None,
         skipped: outcome
             .findings
             .skipped
@@ -98,6 +102,20 @@ fn case(outcome: &Outcome) -> TestCase {
             text: Some(errors),
         }),
         output: (!warnings.is_empty()).then(|| format!("warning: {warnings}")),
+    }
+}
+
+/// A test case of its own for the error that no rule was checked: viewers take a suite that is skipped as a whole
+/// for a success.
+fn unchecked(why: &str) -> TestCase {
+    TestCase {
+        name: "check",
+        class: "check",
+        time: "0.000".into(),
+        error: Some(Text { message: legal(why), text: None }),
+        failure: None,
+        skipped: None,
+        output: None,
     }
 }
 
@@ -128,7 +146,7 @@ mod tests {
         outcomes[0].findings.fail("a\u{1}b", "<&\"]]>");
         outcomes[1].findings.add("c", "d");
         outcomes[2].findings.skip("e");
-        let report = Report { path: "x.fmu".into(), outcomes };
+        let report = Report { path: "x.fmu".into(), outcomes, unchecked: None };
         let mut out = Vec::new();
         write(&report, &mut out).unwrap();
         let root = Element::parse(&out).unwrap();

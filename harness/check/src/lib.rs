@@ -206,6 +206,11 @@ impl Findings {
         }
     }
 
+    /// Whether an error was found.
+    fn has_error(&self) -> bool {
+        self.list.iter().any(|finding| finding.severity == Severity::Error)
+    }
+
     /// The rule does not apply.
     pub fn skip(&mut self, why: impl Into<String>) {
         self.skipped = Some(why.into());
@@ -244,7 +249,24 @@ pub struct Report {
     pub path: PathBuf,
     /// One for each rule, in the table's order.
     pub outcomes: Vec<Outcome>,
+    /// The error that no selected rule was checked, if that is so: such a report says nothing about the FMU.
+    pub unchecked: Option<String>,
 }
+
+/// Rules that say why a file cannot be opened as an FMU. If it cannot, those that are broken are in the report even
+/// if they are not selected.
+const OPENING: [&str; 10] = [
+    "zip.readable",
+    "zip.methods",
+    "zip.names",
+    "zip.links",
+    "zip.duplicates",
+    "zip.description",
+    "xml.well_formed",
+    "xml.encoding",
+    "xml.size",
+    "xml.doctype",
+];
 
 /// Looks at all rules, or those asked for; `progress` is called after each rule of calls with their
 /// number.
@@ -337,7 +359,46 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     };
     let mut outcomes: Vec<Outcome> = selected.par_iter().map(one).collect();
     tell_what_nobody_tells(&mut outcomes);
-    Ok(Report { path: path.to_path_buf(), outcomes })
+    let unchecked = unchecked(&outcomes, &options.only);
+    let unopened = archive.refusal().or(description.as_ref().err().cloned());
+    if let Some(why) = unopened {
+        let is_selected = |rule: &Rule| selected.iter().any(|selected| selected.id == rule.id);
+        let others = table.iter().filter(|rule| OPENING.contains(&rule.id) && !is_selected(rule));
+        let mut others: Vec<Outcome> = others.map(|rule| one(&rule)).collect();
+        others.retain(|outcome| outcome.findings.has_error());
+        outcomes.extend(others);
+        if !outcomes.iter().any(|outcome| outcome.findings.has_error())
+            && let Some(rule) = table.iter().find(|rule| rule.id == OPENING[0])
+        {
+            outcomes.retain(|outcome| outcome.rule.id != rule.id);
+            let mut findings = Findings::new(rule.severity);
+            findings.fail("the archive", format!("it cannot be opened as an FMU: {why}"));
+            outcomes.push(Outcome { rule, findings, time: Duration::ZERO });
+        }
+        let place = |outcome: &Outcome| table.iter().position(|rule| rule.id == outcome.rule.id);
+        outcomes.sort_by_key(place);
+    }
+    Ok(Report { path: path.to_path_buf(), outcomes, unchecked })
+}
+
+/// The error that no rule of `outcomes`, those selected by `only`, was checked.
+fn unchecked(outcomes: &[Outcome], only: &[String]) -> Option<String> {
+    let is_skipped = |o: &Outcome| o.findings.skipped.is_some() && o.findings.list.is_empty();
+    if !outcomes.iter().all(is_skipped) {
+        return None;
+    }
+    let why = outcomes.first().and_then(|outcome| outcome.findings.skipped.as_deref());
+    let selection = only.join(",");
+    Some(match (outcomes.len(), why) {
+        (0, _) | (_, None) => format!(
+            "nothing was checked: this version of FMI has no rule {selection} (`hubslosh check --rules` lists the \
+             rules of each version)"
+        ),
+        (n, Some(why)) => format!(
+            "nothing was checked: all {n} rules of {selection} were skipped, the first because {why} (select rules \
+             that apply, or check all of them without --only)"
+        ),
+    })
 }
 
 /// A rule that was skipped for a fault that another rule tells becomes a finding if that rule was
@@ -428,6 +489,9 @@ impl Report {
             self.count(Severity::Warning),
             self.outcomes.len() - skipped,
         );
+        if let Some(why) = &self.unchecked {
+            let _ = writeln!(text, "error: {why}");
+        }
         text
     }
 }

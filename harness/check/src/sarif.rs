@@ -39,6 +39,11 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
             })
         })
         .collect();
+    let notifications: Vec<_> = report
+        .unchecked
+        .iter()
+        .map(|why| json!({ "level": "error", "message": { "text": why } }))
+        .collect();
     let file = json!({
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
         "version": "2.1.0",
@@ -48,6 +53,10 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
                 "version": env!("CARGO_PKG_VERSION"),
                 "rules": rules,
             } },
+            "invocations": [{
+                "executionSuccessful": report.unchecked.is_none(),
+                "toolExecutionNotifications": notifications,
+            }],
             "results": results,
         }],
     });

@@ -107,7 +107,7 @@ const EXIT_CODES: &str = "Exit codes:\n  \
     0  done, or the reader of its output has closed the pipe\n  \
     1  it failed; stderr says what was wrong, where, and what is allowed (of check: errors were \
     found; with --strict: warnings were)\n  \
-    2  the command line was not understood";
+    2  the command line was not understood (of check: no selected rule was checked)";
 
 #[derive(Subcommand)]
 enum Command {
@@ -247,7 +247,7 @@ fn carry_out(cli: Cli) -> u8 {
         Ok(()) => terminal::code(),
         Err(error) => {
             terminal::error(format_args!("{error:#}"));
-            1
+            if error.is::<check::Unchecked>() { 2 } else { 1 }
         }
     }
 }

@@ -12,7 +12,8 @@ use crate::{fmu, progress, terminal};
 /// Checks an FMU 2.0 or 3.0 against the standard and against what hosts ask for.
 ///
 /// Looks at the archive, the description and the binaries, and calls the binary for this platform
-/// as hosts do. The exit code is 0 when there are no errors; warnings are only reported.
+/// as hosts do. The exit code is 0 when there are no errors, 1 when there are, and 2 when no selected rule could be
+/// checked; warnings are only reported.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh check dist/HubSlosh.fmu\n  \
     hubslosh check other.fmu --only zip,xml --junit check.xml\n  hubslosh check --rules")]
@@ -39,6 +40,18 @@ pub struct CheckArgs {
     #[arg(long)]
     rules: bool,
 }
+
+/// No selected rule was checked; the exit code is 2.
+#[derive(Debug)]
+pub struct Unchecked(String);
+
+impl std::fmt::Display for Unchecked {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Unchecked {}
 
 /// What `check` starts for the calls of one rule.
 #[derive(clap::Args)]
@@ -89,6 +102,9 @@ impl CheckArgs {
         }
         if let warnings @ 1.. = report.count(Severity::Warning) {
             terminal::warn(format_args!("{} draws {warnings} warnings", fmu.display()));
+        }
+        if let Some(why) = report.unchecked {
+            return Err(Unchecked(format!("{}: {why}", fmu.display())).into());
         }
         match report.count(Severity::Error) {
             0 => Ok(()),

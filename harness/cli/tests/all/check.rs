@@ -258,6 +258,77 @@ fn archives_that_hosts_stumble_over_are_told() {
     );
 }
 
+/// The exit code, stdout and stderr of a check of a file with this content.
+fn command(content: &[u8], arguments: &[&str]) -> (Option<i32>, String, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.fmu");
+    std::fs::write(&path, content).unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+        .current_dir(folder.path())
+        .args(["check", "file.fmu"])
+        .args(arguments)
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (done.status.code(), text(&done.stdout), text(&done.stderr))
+}
+
+#[test]
+fn a_check_that_skips_every_selected_rule_fails_with_exit_code_2() {
+    for (content, only) in [
+        (&b"not a zip archive"[..], "xml"),
+        (b"", "load,steps"),
+        // rules of FMI 3.0 alone
+        (&zipped(ours(), CompressionMethod::Stored), "events"),
+        (&zipped(ours(), CompressionMethod::Stored), "values.in_range"),
+    ] {
+        let (code, stdout, stderr) = command(content, &["--only", only]);
+        assert_eq!(code, Some(2), "{only}: {stdout}{stderr}");
+        assert!(stdout.contains("error: nothing was checked: "), "{only}: {stdout}");
+        assert!(stderr.contains("nothing was checked: "), "{only}: {stderr}");
+        let (code, stdout, _) = command(content, &["--only", only, "--json"]);
+        let json: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+        assert_eq!(code, Some(2));
+        assert!(json["unchecked"].as_str().unwrap().starts_with("nothing was checked: "), "{json}");
+        let report = look(content, &only.split(',').collect::<Vec<_>>());
+        let mut file = Vec::new();
+        check::sarif::write(&report, &mut file).unwrap();
+        let sarif: serde_json::Value = serde_json::from_slice(&file).unwrap();
+        let invocation = &sarif["runs"][0]["invocations"][0];
+        assert_eq!(invocation["executionSuccessful"], false, "{sarif}");
+        assert_eq!(invocation["toolExecutionNotifications"][0]["level"], "error");
+        let mut file = Vec::new();
+        check::junit::write(&report, &mut file).unwrap();
+        let root = Element::parse(&file).unwrap();
+        assert_eq!((root.get("errors"), root.children[0].get("errors")), (Some("1"), Some("1")));
+        let case = root.children[0].children.last().unwrap();
+        assert_eq!((case.get("name"), case.children[0].name.as_str()), (Some("check"), "error"));
+    }
+}
+
+#[test]
+fn a_file_that_is_not_an_fmu_breaks_a_rule_whatever_rules_are_selected() {
+    let mut link =
+        ZipWriter::new_append(Cursor::new(zipped(ours(), CompressionMethod::Stored))).unwrap();
+    link.add_symlink("extra/link", "../../outside", SimpleFileOptions::default()).unwrap();
+    let without_description = ours().iter().filter(|(name, _)| name != XML).cloned().collect();
+    let cut = xml().into_bytes()[..1000].to_vec();
+    for (content, rule) in [
+        (b"not a zip archive".to_vec(), "zip.readable"),
+        (Vec::new(), "zip.readable"),
+        (link.finish().unwrap().into_inner(), "zip.links"),
+        (zipped(&without_description, CompressionMethod::Stored), "zip.description"),
+        (zipped(&with(XML, cut), CompressionMethod::Stored), "xml.well_formed"),
+    ] {
+        for only in ["xml.guid", "zip.capitals", "bin.name", "load.version"] {
+            let report = look(&content, &[only]);
+            assert!(broken(&report).contains(rule), "{rule}, --only {only}: {}", report.text());
+        }
+    }
+    let report = look(&zipped(ours(), CompressionMethod::Stored), &["xml.guid"]);
+    assert_eq!((report.unchecked.clone(), report.outcomes.len()), (None, 1), "{}", report.text());
+}
+
 /// The XML with the first `from` after `after` changed to `to`.
 fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
     let text = xml();
