@@ -468,16 +468,16 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Hub rate at the start")
         .display_unit("deg/s").range(-1e3, 1e3),
     V::parameter("init.slosh_angle", |p, _| &mut p.init.slosh_angle, "rad",
-        "slosh_angle at the start. Not 0, so that with nothing set something moves; 0 to start at rest")
+        "slosh_angle at the start. Not 0, so that with nothing set something moves; 0 to start at rest. With slosh.table.direction[1] not 0, the start has to be along it")
         .display_unit("deg").range(-1.5, 1.5),
     V::parameter("init.slosh_angle_radial", |p, _| &mut p.init.slosh_angle_radial, "rad",
-        "slosh_angle_radial at the start; without meaning in planar models")
+        "slosh_angle_radial at the start. Models linear and planar: the radial part of a start along slosh.table.direction[1]; without effect where that is 0")
         .display_unit("deg").range(-1.5, 1.5),
     V::parameter("init.slosh_rate", |p, _| &mut p.init.slosh_rate, "rad/s",
-        "slosh_rate at the start")
+        "slosh_rate at the start. With slosh.table.direction[1] not 0, the start has to be along it")
         .display_unit("deg/s").range(-1e3, 1e3),
     V::parameter("init.slosh_rate_radial", |p, _| &mut p.init.slosh_rate_radial, "rad/s",
-        "slosh_rate_radial at the start; without meaning in planar models")
+        "slosh_rate_radial at the start. Models linear and planar: as init.slosh_angle_radial")
         .display_unit("deg/s").range(-1e3, 1e3),
 
     // Reaction wheel

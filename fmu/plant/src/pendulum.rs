@@ -1,10 +1,17 @@
 //! One slosh mode as a pendulum: its constants, its restoring force and its drag.
 
+use alloc::format;
+use alloc::string::String;
+
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul, mul_ramp};
 
 use crate::amplitude::Growth;
 use crate::baffle::Baffle;
+use crate::parameters::Init;
+
+/// How far the start of mode 1 may be off its direction, rad: what decimals round.
+const ALONG: f64 = 1e-6;
 
 /// One slosh mode as a pendulum that hangs at the tank's axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,6 +124,32 @@ impl Pendulum {
     #[inline(always)]
     pub fn is_askew(&self) -> bool {
         self.along[0] != 0.0
+    }
+
+    /// Why mode 1 cannot start as `init` says: it moves along its direction, and the start is not along it.
+    pub fn start_problem(&self, init: &Init) -> Option<String> {
+        let [x, t] = self.along;
+        let starts = [
+            ("angle", "rad", init.slosh_angle_radial, init.slosh_angle),
+            ("rate", "rad/s", init.slosh_rate_radial, init.slosh_rate),
+        ];
+        starts.into_iter().find_map(|(name, unit, radial, tangential)| {
+            let size = libm::hypot(radial, tangential);
+            let off = libm::fabs(radial * t - tangential * x) > ALONG * size;
+            // The same size along the direction.
+            let along = libm::copysign(size, radial * x + tangential * t);
+            (self.is_askew() && off).then(|| {
+                format!(
+                    "init.slosh_{name} = {tangential:?} {unit} and init.slosh_{name}_radial = {radial:?} {unit} are not along \
+                     slosh.table.direction[1] = {:?} rad, the only direction in which mode 1 moves (allowed: both 0, or \
+                     tan(slosh.table.direction[1]) = init.slosh_{name}_radial / init.slosh_{name}, for example \
+                     init.slosh_{name} = {:?} with init.slosh_{name}_radial = {:?})",
+                    libm::atan2(x, t),
+                    along * t,
+                    along * x
+                )
+            })
+        })
     }
 
     /// Radial and tangential part of what is along the bob's direction.

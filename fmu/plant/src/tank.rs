@@ -193,6 +193,18 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
                 .to_string(),
         );
     }
+    let radial = [
+        ("init.slosh_angle_radial", p.init.slosh_angle_radial),
+        ("init.slosh_rate_radial", p.init.slosh_rate_radial),
+    ];
+    let along_tangent = matches!(slosh.model, SloshModel::Linear | SloshModel::Planar)
+        && (geometry || slosh.table.direction[0] == 0.0);
+    for (name, value) in radial.into_iter().filter(|(_, value)| along_tangent && *value != 0.0) {
+        warnings.push(format!(
+            "{name} = {value:?} is without effect: with slosh.model = linear and planar, mode 1 moves along the tangent alone \
+             (slosh.model = spherical, paraboloid and liquid move radially, too)"
+        ));
+    }
     let start = Parameters::default();
     let unused: Vec<&str> = [
         ("tank.h", p.tank.h != start.tank.h),

@@ -26,11 +26,14 @@
 //! A hub that only turns moves a mode along the radius (n_t = 0) by terms of second order alone, r w^2 and 2 w u': they
 //! are in `planar.rs`. Here such a mode is moved by a lean of the bench, and its mass is carried on the circle of radius r.
 
+use alloc::string::String;
+
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, next, number, square, values};
 
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
+use crate::parameters::Init;
 use crate::pendulum::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -51,6 +54,10 @@ impl SloshMode for Linear {
 
     fn new(p: &Pendulum) -> Self {
         Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, drag: ZERO }
+    }
+
+    fn start_problem(&self, init: &Init) -> Option<String> {
+        self.p.start_problem(init)
     }
 
     fn pendulum(&self) -> &Pendulum {

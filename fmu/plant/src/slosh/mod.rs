@@ -71,10 +71,7 @@ impl Liquid {
 
     /// Reason why the motion cannot start with these parameters, if there is one.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
-        fn of<M: SloshMode>(_: &[M], init: &Init) -> Option<String> {
-            M::start_problem(init)
-        }
-        with_modes!(self, modes => of(modes, init))
+        with_modes!(self, modes => modes.first().and_then(|mode| mode.start_problem(init)))
     }
 }
 
@@ -117,7 +114,7 @@ pub trait SloshMode {
     /// The mode at rest; `start` puts it somewhere.
     fn new(pendulum: &Pendulum) -> Self;
     /// Reason why the motion cannot start with these parameters, if there is one.
-    fn start_problem(_init: &Init) -> Option<String> {
+    fn start_problem(&self, _init: &Init) -> Option<String> {
         None
     }
     /// The pendulum that it is made of.

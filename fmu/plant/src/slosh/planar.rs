@@ -32,11 +32,14 @@
 //! Along the radius (n_t = 0) the hub's acceleration does not move the bob: w^2 (r + u) throws it outwards, and it turns with
 //! the hub at r + u, so that its motion slows and speeds up the hub (2 w u').
 
+use alloc::string::String;
+
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, next, number, sin_cos, square, values};
 
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
+use crate::parameters::Init;
 use crate::pendulum::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -74,6 +77,10 @@ impl SloshMode for Planar {
             al_d2: ZERO,
             force: ZERO,
         }
+    }
+
+    fn start_problem(&self, init: &Init) -> Option<String> {
+        self.p.start_problem(init)
     }
 
     fn pendulum(&self) -> &Pendulum {

@@ -181,7 +181,7 @@ impl SloshMode for Spherical {
         [x * x + y * y, x_d * x_d + y_d * y_d]
     }
 
-    fn start_problem(init: &Init) -> Option<String> {
+    fn start_problem(&self, init: &Init) -> Option<String> {
         let sines = [init.slosh_angle_radial, init.slosh_angle].map(libm::sin);
         let sum = sines[0] * sines[0] + sines[1] * sines[1];
         (sum > 0.9999).then(|| {

@@ -309,3 +309,70 @@ fn directions_are_refused_where_they_mean_nothing() {
     });
     assert!(light.unwrap().contains("least inert"));
 }
+
+/// Mode 1 moves along its direction alone: the outputs at the start are what was set, or the start is refused and the message
+/// gives a start that is accepted.
+#[test]
+fn a_start_is_along_the_direction_of_mode_1_or_refused() {
+    for model in MODELS {
+        for direction in [0.6, -1.2, FRAC_PI_2] {
+            let mut p = askew(model, FrictionModel::None);
+            p.slosh.table.direction[..3].copy_from_slice(&[direction, 0.0, 0.3]);
+            let (sin, cos) = f64::sin_cos(direction);
+            let start = |p: &Parameters| Plant::new(p, &Inputs::default(), 0.0, TOLERANCE);
+            (p.init.slosh_angle, p.init.slosh_angle_radial) = (0.3 * cos, 0.3 * sin);
+            (p.init.slosh_rate, p.init.slosh_rate_radial) = (-2.0 * cos, -2.0 * sin);
+            let o = start(&p).unwrap().outputs(&Inputs::default());
+            let got = [o.slosh_angle, o.slosh_angle_radial, o.slosh_rate, o.slosh_rate_radial];
+            let init = p.init;
+            let set = [
+                init.slosh_angle,
+                init.slosh_angle_radial,
+                init.slosh_rate,
+                init.slosh_rate_radial,
+            ];
+            for (got, set) in got.iter().zip(set) {
+                assert!((got - set).abs() < 1e-15, "{model:?} {direction}: {got} {set}");
+            }
+            // off it by a thousandth, and what earlier versions took for a part along the direction
+            for (tangential, radial) in
+                [(0.3 * cos + 3e-4 * sin, 0.3 * sin - 3e-4 * cos), (0.3 * (cos + sin), 0.0)]
+            {
+                (p.init.slosh_angle, p.init.slosh_angle_radial) = (tangential, radial);
+                let said = start(&p).unwrap_err().join("\n");
+                assert!(said.contains("init.slosh_angle_radial"), "{said}");
+                assert!(said.contains("slosh.table.direction[1]"), "{said}");
+                let example = |name: &str| -> f64 {
+                    let after = said.rsplit(&format!("{name} = ")).next().unwrap();
+                    after.split([' ', ')']).next().unwrap().parse().unwrap()
+                };
+                p.init.slosh_angle = example("init.slosh_angle");
+                p.init.slosh_angle_radial = example("init.slosh_angle_radial");
+                start(&p).unwrap();
+            }
+            p.init.slosh_rate = 1.0 + p.init.slosh_rate;
+            let said = start(&p).unwrap_err().join("\n");
+            assert!(said.contains("init.slosh_rate ="), "{said}");
+        }
+    }
+}
+
+#[test]
+fn a_radial_start_without_effect_is_warned_of() {
+    for (model, direction, warned) in [
+        (SloshModel::Linear, 0.0, true),
+        (SloshModel::Planar, 0.0, true),
+        (SloshModel::Planar, 0.6, false),
+        (SloshModel::Spherical, 0.0, false),
+    ] {
+        let mut p = askew(model, FrictionModel::None);
+        p.slosh.table.direction = [0.0; plant::MODES];
+        p.slosh.table.direction[0] = direction;
+        for radial in [0.0, 0.1] {
+            (p.init.slosh_angle_radial, p.init.slosh_rate_radial) = (radial, 0.0);
+            let said = Plant::warnings(&p, &Inputs::default()).join("\n");
+            let found = said.contains("init.slosh_angle_radial = 0.1 is without effect");
+            assert_eq!(found, warned && radial != 0.0, "{model:?} {said}");
+        }
+    }
+}
