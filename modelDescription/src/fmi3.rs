@@ -19,7 +19,7 @@ use serde::Serialize;
 use crate::schema::{Category, DefaultExperiment, Item, LogCategories, Units};
 use crate::{RELEASED, STEP_SIZE, STOP_TIME, folder, is_derivative, is_output, real, unit, write};
 
-/// Where the committed XML is.
+/// Path of the committed XML.
 pub fn path<M: Model>(layout: Layout) -> PathBuf {
     folder::<M>().join(match layout {
         Layout::Scalars => "fmi3/modelDescription.xml",
@@ -166,7 +166,7 @@ enum Variable {
     Enumeration(Box<Attributes>),
 }
 
-/// What a variable of any type may have.
+/// Attributes that a variable of any type may have.
 #[derive(Debug, Default, Serialize)]
 struct Attributes {
     #[serde(rename = "@name")]
@@ -205,7 +205,7 @@ struct Attributes {
     dimensions: Vec<Size>,
 }
 
-/// How long an array is along one of its dimensions: always, or as a structural parameter says.
+/// Size of an array along one dimension: fixed, or set by a structural parameter.
 #[derive(Debug, Serialize)]
 struct Size {
     #[serde(rename = "@start")]
@@ -419,7 +419,7 @@ fn text(value: Value) -> String {
     }
 }
 
-/// What is said of all elements of an entry. Those of `own` are the variable's own.
+/// Attributes shared by all elements of an entry; those of `own` belong to the variable itself.
 fn of_entry<M: Model>(
     layout: Layout,
     v: &runtime::variable::Variable<M>,

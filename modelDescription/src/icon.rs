@@ -6,8 +6,8 @@
 
 use sha2::{Digest, Sha256};
 
-/// Where the drawing (`icon.svg`), its picture (`icon.png`, each FMU's `model.png`) and their
-/// hashes are.
+/// Folder of the drawing (`icon.svg`), its picture (`icon.png`, each FMU's `model.png`) and their
+/// hashes.
 pub const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon");
 /// Width and height, px.
 pub const SIZE: u32 = 512;

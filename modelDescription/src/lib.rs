@@ -25,7 +25,7 @@ pub fn folder<M: Model>() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(M::table().about.model)
 }
 
-/// Where the committed XML is.
+/// Path of the committed XML.
 pub fn path<M: Model>() -> PathBuf {
     folder::<M>().join("modelDescription.xml")
 }
@@ -34,7 +34,7 @@ pub fn path<M: Model>() -> PathBuf {
 /// byte for byte.
 const RELEASED: &str = "2026-11-22T12:00:00Z";
 
-/// What a host shows when it knows nothing better: 20 s at the gyro's 50 Hz.
+/// Default stop time: 20 s at the gyro's 50 Hz.
 const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use runtime::Model;
 use runtime::variable::{Causality, Kind, Value, Variable};
 
-/// Where the committed page is.
+/// Path of the committed page.
 pub fn path<M: Model>() -> PathBuf {
     crate::folder::<M>().join("documentation").join("variables.md")
 }
@@ -121,7 +121,7 @@ fn range<M: Model>(variable: &Variable<M>) -> (String, String) {
     }
 }
 
-/// As people write it: powers of ten only where there would be many zeros.
+/// Number in the usual notation: powers of ten only in place of many zeros.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }

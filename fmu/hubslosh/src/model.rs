@@ -16,12 +16,12 @@ use crate::table::{self, TABLE};
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
-    /// Whether the present inputs are applied, see [`Model::apply_present_inputs`].
+    /// True once the present inputs are applied, see [`Model::apply_present_inputs`].
     present: bool,
 }
 
 impl HubSlosh {
-    /// What follows from the parameters.
+    /// Values calculated from the parameters.
     pub fn calculated(&self) -> &Calculated {
         self.plant.calculated()
     }
@@ -47,13 +47,13 @@ pub struct Parameters {
     pub friction_kind: i32,
     /// 1 for false, 2 for true, 0: as the Boolean says; likewise below.
     pub zeta_from_correlation_kind: i32,
-    /// Of `slosh.capillarity`.
+    /// Integer twin of `slosh.capillarity`.
     pub capillarity_kind: i32,
-    /// Of `slosh.table.one_axis`.
+    /// Integer twin of `slosh.table.one_axis`.
     pub one_axis_kind: i32,
-    /// Of `wheel.enabled`.
+    /// Integer twin of `wheel.enabled`.
     pub wheel_enabled_kind: i32,
-    /// Of `imu.enabled`.
+    /// Integer twin of `imu.enabled`.
     pub imu_enabled_kind: i32,
 }
 
@@ -95,8 +95,8 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// What the plant is made of: the enumerations and Booleans with their `…kind` applied. An enumeration that
-    /// contradicts its kind is refused; a Boolean is not, for it is noise in the hosts that its kind is for.
+    /// Parameters of the plant with the `…kind` of enumerations and Booleans applied. An enumeration that
+    /// contradicts its kind is refused; a Boolean is not, because the hosts that need the kind set it at random.
     fn resolved(&self) -> Result<plant::Parameters, Vec<String>> {
         let mut p = self.plant;
         let start = plant::Parameters::default();
@@ -152,7 +152,7 @@ fn failure(why: StepError) -> StepFailure {
     StepFailure { text: why.to_string(), shorter_may_succeed: why.shorter_may_succeed() }
 }
 
-/// How many words [`Model::save`] writes.
+/// Number of words that [`Model::save`] writes.
 pub const SAVED_WORDS: usize = State::WORDS + 1 + StoppedStep::WORDS;
 
 impl Model for HubSlosh {

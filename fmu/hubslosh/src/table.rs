@@ -76,9 +76,9 @@ const LIQUID_MODES: &[&str] = &["tank.", "fluid.", "slosh.", "bench.", "init.the
 // back mixes the directions in the last digit.
 const SLOSH_START: &[&str] = &["tank.", "slosh.", "bench.", "init."];
 
-/// Of the modes that are kept.
+/// Dimension over the modes in use.
 const PER_MODE: &[Dimension] = &[Sized("slosh.modes", MODES)];
-/// Of a table of modes, of which those of the lowest frequencies are kept.
+/// Dimension of a table of modes, of which those with the lowest frequencies are used.
 const TABLE_OF_MODES: &[Dimension] = &[Fixed(MODES)];
 
 type V = Variable<HubSlosh>;
@@ -573,7 +573,7 @@ static SLOSH_MODEL: Enumeration = Enumeration {
     ],
 };
 
-/// Where the modal parameters come from.
+/// Source of the modal parameters.
 static SLOSH_SOURCE: Enumeration = Enumeration {
     name: "SloshSource",
     description: "Sources of the modal parameters",
@@ -583,7 +583,7 @@ static SLOSH_SOURCE: Enumeration = Enumeration {
     ],
 };
 
-/// How damping follows the natural frequency.
+/// Dependence of damping on the natural frequency.
 static DAMPING_LAW: Enumeration = Enumeration {
     name: "DampingLaw",
     description: "Viscous coefficient c of a mode against its natural frequency omega",
@@ -613,7 +613,7 @@ static FRICTION_MODEL: Enumeration = Enumeration {
     ],
 };
 
-/// How high the wave is.
+/// Amplitude class of the wave.
 static REGIME: Enumeration = Enumeration {
     name: "Regime",
     description: "Wave height at the wall against the tank's radius R",

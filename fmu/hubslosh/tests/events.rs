@@ -98,7 +98,7 @@ fn torque(step: usize) -> f64 {
     0.06 * (0.7 * step as f64).sin()
 }
 
-/// What is compared at communication points: what is continuous, the reading and the number of changes of contact.
+/// Variables compared at communication points: the continuous ones, the gyro reading and the number of contact changes.
 const LOOKED_AT: [&str; 12] = [
     "theta",
     "omega",

@@ -28,11 +28,11 @@ const LUMP: &str = "the liquid leaves the tank's bottom and goes on as one lump 
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// Whether the present inputs are applied: in Co-Simulation ranges are those of the present motion.
+    /// True once the present inputs are applied: in Co-Simulation ranges are those of the present motion.
     present: bool,
-    /// Whether the motion of a tank without a ball regime has left its range.
+    /// True once the motion of a tank without a model of detached liquid has left its range.
     has_left_range: bool,
-    /// Whether the liquid of one with has left its bottom.
+    /// True once the liquid of a tank with such a model has detached.
     has_had_lump: bool,
 }
 
@@ -84,7 +84,7 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// What the tank is made of. `coupling_kind` may not contradict a `coupling` that has been set.
+    /// Parameters of the tank. `coupling_kind` may not contradict a `coupling` that has been set.
     fn resolved(&self) -> Result<TankParameters, Vec<String>> {
         let mut p = self.tank;
         let (coupling, kind) = (p.coupling as i32, self.coupling_kind);
@@ -120,7 +120,7 @@ impl Parameters {
 /// the tank stands on the ground and is pushed with [`START_ACCELERATION`].
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
-    /// As the tank takes it.
+    /// Inputs in the form that the tank takes.
     pub tank: TankInputs,
     /// The slope of omega, rad/s2.
     pub omega_slope: [f64; 3],

@@ -63,7 +63,7 @@ const DISSIPATED: usize = 6 * MODES;
 const LIQUID: usize = DISSIPATED + 1;
 const BALL: usize = LIQUID + 1;
 
-/// As an item of [`BALL_STATE`].
+/// Item of [`BALL_STATE`].
 fn ball_state(state: BallState) -> i32 {
     match state {
         BallState::Settled => 1,

@@ -12,13 +12,13 @@ use crate::table::TABLE;
 #[derive(Clone, Debug)]
 pub struct Model {
     craft: Spacecraft,
-    /// Whether the present inputs are applied: a jump of the wheels' momentum or of an outflow acts
+    /// True once the present inputs are applied: a jump of the wheels' momentum or of an outflow acts
     /// at once in Co-Simulation.
     present: bool,
     wheels: Wheels,
-    /// Whether a tank without a ball regime has left its range.
+    /// True once a tank without a model of detached liquid has left its range.
     has_left_range: bool,
-    /// Whether the liquid of one with has left its bottom.
+    /// True once liquid of a tank with such a model has detached.
     has_had_lump: bool,
 }
 
@@ -31,13 +31,13 @@ const OUT_OF_RANGE: &str = "a tank leaves its range (tank[].in_range): thrust pu
 const LUMP: &str = "the liquid of a tank leaves its bottom and goes on as one lump (tank[].ball.state): times and momenta of \
                     crossings hold, forces of impacts are indications of their order, and so is what follows them";
 
-/// Whether a host that integrates itself, and from whom no slope of h_wheels is known, leaves the wheels' reaction
-/// -h_w' out of the torque: on an axis on which h_wheels moves and torque has never been other than 0.
+/// Detects a Model Exchange host that omits the wheels' reaction -h_w' from the torque: h_wheels moves on an axis on which torque
+/// has always been 0.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wheels {
     /// The torque that there has been, by axis.
     torque: [bool; 3],
-    /// How many steps h_wheels has moved in without. One alone may be the end of a ramp whose torque has ended.
+    /// Number of steps in which h_wheels moved without torque. A single one may be the end of a ramp whose torque has ended.
     moved: [u8; 3],
 }
 
@@ -109,7 +109,7 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// What the craft is made of. `mount_kind` may not contradict a `mount` that has been set.
+    /// Parameters of the craft. `mount_kind` may not contradict a `mount` that has been set.
     fn resolved(&self) -> Result<craft::Parameters, Vec<String>> {
         let mut p = self.craft;
         let (mount, kind) = (p.mount as i32, self.mount_kind);

@@ -155,7 +155,7 @@ fn ball(n: usize) -> usize {
     index::ball(n / 3) + n % 3
 }
 
-/// As an item of [`BALL_STATE`].
+/// Item of [`BALL_STATE`].
 fn ball_state(state: BallState) -> i32 {
     match state {
         BallState::Settled => 1,

@@ -131,7 +131,7 @@ fn linear_fit(points: &[Point], time: f64) -> (Noise, f64) {
     (noise, miss)
 }
 
-/// Where `f` is least from `low` to `high`: a coarse look, then golden sections.
+/// Minimum of `f` from `low` to `high`: a coarse scan, then golden sections.
 fn minimum(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     const LOOKS: usize = 50;
     let step = (high - low) / LOOKS as f64;

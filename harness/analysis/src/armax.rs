@@ -144,7 +144,7 @@ fn companion(c: &[f64]) -> DMatrix<f64> {
     })
 }
 
-/// Whether all zeros of 1 + c_1 q⁻¹ + … lie within the unit circle.
+/// Returns true if all zeros of 1 + c_1 q⁻¹ + … lie within the unit circle.
 fn is_stable(c: &[f64]) -> bool {
     companion(c).complex_eigenvalues().iter().all(|z| z.norm() < 1.0)
 }

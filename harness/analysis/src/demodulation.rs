@@ -22,7 +22,7 @@ pub const LEAST_CYCLES: f64 = 3.0;
 /// enough to tell the harmonics of a sticking bearing from the sweep.
 pub const CYCLES: f64 = 24.0;
 
-/// Of its own frequency, the most by which a sweep may move within a window.
+/// Largest relative change of a sweep's frequency within a window.
 const MOST_MOVE: f64 = 0.015;
 
 /// Cycles of the window at a frequency, Hz: 24, or fewer if the sweep would move by more
@@ -52,7 +52,7 @@ pub fn deviation(
     each.map(|((h, v), gain)| (v * gain / 2.0).sqrt() / h.norm()).collect()
 }
 
-/// How fast the error of a response changes along the frequency, in units of itself per Hz: the root
+/// Rate at which the error of a response changes along the frequency, in units of itself per Hz: the root
 /// of ∫w'²/∫w², 2π/√3 per length of a Hann window, over the sweep's rate.
 pub fn slope(sweep: &Sweep, frequency: f64) -> f64 {
     let window = cycles(sweep, frequency) / frequency;

@@ -2,7 +2,7 @@
 
 use crate::FrequencyResponse;
 
-/// What a frequency response shows.
+/// Features of a frequency response.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {
     /// Frequency of the local maximum of |H|, Hz.
@@ -16,15 +16,15 @@ pub struct Features {
 /// Standard deviations of [`Features`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviations {
-    /// Of the resonance, Hz.
+    /// Resonance frequency, Hz.
     pub f_res: Option<f64>,
-    /// Of the antiresonance, Hz.
+    /// Antiresonance frequency, Hz.
     pub f_dip: Option<f64>,
 }
 
 impl Features {
-    /// How uncertain they are, from the response that they were found in, its relative standard
-    /// deviation at each frequency, and how fast its error changes along a frequency, in units of
+    /// Standard deviations of the features, from the response, its relative standard
+    /// deviation at each frequency, and the rate at which its error changes along a frequency, in units of
     /// itself per Hz. An error ε of ln |H| moves an extremum by −ε'/(ln |H|)''.
     pub fn deviations(
         &self,
@@ -76,7 +76,7 @@ impl Features {
         }
     }
 
-    /// Whether there is an antiresonance or a resonance.
+    /// Returns true if there is an antiresonance or a resonance.
     pub fn any(&self) -> bool {
         self.f_dip.is_some() || self.f_res.is_some()
     }

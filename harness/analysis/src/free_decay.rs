@@ -47,7 +47,7 @@ pub struct Value {
     pub std: f64,
 }
 
-/// What records of one oscillation show together.
+/// Estimates from all records of one oscillation.
 #[derive(Clone, Debug)]
 pub struct FreeDecay {
     /// f, Hz.
@@ -105,7 +105,7 @@ fn model(time: &[f64], common: &[f64], own: &[f64], size: f64) -> Vec<f64> {
 }
 
 impl FreeDecay {
-    /// Of records of one oscillation; `None` if a record has less than [`LEAST_PERIODS`] of it, or none at all.
+    /// Fits records of one oscillation; `None` without records, or if a record has less than [`LEAST_PERIODS`] of it.
     pub fn of(records: &[Record]) -> Option<FreeDecay> {
         let starts: Vec<Start> = records.iter().map(Start::of).collect::<Option<_>>()?;
         let size = starts.iter().map(|start| start.amplitude).fold(0.0, f64::max);
@@ -251,10 +251,10 @@ fn beside(time: &[f64], residual: &[f64], frequency: f64) -> Beside {
     Beside { power: mean(&near), other }
 }
 
-/// Of a phasor: time, ∫A, ∫A², A and φ.
+/// Row of a phasor: time, ∫A, ∫A², A and φ.
 type Row = (f64, f64, f64, f64, f64);
 
-/// Where a search starts.
+/// Start of a search.
 struct Start {
     frequency: f64,
     zeta: f64,

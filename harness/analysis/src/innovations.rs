@@ -47,7 +47,7 @@ pub struct Tests {
 }
 
 impl Tests {
-    /// Whether all are passed.
+    /// Returns true if all tests are passed.
     pub fn passed(&self) -> bool {
         self.worst() < LIMIT
     }
@@ -159,7 +159,7 @@ pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// By chance alone a test of one record exceeds the limit in one of some 10,000.
+    /// A test of one record exceeds the limit by chance in one of some 10,000.
     #[test]
     fn white_noise_passes_in_short_records_too() {
         let mut random = crate::random::Random::new(7, 0);

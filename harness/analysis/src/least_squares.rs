@@ -8,7 +8,7 @@ pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
 /// Their derivatives at x, a row for each residual; `None` ends the search.
 pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 
-/// Where the sum of squares is least.
+/// Minimum of the sum of squares.
 #[derive(Clone, Debug)]
 pub struct Minimum {
     /// The variables.
@@ -17,7 +17,7 @@ pub struct Minimum {
     pub cost: f64,
     /// The search ended at a minimum, not at the end of its patience.
     pub converged: bool,
-    /// Why it ended.
+    /// Reason for stopping.
     pub reason: String,
 }
 

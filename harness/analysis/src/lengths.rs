@@ -1,5 +1,5 @@
-//! How long windows, lags and segments are. They follow from the torque's own band and duration, so
-//! that a spacecraft whose slosh takes 20 s is seen as sharply as a bench's, whose takes 0.4 s. For
+//! Lengths of windows, lags and segments. They follow from the torque's own band and duration, so
+//! that a spacecraft whose slosh takes 20 s is resolved as sharply as a bench's, whose takes 0.4 s. For
 //! the thesis's sweep, 1.25 to 3.5 Hz in 2700 s, they are 24 cycles, 200 s and 20 s.
 
 use crate::sweep::Sweep;
@@ -8,7 +8,7 @@ use crate::{BAND, spa, welch};
 /// Samples in a cycle of the band's highest frequency that an estimate of the whole record needs;
 /// the thesis's sweep has 14.3.
 const SAMPLES: f64 = 14.0;
-/// Of the record, the most that a lag may be.
+/// Longest lag as a share of the record.
 const MOST_LAG: f64 = 0.5;
 
 /// Lengths for estimates from a whole record, s.
@@ -25,7 +25,7 @@ pub struct Lengths {
 }
 
 impl Lengths {
-    /// Of a record of `duration` s sampled every `step` s whose torque has power in the band, Hz.
+    /// Lengths for a record of `duration` s sampled every `step` s whose torque has power in the band, Hz.
     pub fn of(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
         let middle = |(from, to): (f64, f64)| (from * to).sqrt();
         let slower = middle(BAND) / middle(band);

@@ -1,5 +1,5 @@
-//! How much of an output no linear response to the input explains: gyro noise, what dry friction and
-//! a nonlinear liquid add. From it follows how uncertain a frequency response is.
+//! Part of an output that no linear response to the input explains: gyro noise, and the effects of dry friction and
+//! a nonlinear liquid. It determines the uncertainty of a frequency response.
 //!
 //! The local rational method (McKelvey and Guérin, *Non-parametric frequency response estimation
 //! using a local rational model*, SYSID 2012; Pintelon and Schoukens, *System Identification: A

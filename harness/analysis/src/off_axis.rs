@@ -1,4 +1,4 @@
-//! How much of the liquid's force is not about the axis (thesis 6.3.6, as far as a hub that can't
+//! Share of the liquid's force that is not about the axis (thesis 6.3.6, as far as a hub that cannot
 //! tilt shows it).
 //!
 //! The thesis takes the rates that a gyro reads about x and y. What makes a platform tilt is the

@@ -11,7 +11,7 @@ const QUANTILES: usize = 200;
 /// Chunks, at most.
 const CHUNKS: usize = 1000;
 
-/// What a record at rest shows.
+/// Statistics of a record at rest.
 #[derive(Clone, Debug)]
 pub struct Rest {
     /// Time between samples, s.
@@ -22,7 +22,7 @@ pub struct Rest {
     pub mean: f64,
     /// Slope of the line that fits best, rad/s².
     pub trend: f64,
-    /// Of the samples without that line: standard deviation, rad/s, …
+    /// Standard deviation of the samples without that line, rad/s, …
     pub deviation: f64,
     /// … skewness and excess kurtosis; 0 of a normal distribution.
     pub skewness: f64,
@@ -54,7 +54,7 @@ pub struct Chunk {
 }
 
 impl Rest {
-    /// Of samples that are `step` (s) apart, in chunks of `chunk` (s), the autocorrelation up to `lag` (s).
+    /// Analyses samples that are `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to `lag` (s).
     pub fn of(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
         let n = samples.len() as f64;
         let middle = (n - 1.0) / 2.0;

@@ -21,7 +21,7 @@ pub struct Line {
     pub input: Complex64,
     /// Y.
     pub output: Complex64,
-    /// What the equation is divided by.
+    /// Divisor of the equation.
     pub scale: f64,
 }
 

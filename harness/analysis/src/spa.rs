@@ -28,7 +28,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// As [`frequency_response`].
+    /// Estimate from input and output; arguments as of [`frequency_response`].
     pub fn of(step: f64, input: &[f64], output: &[f64], frequencies: &[f64], lag: f64) -> Estimate {
         let (response, power) = estimate(step, input, output, frequencies, lag);
         let duration = step * input.len() as f64;
@@ -54,7 +54,7 @@ impl Estimate {
         each.map(|((h, v), u)| (v / (2.0 * average * h.norm_sqr() * u)).sqrt()).collect()
     }
 
-    /// How fast the error changes along the frequency, in units of itself per Hz: 2π times the root
+    /// Rate at which the error changes along the frequency, in units of itself per Hz: 2π times the root
     /// mean square of the lag under the squared window, (1/2 − 15/(4π²)) 2/3 M² for Hann's.
     pub fn slope(&self) -> f64 {
         let pi = std::f64::consts::PI;

@@ -15,11 +15,11 @@ pub struct Sweep {
     pub f1: f64,
     /// T, s.
     pub duration: f64,
-    /// How it gets from one to the other.
+    /// Law of the frequency's growth.
     pub law: Law,
 }
 
-/// How a sweep's frequency grows.
+/// Law of the growth of a sweep's frequency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
     /// f = f0 e^{at}, a = ln(f1/f0)/T (Rubaga's thesis 5.1.4).

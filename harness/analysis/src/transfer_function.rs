@@ -119,7 +119,7 @@ impl TransferFunction {
         answer
     }
 
-    /// What the model does without input, from the initial state that comes closest (least squares)
+    /// Free response of the model from the initial state that comes closest (least squares)
     /// to a signal sampled every `step` s.
     ///
     /// The measured band says little of the real pole: it may be fitted as slow as a minute or an

@@ -20,12 +20,12 @@ use crate::{Complex64, FrequencyResponse, statistics};
 /// they are not told otherwise.
 pub const SEGMENTS: usize = 8;
 
-/// How long segments are.
+/// Choice of the segment length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segments {
-    /// So many seconds, but short enough for [`SEGMENTS`] of them.
+    /// Length in seconds, reduced if necessary to fit [`SEGMENTS`] of them.
     Seconds(f64),
-    /// As long as [`SEGMENTS`] of them can be.
+    /// Longest length of which [`SEGMENTS`] fit.
     Longest,
 }
 
@@ -54,7 +54,7 @@ pub struct Spectra {
 }
 
 impl Spectra {
-    /// Of two equally long signals sampled every `step` s.
+    /// Estimate from two equally long signals sampled every `step` s.
     pub fn of(step: f64, input: &[f64], output: &[f64], segments: Segments) -> Self {
         // Half overlap: SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
         let longest = (2 * input.len() / (SEGMENTS + 1)).max(2);
@@ -123,7 +123,7 @@ impl Spectra {
         self.coherence().into_iter().map(|c| 10.0 * (c / (1.0 - c)).log10()).collect()
     }
 
-    /// What a value per bin is in the bin nearest to a frequency, Hz.
+    /// Value of the bin nearest to a frequency, Hz.
     pub fn at(&self, values: &[f64], frequency: f64) -> f64 {
         values[((frequency / self.resolution).round() as usize).min(values.len() - 1)]
     }

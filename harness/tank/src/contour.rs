@@ -59,7 +59,7 @@ const SHOULDER: f64 = 1e-6;
 /// Least sine of the wall's angle with the free surface.
 const STEEP: f64 = 1e-3;
 
-/// Where a contour passes through a height.
+/// Crossing of a contour with a height.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     segment: usize,
@@ -399,7 +399,7 @@ fn shoulder(fill: f64) -> Problems {
     .into()
 }
 
-/// What is wrong with one segment by itself.
+/// Error in one segment by itself.
 fn defect(segment: &Segment) -> Option<String> {
     let numbers: Vec<f64> = match segment.curve {
         Curve::Line { from, to } => vec![from[0], from[1], to[0], to[1]],
@@ -460,8 +460,8 @@ fn samples(segment: &Segment) -> usize {
     }
 }
 
-/// Where `sign` z is smallest on a segment, and that value, by golden section around the lowest
-/// sample; the place as a fraction of the parameter.
+/// Minimum of `sign` z on a segment and its position as a fraction of the parameter, by golden section around the lowest
+/// sample.
 fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let count = samples(segment);
     let height = |s: f64| sign * segment.at(s.clamp(0.0, 1.0))[1];
@@ -572,7 +572,7 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Of the liquid below the free surface, by Gauss' theorem along the wall: the volume is
+    /// Volume integrals of the liquid below the free surface, by Gauss' theorem along the wall: the volume is
     /// pi int r^2 dz, and so on.
     pub fn of(wall: &Wall) -> Volume {
         let rule = Gauss::new(20);

@@ -160,7 +160,7 @@ fn source_of(shape: formula::Shape) -> &'static str {
     }
 }
 
-/// Where a shape's correlation leaves its range, one sentence each.
+/// Lists where a shape's correlation leaves its range, one sentence each.
 fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
     match shape {
         formula::Shape::Sphere { radius, depth } => sphere(radius, depth, nu, g).outside,

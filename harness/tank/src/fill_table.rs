@@ -23,7 +23,7 @@ const MODES: usize = 3;
 /// Fills among which points are placed.
 const CANDIDATES: usize = 97;
 
-/// What an error of 1 is: 0.5 % of a frequency, a mass or the largest radius of the surface.
+/// Unit of errors: 0.5 % of a frequency, a mass or the largest radius of the surface.
 const LIMIT: f64 = 5e-3;
 
 /// Fills of a table between two ends, m above the lowest point, and how well they are chosen.
@@ -81,7 +81,7 @@ impl Curves {
         worst
     }
 
-    /// What is to be least: the first mode's largest error, and the others' by their share of its mass.
+    /// Cost function: the first mode's largest error, and those of the others weighted by their share of its mass.
     fn cost(&self, points: &[usize]) -> f64 {
         let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);
         let of = |n: usize| {

@@ -93,7 +93,7 @@ fn flat_omega2(bond: f64) -> f64 {
     XI * bond + XI.powi(3)
 }
 
-/// What the curved meniscus adds to Omega_1^2 of the flat surface.
+/// Shift of Omega_1^2 by the curved meniscus, relative to the flat surface.
 ///
 /// Interpolated between the values of the table in cos(angle) and ln(1 + Bo), so that 90 degrees is exact;
 /// beyond Bo = 100 it goes as 1/Bo to its limit -2 xi^2 cos(angle) (shape derivative of the eigenvalue).

@@ -95,7 +95,7 @@ pub struct WallSpeed {
     pub ratio: f64,
 }
 
-/// What moves with the tank when the first `modes` modes are pendulums.
+/// Fixed mass when the first `modes` modes are pendulums.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rest {
     /// Number of modes that are pendulums.
@@ -143,17 +143,17 @@ pub struct Damping {
     pub gravity: f64,
     /// The measured shape that the wetted wall is, or `other`.
     pub shape: &'static str,
-    /// Of the first mode by the shape's correlation, where it has one.
+    /// Damping of the first mode from the shape's correlation, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
-    /// What the first mode's was taken from, and why.
+    /// Basis of the first mode's damping, with the reason.
     pub taken: String,
     /// The modes, in the order of their frequency. Of a box, those along its first length.
     pub modes: Vec<ModeDamping>,
-    /// Of a box, those along its second length.
+    /// Damping of a box's modes along its second length.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modes_y: Vec<ModeDamping>,
-    /// What leaves the range of a formula, one sentence each.
+    /// Formulas used outside their range, one sentence each.
     pub warnings: Vec<String>,
 }
 
@@ -166,7 +166,7 @@ pub struct ModeDamping {
     pub zeta: f64,
     /// Between what it is to be expected.
     pub interval: [f64; 2],
-    /// By the laminar layer at the wall alone.
+    /// Damping by the laminar layer at the wall alone.
     pub laminar: f64,
 }
 
@@ -216,7 +216,7 @@ pub struct ModalData {
     pub i_eff_cg: f64,
     /// The modes, in the order of their frequency. Of a box, those along its first length.
     pub modes: Vec<Mode>,
-    /// What moves with the tank after 1, 2, ... modes.
+    /// Fixed mass after 1, 2, ... modes.
     pub rest: Vec<Rest>,
     /// Both axes of a box.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -246,7 +246,7 @@ pub(crate) struct Surface {
     pub(crate) shape: Vec<[f64; 2]>,
     /// Largest elevation per angle: (r, m/rad).
     pub(crate) peak: Option<[f64; 2]>,
-    /// As in [`Mode`].
+    /// Same as in [`Mode`].
     pub(crate) gradient: f64,
     pub(crate) vertical_wall: bool,
     pub(crate) upright: bool,
@@ -373,7 +373,7 @@ impl ModalData {
         self.error_i_0 = error * (1.0 + lever).powi(2);
     }
 
-    /// Where heights count from, in words.
+    /// Origin of heights, in words.
     pub fn origin(&self) -> String {
         if self.z_lowest.abs() < 1e-9 {
             return "z = 0 is the tank's lowest point, z up".to_string();
@@ -384,7 +384,7 @@ impl ModalData {
         )
     }
 
-    /// What moves with the tank when the first `modes` modes are pendulums.
+    /// Fixed mass when the first `modes` modes are pendulums.
     ///
     /// # Panics
     /// If there are not so many modes.

@@ -161,7 +161,7 @@ impl Boundary {
         [s, norm(residual) / norm(slope)]
     }
 
-    /// Where the boundary begins and ends at the axis, the two ends are not one point.
+    /// Returns true at the axis, where the boundary's two ends are different points.
     fn on_axis(&self, corner: Corner) -> bool {
         corner == 0 && self.ends[0][0][0] == 0.0
     }

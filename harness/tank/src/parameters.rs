@@ -27,7 +27,7 @@ pub enum Target {
     },
 }
 
-/// What is known of the liquid besides its density.
+/// Properties of the liquid other than its density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
     /// Specific force along the axis at which damping ratios and stiffnesses hold, m/s²; 0 or more.
@@ -56,9 +56,9 @@ pub enum Value {
 /// Parameters under the names of an FMU's variables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSet {
-    /// Where they come from, and how good they are: one line each.
+    /// Source and accuracy of the values, one line each.
     pub notes: Vec<String>,
-    /// What is left out or not known: one line each.
+    /// Omitted or unknown values, one line each.
     pub warnings: Vec<String>,
     /// Values far outside of what their formula holds for, which nobody should use unseen: one line each.
     pub unknown: Vec<String>,
@@ -363,7 +363,7 @@ impl ParameterSet {
         self.notes.iter().cloned().chain(warnings)
     }
 
-    /// As TOML.
+    /// Returns the parameters as TOML.
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
         for note in self.comments() {
@@ -380,7 +380,7 @@ impl ParameterSet {
         text
     }
 
-    /// As SSV, the parameter set of SSP 1.0.
+    /// Returns the parameters as SSV, the parameter set of SSP 1.0.
     pub fn to_ssv(&self) -> String {
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n");
         for note in self.comments() {

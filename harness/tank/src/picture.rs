@@ -122,7 +122,7 @@ fn outline(segments: &[Segment]) -> Vec<Point> {
     points
 }
 
-/// What is drawn of a tank: its wall, the wetted wall, both on the right of the axis.
+/// Drawn section of a tank: its wall and the wetted wall, both on the right of the axis.
 struct Section {
     wall: Vec<Point>,
     wetted: Vec<Point>,
@@ -401,7 +401,7 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     page(left, 70.0 + chart_height + 60.0, &title, &svg)
 }
 
-/// How the frequency of an upright cylinder's first mode depends on its amplitude, over the depth: the shifts of
+/// Chart of the amplitude dependence of an upright cylinder's first frequency over the depth: the shifts of
 /// omega^2 per squared slosh angle, planar and circular, those of a pendulum, and the secondary resonances, where the
 /// third order has poles. Points mark the bench's fills, 5 and 10 cm.
 pub fn third_order(overlaps: &Overlaps) -> String {

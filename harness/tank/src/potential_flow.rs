@@ -314,8 +314,8 @@ impl Discretisation {
         Part { v0, v1, points, weights, values, halves: None }
     }
 
-    /// Where in the complex plane of a panel's v the point x is, and its mirror image behind the
-    /// axis: the kernels are singular at both. None if far from the panel.
+    /// Preimages of the point x and of its mirror image behind the axis in the complex plane of a panel's v: the kernels are singular at both.
+    /// `None` far from the panel.
     fn preimages(
         &self,
         panel: &Panel,
@@ -456,7 +456,7 @@ impl Discretisation {
         all
     }
 
-    /// Where on the free surface |u| is largest: (r, u).
+    /// Position and value of the largest |u| on the free surface: (r, u).
     pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
         let step = 1.0 / 16.0;
         let mut best = [0.0; 2];
@@ -728,8 +728,8 @@ mod tests {
         }
     }
 
-    /// Where a point is, and its image behind the axis, in a panel's own v: v^gamma is its foot on the panel and its distance
-    /// over the length; what is found is closer than the rule of the panel's own points allows.
+    /// Preimages of a point and of its image behind the axis in a panel's own v: v^gamma is the foot point on the panel and the distance
+    /// over the length. The preimages lie closer than the rule of the panel's own points allows.
     #[test]
     fn a_point_s_preimage_is_the_root_of_its_place() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);

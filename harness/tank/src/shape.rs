@@ -1,4 +1,4 @@
-//! Which shape a contour is, as far as it is wetted: a tank has one damping, however it was drawn.
+//! Recognises the shape of the wetted contour: a tank has one damping, however it was drawn.
 
 use formulas::damping;
 
@@ -6,7 +6,7 @@ use crate::contour::Wall;
 use crate::curve::{Point, norm, sub};
 use crate::tank::Shape;
 
-/// How close the wetted wall is to a shape, over its size.
+/// Largest distance of the wetted wall from a shape, over its size.
 const SAME: f64 = 1e-6;
 
 /// Places on each segment that are compared.
@@ -22,7 +22,7 @@ pub(crate) struct Recognised {
 }
 
 impl Recognised {
-    /// As the formulas have it.
+    /// The shape as the damping formulas take it.
     pub fn measured(&self) -> damping::Shape {
         let depth = self.fill;
         match self.shape {

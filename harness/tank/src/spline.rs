@@ -46,7 +46,7 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     Ok(segments)
 }
 
-/// Of very many points every k-th, both ends kept, so that all `total` points make some 100 segments.
+/// Keeps every k-th of very many points and both ends, so that all `total` points make some 100 segments.
 fn thinned(points: &[Point], total: usize) -> Vec<Point> {
     let every = total.div_ceil(MANY);
     let last = points.len() - 1;

@@ -40,7 +40,7 @@ pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems
 }
 
 impl Sweep {
-    /// As comma-separated values with a heading; columns of modes that a row lacks are empty. Units SI;
+    /// Returns comma-separated values with a heading; columns of modes that a row lacks are empty. Units SI;
     /// H and hinge from the contour's own zero.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
@@ -125,7 +125,7 @@ pub struct AtFill {
     pub i_eff_cg: f64,
     /// The modes; their shapes are empty.
     pub modes: Vec<Mode>,
-    /// What moves with the tank when all these modes are pendulums.
+    /// Fixed mass when all these modes are pendulums.
     pub rest: Rest,
 }
 

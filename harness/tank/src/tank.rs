@@ -202,7 +202,7 @@ impl Shape {
     }
 }
 
-/// What a tank looks like.
+/// Shape of a tank.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// A body of revolution.
@@ -232,7 +232,7 @@ pub struct Tank {
     pub geometry: Geometry,
 }
 
-/// How full a tank is.
+/// Amount of liquid in a tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fill {
     /// Height of the free surface above the tank's lowest point, m.

@@ -1,4 +1,4 @@
-//! How the frequency of the first mode of an upright cylinder depends on its amplitude: potential
+//! Amplitude dependence of the frequency of an upright cylinder's first mode: potential
 //! flow to third order, for the planar and for the circular (rotary) wave.
 //!
 //! Surface elevation eta and surface potential Phi are canonical variables (Zakharov 1968) with

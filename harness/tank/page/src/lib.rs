@@ -14,7 +14,7 @@ use hubslosh_tank::tank::Geometry;
 use hubslosh_tank::{Fill, ModalData, Problems, Tank};
 use serde::Serialize;
 
-/// What a page is told of a tank.
+/// Results for a tank, as the page receives them.
 #[derive(Serialize)]
 struct Answer {
     /// Modal parameters.
@@ -23,7 +23,7 @@ struct Answer {
     depth: Option<f64>,
     /// The wall, (r, z) from the axis along the bottom and up, m above the contour's own zero; of a box nothing.
     outline: Vec<Point>,
-    /// Of each mode the elevation per angle along the surface: (r, m/rad), from the axis or inner wall outwards.
+    /// Elevation of each mode per angle along the surface: (r, m/rad), from the axis or inner wall outwards.
     surfaces: Vec<Vec<[f64; 2]>>,
 }
 

@@ -545,7 +545,7 @@ fn a_contour_has_at_most_200_segments() {
     assert!(message.contains("The contour has 201 segments, at most 200."), "{message}");
 }
 
-/// What a result is of is in it: by it a reader knows which lengths to expect.
+/// The result names its kind, so that a reader knows which lengths to expect.
 #[test]
 fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
     for (text, kind) in [
@@ -561,7 +561,7 @@ fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
     }
 }
 
-/// Of a box of 0.8 m by 0.5 m both axes; each number where the heading says.
+/// The tank is a box of 0.8 m by 0.5 m with both axes; each number stands below its heading.
 #[test]
 fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");

@@ -464,7 +464,7 @@ fn a_cylinder_s_damping_names_its_source() {
     }
 }
 
-/// What a shape's formula says of its range, said of the tank at the specific force that its frequency makes: gravity's.
+/// The tank repeats the warnings of its shape's formula, at the specific force of its frequency.
 #[test]
 fn a_tank_s_damping_warns_as_the_formula_of_its_shape() {
     for (shape, fill, formula) in [
@@ -592,8 +592,7 @@ fn a_ring_in_any_tank_covers_a_part_of_the_section_at_its_own_depth() {
     assert!(found.outside.iter().any(|why| why.contains("covers 0.36")), "{:?}", found.outside);
 }
 
-/// Where the words of a correlation's damping name the other estimate, they have its number: 1.45 layers, or what the
-/// correlation makes; three digits at least.
+/// If the words on a correlation's damping name the other estimate, they state its number, to three digits at least.
 #[test]
 fn the_words_of_a_damping_have_the_number_that_was_not_taken() {
     let number = |taken: &str, before: &str| -> f64 {

@@ -64,7 +64,7 @@ fn spheres_have_the_known_limits() {
     assert!((data.modes[0].m / (1000.0 * a.powi(3)) - 1.933).abs() < 0.01);
 }
 
-/// Of a shallow spherical dish almost nothing is left after five modes: m_4 l_4^2 is 5e-14 m R^2 at h = 0.01 R, so that
+/// A shallow spherical dish leaves almost nothing after five modes: m_4 l_4^2 is 5e-14 m R^2 at h = 0.01 R, so that
 /// I_0 is its own error. The fixed mass stands at the sphere's centre, 7 to 220 R above the liquid.
 #[test]
 fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
@@ -144,7 +144,7 @@ fn a_cone_of_45_degrees_has_one_mode() {
     }
 }
 
-/// What is left is positive for any number of modes: the added mass with pressure 0 on the surface.
+/// The fixed mass is positive for any number of modes: it is the added mass with pressure 0 on the surface.
 #[test]
 fn rest_is_positive_for_any_number_of_modes() {
     for case in reference() {

@@ -1,4 +1,4 @@
-//! What people look at.
+//! Pictures of tanks.
 
 use std::path::Path;
 
@@ -36,7 +36,7 @@ fn a_tank_and_its_sweep_look_as_before() {
     is_drawn(&picture::sweep(&tank, &swept, 9.80665), "tests/tank/drawn/sweep.svg");
 }
 
-/// What is drawn of curves: walls, surfaces, modes, charts.
+/// Paths of curves: walls, surfaces, modes, charts.
 fn curves(svg: &str) -> Vec<&str> {
     svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
 }

@@ -175,7 +175,7 @@ fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
     }
 }
 
-/// What a table says of its errors is the largest between its points, by the law by which the FMUs interpolate: of a
+/// The errors that a table states are the largest between its points under the FMUs' interpolation. The test uses a
 /// cylinder, whose modes are known at every fill.
 #[test]
 fn a_placed_table_states_the_errors_between_its_points() {
@@ -274,7 +274,7 @@ fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
     assert!(fill_table::place(&tank, 0.1, 1.0, 3).is_err());
 }
 
-/// Of a cone of 45 degrees the first mode alone carries liquid (phi_1 = r z), of a sphere all do, and a six-axis FMU keeps
+/// In a cone of 45 degrees only the first mode carries liquid (phi_1 = r z); in a sphere all do, and a six-axis FMU keeps
 /// three of them.
 #[test]
 fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
