@@ -19,11 +19,11 @@ use signals::table::Table;
 pub struct Example {
     /// The FMU's modelName, with which the names of the files begin.
     pub model: &'static str,
-    /// What drives it: inputs with their amplitude, the time function it is the amplitude of.
+    /// Driven inputs: name, amplitude, time function.
     inputs: &'static [(&'static str, f64, Course)],
 }
 
-/// How an input goes over time; t in s, the largest value is 1.
+/// Time function of an input; t in s, largest value 1.
 type Course = fn(t: f64) -> f64;
 
 /// A sine below the sloshing frequency of the bench that swells and fades within ten seconds, then nothing: the hub

@@ -21,7 +21,7 @@ const MOST_RECORDS: usize = 10_000;
 /// longest averaging time is a tenth of the record.
 const LEAST_TIMES: f64 = 30.0;
 
-/// What is to be recorded.
+/// A recording to be made.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// Start values by FMU name, as text; not `imu.enabled` and `imu.seed`.
@@ -35,9 +35,9 @@ pub struct Recording {
 /// Specified and estimated noise.
 #[derive(Clone, Debug)]
 pub struct Characteristics {
-    /// As specified; N with the noise that rounding to `imu.lsb` adds, lsb/√(12 rate).
+    /// Specified noise; N includes the noise of rounding to `imu.lsb`, lsb/√(12 rate).
     pub specified: Noise,
-    /// What the mean of the records' Allan variances shows.
+    /// Noise estimated from the mean of the records' Allan variances.
     pub estimated: Noise,
     /// Standard errors of `estimated`, from the scatter of the single records; NaN if those that can
     /// be fitted are fewer than [`LEAST_RECORDS`].
@@ -225,7 +225,7 @@ impl Characteristics {
 /// A parameter of the noise by its name and unit.
 type Quantity = (&'static str, fn(&Noise) -> f64);
 
-/// What the table shows.
+/// Quantities in the table.
 const QUANTITIES: [Quantity; 3] = [
     ("N, rad/s/sqrt(Hz)", |noise| noise.arw),
     ("B, rad/s", |noise| noise.bias_instability),

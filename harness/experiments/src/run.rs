@@ -12,7 +12,7 @@ use host::drive::Inputs;
 use host::fmu::{Fmu, Instance};
 use signals::table::{self, Table};
 
-/// What is to be run.
+/// A run of an FMU.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Start values by FMU name, as text; set in this order.
@@ -345,7 +345,7 @@ impl Run {
 struct Recorder {
     reals: Vec<u32>,
     others: Vec<Variable>,
-    /// Which column each value belongs to: first the reals, then the others.
+    /// Column of each value: reals first, then the others.
     places: Vec<usize>,
     values: Vec<f64>,
     columns: Vec<Vec<f64>>,

@@ -1,4 +1,4 @@
-//! What a bench says of a flight tank, in words: Bond numbers, the tank that has the same ones,
+//! Similarity of a bench and a flight tank, in words: Bond numbers, the tank with the same ones,
 //! Froude's factors (`formulas::similarity`; Rubaga's thesis 2.5, 2.6, 7.2, with its numbers corrected).
 //!
 //! The two numbers of an angular acceleration are not the same: the thesis's 45.87 is Bo_i of
@@ -34,7 +34,7 @@ fn positive(values: &[(&str, f64)]) -> Result<()> {
     Ok(())
 }
 
-/// What was computed, in words and for programs.
+/// Results in words and for programs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// Lines for people.
@@ -43,7 +43,7 @@ pub struct Found {
     pub json: Value,
 }
 
-/// What is known of the flight tank.
+/// Known quantities of the flight tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
     /// Its radius, m; wanted is the acceleration.
@@ -207,15 +207,15 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
 /// A number of the thesis's scaling, as printed and as it follows from its own data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Where it stands and what it is.
+    /// Place and name of the number in the thesis.
     pub what: &'static str,
-    /// As printed.
+    /// Value as printed.
     pub printed: &'static str,
-    /// As it follows.
+    /// Value that follows from the formulas.
     pub value: f64,
     /// Its unit.
     pub unit: &'static str,
-    /// Why it differs, if it does.
+    /// Reason for a difference, if there is one.
     pub remark: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! Where weight does not rule the liquid of a run: Bond, Weber and Froude numbers (Rubaga's thesis 2.5) of the bench's tank and of
+//! Detects runs in which weight does not dominate the liquid: Bond, Weber and Froude numbers (Rubaga's thesis 2.5) of the bench's tank and of
 //! tanks in six axes.
 
 use anyhow::{Result, ensure};
@@ -32,8 +32,8 @@ pub struct Weightless {
 }
 
 impl Contents {
-    /// What a liquid is like that weight rules least, if that is too little, over rows of the specific force towards the bottom, m/s²,
-    /// and the speed of its surface, m/s. A row's Weber number is by the radius and the highest speed up to it.
+    /// State of the liquid in the row in which weight dominates least, if it does not dominate, over rows of the specific force towards the bottom, m/s²,
+    /// and the speed of its surface, m/s. A row's Weber number uses the radius and the highest speed up to it.
     pub fn without_weight(&self, rows: impl IntoIterator<Item = (f64, f64)>) -> Option<Weightless> {
         let (mut speed, mut worst) = (0.0f64, None::<(f64, Weightless)>);
         for (g, v) in rows {
@@ -51,7 +51,7 @@ impl Contents {
 }
 
 impl Weightless {
-    /// Whether the liquid leaves the tank's bottom: inertia rules, or what rules points out of the liquid.
+    /// Returns true if the liquid leaves the tank's bottom: inertia dominates, or the dominant force points out of the liquid.
     fn leaves(self) -> bool {
         self.bond < -1.0 || ruling_force(self.bond, self.weber).starts_with("inertia")
     }
@@ -90,7 +90,7 @@ struct Tank {
     upwards: [f64; 3],
     /// Wall elevation per slosh angle of each mode, m.
     wave: Vec<f64>,
-    /// Whether the FMU has a model of liquid that leaves the bottom, and does not use it in this tank.
+    /// True if the FMU models detached liquid, but not in this tank.
     has_ball: bool,
 }
 
@@ -98,7 +98,7 @@ struct Tank {
 #[derive(Clone, Debug)]
 pub struct Tanks {
     tanks: Vec<Tank>,
-    /// What an accelerometer at O reads: `specific_force`, or SloshTank's input `a`.
+    /// Specific force at O: `specific_force`, or SloshTank's input `a`.
     accelerometer: &'static str,
 }
 
@@ -108,12 +108,14 @@ fn components(name: &str) -> [String; 3] {
 }
 
 impl Tanks {
-    /// Of an initialised instance; none if the FMU is neither Spacecraft nor SloshTank. Density is the tank's `density`, the radius that of
-    /// its `diameter` or of the cylinder with its `wave`, R = wave (ξ² − 1)/2; the surface `tension`, N/m, no FMU in six axes knows.
-    /// Left out are tanks without modes, of which nothing is known (`wave` = 0), and whose liquid a stiffness k holds.
+    /// Tanks of an initialised instance; `None` if the FMU is neither Spacecraft nor SloshTank.
+    ///
+    /// The density is the tank's `density`. The radius is that of its `diameter`, or of the cylinder with its `wave`,
+    /// R = wave (ξ² − 1)/2. The surface `tension` is in N/m; no FMU in six axes has it. Tanks without modes, unknown
+    /// ones (`wave` = 0), and those whose liquid a stiffness k holds are left out.
     ///
     /// # Errors
-    /// If the tension is no positive number, or a variable cannot be read.
+    /// If the tension is not positive, or a variable cannot be read.
     pub fn of(
         description: &ModelDescription,
         instance: &mut Instance,
@@ -279,7 +281,7 @@ mod tests {
         Tanks { tanks: vec![tank], accelerometer: "specific_force" }
     }
 
-    /// What the tanks say of rows of the specific force along y, the angular acceleration about z, the rate about x and the first modes'
+    /// Warnings of the tanks for rows of the specific force along y, the angular acceleration about z, the rate about x and the first modes'
     /// rates along x.
     fn said(tanks: &Tanks, rows: &[[f64; 5]]) -> Vec<String> {
         let names: Vec<String> = ["time".to_string()].into_iter().chain(tanks.needs()).collect();

@@ -22,7 +22,7 @@ use host::output::{self, sha256};
 use host::temporary::{self, Registered};
 use signals::table::Table;
 
-/// Where the runs are.
+/// Folder of the stored runs.
 pub const RUNS: &str = "runs";
 /// The hashes of all files.
 pub const MANIFEST: &str = "manifest.sha256";
@@ -102,7 +102,7 @@ impl Folder {
         })
     }
 
-    /// Where it is.
+    /// Path of the campaign's directory.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -246,8 +246,8 @@ fn hold(path: &Path, about: &str) -> Result<File> {
     Ok(lock)
 }
 
-/// Whether a name is one that a campaign gives to what it publishes: nothing else is removed, whatever
-/// stands in the manifest.
+/// Returns true for names of files that a campaign publishes: nothing else is removed, whatever
+/// the manifest lists.
 fn is_published(name: &str) -> bool {
     let features = name.strip_prefix("features").and_then(|rest| rest.strip_suffix(".csv"));
     matches!(name, "plan.toml" | "report.html" | "runs.csv" | "view.html")

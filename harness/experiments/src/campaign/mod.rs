@@ -70,19 +70,19 @@ const PARAMETERS: [&str; 8] = [
     "friction.b",
 ];
 
-/// Whether an FMU is the bench, as far as the analysis asks.
+/// Returns true if the FMU has the variables that the bench's analysis needs.
 fn is_bench(description: &ModelDescription) -> bool {
     let has = |name: &&str| description.variables.iter().any(|v| v.name == *name);
     STORED[1..].iter().all(has) && PARAMETERS.iter().all(has)
 }
 
-/// Whether a variable is the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.
+/// Returns true for the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.
 pub fn is_slosh_angle(name: &str) -> bool {
     name.starts_with("tank") && (name.contains(".angle_x[") || name.contains(".angle_y["))
 }
 
-/// What is stored of a run of an FMU: [`STORED`] of the bench; else time, the driven input and
-/// every output that is a number.
+/// Stored columns of a run: [`STORED`] for the bench; otherwise time, the driven input and
+/// every numeric output.
 pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
@@ -99,7 +99,7 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
 /// A plan that is carried out.
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// What is to be done.
+    /// Plan of the campaign.
     pub plan: Plan,
     /// Simulate again what is stored already.
     pub force: bool,
@@ -114,18 +114,18 @@ pub struct Campaign {
 /// A run that failed, and why.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// Which run.
+    /// The run.
     pub case: Case,
-    /// Why.
+    /// Reason of the failure.
     pub reason: String,
 }
 
 /// A run of an FMU that is not the bench.
 #[derive(Clone, Debug)]
 pub struct Unanalysed {
-    /// Which run.
+    /// The run.
     pub case: Case,
-    /// What is stored of it, thinned.
+    /// Stored columns, thinned.
     pub history: History,
     /// Its last rows, as they are.
     pub tail: History,
@@ -147,7 +147,7 @@ impl Results {
     }
 }
 
-/// What became of one run.
+/// Outcome of one run.
 enum Done {
     Analysed(Box<Outcome>),
     Unanalysed(Box<Unanalysed>),
@@ -219,7 +219,7 @@ impl Campaign {
         Ok(collected)
     }
 
-    /// Whether the directory holds the results of another plan.
+    /// Returns true if the directory holds the results of another plan.
     pub fn holds_another(&self) -> bool {
         std::fs::read_to_string(self.plan_file()).is_ok_and(|text| text != self.plan.text)
     }

@@ -1,5 +1,5 @@
-//! What a run of the bench shows: totals of the run as a whole, and, where its torque allows, its
-//! frequency response by three estimators, a fitted model, and how the liquid moved.
+//! Results of a run of the bench: totals and, if its torque allows, its
+//! frequency response by three estimators, a fitted model, and the motion of the liquid.
 
 use std::borrow::Cow;
 
@@ -66,7 +66,7 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Of a recording.
+    /// Totals of a recording.
     fn of_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
@@ -109,7 +109,7 @@ struct Rates {
     others: [Option<Vec<f64>>; 2],
     /// Bias about the hub's axis, rad/s; 0 of a gyro without errors.
     bias: f64,
-    /// What of the means is to be known.
+    /// Warnings about the means of the rates.
     warnings: Vec<String>,
 }
 
@@ -149,7 +149,7 @@ impl Rates {
     }
 }
 
-/// What is to be known of a rate's mean over a record, and of how the mean drifts along it.
+/// Warning about a rate's mean over a record, or about its drift.
 fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
     let (mean, deviation) = (statistics::mean(rate), statistics::deviation(rate));
     let parts: Vec<f64> =
@@ -193,7 +193,7 @@ impl History {
     /// Stretches of a run that are told apart.
     pub const STRETCHES: usize = 300;
 
-    /// Of columns of equal length.
+    /// History from columns of equal length.
     pub fn of(time: &[f64], columns: &[(&str, &[f64])]) -> History {
         let length = time.len().div_ceil(Self::STRETCHES);
         if length <= 2 {
@@ -232,7 +232,7 @@ impl History {
 /// and angles outwards and towards +θ, rad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SloshPath {
-    /// Where the wave is largest.
+    /// Points of the largest wave.
     pub largest: Vec<[f64; 3]>,
     /// Around the onset of rotary slosh, if there is any.
     pub onset: Option<Vec<[f64; 3]>>,
@@ -266,28 +266,28 @@ impl SloshPath {
 /// A run of the bench, and what it shows.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Which run.
+    /// The run.
     pub case: Case,
     /// Model, tank and fill.
     pub range: Range,
     /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
     pub linear: Linear,
-    /// Of the run as a whole.
+    /// Totals over the whole run.
     pub totals: Totals,
-    /// What the whole record shows; `None` if the torque is neither sweep nor noise.
+    /// Estimates from the whole record; `None` if the torque is neither sweep nor noise.
     pub record: Option<Record>,
-    /// What is seen while a sweep passes; `None` if the torque is no sweep.
+    /// Estimates along the sweep; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
     /// Torque, rate, slosh angles, and the residual: the rate less its bias and less that of the exact linear
     /// counterpart under the same torque.
     pub history: History,
     /// The crest's path seen from above.
     pub path: SloshPath,
-    /// What ruled the liquid where its weight did not ([`Range::without_weight`]).
+    /// Dominant force on the liquid if it was not weight ([`Range::without_weight`]).
     pub weightless: Option<String>,
     /// It was not simulated but read.
     pub reused: bool,
-    /// What is to be known of the rates that a gyro read.
+    /// Warnings about the rates that a gyro measured.
     pub warnings: Vec<String>,
 }
 
@@ -298,18 +298,18 @@ pub struct Estimate {
     pub response: FrequencyResponse,
     /// Its antiresonance and resonance; none if they are not to be trusted.
     pub features: Features,
-    /// What it resolves at the resonance, Hz.
+    /// Frequency resolution at the resonance, Hz.
     pub resolution: f64,
     /// Standard deviation of its magnitude, relative, and of its phase, rad, from what of the rate
     /// no linear response explains; empty if that is not known.
     pub deviation: Vec<f64>,
     /// Standard deviations of the features.
     pub deviations: Deviations,
-    /// Why its features are not to be trusted, if they are not.
+    /// Reason for rejecting its features, if they are rejected.
     pub doubt: Option<Doubt>,
 }
 
-/// Why a response shows an antiresonance and a resonance that are not to be trusted.
+/// Reasons for rejecting the antiresonance and resonance of a response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Doubt {
     /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.
@@ -363,8 +363,8 @@ impl Estimate {
     }
 }
 
-/// Whether a separation of antiresonance and resonance is less than can be told apart, Hz; of one of
-/// the two alone nothing is said.
+/// Returns true if antiresonance and resonance are closer than the resolution `than`, Hz; false if
+/// either is missing.
 fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
@@ -384,9 +384,9 @@ pub type Curve = Vec<(f64, f64)>;
 /// Estimates from the whole record.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// By `spa`.
+    /// Estimate by `spa`.
     pub spa: Estimate,
-    /// By Welch's H1.
+    /// Estimate by Welch's H1.
     pub h1: Estimate,
     /// Signal-to-noise ratio of the rate at resonance and antiresonance of `spa`, dB, from its
     /// coherence with the torque; `None` if there are no such.
@@ -405,9 +405,9 @@ pub struct Record {
 pub struct Passing {
     /// Response of the rate.
     pub rate: Estimate,
-    /// Where in the sweep the slosh was rotary; `None` of a recording, which has no liquid's angles.
+    /// Part of the sweep with rotary slosh; `None` for a recording, which has no angles of the liquid.
     pub rotary: Option<Rotary>,
-    /// How much of the liquid's force was off the axis; of a recording, of the hub's rates, if it has more than one.
+    /// Share of the liquid's force off the axis; for a recording, of the hub's rates, if it has more than one.
     pub off_axis: Option<OffAxis>,
     /// The leakage at the frequencies of `rate`; empty where it is not known.
     pub leakage: Vec<f64>,
@@ -668,7 +668,7 @@ impl Outcome {
         self.estimate().map_or(Features::default(), |(estimate, _)| estimate.features)
     }
 
-    /// How the run left the range of its model, if it did.
+    /// Describes how the run left the range of its model, if it did.
     pub fn beyond_model(&self) -> Option<String> {
         let how = [self.range.left(&[self.totals.peak_wave_height]), self.weightless.clone()];
         let how: Vec<String> = how.into_iter().flatten().collect();
@@ -690,12 +690,12 @@ impl Outcome {
         Some(self.record.as_ref()?.fit.as_ref()?.0)
     }
 
-    /// Where in the sweep the slosh was rotary.
+    /// Part of the sweep with rotary slosh.
     pub fn rotary(&self) -> Option<Rotary> {
         self.passing.as_ref()?.rotary
     }
 
-    /// How much of the liquid's force was off the axis.
+    /// Share of the liquid's force off the axis.
     pub fn off_axis(&self) -> Option<OffAxis> {
         self.passing.as_ref()?.off_axis
     }
@@ -710,7 +710,7 @@ impl Outcome {
         })
     }
 
-    /// Whether it was recorded, not simulated.
+    /// Returns true for a recording, false for a simulation.
     pub fn is_recording(&self) -> bool {
         self.case.recording.is_some()
     }
@@ -737,7 +737,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// Of an initialised instance; `None` if the FMU is not the bench.
+    /// Range of an initialised instance; `None` if the FMU is not the bench.
     pub fn of(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
         if !super::is_bench(description) {
             return Ok(None);
@@ -758,7 +758,7 @@ impl Range {
         }))
     }
 
-    /// What the liquid of a run with these wave heights, m, is ruled by at its least specific force, if that is not gravity:
+    /// Dominant force on the liquid of a run with these wave heights, m, at its least specific force, if it is not gravity:
     /// Bond, Weber and Froude numbers by the tank's radius and the fastest wave before, V = η √(g/l) (thesis 2.5). `g`: `g_axial`
     /// at each row, m/s², of a run that drives it.
     pub fn without_weight(&self, waves: &[f64], g: Option<&[f64]>) -> Option<String> {
@@ -773,8 +773,8 @@ impl Range {
         contents.without_weight(rows).map(|numbers| numbers.to_string())
     }
 
-    /// How a run with these wave heights, m, left it: a linear liquid in waves beyond a quarter of
-    /// the tank's radius (thesis 2.3.5), or any whose trough would lie below the tank's bottom.
+    /// Describes how a run with these wave heights, m, left the range: a linear liquid in waves above a quarter of
+    /// the tank's radius (thesis 2.3.5), or any liquid whose trough would lie below the tank's bottom.
     pub fn left(&self, waves: &[f64]) -> Option<String> {
         let wave = waves.iter().fold(0.0, |most: f64, wave| most.max(wave.abs()));
         let mm = |length: f64| format!("{:.1} mm", length * 1e3);

@@ -8,7 +8,7 @@ use signals::table::Table;
 use crate::plan::{Case, Recorded};
 use crate::profile::Torque;
 
-/// What is read of a recording: the rate has the rows, torque and the rates about the other axes are joined by lines.
+/// Signals read from a recording: the rate defines the rows; torque and rates about the other axes are interpolated linearly.
 const SIGNALS: [Signal; 4] = [
     Signal { name: "omega", required: true, between: Between::Line, unit: None },
     Signal { name: "tau_cmd", required: true, between: Between::Line, unit: None },

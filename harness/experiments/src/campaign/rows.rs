@@ -53,7 +53,7 @@ pub struct FeatureRow {
 }
 
 impl FeatureRow {
-    /// Of a run that was not analysed: which it is.
+    /// Row of a run that was not analysed: its identification alone.
     pub fn unanalysed(case: &Case, plan_sha256: &str) -> FeatureRow {
         FeatureRow {
             model: case.model.clone(),
@@ -64,7 +64,7 @@ impl FeatureRow {
         }
     }
 
-    /// Of a run, with one of its estimates and the estimator's name.
+    /// Row of a run with one of its estimates and the estimator's name.
     pub fn of(
         run: &Outcome,
         estimate: Option<(&Estimate, &'static str)>,
@@ -131,7 +131,7 @@ pub struct MadeFrom {
 }
 
 impl MadeFrom {
-    /// Of a run, and why it failed if it did.
+    /// Row of a run, with the reason if it failed.
     pub fn of(case: &Case, failure: Option<&Failure>, fmu: &host::fmu::Fmu) -> MadeFrom {
         let recording = case.recording.as_ref();
         let bytes = recording.and_then(|recording| std::fs::read(&recording.path).ok());

@@ -13,7 +13,7 @@ use signals::table::{self, Table};
 /// Raised when stored runs of an older program mean something else.
 const FORMAT: &str = "1";
 
-/// What determines a run's numbers: two runs with the same recipe are the same run, whichever
+/// Everything that determines a run's numbers: two runs with the same recipe are the same run, whichever
 /// archive the FMU came in. It is the metadata of its Parquet file, which may hold more:
 ///
 /// * `model`, `binary_sha256`: the model's name and the binary that was loaded,
@@ -132,7 +132,7 @@ fn difference(
     None
 }
 
-/// Why a stored run is of no use, as a sentence.
+/// States why a stored run cannot be reused.
 pub fn because(case: &Case, why: &str) -> String {
     format!("re-running {}: {why}", case.name)
 }

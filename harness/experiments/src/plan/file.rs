@@ -34,7 +34,7 @@ impl Scalar {
 }
 
 impl fmt::Display for Scalar {
-    /// As an FMU's start values are written.
+    /// Writes the value in the form of an FMU's start values.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Scalar::Truth(value) => value.fmt(f),
@@ -271,7 +271,7 @@ impl Reader<'_> {
         listed
     }
 
-    /// What was recorded of a run, if anything was.
+    /// Reads the recording of a run, if the plan names one.
     fn recording(&mut self, place: &str, table: &DeTable) -> Option<Recorded> {
         let columns = self.text(place, table, "columns");
         let columns = match columns {

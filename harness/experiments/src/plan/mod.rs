@@ -53,10 +53,10 @@ pub const BUILT_IN: &[(&str, &str)] = &[
 
 /// The communication step of a plan that names none: the thesis's IMU at 50 Hz, s.
 const STEP: f64 = 0.02;
-/// What the interface's file names `<model>_<fill>mm_<amplitude>` are made of.
+/// Parts of the file names `<model>_<fill>mm_<amplitude>` that the interface fixes.
 const NAMING: [&str; 3] = ["slosh.model", "tank.h", "profile.amplitude"];
 
-/// What a file says of a name: an FMU variable, `profile`, `profile.PARAMETER`.
+/// Value for a name in a plan file: an FMU variable, `profile`, `profile.PARAMETER`.
 #[derive(Clone, Debug)]
 struct Named<T> {
     name: String,
@@ -70,10 +70,10 @@ impl<T> Named<T> {
     }
 }
 
-/// What a campaign is to do.
+/// Plan of a campaign.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What it is about.
+    /// Title of the report.
     pub title: String,
     /// The file's text.
     pub text: String,
@@ -102,7 +102,7 @@ pub struct Sweeps {
     pub amplitudes: Vec<f64>,
     /// Name of the profile, `exp-sweep` or `lin-sweep`.
     pub profile: &'static str,
-    /// What is set in every run, by FMU name.
+    /// Settings of every run, by FMU name.
     pub set: Vec<(String, String)>,
     /// Relative tolerance of the FMU's solver; `None`: the FMU's own.
     pub tolerance: Option<f64>,
@@ -125,7 +125,7 @@ pub struct Recorded {
     pub columns: Columns,
 }
 
-/// What stands for the slosh model of a run that was recorded.
+/// Name used in place of the slosh model for a recording.
 pub const RECORDING: &str = "recording";
 
 /// One run of a plan.
@@ -162,14 +162,14 @@ pub struct Case {
     pub tolerance: Option<f64>,
     /// The torque is held over each step.
     pub hold: bool,
-    /// What is recorded of it beside the FMU's variables.
+    /// Sensors recorded in addition to the FMU's variables.
     pub sensors: Vec<Sensor>,
     /// It is not simulated but read: what a bench did under this torque.
     pub recording: Option<Recorded>,
 }
 
 impl Case {
-    /// What is to be driven.
+    /// Run that the case describes.
     pub fn run(&self) -> Run {
         Run {
             settings: self.settings.clone(),
@@ -357,12 +357,12 @@ impl Plan {
         }
     }
 
-    /// What is set in every run, by FMU name.
+    /// Settings of every run, by FMU name.
     pub fn set(&self) -> impl Iterator<Item = (&str, &str)> {
         self.set.iter().map(|set| (set.name.as_str(), set.value.as_str()))
     }
 
-    /// Whether values are drawn at random.
+    /// Returns true if values are drawn at random.
     pub fn is_random(&self) -> bool {
         self.draws.is_some()
     }

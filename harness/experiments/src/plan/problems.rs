@@ -1,4 +1,4 @@
-//! What is wrong with a plan, all at once, each with its lines in the file.
+//! All errors of a plan at once, each with its lines in the file.
 
 use anyhow::{Result, bail};
 
@@ -33,7 +33,7 @@ impl Lines {
     }
 }
 
-/// What is wrong, each once.
+/// Errors, each once.
 #[derive(Default)]
 pub(super) struct Problems(Vec<(Lines, String)>);
 

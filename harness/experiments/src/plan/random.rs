@@ -8,7 +8,7 @@ use super::Named;
 use super::problems::Problems;
 use crate::profile::Written;
 
-/// How often a number is drawn again that lies outside its bounds.
+/// Largest number of draws until a number lies within its bounds.
 const MOST_DRAWS: usize = 10_000;
 
 /// `[random]`.
@@ -19,7 +19,7 @@ pub(super) struct Draws {
     pub draw: Vec<Named<Distribution>>,
 }
 
-/// Where a random value comes from; drawn again while outside `min` to `max` and the bounds of the
+/// Source of a random value; drawn again while outside `min` to `max` and the bounds of the
 /// variable itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Distribution {
@@ -51,7 +51,7 @@ pub(super) struct Family {
     pub parameters: [&'static str; 2],
     kind: fn(f64, f64) -> Kind,
     makes_sense: fn(f64, f64) -> bool,
-    /// What must hold.
+    /// Condition that the parameters must meet.
     rule: &'static str,
 }
 

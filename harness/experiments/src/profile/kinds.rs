@@ -15,17 +15,17 @@ use super::shape::{Dwell, Piece, Pieces, Shape};
 pub struct Kind {
     /// Its name.
     pub name: &'static str,
-    /// What the torque is, for people.
+    /// Description of the torque, for readers.
     pub says: &'static str,
-    /// What can be chosen; one is called `duration`.
+    /// Parameters; one is called `duration`.
     pub parameters: &'static [Parameter],
-    /// What must hold between several parameters, and the sentence that says so.
+    /// Conditions between several parameters, each with its sentence.
     pub(super) demands: &'static [Demand],
     /// The torque; the values are allowed ones.
     pub(super) shape: fn(&Values) -> Arc<dyn Shape>,
 }
 
-/// What must hold, and the sentence that says so.
+/// A condition, and the sentence that states it.
 pub(super) type Demand = (fn(&Values) -> bool, &'static str);
 
 /// A number that a profile or a sensor is given.
@@ -37,13 +37,13 @@ pub struct Parameter {
     pub default: f64,
     /// Its unit; empty if it has none.
     pub unit: &'static str,
-    /// What it is, for axes.
+    /// Label on axes.
     pub label: &'static str,
-    /// Which values make sense.
+    /// Allowed values.
     pub allowed: Allowed,
 }
 
-/// Which values of a parameter make sense; all are finite.
+/// Allowed values of a parameter; all are finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Allowed {
     /// All.
@@ -61,7 +61,7 @@ pub enum Allowed {
 }
 
 impl Allowed {
-    /// What is wrong with a value, to follow the parameter's name.
+    /// States what is wrong with a value; the text follows the parameter's name.
     pub(super) fn fault(self, value: f64) -> Option<String> {
         let (met, demand) = match self {
             Allowed::Any => (true, String::new()),
@@ -133,7 +133,7 @@ const BAND: Demand = (
     "f0 and f1 must be from 1e-9 to 1e9 Hz",
 );
 
-/// Of what may begin at 0 Hz.
+/// Condition for a band that may begin at 0 Hz.
 const BAND_FROM_ZERO: Demand = (
     |v| {
         let band = 1.0 / FREQUENCY..=FREQUENCY;

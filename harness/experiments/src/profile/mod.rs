@@ -180,7 +180,7 @@ impl Written {
         Torque::read(path, held)
     }
 
-    /// Whether a parameter takes whole numbers only.
+    /// Returns true if a parameter takes integers only.
     pub fn is_whole(&self, key: &str) -> bool {
         let kind = KINDS.iter().find(|kind| kind.name == self.name);
         let parameter = kind.and_then(|kind| kind.parameters.iter().find(|p| p.name == key));
@@ -249,7 +249,7 @@ impl FromStr for Profile {
 }
 
 impl fmt::Display for Profile {
-    /// As the parser takes it, with every parameter.
+    /// Writes the profile as the parser reads it, with every parameter.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(&self.kind.written(&self.values))
     }
@@ -266,7 +266,7 @@ impl Profile {
         Values { kind: self.kind, values: &self.values }.get(name)
     }
 
-    /// What its kind says of a parameter.
+    /// Description of a parameter.
     pub fn parameter(&self, name: &str) -> Option<&'static Parameter> {
         self.kind.parameters.iter().find(|parameter| parameter.name == name)
     }
@@ -293,7 +293,7 @@ impl Profile {
     }
 }
 
-/// Where a run's torque comes from.
+/// Source of a run's torque.
 #[derive(Clone, Debug)]
 pub enum Torque {
     /// A formula.

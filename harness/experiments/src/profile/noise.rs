@@ -27,7 +27,7 @@ pub struct Noise {
     pub f1: f64,
     /// Power density ∝ f^exponent: 0 white, −1 pink, −2 brown.
     pub exponent: f64,
-    /// Which of the noises of this kind.
+    /// Seed of the noise.
     pub seed: u64,
     /// Largest torque, N·m; beyond it the noise is clipped.
     pub limit: f64,

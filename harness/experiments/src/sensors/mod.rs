@@ -25,9 +25,9 @@ use signals::table::Table;
 pub struct Kind {
     /// Its name.
     pub name: &'static str,
-    /// What it measures, for people.
+    /// Description of the measured quantity, for readers.
     pub says: &'static str,
-    /// What can be chosen beside [`ERRORS`].
+    /// Parameters in addition to [`ERRORS`].
     pub parameters: &'static [Parameter],
     /// Unit of its readings; empty: that of the variable.
     pub unit: &'static str,
@@ -105,7 +105,7 @@ pub const KINDS: &[Kind] = &[
 /// Stands for the unit of a sensor's readings.
 const READING: &str = "its unit";
 
-/// How wrong any sensor can be.
+/// Errors that any sensor can have.
 pub const ERRORS: [Parameter; 7] = [
     parameter("rate", 0.0, "Hz", "samples a second; 0: one a row", Allowed::NotNegative),
     parameter("noise", 0.0, READING, "standard deviation of a sample", Allowed::NotNegative),
@@ -121,7 +121,7 @@ pub const ERRORS: [Parameter; 7] = [
 pub struct Sensor {
     /// The column's name.
     pub name: String,
-    /// As it was written.
+    /// The text that was parsed.
     pub text: String,
     kind: &'static Kind,
     of: Option<String>,
@@ -201,12 +201,12 @@ impl Sensor {
         Ok(Sensor { name: name.into(), text: text.trim().into(), kind, of, own: values, errors })
     }
 
-    /// How wrong it is.
+    /// Errors of the sensor.
     pub fn errors(&self) -> &Errors {
         &self.errors
     }
 
-    /// What it measures of an FMU with these settings.
+    /// Quantity that the sensor measures in an FMU with these settings.
     ///
     /// # Errors
     /// If the FMU has no such quantity.
@@ -240,19 +240,19 @@ impl Sensor {
         }
     }
 
-    /// Whether a column has the name of one of its channels.
+    /// Returns true if a column has the name of one of the sensor's channels.
     pub fn has(&self, column: &str) -> bool {
         let rest = column.strip_prefix(&self.name);
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     }
 
-    /// What it would read if it sampled in every row and had neither noise nor steps.
+    /// Reading of a sensor that samples in every row, without noise and quantisation.
     pub fn expected(&self, value: f64) -> f64 {
         self.errors.scale * value + self.errors.bias
     }
 
-    /// What it reads of one channel in the rows of a run; NaN where no reading arrives. `stream` tells the noise of channels and
-    /// runs apart.
+    /// Readings of one channel in the rows of a run; NaN in rows without a reading. `stream` separates the noise of channels and
+    /// runs.
     fn readings(&self, truth: &[f64], every: usize, late: usize, stream: &str) -> Vec<f64> {
         let Errors { noise, quantum, seed, .. } = self.errors;
         let mut random = Random::new(seed, fnv(stream));

@@ -1,4 +1,4 @@
-//! What sensors measure, from variables of the FMU.
+//! Measured quantities, computed from variables of the FMU.
 //!
 //! The surface in an upright cylinder of radius R = d/2, filled to h, is a sum of modes (NASA SP-106, chapter 2; Dodge 2000). At the
 //! angle φ on the wall, from radial outwards towards tangential, with α_n the slosh angle of mode n in that direction:
@@ -21,12 +21,12 @@ use anyhow::{Context, Result, ensure};
 use formulas::cylinder::{MODES, XI};
 use host::description::{ModelDescription, Type};
 
-/// What one sensor measures.
+/// Measured quantity of one sensor.
 #[derive(Clone, Debug)]
 pub struct Quantity {
     /// Variables of the FMU that it follows from, all Real.
     pub needs: Vec<String>,
-    /// What it shows: the ending of the column's name, and the unit.
+    /// Channels: the ending of the column's name, and the unit.
     pub channels: Vec<(String, String)>,
     rule: Rule,
 }
@@ -40,7 +40,7 @@ enum Rule {
     Acceleration { radius: f64, angle: f64 },
 }
 
-/// How the coordinates `slosh.q_radial` and `slosh.q_tangential` of a mode of HubSlosh make slosh angles.
+/// Relation between the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh and slosh angles.
 #[derive(Clone, Copy, Debug)]
 pub enum Coordinate {
     /// It is the angle.
@@ -52,7 +52,7 @@ pub enum Coordinate {
 }
 
 impl Coordinate {
-    /// That of a `slosh.model`; none of a model whose liquid does not move.
+    /// Coordinate of a `slosh.model`; `None` for a model whose liquid does not move.
     pub fn of(model: &str) -> Option<Coordinate> {
         match model {
             "linear" | "planar" => Some(Coordinate::Angle),
@@ -82,7 +82,7 @@ struct Modes {
     coordinate: Coordinate,
 }
 
-/// What moves the tank, as [`MOTION`] names it.
+/// Variables that describe the motion of the tank.
 const MOTION: [&str; 7] =
     ["theta", "omega", "omega_dot", "tank.r", "g_axial", "bench.tilt", "bench.tilt_azimuth"];
 
@@ -152,7 +152,7 @@ impl Quantity {
         Ok(Quantity { needs, channels: one("m/s2"), rule: Rule::Acceleration { radius, angle } })
     }
 
-    /// What it is, channel by channel, where the variables that it needs have these values, in their order.
+    /// Value of each channel for these values of the required variables, in their order.
     pub fn values(&self, read: &[f64]) -> Vec<f64> {
         match &self.rule {
             Rule::Itself => vec![read[0]],
@@ -219,7 +219,7 @@ fn one(unit: &str) -> Vec<(String, String)> {
 }
 
 impl Modes {
-    /// How many of the values that are read are theirs.
+    /// Number of values that belong to this part.
     fn reads(&self) -> usize {
         3 * self.count + 1
     }
@@ -235,7 +235,7 @@ impl Modes {
     }
 }
 
-/// What is known of a HubSlosh before it runs: its start values, as text.
+/// HubSlosh's start values as text, from which the surface is computed.
 pub struct Surface<'a> {
     /// The FMU.
     pub description: &'a ModelDescription,

@@ -22,7 +22,7 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    /// By the times of all steps.
+    /// Choice by the times of all steps.
     pub fn new(times: &[f64]) -> Chosen {
         let mut order: Vec<usize> = (0..times.len()).collect();
         order.sort_by(|i, j| times[*i].total_cmp(&times[*j]));
@@ -42,7 +42,7 @@ impl Chosen {
         all
     }
 
-    /// What the counts of [`Chosen::all`] are of `steps` in all.
+    /// Spread of the counts of [`Chosen::all`] over `steps` steps in all.
     pub fn spread(&self, counts: &[u64], steps: usize) -> Option<Spread<u64>> {
         let all = self.all();
         let of = |steps: &[usize]| {
@@ -149,7 +149,7 @@ pub fn count(mut child: std::process::Child, steps: usize) -> Result<Vec<u64>> {
 mod tests {
     use super::*;
 
-    /// Of 20,000 steps two are above the percentile.
+    /// Two of 20,000 steps are above the percentile.
     #[test]
     fn the_slowest_and_those_around_the_median_are_counted() {
         let times: Vec<f64> = (0..20_000).map(f64::from).collect();

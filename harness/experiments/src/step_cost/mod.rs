@@ -1,4 +1,4 @@
-//! What one communication step costs, and how many internal steps a deadline allows.
+//! Cost of one communication step, and the number of internal steps that a deadline allows.
 //!
 //! A manoeuvre is made in steps with held inputs. Each step is taken several times from the same saved state, and the
 //! least of its times counts: other programs only add to a time. Which number for `solver.max_steps` fits a deadline is
@@ -20,7 +20,7 @@ use crate::run::{Run, driven};
 
 /// The parameter that bounds the internal steps of a communication step.
 pub const MAX_STEPS: &str = "solver.max_steps";
-/// How often a step is taken from the same state.
+/// Number of repetitions of a step from the same state.
 const TAKEN: usize = 5;
 /// The longest step that is asked for, s: what it needs no FMU needs more.
 const LONGEST: f64 = 1e6;
@@ -30,7 +30,7 @@ const MOST: u64 = 1_000_000;
 const STATES: usize = 40;
 const TIME: f64 = 0.5;
 
-/// What an FMU of this project is driven by where nothing else is said.
+/// Default drive of an FMU of this project.
 struct Usual {
     settings: &'static [(&'static str, &'static str)],
     input: &'static str,
@@ -210,7 +210,7 @@ pub fn spread(times: &[f64]) -> Spread<f64> {
     Spread::of(times)
 }
 
-/// Whether a step was refused because it would need more internal steps than it may take.
+/// Returns true if a step was refused because it needs more internal steps than allowed.
 fn is_too_much(error: &CallError) -> bool {
     error.text().contains(MAX_STEPS)
 }
@@ -223,7 +223,7 @@ fn bounded(run: &Run, max_steps: u64) -> Run {
     bounded
 }
 
-/// When a manoeuvre is refused because a step needs more internal steps than these, s.
+/// Time at which a manoeuvre is refused because a step needs more than `max_steps` internal steps, s.
 fn refused(fmu: &Fmu, run: &Run, max_steps: u64) -> Result<Option<f64>> {
     let run = bounded(run, max_steps);
     let mut course = Course::new(&run, fmu)?;
@@ -237,7 +237,7 @@ fn refused(fmu: &Fmu, run: &Run, max_steps: u64) -> Result<Option<f64>> {
     Ok(None)
 }
 
-/// How many internal steps the manoeuvre's most expensive step needs, and when that is, s.
+/// Largest number of internal steps in one step of the manoeuvre, and its time, s.
 fn needed(fmu: &Fmu, run: &Run, progress: &impl Fn(u64)) -> Result<(u64, f64)> {
     let mut when = run.start();
     let (mut too_few, mut enough) = (0, 1);
@@ -258,7 +258,7 @@ fn needed(fmu: &Fmu, run: &Run, progress: &impl Fn(u64)) -> Result<(u64, f64)> {
     Ok((enough, when))
 }
 
-/// What so many internal steps take at worst, s: the longest time of a step that is refused after them, at states along
+/// Worst time of `max_steps` internal steps, s: the longest time of a step that is refused after them, at states along
 /// the manoeuvre, each the least of several.
 fn worst(fmu: &Fmu, run: &Run, max_steps: u64, allowed: f64) -> Result<f64> {
     let run = bounded(run, max_steps);
@@ -312,14 +312,14 @@ fn worst(fmu: &Fmu, run: &Run, max_steps: u64, allowed: f64) -> Result<f64> {
     Ok(worst)
 }
 
-/// What is chosen for a deadline.
+/// Choice for a deadline.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
     /// For `solver.max_steps`.
     pub max_steps: u64,
-    /// What so many internal steps took at worst, s.
+    /// Worst time of this many internal steps, s.
     pub worst: f64,
-    /// How many the manoeuvre's own steps need at most.
+    /// Largest number of internal steps that the manoeuvre itself needs.
     pub needed: u64,
 }
 

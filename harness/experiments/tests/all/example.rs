@@ -23,7 +23,7 @@ fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Where the example is committed.
+/// Folder of the committed example.
 fn folder(example: &Example) -> PathBuf {
     pack::model(example.model).unwrap().example()
 }

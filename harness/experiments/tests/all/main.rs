@@ -1,4 +1,4 @@
-//! What the bench finds of the packed FMU.
+//! Tests of the bench on the packed FMU.
 
 mod example;
 mod gyro;

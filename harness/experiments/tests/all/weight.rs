@@ -6,7 +6,7 @@ use experiments::weight::Tanks;
 use host::fmu::Fmu;
 use pack::packed_model_for_tests;
 
-/// What is said of a run of `model` with these settings, `input` driven by rows, and this surface tension, N/m.
+/// Warnings for a run of `model` with these settings, `input` driven by rows, and this surface tension, N/m.
 fn said(
     model: &str,
     settings: &[(&str, &str)],
