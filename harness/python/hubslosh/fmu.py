@@ -33,6 +33,29 @@ Quantity = Value | tuple[float, str]
 """A value, or a number with its unit, such as ``(50, "mm")``."""
 
 
+class DefinedUnit(str):
+    """A unit's name with its definition by SI base units, as a file has it."""
+
+    EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+    """Base units, by their names in FMI and SSP."""
+
+    exponents: dict[str, int]
+    factor: float
+    offset: float
+
+    def __new__(
+        cls, name: str, exponents: dict[str, int], factor: float, offset: float
+    ) -> "DefinedUnit":
+        """Take a unit: a number in it is factor · number + offset in SI base units."""
+        unit = super().__new__(cls, name)
+        unit.exponents, unit.factor, unit.offset = exponents, factor, offset
+        return unit
+
+    def __getnewargs__(self) -> tuple[str, dict[str, int], float, float]:  # type: ignore[override]
+        """Return what a copy is made from."""
+        return str(self), self.exponents, self.factor, self.offset
+
+
 class FmuError(Exception):
     """What went wrong, in the FMU's own words where it has any."""
 
@@ -123,6 +146,7 @@ class Fmu:
             unit.name: {shown.name: shown for shown in unit.displayUnits}
             for unit in self.description.unitDefinitions
         }
+        self._bases = {unit.name: unit.baseUnit for unit in self.description.unitDefinitions}
 
     @classmethod
     def open(cls, model: str | Path) -> "Fmu":
@@ -207,6 +231,11 @@ class Fmu:
     def scale(self, name: str, unit: str) -> tuple[float, float]:
         """Return (factor, offset) of a unit: a number in it is factor · value + offset."""
         base = self.unit(name)
+        if isinstance(unit, DefinedUnit) and (known := self._bases.get(base)) is not None:
+            exponents = {key: getattr(known, key) for key in DefinedUnit.EXPONENTS}
+            if exponents != unit.exponents:
+                raise ValueError(f"the unit {unit} of the file is no unit of its kind, {base}")
+            return known.factor / unit.factor, (known.offset - unit.offset) / unit.factor
         if unit == base:
             return 1.0, 0.0
         shown = self._units.get(base, {})

@@ -2,16 +2,17 @@
 
 import argparse
 import json
+import math
 import os
 import tempfile
 import tomllib
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from .fmu import FmuError, Value
+from .fmu import DefinedUnit, FmuError, Quantity, Value
 
 
 def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
@@ -33,11 +34,14 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
     return {name: table[name].to_numpy().astype(float) for name in columns}
 
 
-def read_parameters(path: str | Path) -> dict[str, Value]:
+def read_parameters(path: str | Path) -> dict[str, Quantity]:
     """Read a file of parameters: .toml, .ssv or .json.
 
     ``"name" = value`` as TOML (nested tables are names with dots), SSP 1.0's parameter set
     (``hubslosh tank --parameters`` writes both), or what ``hubslosh identify --out`` writes.
+
+    A parameter of a .ssv with a unit is a pair (number, unit). The unit is that of the file's
+    definitions, otherwise one of the FMU's; `Fmu.convert` converts it or refuses it.
     """
     if not isinstance(path, str | Path):
         raise FmuError(f"the file of parameters must be a path, not {path!r}")
@@ -54,7 +58,8 @@ def read_parameters(path: str | Path) -> dict[str, Value]:
             raise FmuError(f"{path}: the name must end in .toml, .ssv or .json")
     except (OSError, ValueError, ET.ParseError) as error:
         raise FmuError(f"{path} cannot be read: {error}") from None
-    wrong = [n for n, value in found.items() if not isinstance(value, bool | int | float | str)]
+    allowed = bool | int | float | str | tuple  # a tuple is a number with its unit
+    wrong = [n for n, value in found.items() if not isinstance(value, allowed)]
     if wrong or not found:
         what = f"{', '.join(wrong)} must be numbers, true, false or texts" if wrong else "is empty"
         raise FmuError(f"{path}: {what}")
@@ -79,15 +84,57 @@ def _flatten(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, ob
             yield name, value
 
 
-def _parameters_of(root: ET.Element) -> Iterator[tuple[str, Value]]:
-    convert = {"Real": float, "Integer": int, "Boolean": lambda text: text in ("true", "1")}
+_KINDS: Mapping[str, Callable[[str], Value]] = {
+    "Real": float,
+    "Integer": int,
+    "Boolean": lambda text: _TRUTHS[text.strip()],
+}
+"""Converts the text of a parameter of this kind; others are texts."""
+
+_TRUTHS = {"true": True, "1": True, "false": False, "0": False}
+"""Values of xs:boolean."""
+
+
+def _parameters_of(root: ET.Element) -> Iterator[tuple[str, Quantity]]:
+    """Yield the parameters of SSP's parameter set, those with a unit as (number, unit)."""
     space = root.tag[: root.tag.find("}") + 1]
+    units = dict(_units_of(root))
+    seen = set()
     for parameter in root.iterfind(f"{space}Parameters/{space}Parameter"):
         value = next(iter(parameter), None)
         if value is None or "value" not in value.attrib or "name" not in parameter.attrib:
             raise FmuError("a Parameter without name or value")
-        kind = value.tag.removeprefix(space)
-        yield parameter.attrib["name"], convert.get(kind, str)(value.attrib["value"])
+        name, kind = parameter.attrib["name"], value.tag.removeprefix(space)
+        if name in seen:
+            raise FmuError(f"{name} is given twice")
+        seen.add(name)
+        try:
+            number = _KINDS.get(kind, str)(value.attrib["value"])
+        except (ValueError, KeyError):
+            text = value.attrib["value"]
+            raise FmuError(f"{name} cannot be {text!r} (allowed: a value of type {kind})") from None
+        unit = value.get("unit")
+        yield name, number if unit is None else (number, units.get(unit, unit))
+
+
+def _units_of(root: ET.Element) -> Iterator[tuple[str, DefinedUnit]]:
+    """Yield the units that a parameter set defines (SSP 1.0, section 4.5.3)."""
+    for unit in root.iterfind("{*}Units/{*}Unit"):
+        name, base = unit.get("name"), unit.find("{*}BaseUnit")
+        if name is None or base is None:
+            raise FmuError("a Unit without name or BaseUnit")
+        try:
+            exponents = {key: int(base.get(key, "0")) for key in DefinedUnit.EXPONENTS}
+            factor, offset = (float(base.get(key, default)) for key, default in _SCALE.items())
+        except ValueError as error:
+            raise FmuError(f"the unit {name}: {error}") from None
+        if not (math.isfinite(factor) and factor and math.isfinite(offset)):
+            raise FmuError(f"the unit {name}: factor and offset must be finite, and factor not 0")
+        yield name, DefinedUnit(name, exponents, factor, offset)
+
+
+_SCALE = {"factor": "1", "offset": "0"}
+"""Attributes of a BaseUnit, with their defaults."""
 
 
 def write_table(

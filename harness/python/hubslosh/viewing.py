@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .arguments import check_table
-from .fmu import FmuError, Quantity, find
+from .fmu import DefinedUnit, Fmu, FmuError, Quantity, find
 from .program import _run, find_program
 
 if TYPE_CHECKING:
@@ -92,6 +92,8 @@ def view(
         arguments: list[str | Path] = ["view", file, "--out", page]
         arguments += ["--fmu", find(model)] if model is not None else []
         for name, value in {**known, **(parameters or {})}.items():
+            if isinstance(value, tuple) and isinstance(value[-1], DefinedUnit):
+                value = Fmu.open(model or "HubSlosh").convert(name, value)
             arguments += ["--set", f"{name}={_text(value)}"]
         for number, tank in numbered.items():
             arguments += ["--tank", f"{number}:{tank}"]

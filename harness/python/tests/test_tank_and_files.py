@@ -1,6 +1,7 @@
 """A tank from Python as from the command line; tables as files; plots of everything."""
 
 import json
+import pickle
 import subprocess
 from pathlib import Path
 
@@ -173,3 +174,87 @@ def test_every_plot_has_what_it_promises(fmu: Path) -> None:
     ):
         with pytest.raises(FmuError, match=sentence):
             call()
+
+
+SSV = """<?xml version="1.0" encoding="UTF-8"?>
+<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+ xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0" name="bench">
+ <ssv:Parameters>{parameters}</ssv:Parameters>
+ <ssv:Units>
+  <ssc:Unit name="mil"><ssc:BaseUnit m="1" factor="2.54e-5"/></ssc:Unit>
+  <ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit>
+  <ssc:Unit name="min"><ssc:BaseUnit s="1" factor="60"/></ssc:Unit>
+  {units}
+ </ssv:Units>
+</ssv:ParameterSet>
+"""
+
+
+def parameter(name: str, value: str, unit: str = "", kind: str = "Real") -> str:
+    """Return a parameter of a parameter set."""
+    unit = f' unit="{unit}"' if unit else ""
+    return f'<ssv:Parameter name="{name}"><ssv:{kind} value="{value}"{unit}/></ssv:Parameter>'
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value"),
+    [
+        (parameter("tank.h", "50", "mm"), "tank.h", 0.05),  # defined in the file
+        (parameter("tank.h", "1000", "mil"), "tank.h", 0.0254),  # unknown to the FMU
+        (parameter("tank.h", "0.05", "m"), "tank.h", 0.05),
+        (parameter("tank.h", "0.05"), "tank.h", 0.05),
+        (
+            parameter("init.slosh_angle", "3", "deg"),
+            "init.slosh_angle",
+            np.radians(3),
+        ),  # of the FMU
+    ],
+)
+def test_units_of_a_parameter_set_are_converted(
+    fmu: Path, tmp_path: Path, text: str, name: str, value: float
+) -> None:
+    """Through the file's definitions, otherwise through the FMU's."""
+    file = tmp_path / "bench.ssv"
+    file.write_text(SSV.format(parameters=text, units=""))
+    converted = hubslosh.fmu.Fmu.open(fmu).convert(name, hubslosh.read_parameters(file)[name])
+    assert converted == pytest.approx(value, rel=1e-15)
+    by_file = hubslosh.simulate(fmu, file, stop=0.2)
+    by_value = hubslosh.simulate(fmu, {name: converted}, stop=0.2)
+    assert by_file.equals(by_value)
+    again = pickle.loads(pickle.dumps(hubslosh.read_parameters(file)))
+    assert hubslosh.fmu.Fmu.open(fmu).convert(name, again[name]) == converted
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "said"),
+    [
+        (
+            parameter("tank.h", "50", "furlong"),
+            "",
+            r"tank.h cannot be .*no unit furlong \(units: m",
+        ),
+        (
+            parameter("tank.h", "50", "min"),
+            "",
+            "the unit min of the file is no unit of its kind, m",
+        ),
+        (parameter("friction.model", "1", "m", "Integer"), "", "has no unit"),
+        (parameter("tank.h", "50 mm"), "", "allowed: a value of type Real"),
+        (parameter("gyro.on", "yes", kind="Boolean"), "", "allowed: a value of type Boolean"),
+        (parameter("tank.h", "1") * 2, "", "tank.h is given twice"),
+        (parameter("tank.h", "1"), '<ssc:Unit name="x"/>', "a Unit without name or BaseUnit"),
+        (
+            parameter("tank.h", "1"),
+            '<ssc:Unit name="x"><ssc:BaseUnit m="1" factor="0"/></ssc:Unit>',
+            "the unit x: factor and offset must be finite, and factor not 0",
+        ),
+    ],
+)
+def test_a_unit_that_is_not_one_of_the_variable_is_refused(
+    fmu: Path, tmp_path: Path, text: str, units: str, said: str
+) -> None:
+    """So is what is not a parameter set."""
+    file = tmp_path / "bench.ssv"
+    file.write_text(SSV.format(parameters=text, units=units))
+    with pytest.raises(FmuError, match=said):
+        hubslosh.simulate(fmu, file, stop=0.2)
