@@ -334,7 +334,7 @@ pub(super) fn rotation(q: &[f64]) -> Rotation3<f64> {
 
 /// The wall that a tank's lump meets: its centre on the tank's axis and its semi-axes b, b, a, from the liquid's centre
 /// at rest and the pendulums' m l.
-fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
+pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     let tank = &p.tank[i];
     let modes = || 0..tank.modes;
     let mass = tank.m_0 + modes().map(|n| tank.mass[n]).sum::<f64>();
@@ -346,7 +346,7 @@ fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
 }
 
 /// J_a: of the parts of the liquid, with its rods along `p`, about their centre; body axes.
-fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
+pub(super) fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
     let tank = &p.tank[i];
     let axes = *rotation(&tank.q).matrix();
     let mut parts = vec![(tank.m_0, V::z() * tank.h_0)];

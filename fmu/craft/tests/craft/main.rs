@@ -10,6 +10,7 @@ mod component;
 mod decays;
 mod draining;
 mod equations;
+mod events;
 mod exchange;
 mod impulses;
 mod independent;
