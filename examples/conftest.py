@@ -32,5 +32,5 @@ def fmu(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="session")
 def spacecraft(fmu: str) -> str:
-    """Return Spacecraft.fmu; SloshTank.fmu is beside it."""
+    """Return Spacecraft.fmu; SloshTank.fmu is in the same folder."""
     return str(Path(fmu).with_name("Spacecraft.fmu")) if fmu.endswith(".fmu") else "Spacecraft"

@@ -307,7 +307,7 @@ fn named(module: &Module, code: &str) -> Vec<Module> {
     found
 }
 
-/// Of each folder of a crate its modules (a folder is one), each with those beside it that it names. What stands
+/// Modules of each folder of a crate (a folder counts as one), each with the modules of the same folder that it names. What stands
 /// in the folder itself (`mod.rs`, `lib.rs`) is of the folder: who names it names no module beside.
 fn modules(
     sources: &BTreeMap<Module, String>,

@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::common::{python, run};
 use pack::{Fmi, MODELS, packed_model_for_tests, packed_version_for_tests};
 
-/// Whatever FMPy is told of events, the motion has the bits of FMI 2.0; through CVODE it is the same within what its
+/// The motion is bit-identical to FMI 2.0 however FMPy handles events; through CVODE it is the same within what its
 /// tolerance, 1e-9, makes of 20 s of stick and slip.
 const FMPY: &str = r#"
 import sys

@@ -163,7 +163,7 @@ fn model_exchange_gives_the_crate_fmi_the_bits_that_it_gives_us() {
     theirs.terminate().unwrap();
 }
 
-/// FMI 3.0 in the crate's hands, beside FMI 2.0 in ours.
+/// The crate runs FMI 3.0; our host runs FMI 2.0 for comparison.
 mod fmi3 {
     use std::io::{Read, Write};
 

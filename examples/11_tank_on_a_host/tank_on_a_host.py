@@ -39,9 +39,9 @@ SIGNALS = {
     **{f"omega[{i}]": f"omega[{i}]" for i in (1, 2, 3)},
     **{f"omega_dot[{i}]": f"omega_dot[{i}]" for i in (1, 2, 3)},
 }
-"""What the tank is told, by what the host has."""
+"""Inputs of the tank, each with the host's signal."""
 LOADS = {f"bias[{i}]": f"{'force' if i < 4 else 'torque'}[{(i - 1) % 3 + 1}]" for i in range(1, 7)}
-"""What the host is told, by what the tank has."""
+"""Inputs of the host, each with the tank's signal."""
 
 Values = dict[str, float | int]
 

@@ -1,4 +1,4 @@
-"""The numbers of README: the zone, growth in it and beside it, the damping that closes it."""
+"""The numbers of README: the zone, growth inside and outside, the damping that closes it."""
 
 import pytest
 from danger_zone import Craft, growth, predicted_zone, simulated_growth, zone
@@ -33,7 +33,7 @@ def test_the_simulated_loop_grows_as_its_poles_say(spacecraft: str, z: float) ->
 
 
 def test_the_damping_needed_is_the_predicted_one(spacecraft: str) -> None:
-    """5 % beside it the loop is stable or not."""
+    """5 % from the boundary the loop is stable or not."""
     needed = Craft(0.5).damping_needed
     assert growth(spacecraft, Craft(0.5, zeta=0.95 * needed)) > 0
     assert growth(spacecraft, Craft(0.5, zeta=1.05 * needed)) < 0

@@ -1,8 +1,7 @@
 //! modelDescription.xml from an FMU's variable table.
 //!
-//! Nothing is said here about any single variable: what the XML says of it is in
-//! the table, and the XML is committed so that a change of the interface
-//! shows in a diff.
+//! This crate knows no single variable: the table describes them. The XML is committed so that a
+//! change of the interface shows in a diff.
 
 pub mod fmi3;
 pub mod icon;

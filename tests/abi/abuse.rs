@@ -102,7 +102,7 @@ impl Unpacked {
     }
 }
 
-/// How a C host is told of a variable's type.
+/// Codes of variable types for the C host.
 fn letter(variable: &Variable) -> char {
     match variable.kind() {
         Type::Real => 'R',

@@ -975,7 +975,7 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
                     (Value::Boolean(b), _) => Value::Boolean(!b),
                 };
             set(&mut other, &[(&parameter.name(), value)]);
-            // Beside another item of the enumeration it would be an error.
+            // Together with another item of the enumeration it would be an error.
             if let Some(group) = parameter.variable.name.strip_suffix(".kind") {
                 let model = TABLE.scalars[reference_of_model(group) as usize];
                 set(&mut other, &[(&model.name(), model.start().unwrap())]);
