@@ -10,7 +10,7 @@ import contextlib
 import copy
 import threading
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from ctypes import byref
 from pathlib import Path
 from types import TracebackType
@@ -120,12 +120,16 @@ class Instance:
 
     Those of FMI 3.0 have the calls of FMI 2.0 (`fmi3`).
 
-    Use it in a ``with`` statement. The package's FMUs start at rest here: what moves was asked for.
+    Use it in a ``with`` statement. Calls from several threads follow one another. The package's
+    FMUs start at rest here: what moves was asked for.
     """
 
     def __init__(self, fmu: Fmu, kind: type) -> None:
         """Instantiate for Co-Simulation (``FMU2Slave``) or Model Exchange (``FMU2Model``)."""
         self._instance: Any = None
+        # Held during every call, for the FMU must not be freed within one.
+        self._lock = threading.RLock()
+        self._depth = 0
         self.fmu = fmu
         description = fmu.description
         if kind is fmi2.FMU2Slave:
@@ -174,10 +178,28 @@ class Instance:
         self.close()
 
     def close(self) -> None:
-        """Free the instance."""
-        if self._instance is not None:
-            self._instance.freeInstance()
-            self._instance = None
+        """Free the instance; a call in another thread ends first.
+
+        Raises FmuError within a run, where a controller might call it.
+        """
+        with self._lock:
+            if self._depth:
+                raise FmuError("the instance is in a call: close it after its end")
+            if self._instance is not None:
+                self._instance.freeInstance()
+                self._instance = None
+
+    @contextlib.contextmanager
+    def _held(self) -> Iterator[Any]:
+        """Yield fmpy's instance, which nobody else calls or frees meanwhile."""
+        with self._lock:
+            if self._instance is None:
+                raise FmuError("the instance is closed")
+            self._depth += 1
+            try:
+                yield self._instance
+            finally:
+                self._depth -= 1
 
     def names(self, *causalities: str) -> list[str]:
         """Return the names of the variables with these causalities ("output", "local", …)."""
@@ -215,11 +237,12 @@ class Instance:
 
     def _call(self, function: str, *args: Any, **kwargs: Any) -> Any:
         """Call a function of fmpy's instance; an error or a warning carries what the FMU logged."""
-        _messages.said.clear()
-        try:
-            result = getattr(self._instance, function)(*args, **kwargs)
-        except FMICallException as error:
-            raise FmuError(" ".join([str(error), *_messages.said])) from None
+        with self._held() as instance:
+            _messages.said.clear()
+            try:
+                result = getattr(instance, function)(*args, **kwargs)
+            except FMICallException as error:
+                raise FmuError(" ".join([str(error), *_messages.said])) from None
         for message in _messages.said:
             warnings.warn(message, FmuWarning, stacklevel=5)
         return result
@@ -321,8 +344,9 @@ class Plant(Instance):
             integer_outputs=signals(outputs["getInteger"], whole, None),
             boolean_outputs=signals(outputs["getBoolean"], whole, None),
         )
-        _messages.said.clear()
-        stop = batch.run(self._instance, run, feedback)
+        with self._held() as instance:
+            _messages.said.clear()
+            stop = batch.run(instance, run, feedback)
         recorded = dict(zip(outputs["getReal"], run.real_outputs.values.T, strict=True))
         recorded |= zip(outputs["getInteger"], run.integer_outputs.values.T, strict=True)
         recorded |= zip(outputs["getBoolean"], run.boolean_outputs.values.T != 0, strict=True)
@@ -351,20 +375,22 @@ class Plant(Instance):
 
     def save(self) -> tuple[float, bytes]:
         """Return the time (s) and the serialized state, for `restore` of any instance."""
-        state = self._call("getFMUstate")
-        try:
-            return self.time, self._call("serializeFMUstate", state)
-        finally:
-            self._call("freeFMUstate", state)
+        with self._held():
+            state = self._call("getFMUstate")
+            try:
+                return self.time, self._call("serializeFMUstate", state)
+            finally:
+                self._call("freeFMUstate", state)
 
     def restore(self, saved: tuple[float, bytes]) -> None:
         """Go back to what `save` returned, here or in another instance."""
-        state = self._call("deSerializeFMUstate", saved[1])
-        try:
-            self._call("setFMUstate", state)
-        finally:
-            self._call("freeFMUstate", state)
-        self.time = saved[0]
+        with self._held():
+            state = self._call("deSerializeFMUstate", saved[1])
+            try:
+                self._call("setFMUstate", state)
+            finally:
+                self._call("freeFMUstate", state)
+            self.time = saved[0]
 
 
 def drive(

@@ -1,11 +1,15 @@
 """A saved state brings everything back, bit for bit."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hubslosh import FmuError, Plant
+from hubslosh.feedback import Feedback
 
 STEP = 0.02  # s
 EVERYTHING = {
@@ -70,3 +74,62 @@ def test_a_damaged_state_is_refused_and_changes_nothing(fmu: Path) -> None:
             with pytest.raises(FmuError, match="fmi2DeSerializeFMUstate"):
                 plant.restore((time, bad))
         assert plant.save() == (time, good)
+
+
+CLOSED = """
+import sys, threading
+import numpy as np
+from hubslosh import FmuError, Plant
+
+for _ in range(8):
+    plant = Plant(sys.argv[1], {"init.slosh_angle": 0.2})
+    time = np.arange(10001) * 0.01
+    found = []
+
+    def run():
+        try:
+            found.append(plant.run(time, {}, None, ["omega"])["omega"][-1])
+        except FmuError as error:
+            found.append(str(error))
+
+    runs = [threading.Thread(target=run) for _ in range(2)]
+    for thread in runs:
+        thread.start()
+    plant.close()
+    for thread in runs:
+        thread.join()
+    for result in found:
+        assert isinstance(result, float) or "closed" in result or "stopped" in result, found
+    try:
+        plant.get(["omega"])
+    except FmuError as error:
+        assert "the instance is closed" in str(error)
+    else:
+        raise AssertionError
+    plant.close()
+"""
+
+
+def test_close_waits_for_a_run_in_another_thread(fmu: Path) -> None:
+    """In a process of its own: without the lock it ends by SIGSEGV."""
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    command = [sys.executable, "-c", CLOSED, fmu]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{done.returncode}: {done.stderr}"
+
+
+def test_a_controller_cannot_close_the_instance_that_it_controls(fmu: Path) -> None:
+    """The run ends with that error; the instance can be closed then."""
+    with Plant(fmu) as plant:
+
+        def law(*_: object) -> list[float]:
+            plant.close()
+            return [0.0]
+
+        measured, command = (
+            np.array([plant.fmu.variable(name).valueReference], np.uint32)
+            for name in ("omega", "tau_cmd")
+        )
+        feedback = Feedback(law, measured, command, cycles=2, parts=1, switch=0, latency=0)
+        with pytest.raises(FmuError, match="the instance is in a call"):
+            plant.run(np.arange(3) * 0.1, {}, None, ["omega"], feedback)
