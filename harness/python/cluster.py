@@ -49,6 +49,7 @@ try:
     from tqdm import tqdm
 
     import hubslosh
+    from hubslosh.store import read_manifest
 except ModuleNotFoundError as missing:
     environment.run_again_in("cluster", missing)
 
@@ -149,8 +150,17 @@ class Folder:
         self._lock.truncate(0)
         self._lock.write(f"process {os.getpid()}, cluster.py")
         self._lock.flush()
-        lines = self.manifest.read_text().splitlines() if self.manifest.is_file() else []
-        self._sums = {name: sum_ for sum_, _, name in (line.partition("  ") for line in lines)}
+        try:
+            self._sums = read_manifest(self.manifest) if self.manifest.exists() else {}
+            if self._sums and not self.manifest.read_bytes().endswith(b"\n"):
+                # A kill cut off the last line; the next one must not be appended to it.
+                lines = (f"{sum_}  {name}\n" for name, sum_ in self._sums.items())
+                draft = self.manifest.with_suffix(".new")
+                draft.write_text("".join(lines), encoding="utf-8", newline="\n")
+                draft.replace(self.manifest)
+        except (OSError, ValueError, hubslosh.FmuError) as error:
+            self._lock.close()
+            raise CampaignError(str(error)) from None
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -160,10 +170,16 @@ class Folder:
         """Let go of it."""
         self._lock.close()
 
-    def is_damaged(self, file: str) -> bool:
-        """Return whether a stored run is not what was stored."""
-        data = (self.manifest.parent / file).read_bytes()
-        return self._sums.get(file) not in (None, hashlib.sha256(data).hexdigest())
+    def why_damaged(self, file: str) -> str | None:
+        """Return why a stored run cannot be trusted, or None if it can."""
+        path = self.manifest.parent / file
+        if file not in self._sums:
+            # A run of `hubslosh campaign` had a line before it had its name.
+            writer = pyarrow.parquet.ParquetFile(path).metadata.created_by
+            lost = writer.startswith("parquet-rs")
+            return f"it has no line in {self.manifest.name}, which is damaged" if lost else None
+        same = self._sums[file] == hashlib.sha256(path.read_bytes()).hexdigest()
+        return None if same else f"its SHA-256 is not that in {self.manifest.name}"
 
     def add(self, file: str) -> None:
         """Say of a run what was stored."""
@@ -268,8 +284,8 @@ def make_runs_in(
     for run in todo["runs"]:
         path = harness.out / run["file"]
         why = why_not_stored(path, run, todo["kept"]) if path.exists() else ""
-        if why is None and folder.is_damaged(run["file"]):
-            why = f"its SHA-256 is not that in {folder.manifest.name}"
+        if why is None:
+            why = folder.why_damaged(run["file"])
         if why:
             print(f"re-running {run['name']}: {why}")
         if why is not None:

@@ -79,6 +79,23 @@ def decoded(value: Any) -> float:
     return float(value["float"] if isinstance(value, dict) else value)
 
 
+def read_manifest(path: Path) -> dict[str, str]:
+    """Return the last SHA-256 of each file; a last line that a kill cut off does not count.
+
+    Raises FmuError if another line is not one of a manifest.
+    """
+    *lines, _cut = path.read_text(encoding="utf-8").split("\n")
+    found = {}
+    for number, line in enumerate(lines, 1):
+        if not (parts := _LINE.fullmatch(line)):
+            raise FmuError(
+                f"line {number} of {path} is damaged: {line!r:.120} (allowed: SHA-256, two "
+                "spaces, name); restore the file, or use another folder"
+            )
+        found[parts[2]] = parts[1]
+    return found
+
+
 class Store:
     """A study's folder, held from ``with`` to its end."""
 
@@ -161,7 +178,10 @@ class Store:
         if study.exists() and (data := study.read_bytes()) != text:
             self._compare(json.loads(data))
         if manifest.exists():
-            self._sums = self._read_manifest(manifest)
+            found = read_manifest(manifest)
+            self._sums = {
+                name: sum_ for name, sum_ in found.items() if (self.path / name).is_file()
+            }
             if study.exists():
                 self._sums[STUDY] = hashlib.sha256(text).hexdigest()
             self._write_manifest()
@@ -173,19 +193,6 @@ class Store:
         self._manifest = manifest.open("ab", buffering=0)
         if not study.exists():
             self._publish(STUDY, text)
-
-    def _read_manifest(self, path: Path) -> dict[str, str]:
-        """Return the last SHA-256 of each file; a last line that a kill cut off does not count."""
-        *lines, _cut = path.read_text(encoding="utf-8").split("\n")
-        found = {}
-        for number, line in enumerate(lines, 1):
-            if not (parts := _LINE.fullmatch(line)):
-                raise FmuError(
-                    f"line {number} of {path} is damaged: {line!r:.120} (allowed: SHA-256, two "
-                    "spaces, name); restore the file, or give another folder"
-                )
-            found[parts[2]] = parts[1]
-        return {name: sum_ for name, sum_ in found.items() if (self.path / name).is_file()}
 
     def _write_manifest(self) -> None:
         """Replace the manifest by one with a line for each file."""

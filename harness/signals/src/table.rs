@@ -213,6 +213,12 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
         .collect())
 }
 
+/// The library that wrote a Parquet file, as the file says.
+pub fn writer(path: &Path) -> Option<String> {
+    let reader = SerializedFileReader::new(File::open(path).ok()?).ok()?;
+    reader.metadata().file_metadata().created_by().map(String::from)
+}
+
 /// Names of the columns of a file.
 pub fn names(path: &Path) -> Result<Vec<String>> {
     let name = path.display();

@@ -110,6 +110,46 @@ fn every_flipped_bit_in_a_stored_run_is_noticed() {
 }
 
 #[test]
+fn a_flipped_run_without_its_manifest_is_never_reused() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "profile = \"sine:duration=0.2\"\n[vary]\nhub.I = [0.3, 0.31]\n";
+    successful(campaign(directory, plan));
+    let before = published(directory);
+    let manifest = directory.join("c").join(MANIFEST);
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    let run = directory.join("c/runs").join(&names(&directory.join("c/runs"))[0]);
+    let name = format!("runs/{}", run.file_name().unwrap().to_string_lossy());
+    let whole = std::fs::read(&run).unwrap();
+    let mut flipped = whole.clone();
+    flipped[100] ^= 1;
+    // a line is lost: its run is simulated again, and the command says so
+    let without: String = text.split_inclusive('\n').filter(|line| !line.contains(&name)).collect();
+    for damaged in [without, String::new()] {
+        std::fs::write(&run, &flipped).unwrap();
+        std::fs::write(&manifest, damaged).unwrap();
+        let (_, error) = successful(campaign(directory, plan));
+        assert!(error.contains("it has no line in manifest.sha256"), "{error}");
+        assert!(std::fs::read(&run).unwrap() == whole);
+        assert!(published(directory) == before);
+    }
+    // a file is lost
+    std::fs::remove_file(&run).unwrap();
+    let (_, error) = successful(campaign(directory, plan));
+    assert!(error.contains(": its file is missing"), "{error}");
+    // the manifest is lost
+    std::fs::write(&run, &flipped).unwrap();
+    std::fs::remove_file(&manifest).unwrap();
+    let done = campaign(directory, plan).output().unwrap();
+    let (_, error) = said(&done);
+    assert_eq!(done.status.code(), Some(1), "{error}");
+    assert!(error.contains("nothing verifies the stored runs; restore it, or remove"), "{error}");
+    std::fs::remove_dir_all(directory.join("c/runs")).unwrap();
+    successful(campaign(directory, plan));
+    assert!(published(directory) == before);
+}
+
+#[test]
 fn a_second_campaign_in_a_directory_hears_who_holds_it() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();

@@ -8,25 +8,28 @@
 //! .unfinished/                              what is being written; removed at the start and the end
 //! ```
 //!
-//! A run's line is added to the manifest before the run gets its name. So a stored run without a line
-//! is another program's, and one that differs from the last line with its name is damaged.
+//! A run's line is added to the manifest before the run gets its name. So a stored run that differs from
+//! the last line with its name is damaged. A run without a line is another program's; if HubSlosh wrote
+//! it, the manifest is damaged. The folder of a study has the same layout (`harness/python/hubslosh/store.py`).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use host::output::{self, sha256};
 use host::temporary::{self, Registered};
-use signals::table::Table;
+use signals::table::{self, Table};
 
 /// Folder of the stored runs.
 pub const RUNS: &str = "runs";
 /// The hashes of all files.
 pub const MANIFEST: &str = "manifest.sha256";
 const LOCK: &str = ".lock";
+/// What a study of Python's `monte_carlo` is.
+const STUDY: &str = "study.json";
 const UNFINISHED: &str = ".unfinished";
 
 /// A campaign's directory, until this is dropped.
@@ -34,6 +37,10 @@ const UNFINISHED: &str = ".unfinished";
 pub struct Folder {
     path: PathBuf,
     unfinished: PathBuf,
+    /// Files that are in the manifest, but not in the directory.
+    lost: BTreeSet<String>,
+    /// No campaign was in the directory before: all runs are other programs'.
+    is_new: bool,
     manifest: Mutex<Manifest>,
     _registered: Registered,
     _lock: File,
@@ -42,7 +49,7 @@ pub struct Folder {
 /// The hashes of the files, by name, and the file in which they are.
 #[derive(Debug)]
 struct Manifest {
-    /// `None` from its publication on.
+    /// `None` from its publication on, and after a line that could not be written.
     file: Option<File>,
     sums: BTreeMap<String, String>,
 }
@@ -52,14 +59,66 @@ fn lines(sums: &BTreeMap<String, String>) -> String {
     sums.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect()
 }
 
-/// The last hash of each name; a line that a kill cut off is none.
-fn sums(text: &str) -> BTreeMap<String, String> {
-    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-    let pair = |line: &str| {
-        let (sum, name) = line.split_once("  ").filter(|(sum, _)| sum.len() == 64)?;
-        Some((name.to_string(), sum.to_string()))
+/// The last hash of each name; a line that a kill cut off does not count.
+///
+/// # Errors
+/// If another line is not one of a manifest.
+fn sums(text: &str) -> Result<BTreeMap<String, String>> {
+    let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+    let pair = |(row, line): (usize, &str)| {
+        let is_hash = |sum: &str| {
+            sum.len() == 64 && sum.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+        };
+        let pair = line.split_once("  ").filter(|(sum, name)| is_hash(sum) && !name.is_empty());
+        let (sum, name) = pair.with_context(|| {
+            let shown: String = line.chars().take(SHOWN).collect();
+            format!("line {} is {shown:?} (allowed: SHA-256, two spaces, name)", row + 1)
+        })?;
+        Ok((name.to_string(), sum.to_string()))
     };
-    whole.lines().filter_map(pair).collect()
+    whole.lines().enumerate().map(pair).collect()
+}
+
+/// Characters of a damaged line that a message shows.
+const SHOWN: usize = 120;
+
+/// The bytes of a file. What is not a regular file, such as a pipe, might be read without an end.
+fn bytes(path: &Path) -> Result<Vec<u8>> {
+    let read = || {
+        ensure!(path.metadata()?.is_file(), "it is not a regular file");
+        Ok(fs::read(path)?)
+    };
+    read().with_context(|| format!("{} cannot be read", path.display()))
+}
+
+/// Reads a directory's manifest.
+///
+/// # Errors
+/// If nothing verifies the runs that are there: the manifest is damaged, or it is missing where a
+/// campaign was before.
+fn read_manifest(path: &Path) -> Result<BTreeMap<String, String>> {
+    let runs = path.join(RUNS);
+    let entries = fs::read_dir(&runs).with_context(|| format!("{} cannot be read", runs.display()));
+    let has_runs = entries?.next().is_some();
+    let place = path.join(MANIFEST);
+    let read = || -> Result<BTreeMap<String, String>> {
+        if fs::symlink_metadata(&place).is_err() {
+            let traces = [LOCK, "plan.toml", "runs.csv", "report.html"];
+            let was_here = traces.iter().any(|name| path.join(name).exists());
+            ensure!(!was_here, "it is missing");
+            return Ok(BTreeMap::new());
+        }
+        sums(std::str::from_utf8(&bytes(&place)?)?)
+    };
+    match read() {
+        Err(error) if has_runs => Err(error.context(format!(
+            "{} is damaged, so nothing verifies the stored runs; restore it, or remove {} to \
+             simulate all runs again",
+            place.display(),
+            runs.display()
+        ))),
+        sums => Ok(sums.unwrap_or_default()),
+    }
 }
 
 /// The name of a run's file in the directory.
@@ -72,9 +131,16 @@ impl Folder {
     /// want it too.
     ///
     /// # Errors
-    /// If another campaign holds it.
+    /// If another campaign holds it, if it is a study's, or if its manifest is damaged.
     pub fn take(path: &Path, about: &str) -> Result<Folder> {
+        ensure!(
+            !path.join(STUDY).exists(),
+            "{} holds a study of monte_carlo; put this campaign elsewhere (--out DIRECTORY)",
+            path.display()
+        );
         output::directory(&path.join(RUNS))?;
+        let listed = read_manifest(path)?;
+        let is_new = !path.join(MANIFEST).exists();
         let lock = hold(path, about)?;
         let unfinished = path.join(UNFINISHED);
         if unfinished.exists() {
@@ -84,18 +150,19 @@ impl Folder {
         output::directory(&unfinished)?;
         let registered = temporary::register(&unfinished);
         let place = path.join(MANIFEST);
-        let text = fs::read(&place).unwrap_or_default();
-        let text = String::from_utf8_lossy(&text);
-        let mut found = sums(&text);
-        found.retain(|name, _| path.join(name).is_file());
-        if lines(&found) != text {
-            output::atomically(&place, |file| Ok(file.write_all(lines(&found).as_bytes())?))?;
+        let (found, lost): (BTreeMap<_, _>, BTreeMap<_, _>) =
+            listed.into_iter().partition(|(name, _)| path.join(name).is_file());
+        let text = lines(&found);
+        if fs::read(&place).ok().is_none_or(|there| there != text.as_bytes()) {
+            output::atomically(&place, |file| Ok(file.write_all(text.as_bytes())?))?;
         }
         let file = File::options().append(true).create(true).open(&place);
         let file = file.with_context(|| format!("{} cannot be written", place.display()))?;
         Ok(Folder {
             path: path.to_path_buf(),
             unfinished,
+            lost: lost.into_keys().collect(),
+            is_new,
             manifest: Mutex::new(Manifest { file: Some(file), sums: found }),
             _registered: registered,
             _lock: lock,
@@ -112,6 +179,16 @@ impl Folder {
         self.path.join(file_of(run))
     }
 
+    /// Whether a run was stored, and is missing now.
+    pub fn lacks(&self, run: &str) -> bool {
+        self.lost.contains(&file_of(run)) && !self.run(run).exists()
+    }
+
+    /// Whether a run is in the manifest.
+    pub fn lists(&self, run: &str) -> bool {
+        self.manifest().sums.contains_key(&file_of(run))
+    }
+
     /// The SHA-256 of a stored run; the reason, if it is not what was stored. A run of another program
     /// that is seen for the first time is taken as it is.
     pub fn check(&self, run: &str) -> Result<String, String> {
@@ -121,7 +198,11 @@ impl Folder {
             Some(sum) if *sum != found => Err(format!(
                 "its SHA-256 is not that in {MANIFEST}; it is damaged, or another program replaced it"
             )),
-            _ => Ok(found),
+            Some(_) => Ok(found),
+            None if !self.is_new && is_ours(&self.path.join(&file)) => Err(format!(
+                "it has no line in {MANIFEST}, which is damaged; nothing verifies the run"
+            )),
+            None => Ok(found),
         }
     }
 
@@ -187,10 +268,7 @@ impl Folder {
     }
 
     fn hash(&self, file: &str) -> Result<String> {
-        let path = self.path.join(file);
-        let bytes =
-            fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
-        Ok(sha256(&bytes))
+        Ok(sha256(&bytes(&self.path.join(file))?))
     }
 
     fn add(&self, file: String, sum: String) -> Result<()> {
@@ -199,14 +277,25 @@ impl Folder {
             return Ok(());
         }
         let line = format!("{sum}  {file}\n");
-        let place = manifest.file.as_mut().context("the campaign is published already")?;
-        let added = place.write_all(line.as_bytes());
-        added
-            .and_then(|()| place.sync_data())
-            .with_context(|| format!("{} cannot be written", self.path.join(MANIFEST).display()))?;
+        let name = self.path.join(MANIFEST);
+        let name = name.display();
+        let place = manifest.file.as_mut();
+        let place = place.with_context(|| format!("{name} is closed, or could not be written"))?;
+        let added = place.write_all(line.as_bytes()).and_then(|()| place.sync_data());
+        if added.is_err() {
+            // no other line may follow half a line
+            manifest.file = None;
+        }
+        added.with_context(|| format!("{name} cannot be written"))?;
         manifest.sums.insert(file, sum);
         Ok(())
     }
+}
+
+/// Whether HubSlosh wrote a run: the library of its Parquet files says so, which importers in other
+/// languages do not use.
+fn is_ours(run: &Path) -> bool {
+    table::writer(run).is_none_or(|writer| writer.starts_with("parquet-rs"))
 }
 
 impl Drop for Folder {
@@ -219,6 +308,7 @@ impl Drop for Folder {
 fn hold(path: &Path, about: &str) -> Result<File> {
     let place = path.join(LOCK);
     let name = place.display();
+    ensure!(!place.exists() || place.is_file(), "{name} is not a regular file; remove it");
     let open = File::options().create(true).write(true).truncate(false).open(&place);
     let mut lock = open.with_context(|| format!("{name} cannot be written"))?;
     match lock.try_lock() {
@@ -261,6 +351,7 @@ mod tests {
     use signals::table::Table;
     use std::collections::BTreeMap;
     use std::fs;
+    use std::path::Path;
 
     fn table(value: f64) -> Table {
         Table::new(vec!["time".into()], vec![vec![0.0, value]])
@@ -297,10 +388,99 @@ mod tests {
         assert!(folder.check("b").is_ok());
         // another program's, from then on as it was
         let other = directory.path().join("runs/c.parquet");
-        table(1.0).write(&other, &BTreeMap::new()).unwrap();
+        write_as_another_program(&other, 1.0);
         folder.adopt("c", folder.check("c").unwrap()).unwrap();
-        table(2.0).write(&other, &BTreeMap::new()).unwrap();
+        write_as_another_program(&other, 2.0);
         assert!(folder.check("c").is_err());
+    }
+
+    /// A run that another library wrote.
+    fn write_as_another_program(path: &Path, value: f64) {
+        table(value).write(path, &BTreeMap::new()).unwrap();
+        let mut bytes = fs::read(path).unwrap();
+        let at = bytes.windows(10).rposition(|window| window == b"parquet-rs").unwrap();
+        bytes[at..at + 10].copy_from_slice(b"parquet-xx");
+        fs::write(path, bytes).unwrap();
+    }
+
+    #[test]
+    fn a_damaged_manifest_is_an_error_or_its_runs_are_not_verified() {
+        let directory = tempfile::tempdir().unwrap();
+        let take = || Folder::take(directory.path(), "");
+        let folder = take().unwrap();
+        for run in ["a", "b", "c"] {
+            folder.store(run, &table(1.0), &BTreeMap::new()).unwrap();
+        }
+        drop(folder);
+        let place = directory.path().join(MANIFEST);
+        let good = fs::read_to_string(&place).unwrap();
+        let lines: Vec<&str> = good.split_inclusive('\n').collect();
+        let zeros = "0".repeat(64);
+        let wrong_hash = lines[0].replace(&lines[0][..64], &zeros);
+        // what is in the file, the words of the error or the runs that are not verified
+        type Expected<'a> = Result<&'a [&'a str], &'a str>;
+        let cases: [(Vec<u8>, Expected); 11] = [
+            (Vec::new(), Ok(&["a", "b", "c"])),
+            (lines[1..].concat().into(), Ok(&["a"])),
+            (good.as_bytes()[..good.len() - 5].to_vec(), Ok(&["c"])),
+            (good.replace("  runs/b", " runs/b").into(), Err("line 2 is ")),
+            (good.replacen('\n', "\nxx\n", 1).into(), Err("line 2 is \"xx\"")),
+            (good.replacen(&good[..9], "not a sum", 1).into(), Err("line 1 is \"not a sum")),
+            (good.to_uppercase().into(), Err("line 1 is ")),
+            ([b"\xff", good.as_bytes()].concat(), Err("utf-8")),
+            (format!("{good}{wrong_hash}").into(), Ok(&["a"])),
+            (format!("{wrong_hash}{good}").into(), Ok(&[])),
+            (good.replace('\n', "\r\n").into(), Ok(&[])),
+        ];
+        for (bytes, expected) in cases {
+            let text = String::from_utf8_lossy(&bytes).into_owned();
+            fs::write(&place, bytes).unwrap();
+            match (take(), expected) {
+                (Err(error), Err(words)) => {
+                    let error = format!("{error:#}");
+                    assert!(error.contains(words), "{error}");
+                    assert!(error.contains("nothing verifies the stored runs"), "{error}");
+                    assert_eq!(String::from_utf8_lossy(&fs::read(&place).unwrap()), text);
+                }
+                (Ok(folder), Ok(unverified)) => {
+                    let wrong =
+                        ["a", "b", "c"].into_iter().filter(|run| folder.check(run).is_err());
+                    assert_eq!(wrong.collect::<Vec<_>>(), unverified, "{text}");
+                }
+                (took, _) => panic!("{text}: {took:?}"),
+            }
+        }
+        fs::remove_file(&place).unwrap();
+        let error = format!("{:#}", take().unwrap_err());
+        assert!(error.contains("it is missing") && error.contains("remove"), "{error}");
+        fs::create_dir(&place).unwrap();
+        let error = format!("{:#}", take().unwrap_err());
+        assert!(error.contains("it is not a regular file"), "{error}");
+        // without runs there is nothing to verify
+        fs::remove_dir(&place).unwrap();
+        fs::remove_dir_all(directory.path().join("runs")).unwrap();
+        take().unwrap();
+    }
+
+    #[test]
+    fn a_run_that_is_in_the_manifest_and_not_in_the_directory_is_missing() {
+        let directory = tempfile::tempdir().unwrap();
+        let take = || Folder::take(directory.path(), "").unwrap();
+        take().store("a", &table(1.0), &BTreeMap::new()).unwrap();
+        fs::remove_file(directory.path().join("runs/a.parquet")).unwrap();
+        let folder = take();
+        assert!(folder.lacks("a") && !folder.lacks("b"));
+        folder.store("a", &table(1.0), &BTreeMap::new()).unwrap();
+        assert!(!folder.lacks("a") && folder.lists("a"));
+    }
+
+    #[test]
+    fn the_folder_of_a_study_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        fs::write(directory.path().join("study.json"), "{}").unwrap();
+        let error = Folder::take(directory.path(), "").unwrap_err().to_string();
+        assert!(error.contains("holds a study of monte_carlo"), "{error}");
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
     }
 
     #[test]

@@ -350,6 +350,9 @@ impl Campaign {
         }
         let sensors = Sensors::new(&case.sensors, fmu.description(), &case.settings, case.step)?;
         let path = folder.path().join(folder::file_of(&case.name));
+        if !self.force && folder.lacks(&case.name) {
+            watch(Progress::Note(store::because(case, "its file is missing")));
+        }
         let there = match self.force || !path.exists() {
             true => None,
             false => folder
@@ -365,6 +368,9 @@ impl Campaign {
         let table = match there {
             Some((table, lacks_sensors, sum)) => {
                 watch(Progress::Steps(run.steps() as u64));
+                if !folder.lists(&case.name) {
+                    watch(Progress::Note(store::unverified(case)));
+                }
                 if lacks_sensors {
                     let table = sensors.recorded(table, columns.len(), &case.name, case.step)?;
                     folder.store(&case.name, &table, &table::metadata(&path)?)?;

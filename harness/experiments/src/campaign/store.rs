@@ -5,7 +5,7 @@ use std::path::Path;
 
 use host::fmu::Fmu;
 
-use super::Case;
+use super::{Case, MANIFEST};
 use crate::run::{self, Run};
 use crate::sensors::Sensors;
 use signals::table::{self, Table};
@@ -135,6 +135,14 @@ fn difference(
 /// States why a stored run cannot be reused.
 pub fn because(case: &Case, why: &str) -> String {
     format!("re-running {}: {why}", case.name)
+}
+
+/// Says that a stored run is another program's.
+pub fn unverified(case: &Case) -> String {
+    format!(
+        "reusing {}: another program stored it, and it has no line in {MANIFEST} yet",
+        case.name
+    )
 }
 
 #[cfg(test)]
