@@ -20,6 +20,7 @@ from .simulation import (
     check_outputs,
     check_parameters,
     histories_of,
+    outputs_of,
     parameters_of,
     too_many_rows,
 )
@@ -191,7 +192,7 @@ class Loop:
             ]
         every = parameters_of(self.parameters) | parameters_of(parameters)
         check_parameters(fmu, every, {**histories, **dict.fromkeys(command)}, problems)
-        columns = fmu.names("output") if outputs is None else names_of(outputs, "outputs", problems)
+        columns = outputs_of(fmu, outputs, every, problems)
         check_outputs(fmu, columns, problems)
         if not problems:
             problems += too_many_rows(0.0, stop, self.period / substeps)

@@ -77,7 +77,8 @@ def simulate(
     stop, start: s; by default those of the inputs, otherwise the FMU's suggestion.
     step: between the rows of the result, s; by default the rows of the inputs, otherwise the FMU's
     suggestion. The FMU steps to every row of the inputs whatever the step.
-    outputs: variables to record; by default all outputs.
+    outputs: variables to record; by default all outputs, and of the six-axis FMUs the slosh angles
+    of the tanks in use (and of tanks that drain ``liquid``), by which `view` draws the run.
     tolerance: relative, for the FMU's solver; by default its own choice.
     hold: inputs are held from row to row.
 
@@ -97,7 +98,7 @@ def simulate(
     if rows is None and inputs is not None and not problems and "time" in inputs:
         rows = inputs["time"].to_numpy(float)
     check_parameters(fmu, parameters, histories, problems)
-    columns = fmu.names("output") if outputs is None else names_of(outputs, "outputs", problems)
+    columns = outputs_of(fmu, outputs, parameters, problems)
     check_outputs(fmu, columns, problems)
     if wrong := not_numbers(start=start, stop=stop, step=step, tolerance=tolerance):
         raise FmuError("; ".join(problems + wrong))
@@ -167,6 +168,36 @@ def parameters_of(
             f"parameter set, not {parameters!r}"
         )
     return dict(parameters)
+
+
+def outputs_of(
+    fmu: Fmu,
+    outputs: Sequence[str] | str | None,
+    parameters: Mapping[str, Quantity],
+    problems: list[str],
+) -> list[str]:
+    """Return the variables to record; those of ``None`` are all outputs and what `view` needs."""
+    if outputs is not None:
+        return names_of(outputs, "outputs", problems)
+
+    def number(name: str) -> int:
+        if name not in fmu.variables:
+            return 0
+        try:
+            return int(fmu.convert(name, parameters.get(name, fmu.variables[name].start)))
+        except (FmuError, TypeError):
+            return 0  # what is wrong with a parameter is said elsewhere
+
+    tanks = ["tank", *(f"tank[{i}]" for i in range(1, max(number("tanks"), 1) + 1))]
+    drawn = [
+        f"{tank}.angle_{axis}[{n}]"
+        for tank in tanks
+        for n in range(1, max(number(f"{tank}.modes"), 1) + 1)
+        for axis in "xy"
+    ]
+    drawn += [f"{tank}.liquid" for tank in tanks if number(f"{tank}.fill.points") > 1]
+    names = fmu.names("output")
+    return names + [name for name in drawn if name in fmu.variables and name not in names]
 
 
 def too_many_rows(start: float, stop: float, step: float) -> list[str]:

@@ -68,10 +68,10 @@ def view(
     start, stop: s, a part of the run.
 
     Nothing is simulated. The table needs ``theta`` or ``omega``, ``slosh_angle`` and
-    ``slosh_angle_radial`` (HubSlosh), ``q[1]`` to ``q[4]`` (Spacecraft), and of tanks the
-    directions ``p`` or the slosh angles, all of which ``simulate`` records by default; of tanks
-    that drain also ``liquid``, of HubSlosh's modes after the first ``slosh.q_radial[n]`` and
-    ``slosh.q_tangential[n]``.
+    ``slosh_angle_radial`` (HubSlosh), ``q[1]`` to ``q[4]`` (Spacecraft), and of tanks the slosh
+    angles or the directions ``p``, of tanks that drain also ``liquid``: ``simulate`` and
+    ``closed_loop`` record these by default. HubSlosh's modes after the first are drawn if the
+    table has ``slosh.q_radial[n]`` and ``slosh.q_tangential[n]``.
 
     Raises FmuError with the columns that are missing.
     """

@@ -76,3 +76,25 @@ def test_a_run_is_a_pandas_table_also_after_a_loop_a_copy_and_a_pickle(fmu: Path
     assert type(run["theta"]) is pd.Series
     with pytest.raises(FmuError, match=r"no theta \(or omega\)"):
         run[["time", "tau_cmd"]].view(program=option(request, "--hubslosh"))
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "angles"),
+    [
+        ("HubSlosh", {}, 0),
+        ("Spacecraft", {}, 2),
+        ("Spacecraft", {"tanks": 0}, 2),
+        ("Spacecraft", {"tanks": 2, "tank[1].modes": 3, "tank[2].modes": 2}, 10),
+        ("SloshTank", {}, 2),
+        ("SloshTank", {"tank.modes": 3}, 6),
+    ],
+)
+def test_default_runs_are_shown(
+    fmu: Path, request, name: str, parameters: dict, angles: int
+) -> None:
+    """Of every FMU: what is recorded by default is what the page needs."""
+    path = fmu.with_name(f"{name}.fmu")
+    run = hubslosh.simulate(path, parameters, stop=1.0, step=0.05)
+    assert sum(".angle_" in column for column in run.columns) == angles
+    page = run.view(program=option(request, "--hubslosh"))
+    assert shown(page.html)["time"]["count"] == len(run)
