@@ -15,7 +15,7 @@ use zip::read::Config;
 use zip::unstable::read::ZipIterable;
 use zip::{CompressionMethod, ZipReadOptions, read::OwnedZipFileEntry};
 
-use crate::xml;
+use crate::{input, xml};
 
 /// Most entries of an archive.
 pub const MOST_ENTRIES: usize = 20_000;
@@ -97,9 +97,8 @@ impl Archive {
     /// If the file cannot be read. What is wrong with it as an archive is in [`Archive::fault`].
     pub fn open(path: &Path) -> Result<Archive> {
         let name = path.display();
-        let about = path.metadata().with_context(|| format!("{name} cannot be opened"))?;
-        ensure!(about.is_file(), "{name} cannot be opened: it is not a file");
-        let file = File::open(path).with_context(|| format!("{name} cannot be opened"))?;
+        let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
+        let about = file.metadata().with_context(|| format!("{name} cannot be opened"))?;
         let mut archive = Archive { file, entries: Vec::new(), fault: None };
         archive.fault = archive.read_directory(about.len()).err().map(|why| format!("{why:#}"));
         Ok(archive)

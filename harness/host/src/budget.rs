@@ -7,6 +7,14 @@ use anyhow::{Result, ensure};
 pub const ROWS: usize = 20_000_000;
 /// Bytes of the numbers that are held at once: the bench's columns of the longest run, twice.
 pub const BYTES: u64 = 4 << 30;
+/// Bytes of a text that is read as a whole: plans, parameter sets, results. A table has [`ROWS`] instead.
+pub const TEXT: u64 = 64 << 20;
+/// Bytes of the numbers that are read of one recording: three signals in [`ROWS`] rows.
+pub const RECORDING: u64 = 512 << 20;
+/// Bytes of numbers that a byte of a file may hold, beyond [`RECORDING`]: compressed tables of runs hold up to 10.
+pub const PER_BYTE: u64 = 32;
+/// Bytes that one file may take while it is decompressed, those that are passed over included.
+pub const INFLATED: u64 = 2 << 30;
 /// Runs of a plan.
 pub const RUNS: usize = 100_000;
 /// Threads that work at once.
@@ -57,6 +65,25 @@ pub fn table(rows: usize, columns: usize) -> Result<u64> {
     Ok(bytes)
 }
 
+/// Bytes of the numbers that are read of a file of `size` bytes: a small file that claims to hold much is damaged or
+/// made to harm.
+///
+/// # Errors
+/// As of [`table`], and if they take more than [`RECORDING`] and than [`PER_BYTE`] times the file.
+pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
+    let bytes = table(rows, columns)?;
+    let most = RECORDING.max(size.saturating_mul(PER_BYTE));
+    ensure!(
+        bytes <= most,
+        "{rows} rows of {columns} columns take {:.1} GB in a file of {:.1} MB (allowed: {:.1} GB, or {PER_BYTE} times the \
+         file); fewer columns take less",
+        bytes as f64 / 1e9,
+        size as f64 / 1e6,
+        RECORDING as f64 / 1e9
+    );
+    Ok(bytes)
+}
+
 /// Threads for `wanted` jobs at once (0: as many as the machine has cores) that hold `bytes` each.
 ///
 /// # Errors
@@ -76,6 +103,7 @@ mod tests {
     fn what_is_too_much_is_refused_with_what_is_allowed() {
         assert_eq!(steps(2700.0, 0.02).unwrap(), 135_000);
         assert_eq!(steps(1.0, 0.3).unwrap(), 4);
+        assert!(reading(ROWS, 3, 0).is_ok() && reading(ROWS, 20, 1 << 30).is_ok());
         for (refused, words) in [
             (steps(1e12, 0.02).map(drop), "5.000e13 steps (allowed: at most 20000000)"),
             (steps(1.0, 1e-300).map(drop), "1.000e300 steps"),
@@ -85,6 +113,11 @@ mod tests {
             (table(ROWS + 2, 1).map(drop), "rows (allowed: at most 20000000)"),
             (table(ROWS, 100).map(drop), "take 16.0 GB (allowed: at most 4.3 GB)"),
             (table(usize::MAX, usize::MAX).map(drop), "allowed"),
+            (
+                reading(ROWS, 20, 1000).map(drop),
+                "take 3.2 GB in a file of 0.0 MB (allowed: 0.5 GB,",
+            ),
+            (reading(ROWS, 100, 1 << 40).map(drop), "take 16.0 GB (allowed: at most 4.3 GB)"),
             (jobs(100_000, 1).map(drop), "100000 runs at once (allowed: 1 to 512)"),
         ] {
             let error = refused.unwrap_err().to_string();

@@ -8,6 +8,7 @@
 pub mod archive;
 pub mod binary;
 pub mod budget;
+pub mod bug;
 pub mod c_abi;
 pub mod description;
 pub mod drive;
@@ -15,6 +16,7 @@ pub mod fmi2;
 pub mod fmi3;
 pub mod fmu;
 pub mod guard;
+pub mod input;
 pub mod output;
 pub mod temporary;
 pub mod wasm;

@@ -8,11 +8,13 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use sha2::{Digest, Sha256};
 
-use crate::temporary;
+use crate::{input, temporary};
 
 /// Writes `path` through `write`; if that fails, nothing is left and an older file stays as it was.
-/// The file is on the disk before it gets its name, so that a power cut leaves no empty one.
+/// The file is on the disk before it gets its name, so that a power cut leaves no empty one. A protected input
+/// ([`input::protect`]) is never replaced.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
+    input::check_replaceable(path)?;
     let name = path.display();
     let directory = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

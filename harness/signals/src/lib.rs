@@ -3,5 +3,6 @@
 //! compiled once.
 
 pub mod fourier;
+mod parquet_file;
 pub mod recording;
 pub mod table;

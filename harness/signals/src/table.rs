@@ -9,16 +9,16 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use parquet::basic::{Compression, Encoding, Repetition, Type as Physical, ZstdLevel};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{DataType, DoubleType};
+use parquet::data_type::DoubleType;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
-use host::budget;
 use host::output::atomically;
+use host::{budget, input};
+
+use crate::parquet_file;
 
 /// Columns of equal length.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,10 +100,12 @@ impl Table {
     pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
         let name = path.display();
         let format = format_of(path)?;
-        let file = File::open(path).with_context(|| format!("{name} cannot be opened"))?;
         let table = match format {
-            Format::Csv => read_csv(file, wanted),
-            Format::Parquet => read_parquet(file, wanted),
+            Format::Csv => {
+                let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
+                read_csv(file, wanted)
+            }
+            Format::Parquet => read_parquet(path, wanted),
         }
         .with_context(|| format!("{name} cannot be used"))?;
         table.all_finite().map_err(|error| anyhow!("{name}, {error}"))?;
@@ -204,13 +206,7 @@ impl Table {
 
 /// The key-value metadata of a Parquet file; an error if the file is not complete.
 pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
-    let reader = SerializedFileReader::new(File::open(path)?)?;
-    let pairs = reader.metadata().file_metadata().key_value_metadata();
-    Ok(pairs
-        .into_iter()
-        .flatten()
-        .map(|pair| (pair.key.clone(), pair.value.clone().unwrap_or_default()))
-        .collect())
+    parquet_file::metadata(path).with_context(|| format!("{} cannot be used", path.display()))
 }
 
 /// The library that wrote a Parquet file, as the file says.
@@ -223,32 +219,18 @@ pub fn writer(path: &Path) -> Option<String> {
 pub fn names(path: &Path) -> Result<Vec<String>> {
     let name = path.display();
     let format = format_of(path)?;
-    let file = File::open(path).with_context(|| format!("{name} cannot be opened"))?;
     let names = || -> Result<Vec<String>> {
         match format {
             Format::Csv => {
+                let file = input::open(path).context("it cannot be opened")?;
                 let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
                 let header = reader.headers().context("it has no header row")?;
                 Ok(header.iter().map(|h| h.trim_start_matches('\u{feff}').to_string()).collect())
             }
-            Format::Parquet => parquet_names(path),
+            Format::Parquet => parquet_file::names(path),
         }
     };
     names().with_context(|| format!("{name} cannot be used"))
-}
-
-/// Names of the columns of a Parquet file.
-pub(crate) fn parquet_names(path: &Path) -> Result<Vec<String>> {
-    let file = File::open(path).context("it cannot be opened")?;
-    let reader = SerializedFileReader::new(file).context("it is not a complete Parquet file")?;
-    let schema = reader.metadata().file_metadata().schema_descr();
-    Ok(schema.columns().iter().map(|c| c.name().to_string()).collect())
-}
-
-/// The columns of a Parquet file, NaN where a value is missing.
-pub(crate) fn parquet_columns(path: &Path, wanted: &[&str]) -> Result<Vec<Vec<f64>>> {
-    let table = read_parquet(File::open(path).context("it cannot be opened")?, wanted)?;
-    Ok(table.columns)
 }
 
 /// Where each wanted column stands, or which are missing.
@@ -285,52 +267,13 @@ fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), columns))
 }
 
-fn read_parquet(file: File, wanted: &[&str]) -> Result<Table> {
-    let reader = SerializedFileReader::new(file).context("it is not a complete Parquet file")?;
-    let metadata = reader.metadata();
-    let schema = metadata.file_metadata().schema_descr();
-    let positions = positions(schema.columns().iter().map(|c| c.name()), wanted)?;
-    let rows = metadata.row_groups().iter().map(|group| group.num_rows().max(0) as usize);
-    budget::table(rows.fold(0, usize::saturating_add), wanted.len())?;
-    let mut columns = vec![Vec::new(); wanted.len()];
-    for group in 0..metadata.num_row_groups() {
-        let group = reader.get_row_group(group)?;
-        let rows = group.metadata().num_rows().max(0) as usize;
-        for (&position, (name, values)) in positions.iter().zip(wanted.iter().zip(&mut columns)) {
-            match group.get_column_reader(position)? {
-                ColumnReader::DoubleColumnReader(r) => read_values(r, rows, values, |v| v),
-                ColumnReader::FloatColumnReader(r) => read_values(r, rows, values, f64::from),
-                ColumnReader::Int32ColumnReader(r) => read_values(r, rows, values, f64::from),
-                ColumnReader::Int64ColumnReader(r) => read_values(r, rows, values, |v| v as f64),
-                _ => bail!("column {name} does not hold numbers"),
-            }
-            .with_context(|| format!("column {name}"))?;
-        }
-    }
-    Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), columns))
-}
+/// How the unit of a table's time is stated where a file has integers.
+const IN_SECONDS: &str = "the table's time is in s, write it as floating-point numbers";
 
-/// Appends `rows` values; a missing one becomes NaN, which [`Table::read`] refuses by row.
-fn read_values<T: DataType>(
-    mut reader: ColumnReaderImpl<T>,
-    rows: usize,
-    into: &mut Vec<f64>,
-    convert: impl Fn(T::T) -> f64,
-) -> Result<()> {
-    let (mut levels, mut values) = (Vec::new(), Vec::new());
-    let mut done = 0;
-    while done < rows {
-        let (read, _, _) =
-            reader.read_records(rows - done, Some(&mut levels), None, &mut values)?;
-        ensure!(read > 0, "it ends too early");
-        done += read;
-    }
-    let mut values = values.into_iter().map(convert);
-    if levels.is_empty() {
-        into.extend(values);
-    } else {
-        let level = |level: i16| if level > 0 { values.next() } else { None };
-        into.extend(levels.into_iter().map(level).map(|v| v.unwrap_or(f64::NAN)));
-    }
-    Ok(())
+fn read_parquet(path: &Path, wanted: &[&str]) -> Result<Table> {
+    let place = wanted.iter().position(|name| *name == "time");
+    let time = place.map(|place| parquet_file::Time { place, stated: None, remedy: IN_SECONDS });
+    let names = |names: &[String]| positions(names.iter().map(String::as_str), wanted);
+    let found = parquet_file::read(path, names, time)?;
+    Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), found.columns))
 }

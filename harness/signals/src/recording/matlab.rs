@@ -3,13 +3,12 @@
 //! Vectors are columns under their names, matrices give `name(1)`, `name(2)`, …, fields of structures `a.b`. What
 //! is no array of real numbers (texts, cells, objects) is passed over.
 
-use std::fs::File;
 use std::io::{BufReader, Read, copy, sink};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use flate2::read::ZlibDecoder;
-use host::budget;
+use host::{budget, input};
 
 use super::{Found, Header};
 
@@ -19,6 +18,8 @@ const WIDEST: usize = 100;
 const DEEPEST: usize = 8;
 /// Longest name or list of dimensions, bytes.
 const LONGEST: u32 = 1 << 20;
+/// Most columns and elements of structures in a file.
+const MOST: usize = 1_000_000;
 
 // types of elements
 const MATRIX: u32 = 14;
@@ -26,6 +27,7 @@ const COMPRESSED: u32 = 15;
 // classes of arrays
 const STRUCT: u8 = 2;
 const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15; // double, single, integers
+const INTEGERS: std::ops::RangeInclusive<u8> = 8..=15;
 
 /// An array of numbers of which a file tells: its name, rows and columns, the longer way down.
 struct Shape {
@@ -34,6 +36,8 @@ struct Shape {
     columns: usize,
     /// Values of one column lie side by side (else those of one row).
     by_column: bool,
+    /// Its class is one of integers.
+    integers: bool,
 }
 
 impl Shape {
@@ -53,14 +57,22 @@ pub(super) fn header(path: &Path) -> Result<Header> {
     let mut names = Vec::new();
     walk(path, &mut |shape, _| {
         names.extend(shape.names());
+        ensure!(names.len() <= MOST, "it has more than {MOST} columns");
         Ok(())
     })?;
     ensure!(!names.is_empty(), "it holds no vector or matrix of real numbers");
     Ok(Header::of(names, None))
 }
 
-/// Reads the columns at these places of [`header`].
-pub(super) fn read(path: &Path, header: &Header, places: &[usize]) -> Result<Found> {
+/// Reads the columns at these places of [`header`], that of the time first. `unstated`: no unit of the time is stated;
+/// how to state one.
+pub(super) fn read(
+    path: &Path,
+    header: &Header,
+    places: &[usize],
+    unstated: Option<&String>,
+) -> Result<Found> {
+    let size = path.metadata()?.len();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); places.len()];
     let mut before = 0;
     walk(path, &mut |shape, numbers| {
@@ -69,17 +81,28 @@ pub(super) fn read(path: &Path, header: &Header, places: &[usize]) -> Result<Fou
         if !places.iter().any(|place| here.contains(place)) {
             return Ok(());
         }
-        budget::table(shape.rows, shape.columns + places.len())?;
-        let mut values = Vec::new();
-        numbers.read(shape.rows * shape.columns, &mut values)?;
-        for (column, place) in columns.iter_mut().zip(places).filter(|(_, p)| here.contains(p)) {
-            let k = place - here.start;
-            *column = match shape.by_column {
-                true => values[k * shape.rows..(k + 1) * shape.rows].to_vec(),
-                false => values.iter().copied().skip(k).step_by(shape.columns).collect(),
-            };
+        if let Some(remedy) = unstated.filter(|_| shape.integers && here.contains(&places[0])) {
+            bail!(
+                "{} holds integers, and their unit of time is not known (allowed: floating-point numbers in s, integers of a \
+                 unit that is stated): {remedy}",
+                shape.name
+            );
         }
-        Ok(())
+        budget::reading(shape.rows, places.len(), size)?;
+        // only columns that are wanted are kept: a matrix of bytes is eight times as large in numbers
+        let mut at = 0;
+        numbers.each(shape.rows * shape.columns, &mut |value| {
+            let column = match shape.by_column {
+                true => at / shape.rows,
+                false => at % shape.columns,
+            };
+            at += 1;
+            for (into, place) in columns.iter_mut().zip(places) {
+                if *place == here.start + column {
+                    into.push(value);
+                }
+            }
+        })
     })?;
     let lengths = || columns.iter().map(Vec::len);
     if lengths().min() != lengths().max() {
@@ -103,12 +126,13 @@ pub(super) fn read(path: &Path, header: &Header, places: &[usize]) -> Result<Fou
             );
         }
     }
-    Ok(Found { columns, origin: None })
+    Ok(Found { columns, origin: None, seconds: false })
 }
 
 /// Goes through the arrays of a file.
 fn walk(path: &Path, visit: Visit) -> Result<()> {
-    let mut file = BufReader::new(File::open(path).context("it cannot be opened")?);
+    let mut file = BufReader::new(input::open(path).context("it cannot be opened")?);
+    let mut inflatable = budget::INFLATED;
     let mut start = [0; 128];
     let complete = file.read_exact(&mut start).is_ok();
     ensure!(
@@ -129,10 +153,18 @@ fn walk(path: &Path, visit: Visit) -> Result<()> {
         let mut body = (&mut file).take(tag.bytes.into());
         match tag.kind {
             COMPRESSED => {
-                let mut inflated = ZlibDecoder::new(&mut body);
+                let mut inflated = ZlibDecoder::new(&mut body).take(inflatable);
                 if let Some(tag) = Tag::next(&mut inflated, big)?.filter(|tag| tag.kind == MATRIX) {
-                    array(&mut inflated.take(tag.bytes.into()), big, None, 0, visit)?;
+                    let done =
+                        array(&mut (&mut inflated).take(tag.bytes.into()), big, None, 0, visit);
+                    ensure!(
+                        inflated.limit() > 0,
+                        "it holds more than {:.1} GB when decompressed (allowed: less)",
+                        budget::INFLATED as f64 / 1e9
+                    );
+                    done?;
                 }
+                inflatable = inflated.limit();
             }
             MATRIX => array(&mut body, big, None, 0, visit)?,
             _ => {}
@@ -236,6 +268,9 @@ fn array(
         return structure(from, big, &name, elements, depth, visit);
     }
     let longest = dimensions.iter().copied().max().unwrap_or(0);
+    if elements == 0 {
+        return Ok(());
+    }
     if complex || longest < 2 || elements / longest > WIDEST || dimensions.len() > 2 {
         return Ok(());
     }
@@ -245,6 +280,7 @@ fn array(
         rows: longest,
         columns: elements / longest,
         by_column: dimensions[0] == longest,
+        integers: INTEGERS.contains(&class),
     };
     visit(&shape, &mut Numbers { from, kind: tag.kind, bytes: tag.bytes, small: tag.small, big })
 }
@@ -266,6 +302,13 @@ fn structure(
         String::from_utf8_lossy(&name[..end]).into_owned()
     });
     let fields: Vec<String> = fields.collect();
+    // without fields nothing would be read of an element, however many there are said to be
+    let elements = if fields.is_empty() { 0 } else { elements };
+    ensure!(
+        elements.saturating_mul(fields.len()) <= MOST,
+        "the structure {name} has {elements} elements of {} fields (allowed: {MOST} together)",
+        fields.len()
+    );
     for k in 1..=elements {
         for field in &fields {
             let Some(tag) = Tag::next(from, big)? else { return Ok(()) };
@@ -290,9 +333,12 @@ struct Numbers<'a> {
     big: bool,
 }
 
+/// Bytes that are decoded at once; a multiple of the width of every type.
+const CHUNK: u64 = 1 << 16;
+
 impl Numbers<'_> {
-    /// Appends all, which must be `count`.
-    fn read(&mut self, count: usize, into: &mut Vec<f64>) -> Result<()> {
+    /// Hands over each value, of which there must be `count`.
+    fn each(&mut self, count: usize, with: &mut dyn FnMut(f64)) -> Result<()> {
         let width = match self.kind {
             1 | 2 => 1,
             3 | 4 => 2,
@@ -309,31 +355,43 @@ impl Numbers<'_> {
             Some(bytes) => bytes[..self.bytes as usize].to_vec(),
             None => Vec::new(),
         };
-        if self.small.is_none() {
-            (&mut *self.from).take(self.bytes.into()).read_to_end(&mut data)?;
-            ensure!(data.len() == bytes, "it ends within an array");
+        let mut left = if self.small.is_some() { 0 } else { u64::from(self.bytes) };
+        loop {
+            for bytes in data.chunks_exact(width) {
+                with(self.number(bytes));
+            }
+            if left == 0 {
+                return Ok(());
+            }
+            data.clear();
+            let next = left.min(CHUNK);
+            (&mut *self.from).take(next).read_to_end(&mut data)?;
+            ensure!(data.len() as u64 == next, "it ends within an array");
+            left -= next;
         }
-        into.extend(data.chunks_exact(width).map(|bytes| {
-            // least significant byte first
-            let mut b = [0; 8];
-            b[..width].copy_from_slice(bytes);
-            if self.big {
-                b[..width].reverse();
-            }
-            let [b0, b1, b2, b3, ..] = b;
-            match self.kind {
-                1 => f64::from(b0 as i8),
-                2 => f64::from(b0),
-                3 => f64::from(i16::from_le_bytes([b0, b1])),
-                4 => f64::from(u16::from_le_bytes([b0, b1])),
-                5 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
-                6 => f64::from(u32::from_le_bytes([b0, b1, b2, b3])),
-                7 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
-                9 => f64::from_le_bytes(b),
-                12 => i64::from_le_bytes(b) as f64,
-                _ => u64::from_le_bytes(b) as f64,
-            }
-        }));
-        Ok(())
+    }
+
+    /// The number in `bytes`.
+    fn number(&self, bytes: &[u8]) -> f64 {
+        let width = bytes.len();
+        // least significant byte first
+        let mut b = [0; 8];
+        b[..width].copy_from_slice(bytes);
+        if self.big {
+            b[..width].reverse();
+        }
+        let [b0, b1, b2, b3, ..] = b;
+        match self.kind {
+            1 => f64::from(b0 as i8),
+            2 => f64::from(b0),
+            3 => f64::from(i16::from_le_bytes([b0, b1])),
+            4 => f64::from(u16::from_le_bytes([b0, b1])),
+            5 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
+            6 => f64::from(u32::from_le_bytes([b0, b1, b2, b3])),
+            7 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
+            9 => f64::from_le_bytes(b),
+            12 => i64::from_le_bytes(b) as f64,
+            _ => u64::from_le_bytes(b) as f64,
+        }
     }
 }

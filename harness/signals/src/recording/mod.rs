@@ -18,7 +18,8 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
 pub use self::even::even;
 pub use self::unit::{Quantity, conversion};
-use crate::table::{self, Table};
+use crate::parquet_file;
+use crate::table::Table;
 
 /// Names and units of a file's columns.
 struct Header {
@@ -84,6 +85,8 @@ struct Found {
     columns: Vec<Vec<f64>>,
     /// The first row's date, if time is dates: time counts from there.
     origin: Option<String>,
+    /// Whether times are in s already, whatever unit is stated: those of dates, and of types with a unit.
+    seconds: bool,
 }
 
 /// What becomes of a signal in rows that have no value of it.
@@ -160,7 +163,7 @@ impl File {
             }
             Some("parquet") => {
                 let header = |names| Header::of(names, None);
-                Ok(File::Parquet(header(table::parquet_names(path)?)))
+                Ok(File::Parquet(header(parquet_file::names(path)?)))
             }
             Some("mat") => Ok(File::Matlab(matlab::header(path)?)),
             _ => bail!(
@@ -184,6 +187,7 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     let rows_signal = wanted.signals[0];
     let time = Signal { name: "time", required: true, between: Between::Line, unit: None };
     let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut stated = None; // seconds in the unit of the time, if one is stated
     let (mut problems, mut used) = (Vec::new(), Vec::new());
     let of_use = |name: &str| name == "time" || wanted.signals.iter().any(|s| s.name == name);
     let names: Vec<&str> = wanted.signals.iter().map(|signal| signal.name).collect();
@@ -212,6 +216,9 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
                 continue;
             }
         };
+        if signals.is_empty() && unit.is_some() {
+            stated = Some(factor);
+        }
         used.push(match &unit {
             Some(unit) => format!("{} = {} in {unit}", signal.name, header.names[place]),
             None if header.names[place] == signal.name => signal.name.to_string(),
@@ -227,21 +234,26 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
         problems.join("; "),
         header.names.join(", ")
     );
+    let time = header.names[places[0]].as_str();
+    let remedy = format!("--columns time={time}:ms, or :s, :us, :ns, :min, :h, states it");
     let found = match &file {
         File::Text(layout) => {
             layout.notes.iter().cloned().for_each(&mut *done);
             layout.read(path, &places, done)?
         }
-        File::Parquet(header) => {
-            let names: Vec<&str> = places.iter().map(|p| header.names[*p].as_str()).collect();
-            Found { columns: table::parquet_columns(path, &names)?, origin: None }
+        File::Parquet(_) => {
+            let time = parquet_file::Time { place: 0, stated, remedy: &remedy };
+            let found = parquet_file::read(path, |_| Ok(places.clone()), Some(time))?;
+            Found { columns: found.columns, origin: found.origin, seconds: found.seconds }
         }
-        File::Matlab(header) => matlab::read(path, header, &places)?,
+        File::Matlab(header) => {
+            matlab::read(path, header, &places, stated.is_none().then_some(&remedy))?
+        }
     };
     done(format!("columns used: {}", used.join(", ")));
-    let Found { mut columns, origin } = found;
-    for (column, factor) in columns.iter_mut().zip(&factors) {
-        if *factor != 1.0 && !(origin.is_some() && *factor == factors[0]) {
+    let Found { mut columns, origin, seconds } = found;
+    for (k, (column, factor)) in columns.iter_mut().zip(&factors).enumerate() {
+        if *factor != 1.0 && !(seconds && k == 0) {
             column.iter_mut().for_each(|value| *value *= factor);
         }
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use chrono::{DateTime, NaiveDateTime};
-use host::budget;
+use host::{budget, input};
 
 use super::{Found, Header};
 
@@ -141,7 +141,7 @@ struct Lines {
 
 impl Lines {
     fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).context("it cannot be opened")?;
+        let file = input::open(path).context("it cannot be opened")?;
         Ok(Lines {
             reader: BufReader::with_capacity(1 << 16, file),
             bytes: Vec::new(),
@@ -308,6 +308,7 @@ impl Layout {
         done: &mut dyn FnMut(String),
     ) -> Result<Found> {
         let mut lines = Lines::open(path)?;
+        let size = path.metadata()?.len();
         let mut columns = vec![Vec::new(); places.len()];
         let mut text = String::new();
         let time = places[0];
@@ -338,13 +339,13 @@ impl Layout {
                 ));
                 continue;
             }
-            budget::table(columns[0].len() + 1, places.len())?;
+            budget::reading(columns[0].len() + 1, places.len(), size)?;
             for (column, &place) in columns.iter_mut().zip(places) {
                 let parsed = match value(fields[place], self.separator) {
                     Value::Number(number) if place != time || origin.is_none() => number,
                     Value::Missing => f64::NAN,
                     Value::Date(at) if place == time && (origin.is_some() || column.is_empty()) => {
-                        (at - *origin.get_or_insert(at)) as f64 * 1e-9
+                        (i128::from(at) - i128::from(*origin.get_or_insert(at))) as f64 * 1e-9
                     }
                     _ => {
                         fault(format!(
@@ -370,6 +371,7 @@ impl Layout {
             );
         }
         let origin = origin.map(|at| DateTime::from_timestamp_nanos(at).to_rfc3339());
-        Ok(Found { columns, origin })
+        let seconds = origin.is_some();
+        Ok(Found { columns, origin, seconds })
     }
 }

@@ -193,6 +193,156 @@ fn a_matlab_file_gives_its_vectors_matrices_and_structures() {
     }
 }
 
+/// A file of the tests' data.
+fn stored(name: &str) -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all/data")).join(name)
+}
+
+/// `data/make_parquet.py` wrote them.
+#[test]
+fn times_of_a_parquet_file_are_in_seconds_whatever_type_they_have() {
+    let names = "dur_s dur_ms dur_us dur_ns ts_s ts_ms ts_us ts_ns pandas_td pandas_ts polars_td polars_ns polars_ts int96";
+    for name in names.split(' ') {
+        let path = stored(&format!("{name}.parquet"));
+        let step = if name.ends_with("_s") { 1.0 } else { 0.02 };
+        let expected: Vec<f64> = (0..5).map(|k| f64::from(k) * step).collect();
+        let (table, said) = read_file(&path, &Columns::default()).unwrap();
+        assert_close(column(&table, "time"), &expected, name);
+        assert_close(column(&table, "omega"), &[0.0, 0.5, 1.0, 1.5, 2.0], name);
+        let is_date = name.contains("ts_") || name.ends_with("_ts") || name == "int96";
+        let dates = !name.starts_with("polars");
+        let origin =
+            if dates { "time counts from 2026-01-01T00:00:00+00:00" } else { "counts from 1970" };
+        assert_eq!(said.contains(origin), is_date, "{name}: {said}");
+        // a unit that is stated must be that of the type
+        let error = read_file(&path, &columns("time=time:min")).unwrap_err();
+        assert!(error.contains("but another unit is stated for it, of 60 s"), "{name}: {error}");
+        // the files of `hubslosh run --input` and `view`
+        let table = Table::read(&path, &["time", "omega"]).unwrap();
+        assert_close(column(&table, "time"), &expected, name);
+    }
+    let (table, _) = read_file(&stored("dur_ms.parquet"), &columns("time=time:ms")).unwrap();
+    assert_close(column(&table, "time"), &[0.0, 0.02, 0.04, 0.06, 0.08], "its own unit");
+}
+
+#[test]
+fn integers_as_times_are_refused_until_their_unit_is_stated() {
+    let path = stored("plain.parquet");
+    let error = read_file(&path, &Columns::default()).unwrap_err();
+    assert!(
+        error.contains("column time holds integers, and their unit of time is not known")
+            && error.contains("--columns time=time:ms, or :s, :us, :ns, :min, :h, states it"),
+        "{error}"
+    );
+    let (table, _) = read_file(&path, &columns("time=time:ns")).unwrap();
+    assert_close(column(&table, "time"), &[0.0, 0.02, 0.04, 0.06, 0.08], "ns");
+    let error = format!("{:#}", Table::read(&path, &["time"]).unwrap_err());
+    assert!(error.contains("write it as floating-point numbers"), "{error}");
+}
+
+#[test]
+fn numbers_of_every_parquet_type_have_their_value_and_times_are_no_numbers() {
+    let path = stored("time_half_dec.parquet");
+    let (table, _) = read_file(&path, &Columns::default()).unwrap();
+    assert_close(column(&table, "time"), &[0.0, 0.02, 0.04, 0.06, 0.08], "time of day");
+    assert_close(column(&table, "omega"), &[0.0, 1.0, 2.0, 3.0, 4.0], "decimal");
+    // numbers of 16 bits have 11 binary digits
+    for (k, torque) in column(&table, "tau_cmd").iter().enumerate() {
+        assert!((torque - 0.1 * k as f64).abs() < 2e-4, "{torque}");
+    }
+    for name in ["ts_ns.parquet", "dur_us.parquet", "int96.parquet"] {
+        let error = read_file(&stored(name), &columns("time=omega,omega=time")).unwrap_err();
+        assert!(error.contains("column time holds d"), "{error}");
+        assert!(error.contains("(allowed: numbers)"), "{error}");
+    }
+}
+
+#[test]
+fn a_unit_of_the_times_is_not_one_of_another_signal() {
+    // dates need no unit, but milli- of the torque is the same factor as milli- of the time
+    let text =
+        "t [ms],T [mNm],omega\n2026-01-31T12:00:00.000Z,100,0\n2026-01-31T12:00:00.020Z,250,1\n";
+    let (table, _) = read_text("csv", text.as_bytes(), "time=t,tau_cmd=T").unwrap();
+    assert_close(column(&table, "tau_cmd"), &[0.1, 0.25], "torque");
+}
+
+/// A `.mat` file of one element.
+fn mat(kind: u32, body: &[u8]) -> Vec<u8> {
+    let mut file = vec![b' '; 124];
+    file.extend([0, 1, b'I', b'M']);
+    file.extend(kind.to_le_bytes());
+    file.extend((body.len() as u32).to_le_bytes());
+    file.extend(body);
+    file
+}
+
+/// The beginning of an array: flags, dimensions, name.
+fn array(class: u8, dimensions: [u32; 2], name: &[u8; 4]) -> Vec<u8> {
+    let words = [6, 8, u32::from(class), 0, 5, 8, dimensions[0], dimensions[1], 4 << 16 | 1];
+    let mut body: Vec<u8> = words.iter().flat_map(|word: &u32| word.to_le_bytes()).collect();
+    body.extend(name);
+    body
+}
+
+#[test]
+fn a_mat_file_that_claims_more_than_it_holds_is_refused_at_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.mat");
+    let refused = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        read_file(&path, &columns("time=time,omega=time,tau_cmd=time")).unwrap_err()
+    };
+    // a structure of 2^62 elements without fields: nothing would be read of each
+    let mut body = array(2, [1 << 31, 1 << 31], b"huge");
+    body.extend([5, 0, 4, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]);
+    assert!(refused(&mat(14, &body)).contains("it holds no vector or matrix"));
+    // the same with a field
+    let mut body = array(2, [1 << 31, 1 << 31], b"huge");
+    body.extend([5, 0, 4, 0, 1, 0, 0, 0, 1, 0, 1, 0, b'a', 0, 0, 0]);
+    let error = refused(&mat(14, &body));
+    assert!(error.contains("elements of 1 fields (allowed: 1000000 together)"), "{error}");
+    // 450 million bytes of zeros in 0.4 MB
+    let count = 450_000_000_u32;
+    let mut body = Vec::new();
+    let array = array(9, [count, 1], b"time");
+    body.extend(14_u32.to_le_bytes());
+    body.extend((array.len() as u32 + 8 + count).to_le_bytes());
+    body.extend(array);
+    body.extend(2_u32.to_le_bytes());
+    body.extend(count.to_le_bytes());
+    let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut packed, &body).unwrap();
+    // zeros only as far as the reader could see them: it must refuse before
+    std::io::Write::write_all(&mut packed, &[0; 1 << 16]).unwrap();
+    let error = refused(&mat(15, &packed.finish().unwrap()));
+    assert!(error.contains("their unit of time is not known"), "{error}");
+    std::fs::write(&path, std::fs::read(&path).unwrap()).unwrap();
+    let error = read_file(&path, &columns("time=time:ms,omega=time,tau_cmd=time")).unwrap_err();
+    assert!(error.contains("450000000 rows (allowed: at most 20000000)"), "{error}");
+}
+
+#[test]
+fn a_damaged_parquet_file_is_an_error_and_never_a_panic() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("damaged.parquet");
+    let mut dice = fastrand::Rng::with_seed(1);
+    for name in ["dur_ns.parquet", "polars_td.parquet", "time_half_dec.parquet"] {
+        let whole = std::fs::read(stored(name)).unwrap();
+        for _ in 0..100 {
+            let mut bytes = whole.clone();
+            for _ in 0..dice.usize(1..4) {
+                let at = dice.usize(..bytes.len());
+                bytes[at] = dice.u8(..);
+            }
+            std::fs::write(&path, bytes).unwrap();
+            if let Err(error) = read_file(&path, &Columns::default()) {
+                assert!(error.contains("damaged.parquet"), "{error}");
+            }
+            drop(Table::read(&path, &["time", "omega"]));
+        }
+    }
+}
+
 #[test]
 fn a_fault_is_named_with_line_column_and_what_is_allowed() {
     let error = |text: &str, of: &str| read_text("csv", text.as_bytes(), of).unwrap_err();

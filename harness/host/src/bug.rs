@@ -1,0 +1,74 @@
+//! Panics of our own code: caught where a command ends, and reported as a bug of this program with the files that it had
+//! read.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, PoisonError};
+use std::thread::{self, ThreadId};
+
+use crate::input;
+
+/// Messages of panics, with the thread and the place in the source.
+static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
+
+/// Has panics kept for [`caught`] in place of printed.
+pub fn keep_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));
+        let text = format!("{}{}", message(panic.payload()), place.unwrap_or_default());
+        let mut all = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
+        all.push((thread::current().id(), text));
+    }));
+}
+
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|text| text.to_string());
+    text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or("a panic".into())
+}
+
+/// Runs `work`; the message of its panic if it panics. The first panic counts: a panic of a thread makes the thread that
+/// waits for it panic too.
+pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
+        let mut all = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = message(&*payload);
+        let own = all.iter().position(|(id, _)| *id == thread::current().id());
+        let at = match text.contains("scoped thread panicked") {
+            true => Some(before.min(all.len().saturating_sub(1))),
+            false => all.iter().position(|(_, kept)| kept.starts_with(&text)).or(own),
+        };
+        match at.filter(|at| *at < all.len()) {
+            Some(at) => all.remove(at).1,
+            None => text,
+        }
+    })
+}
+
+/// What a user reads of a panic.
+pub fn report(panic: &str) -> String {
+    let read = input::read_so_far();
+    let files = match read.is_empty() {
+        true => "no file had been read".into(),
+        false => format!("files read: {}", read.join(", ")),
+    };
+    format!(
+        "this is a bug of hubslosh {}, neither of the FMU nor of your files: {panic}; {files}. Please report it with this line, \
+         the command and these files",
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_a_message_that_blames_this_program() {
+        assert_eq!(caught(|| 3), Ok(3));
+        let told = caught(|| -> i32 { panic!("row {} is odd", 7) }).unwrap_err();
+        assert!(told.starts_with("row 7 is odd"), "{told}");
+        let report = report(&told);
+        assert!(report.starts_with("this is a bug of hubslosh") && report.contains("row 7 is odd"));
+    }
+}

@@ -1,0 +1,171 @@
+//! Files that commands read: only regular files, and only as much of them as fits the budget. A named pipe or a
+//! device would block the command, or never end.
+//!
+//! Files that the user names as inputs are protected: [`crate::output`] refuses to replace them.
+
+use std::fs::{File, Metadata};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Result, bail, ensure};
+
+use crate::budget;
+
+/// Opens a regular file for reading; a symbolic link to one counts as one.
+///
+/// # Errors
+/// If the file cannot be opened or is not a regular file. The message does not repeat the path.
+pub fn open(path: &Path) -> Result<File> {
+    let kind = path.metadata()?;
+    // before `File::open`, which waits until somebody writes to a named pipe
+    if !kind.is_file() {
+        bail!("it is {} (allowed: a regular file)", kind_of(&kind));
+    }
+    let file = File::open(path)?;
+    let mut all = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    if all.len() < MOST_NAMED && !all.iter().any(|other| other == path) {
+        all.push(path.to_path_buf());
+    }
+    Ok(file)
+}
+
+/// Files that [`read_so_far`] names at most.
+const MOST_NAMED: usize = 20;
+
+static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// The first files that this process has opened here, for reports of bugs.
+pub fn read_so_far() -> Vec<String> {
+    let all = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    all.iter().map(|path| path.display().to_string()).collect()
+}
+
+/// Reads a file of at most [`budget::TEXT`] bytes.
+///
+/// # Errors
+/// If the file cannot be read, is not a regular file or is too large.
+pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.take(budget::TEXT + 1).read_to_end(&mut bytes)?;
+    ensure!(
+        bytes.len() as u64 <= budget::TEXT,
+        "it is larger than {} MB (allowed: up to that)",
+        budget::TEXT / 1_000_000
+    );
+    Ok(bytes)
+}
+
+/// Reads a text of at most [`budget::TEXT`] bytes in UTF-8.
+///
+/// # Errors
+/// As of [`bytes`], and if the text is not UTF-8.
+pub fn text(path: &Path) -> Result<String> {
+    String::from_utf8(bytes(path)?).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        anyhow::anyhow!("byte {} is not UTF-8 (allowed: text in UTF-8)", at + 1)
+    })
+}
+
+fn kind_of(metadata: &Metadata) -> &'static str {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = metadata.file_type();
+        if kind.is_fifo() {
+            return "a named pipe";
+        }
+        if kind.is_char_device() || kind.is_block_device() {
+            return "a device";
+        }
+        if kind.is_socket() {
+            return "a socket";
+        }
+    }
+    if metadata.is_dir() { "a directory" } else { "a special file" }
+}
+
+/// Identity of a file, the same for all its paths and links. Elsewhere than on Unix a second hard link counts as
+/// another file.
+#[derive(PartialEq)]
+struct Identity(#[cfg(unix)] (u64, u64), #[cfg(not(unix))] PathBuf);
+
+fn identity(path: &Path) -> Option<Identity> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let metadata = path.metadata().ok()?;
+        Some(Identity((metadata.dev(), metadata.ino())))
+    }
+    #[cfg(not(unix))]
+    path.canonicalize().ok().map(Identity)
+}
+
+static PROTECTED: Mutex<Vec<(Identity, PathBuf)>> = Mutex::new(Vec::new());
+
+/// Protects an input: from now on no output of this process replaces the file. A path without a file is ignored.
+pub fn protect(path: &Path) {
+    if !path.is_file() {
+        return;
+    }
+    if let Some(identity) = identity(path) {
+        let mut all = PROTECTED.lock().unwrap_or_else(PoisonError::into_inner);
+        if !all.iter().any(|(other, _)| *other == identity) {
+            all.push((identity, path.to_path_buf()));
+        }
+    }
+}
+
+/// Fails if `path` leads to a protected input: by the same name, a relative path, a symbolic link or a hard link.
+///
+/// # Errors
+/// If it does; the message names both paths.
+pub fn check_replaceable(path: &Path) -> Result<()> {
+    let Some(identity) = identity(path) else { return Ok(()) };
+    let all = PROTECTED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, input)) = all.iter().find(|(other, _)| *other == identity) {
+        bail!(
+            "{} is not written: it is the input {} (allowed: an output that is not an input of the same command)",
+            path.display(),
+            input.display()
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_named_pipe_and_a_device_are_refused_without_waiting() {
+        let directory = tempfile::tempdir().unwrap();
+        let pipe = directory.path().join("a.csv");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(made.success());
+        let error = open(&pipe).unwrap_err().to_string();
+        assert_eq!(error, "it is a named pipe (allowed: a regular file)");
+        let error = text(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert_eq!(error, "it is a device (allowed: a regular file)");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_input_is_protected_under_all_its_names() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = |name: &str| directory.path().join(name);
+        std::fs::write(at("input.csv"), "input").unwrap();
+        std::fs::create_dir(at("folder")).unwrap();
+        std::fs::hard_link(at("input.csv"), at("hard.csv")).unwrap();
+        std::os::unix::fs::symlink("input.csv", at("symbolic.csv")).unwrap();
+        protect(&at("input.csv"));
+        for name in ["input.csv", "hard.csv", "symbolic.csv", "folder/../input.csv"] {
+            let written: Result<()> = crate::output::atomically(&at(name), |_| Ok(()));
+            let error = format!("{:#}", written.unwrap_err());
+            assert!(error.contains("is not written: it is the input"), "{name}: {error}");
+            assert_eq!(std::fs::read_to_string(at(name)).unwrap(), "input");
+        }
+        assert!(check_replaceable(&at("other.csv")).is_ok());
+    }
+}
