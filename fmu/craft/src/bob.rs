@@ -268,14 +268,14 @@ impl Bob {
     #[inline(never)]
     fn drag_of<const N: usize>(&mut self) {
         self.height[N] = dot(self.e, self.p[N]);
-        // |p_perp|^2 = 1 - (p.e)^2, near rest without cancellation at order 0.
-        let off_axis_2 = if N == 0 {
-            let p_perp = sub(self.p[0], scale(self.height[0], self.e));
-            dot(p_perp, p_perp)
+        // |p + e|^2 = 2 + 2 p.e, near rest without cancellation at order 0.
+        let chord2 = if N == 0 {
+            let chord = add(self.p[0], self.e);
+            dot(chord, chord)
         } else {
-            -series::square(N, &self.height)
+            2.0 * self.height[N]
         };
-        self.drag.expand(N, off_axis_2, space::square_vector::<N>(&self.p_d));
+        self.drag.expand(N, chord2, space::square_vector::<N>(&self.p_d));
         self.dragged[N] = space::scale::<N>(&self.drag.c, &self.p_d);
     }
 

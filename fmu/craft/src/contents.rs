@@ -241,7 +241,8 @@ impl MountedTank {
             let p_perp = sub(p, scale(height, e));
             let p_perp_d = sub(p_d, scale(height_d, e));
             let at_hinge = add(add(a, cross(w_d, hinge)), cross(w, cross(w, hinge)));
-            let motion = [dot(p_perp, p_perp), dot(p_d, p_d)];
+            let chord = add(p, e);
+            let motion = [dot(chord, chord), dot(p_d, p_d)];
             let drag = damping::coefficient(tank, n, [m[0], l[0]], dot(e, at_hinge), motion);
             let phi = add(scale(drag * l[0], p_d), scale(l[0] * k, p_perp));
             let centripetal = add(cross(w, cross(w, rho)), cross(w, rho_d).map(|x| x * 2.0));

@@ -4,7 +4,7 @@
 //! drag on the bob: -c l p',   c = 2 m [ zeta w_ref (w/w_ref)^q + zeta_A w A ]
 //! w^2 = a_+/l + k/m,          w_ref: w at a_+ = g_ref
 //! a_+ = (x + sqrt(x^2 + a_f^2))/2
-//! A^2 = |p_perp|^2 + |p'|^2/w^2 + A_0^2
+//! A^2 = angle^2 + |p'|^2/w^2 + A_0^2,   angle: of the rod from the axis (`taylor::angle`)
 //! ```
 //!
 //! q = 1/2: a laminar layer at the wall; 1: the damping ratio stays; 0: c does (`DampingLaw`). x is the specific force
@@ -15,6 +15,7 @@
 //! below any motion of interest, keeps the root where it has a power series. Every part of c is positive: the drag
 //! never drives.
 
+use taylor::angle::{self, SquaredAngle};
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, mul_tail};
 
@@ -44,8 +45,9 @@ pub struct Drag {
     above: Series,
     w2: Series,
     power: Series,
-    /// |p_perp|^2 + A_0^2, w^2 A^2, w A
-    perp2: Series,
+    /// Square of the angle, the same + A_0^2, w^2 A^2, w A
+    angle2: SquaredAngle,
+    tilt2: Series,
     speed2: Series,
     speed: Series,
     /// c, N s/m
@@ -80,7 +82,8 @@ impl Drag {
             above: ZERO,
             w2: ZERO,
             power: ZERO,
-            perp2: ZERO,
+            angle2: SquaredAngle::default(),
+            tilt2: ZERO,
             speed2: ZERO,
             speed: ZERO,
             c: ZERO,
@@ -93,8 +96,8 @@ impl Drag {
         self.x[n] = x;
     }
 
-    /// Coefficient n of c, from those of x, of |p_perp|^2 and of |p'|^2.
-    pub fn expand(&mut self, n: usize, perp2: f64, rate2: f64) -> f64 {
+    /// Coefficient n of c, from those of x, of |p + e|^2 and of |p'|^2.
+    pub fn expand(&mut self, n: usize, chord2: f64, rate2: f64) -> f64 {
         let square = mul(n, &self.x, &self.x) + constant(n, self.floor2);
         self.root[n] = root(n, square, &self.root);
         // For x < 0 without cancellation: a_f^2/2 over sqrt(x^2 + a_f^2) - x.
@@ -116,8 +119,8 @@ impl Drag {
         };
         self.c[n] = self.c_ref * self.power[n];
         if self.growth > 0.0 {
-            self.perp2[n] = perp2 + constant(n, SMALLEST * SMALLEST);
-            self.speed2[n] = mul(n, &self.w2, &self.perp2) + rate2;
+            self.tilt2[n] = self.angle2.expand(n, chord2) + constant(n, SMALLEST * SMALLEST);
+            self.speed2[n] = mul(n, &self.w2, &self.tilt2) + rate2;
             self.speed[n] = root(n, self.speed2[n], &self.speed);
             self.c[n] += self.growth * self.speed[n];
         }
@@ -134,13 +137,13 @@ fn root(n: usize, square: f64, y: &Series) -> f64 {
     (square - both) / (2.0 * y[0])
 }
 
-/// c of mode `n` of a tank in which its mass m and length l change, from x, |p_perp|^2 and |p'|^2.
+/// c of mode `n` of a tank in which its mass m and length l change, from x, |p + e|^2 and |p'|^2.
 pub fn coefficient<T: Number>(
     tank: &Tank,
     n: usize,
     [m, l]: [T; 2],
     x: T,
-    [perp2, rate2]: [T; 2],
+    [chord2, rate2]: [T; 2],
 ) -> T {
     let stiffness = m.recip() * tank.k[n];
     let reference = (l.recip() * tank.g_ref + stiffness).sqrt();
@@ -165,7 +168,7 @@ pub fn coefficient<T: Number>(
     if tank.zeta_amplitude[n] == 0.0 {
         return viscous;
     }
-    let amplitude2 = perp2 + T::constant(SMALLEST * SMALLEST);
+    let amplitude2 = angle::squared(chord2) + T::constant(SMALLEST * SMALLEST);
     let speed = (w * w * amplitude2 + rate2).sqrt();
     viscous + m * speed * (2.0 * tank.zeta_amplitude[n])
 }

@@ -12,6 +12,7 @@
 
 extern crate alloc;
 
+pub mod angle;
 pub mod error;
 pub mod extrapolation;
 pub mod integrator;

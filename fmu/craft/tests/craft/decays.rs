@@ -283,3 +283,32 @@ fn a_tank_that_could_drain_has_the_drag_of_one_that_cannot() {
         }
     }
 }
+
+/// zeta_A A with A^2 = angle^2 + (rate/w)^2 + A_0^2, of the dissipated power 2 zeta_A A m w l^2 rate^2; the sine of the angle
+/// would take 8 % less at 0.7 rad at rest. A tank that could drain and one with planar modes are written apart.
+#[test]
+fn the_amplitude_of_the_damping_is_the_angle_not_its_sine() {
+    let zeta_a = 0.05;
+    for angle in [0.05_f64, 0.4, 0.7] {
+        for rate in [1e-3, 3.0] {
+            let mut tank = tank(angle);
+            tank.p_dot_0[0] = [rate * angle.cos(), 0.0, rate * angle.sin()];
+            (tank.zeta[0], tank.zeta_amplitude[0]) = (0.0, zeta_a);
+            let planar = Tank { direction: [[1.0, 0.0]; MODES], ..tank };
+            let mut drains = tank;
+            drains.fill.points = craft::POINTS;
+            for (tank, what) in [(tank, "plain"), (planar, "planar"), (drains, "drains")] {
+                let p = TankParameters { tank, ..TankParameters::default() };
+                let u = TankInputs { a: Ramp::held([0.0, 0.0, G]), ..TankInputs::default() };
+                let mut alone = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+                let power = alone.derivatives(&u)[6 * MODES];
+                let (m, l) = (tank.mass[0], tank.length[0]);
+                let w = (G / l).sqrt();
+                let amplitude = (angle.powi(2) + (rate / w).powi(2) + 1e-8).sqrt();
+                let want = 2.0 * zeta_a * amplitude * m * w * (l * rate).powi(2);
+                // The series of the angle is 3e-7 off at 0.785 rad; the table has six digits of m and l.
+                assert!((power / want - 1.0).abs() < 3e-6, "{what} {angle} {rate}: {power} {want}");
+            }
+        }
+    }
+}

@@ -105,7 +105,7 @@ fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
 }
 
 /// Drag coefficient of a mode under the specific force `x` along its tank.
-fn drag(tank: &Tank, n: usize, x: f64, perp2: f64, rate2: f64) -> f64 {
+fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
     let (m, l) = (tank.mass[n], tank.length[n]);
     let floor = if tank.g_floor > 0.0 { tank.g_floor } else { 1e-4 * tank.g_ref };
     let root = x.hypot(floor);
@@ -116,7 +116,14 @@ fn drag(tank: &Tank, n: usize, x: f64, perp2: f64, rate2: f64) -> f64 {
         DampingLaw::ConstantRatio => tank.zeta[n],
         DampingLaw::Constant => tank.zeta[n] * w(tank.g_ref) / w(above),
     };
-    let amplitude = (perp2 + rate2 / w(above).powi(2) + 1e-8).sqrt();
+    // The square of the angle from -z as a series in the chord's, six terms (`taylor::angle`).
+    let chord2: f64 = 2.0 + 2.0 * p_z;
+    let squared: f64 = [2.0, 6.0, 20.0, 70.0, 252.0, 924.0]
+        .iter()
+        .zip(1..)
+        .map(|(binomial, n)| 2.0 * chord2.powi(n) / (f64::from(n * n) * binomial))
+        .sum();
+    let amplitude = (squared + rate2 / w(above).powi(2) + 1e-8).sqrt();
     2.0 * m * w(above) * (zeta + tank.zeta_amplitude[n] * amplitude)
 }
 
@@ -213,7 +220,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let perp = dir - e * e.dot(&dir);
         let hinge = rho - dir * l;
         let along = e.dot(&(rigid_a + rigid_w_d.cross(&hinge) + w.cross(&w.cross(&hinge))));
-        let c = drag(tank, n, along, perp.norm_squared(), rate.norm_squared());
+        let c = drag(tank, n, along, e.dot(&dir), rate.norm_squared());
         let (drag, centring) = (rate * (c * l), perp * (tank.k[n] * l));
         let phi = drag + centring;
         let at = 6 + 5 * b;

@@ -121,7 +121,7 @@ pub trait SloshMode {
     fn pendulum(&self) -> &Pendulum;
     /// Mutable [`SloshMode::pendulum`].
     fn pendulum_mut(&mut self) -> &mut Pendulum;
-    /// Squares of displacement over length and of its rate, after `start`, rad2, rad2/s2.
+    /// Squares of the angle and of its rate, after `start`, rad2, rad2/s2; of a paraboloid those of displacement over length.
     fn amplitude2<T: Number>(&self) -> [T; 2];
     /// Coordinates from angles with sin(angle) = displacement/l and their rates.
     fn coordinates(&self, at: &Angles) -> [f64; 4];

@@ -35,6 +35,7 @@
 
 use alloc::format;
 use alloc::string::String;
+use taylor::angle::{self, SquaredAngle};
 use taylor::number::Number;
 use taylor::plane::{
     self, Vector2, ZERO_VECTOR2, dot, each, mul_part, mul_part_head, numbers, scale, scale_head,
@@ -72,6 +73,8 @@ pub struct Spherical {
     v_z_d: Series,
     /// v_z^2
     v_z2: Series,
+    /// Square of the angle from the vertical, for drag that depends on the amplitude.
+    angle2: SquaredAngle,
     /// L_0, L
     tension_0: Series,
     tension: Series,
@@ -161,6 +164,7 @@ impl SloshMode for Spherical {
             v_d: ZERO_VECTOR2,
             v_z_d: ZERO,
             v_z2: ZERO,
+            angle2: SquaredAngle::default(),
             tension_0: ZERO,
             tension: ZERO,
             pulled: [0.0; 2],
@@ -176,9 +180,8 @@ impl SloshMode for Spherical {
     }
 
     fn amplitude2<T: Number>(&self) -> [T; 2] {
-        let [x, y]: [T; 2] = numbers(&self.dir);
         let [x_d, y_d] = numbers::<T>(&self.xi_d).map(|rate| number::<T>(&self.k) * rate);
-        [x * x + y * y, x_d * x_d + y_d * y_d]
+        [angle::squared(self.above_rest::<T>() * 2.0), x_d * x_d + y_d * y_d]
     }
 
     fn start_problem(&self, init: &Init) -> Option<String> {
@@ -243,8 +246,9 @@ impl SloshMode for Spherical {
         self.dir_d[n] = [x_d, y_d];
         self.v_z2[n] = square(n, &self.v_z);
         if ramp && self.p.follows_amplitude() {
-            let ([x2, y2], [x2_d, y2_d]) = (squares(n, &self.dir), squares(n, &self.dir_d));
-            let at = [x2 + y2, x2_d + y2_d + self.v_z2[n]];
+            let [x2_d, y2_d] = squares(n, &self.dir_d);
+            let chord2 = 2.0 * if n == 0 { self.above_rest() } else { self.dir_z[n] };
+            let at = [self.angle2.expand(n, chord2), x2_d + y2_d + self.v_z2[n]];
             self.p.expand_drag(n, at);
         }
         let [drag_x, drag_y] =

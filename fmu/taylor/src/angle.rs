@@ -1,0 +1,89 @@
+//! Square of the angle between two unit vectors, from the square of the chord between their ends.
+//!
+//! ```text
+//! u = 4 sin^2(angle/2)
+//! angle^2 = sum of 2 u^n / (n^2 C(2n, n)) from n = 1 = u + u^2/12 + u^3/90 + ...
+//! ```
+//!
+//! The sum ends at n = 6. Its root differs from the angle by 3e-7 of it at 45 degrees, 5e-4 at 90 and 0.15 at 180, where the
+//! angle itself has a kink; the sum has none, and with it no power series ends there.
+
+use crate::number::Number;
+use crate::series::{Series, ZERO, mul};
+
+/// Coefficients of u, u^2, ...
+const TERMS: [f64; 6] = [1.0, 1.0 / 12.0, 1.0 / 90.0, 1.0 / 560.0, 1.0 / 3150.0, 1.0 / 16_632.0];
+
+/// The square of the angle, rad2, from the square of the chord of the unit circle.
+pub fn squared<T: Number>(chord2: T) -> T {
+    let next = |sum: T, term: &f64| (sum + T::constant(*term)) * chord2;
+    TERMS.iter().rev().fold(T::constant(0.0), next)
+}
+
+/// The same as a power series.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SquaredAngle {
+    chord2: Series,
+    /// The sums of Horner's rule, the last the square of the angle.
+    sums: [Series; TERMS.len()],
+}
+
+impl Default for SquaredAngle {
+    fn default() -> Self {
+        SquaredAngle { chord2: ZERO, sums: [ZERO; TERMS.len()] }
+    }
+}
+
+impl SquaredAngle {
+    /// Coefficient n from that of the square of the chord.
+    pub fn expand(&mut self, n: usize, chord2: f64) -> f64 {
+        self.chord2[n] = chord2;
+        let mut sum = 0.0;
+        for (i, term) in TERMS.iter().rev().enumerate() {
+            if i == 0 {
+                sum = term * chord2;
+            } else {
+                // (sum before + term) u
+                sum = mul(n, &self.sums[i - 1], &self.chord2) + term * chord2;
+            }
+            self.sums[i][n] = sum;
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::number::Dual;
+
+    #[test]
+    fn the_root_is_the_angle_within_3e_7_to_45_degrees_and_smooth_to_180() {
+        for (degrees, allowed) in [(1e-6, 1e-15), (30.0, 3e-9), (45.0, 3e-7), (90.0, 6e-4)] {
+            let angle = f64::to_radians(degrees);
+            let u = 4.0 * (angle / 2.0).sin().powi(2);
+            let found = squared(u).sqrt() / angle - 1.0;
+            assert!(found.abs() < allowed, "{degrees}: {found:e}");
+        }
+        let upside_down = squared(4.0_f64).sqrt() / core::f64::consts::PI;
+        assert!((0.8..1.0).contains(&upside_down), "{upside_down}");
+    }
+
+    /// Of u = 0.3 + 0.2 t - 0.1 t^2: value and slope, and the sum of the series at t = 1/2.
+    #[test]
+    fn the_series_is_that_of_the_function() {
+        let u = [0.3, 0.2, -0.1];
+        let mut angle = SquaredAngle::default();
+        let mut series = ZERO;
+        for (n, x) in series.iter_mut().enumerate() {
+            *x = angle.expand(n, u.get(n).copied().unwrap_or(0.0));
+        }
+        let slope = squared(Dual::of(u[0], u[1])).result();
+        assert!((series[0] - squared(u[0])).abs() < 1e-16);
+        assert!((series[1] - slope).abs() < 1e-15);
+        let sum = series.iter().rev().fold(0.0, |sum, x| sum * 0.5 + x);
+        let want = squared(u[0] + 0.5 * u[1] + 0.25 * u[2]);
+        // The polynomial is of order 12, which the series holds.
+        assert!((sum - want).abs() < 1e-15, "{sum} {want}");
+    }
+}
