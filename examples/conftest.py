@@ -1,4 +1,4 @@
-"""What the examples' tests share: the packed FMU.
+"""Fixtures of the examples' tests: the packed FMU.
 
     cargo run --release -- pack
     cargo run --release -p one-loop -- dist/HubSlosh.fmu dist

@@ -9,7 +9,7 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 
 use crate::common::run;
 
-/// What each package of the workspace links, tests and build scripts left out.
+/// Linked packages of each package of the workspace, without tests and build scripts.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let metadata =
         MetadataCommand::new().current_dir(pack::root()).no_deps().exec().expect("cargo metadata");
@@ -284,7 +284,7 @@ fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
     }
 }
 
-/// What a module names by `crate::`, `self::` and `super::`, as paths from the crate's root.
+/// Paths that a module names by `crate::`, `self::` and `super::`, from the crate's root.
 fn named(module: &Module, code: &str) -> Vec<Module> {
     let (tokens, mut found) = (tokens(code), Vec::new());
     for at in 0..tokens.len() {
@@ -330,7 +330,7 @@ fn modules(
     all
 }
 
-/// What is in a circle or above one.
+/// Modules in a circle or above one.
 fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
     // What uses nothing that is left is no part of a circle.
     while let Some(leaf) =

@@ -14,7 +14,7 @@ use pack::{Fmi, MODELS, Model, packed_version_for_tests};
 /// A number's place in the physics: the name without brackets, and all indices.
 type Key = (String, Vec<usize>);
 
-/// Of a scalar's name: `tank[1].p[2,3]` is tank.p at 1, 2, 3.
+/// Array and indices of a scalar's name: `tank[1].p[2,3]` is tank.p at 1, 2, 3.
 fn key(name: &str) -> Key {
     let (mut plain, mut indices) = (String::new(), Vec::new());
     let mut rest = name;
@@ -178,7 +178,7 @@ fn assert_same(arrays: &BTreeMap<Key, u64>, scalars: &BTreeMap<Key, u64>, when: 
     }
 }
 
-/// What the FMU with arrays is sized to, and what is set in both.
+/// Sizes of the FMU with arrays, and settings of both FMUs.
 struct Case {
     model: &'static Model,
     size: Option<(&'static str, usize)>,

@@ -1,4 +1,4 @@
-//! What several tests share.
+//! Functions shared by several tests.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};

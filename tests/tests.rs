@@ -1,4 +1,4 @@
-//! What must hold of the whole, as one test binary: `cargo test` links once.
+//! Tests of the whole project in one binary: `cargo test` links once.
 
 mod abi {
     mod abuse;

@@ -1,4 +1,4 @@
-"""What README says of the manoeuvre."""
+"""The statements of README about the manoeuvre."""
 
 from my_tank import MY_TANK, answer, compare
 

@@ -16,7 +16,7 @@ from hubslosh.plot import COLORS, save
 SPIN = 1.1  # rad/s, about z
 DAMPED = 31.7569  # N·s/m, drag coefficient of each mode
 MASS, LENGTH = 38.3866, 0.163644
-"""Of each mode: kg, m."""
+"""Mass and length of each mode: kg, m."""
 PROLATE, OBLATE = 71.0, 240.0
 """Moment of inertia of the dry craft about z, kg·m²: less or more than across, 152 and 148."""
 START = (0.06, 0.02, SPIN)  # rad/s

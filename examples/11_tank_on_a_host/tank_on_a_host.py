@@ -22,9 +22,9 @@ STEPS = (0.04, 0.02, 0.01, 0.005)
 """Communication steps, s."""
 RECORDED = [f"omega[{i}]" for i in (1, 2, 3)]
 MASS, CENTRE = 300.0, np.array([0.02, -0.01, 0.1])
-"""Of the host: kg, m from O. The tank with its 382 kg is heavier."""
+"""Mass and centre of mass of the host: kg, m from O. The tank with its 382 kg is heavier."""
 INERTIA = np.diag([210.0, 190.0, 150.0])
-"""Of the host about its centre of mass, kg·m²."""
+"""Inertia of the host about its centre of mass, kg·m²."""
 POSITION = np.array([0.3, 0.1, -0.2])
 """The tank's origin from O, m."""
 M_0, H_0, I_0 = 253.493, 0.0563967, 3.67522

@@ -33,7 +33,7 @@ def test_the_wrench_as_it_is_diverges(both: Path | None) -> None:
 
 
 def test_the_ssp_is_valid_and_has_both_fmus(both: Path | None, tmp_path: Path) -> None:
-    """By fmpy's copy of the schema; nine signals there, six back."""
+    """Validates against fmpy's copy of the schema; nine signals there, six back."""
     archive = tmp_path / "TankOnHost.ssp"
     pack_ssp(both, archive, 0.02)
     system = read_ssd(str(archive), validate=True).system

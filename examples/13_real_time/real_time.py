@@ -18,11 +18,11 @@ import pandas as pd
 import hubslosh
 
 PERIOD = 1e-3
-"""Of the loop, s."""
+"""Cycle time of the loop, s."""
 ANGLE = 0.2
-"""That the controller turns the hub to, rad."""
+"""Commanded angle of the hub, rad."""
 GAINS = 0.6, 0.7
-"""Of the controller: N·m/rad, N·m·s/rad."""
+"""Gains of the controller: N·m/rad, N·m·s/rad."""
 STATE, TORQUE = struct.Struct("<Idd"), struct.Struct("<Id")
 """Datagrams: cycle, angle, rate; cycle, torque."""
 SILENCE = 5.0

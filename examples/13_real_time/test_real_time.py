@@ -1,4 +1,4 @@
-"""What holds however busy the machine is: no time is tested."""
+"""Facts that hold on a busy machine: no time is tested."""
 
 import numpy as np
 from real_time import ANGLE, PERIOD, lines, run

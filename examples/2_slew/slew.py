@@ -17,9 +17,9 @@ from hubslosh.plot import COLORS, save
 ANGLE = np.pi / 2
 """rad."""
 PERIOD, LATENCY = 0.02, 1
-"""Of the controller: s, cycles."""
+"""Cycle time and delay of the controller: s, cycles."""
 BANDWIDTH, ZETA = 0.3, 0.7
-"""Of the PD, for a rigid body: Hz, damping ratio."""
+"""Bandwidth and damping ratio of the PD for a rigid body: Hz, 1."""
 TOLERANCE = np.radians(0.001)
 """The slew is over when the pointing error stays below this, rad."""
 STOP = 40.0  # s

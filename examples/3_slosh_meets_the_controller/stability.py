@@ -1,4 +1,4 @@
-"""When slosh meets the controller: delay decides whether a PD loop damps the liquid or drives it.
+"""Slosh and delay in a PD loop: the delay decides whether the loop damps the liquid or drives it.
 
     python examples/3_slosh_meets_the_controller/stability.py
 
@@ -28,7 +28,7 @@ ZETA = 0.7
 
 @dataclass(frozen=True)
 class Cycle:
-    """How often and how late the controller acts."""
+    """Cycle time and delay of the controller."""
 
     period: float  # s
     latency: int  # cycles
@@ -145,7 +145,7 @@ def slosh_damping(bench: Bench, cycle: Cycle, bandwidth: float, filter=None) -> 
 
 @dataclass(frozen=True)
 class Margins:
-    """How far a loop is from -1."""
+    """Distance of a loop from -1."""
 
     gain: float
     """Largest factor of the gains that leaves the loop stable, dB; negative: it is unstable."""

@@ -1,4 +1,4 @@
-"""What a wheel's limits and a sticking bearing do to a PID, and how far a smoothed law hides it.
+"""Effects of wheel limits and a sticking bearing on a PID, and how much a smoothed law hides.
 
 python examples/4_saturation_and_stiction/stiction.py
 """
@@ -14,15 +14,15 @@ import hubslosh
 from hubslosh.plot import COLORS, save
 
 PERIOD, LATENCY = 0.02, 1
-"""Of the controller: s, cycles."""
+"""Cycle time and delay of the controller: s, cycles."""
 BANDWIDTH, ZETA = 0.3, 0.7
-"""Of the PD part, for a rigid body of `INERTIA`: Hz, damping ratio."""
+"""Bandwidth and damping ratio of the PD part for a rigid body of `INERTIA`: Hz, 1."""
 INERTIA = 0.428
 """kg·m², hub and rigid liquid."""
 INTEGRAL = 0.4
-"""Of the integral part, per s: its gain is this times the proportional one."""
+"""Integral gain over the proportional gain, 1/s."""
 WIDTHS = (1e-2, 1e-3, 1e-5)
-"""Of the smoothed sign (``friction.eps``), rad/s."""
+"""Width of the smoothed sign (``friction.eps``), rad/s."""
 
 
 def run(

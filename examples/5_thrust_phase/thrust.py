@@ -31,7 +31,7 @@ COAST = THRUST / 4
 START, END, STOP = 100.0, 1200.0, 1600.0  # s
 RAMP = 5.0  # s
 PERIOD, LATENCY = 0.5, 1
-"""Of the controller: s, cycles."""
+"""Cycle time and delay of the controller: s, cycles."""
 ZETA = 0.7
 BANDWIDTHS = {"below": 0.009, "near": 0.026, "above": 0.066}
 """Hz, by where they are seen from the slosh frequency."""

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PERIOD, LATENCY = 0.1, 1
-"""Of the controller: s, cycles."""
+"""Cycle time and delay of the controller: s, cycles."""
 BANDWIDTH, ZETA = 0.15, 0.7
-"""Of the PD that is designed for the bench as it should be: Hz, damping ratio."""
+"""Bandwidth and damping ratio of the PD, designed for the nominal bench: Hz, 1."""
 INERTIA = 0.428
 """kg·m², hub and rigid liquid at 10 cm."""
 STOP = 90.0  # s
 PUSH = np.radians(4)
-"""Of the liquid at the start, rad."""
+"""Slosh angle at the start, rad."""
 TOLERANCE = np.radians(0.01)
 """Pointing error within which the hub is settled, rad."""
 

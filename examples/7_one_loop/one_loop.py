@@ -25,7 +25,7 @@ PLANT = {"init.slosh_angle": 0.1, "tank.h": (50, "mm"), "friction.model": "visco
 """The same stand in src/main.rs and ssp/."""
 RECORDED = ["theta", "omega", "slosh_angle"]
 TOLERANCE = 1e-9
-"""By how much hosts may differ, relative to each column's largest value."""
+"""Largest difference between hosts, relative to each column's largest value."""
 
 
 @dataclass

@@ -18,7 +18,7 @@ from hubslosh.plot import COLORS, save
 THRUST = 2400.0  # N
 GIMBAL = -1.3  # m: height of the engine's gimbal; O of the FMU is there
 FREQUENCY, RATIO = 0.2, 0.7
-"""Of the attitude loop: rad/s, damping ratio."""
+"""Bandwidth and damping ratio of the attitude loop: rad/s, 1."""
 DRY = (1180.0, 0.21, 860.0)
 """The dry craft: kg, height of its centre of mass (m), kg·m² about it across the axis."""
 LIQUID = (253.493, 0.0563967, 3.67522)

@@ -19,7 +19,7 @@ SLEW, DURATION = np.radians(30), 20.0
 """About the roll axis: rad, s."""
 STOP, SHOWN = 500.0, 120.0  # s, of the simulation and of the figure
 BANDWIDTH, DAMPING = 0.25, 0.9
-"""Of attitude control, craft rigid: rad/s, 1."""
+"""Bandwidth and damping ratio of attitude control for a rigid craft: rad/s, 1."""
 NOISE = 2e-6  # rad/s, standard deviation of a gyro sample
 UNKNOWN = 1e-3
 """1/s per cycle, what the filter takes for unknown in the liquid's rate."""
@@ -28,10 +28,10 @@ POINTING, RATE = np.radians(2e-3), np.radians(1e-3)
 
 J_XX = 450.0  # kg·m², of the dry craft about roll
 MASS, LENGTH, FIXED, ARM = 35.0, 0.15, 45.0, 0.5
-"""Of each tank: sloshing mass, kg, its pendulum, m, rigid liquid, kg, distance from roll, m."""
+"""Each tank: sloshing mass, kg, pendulum length, m, rigid liquid, kg, distance from roll, m."""
 OWN = 0.5  # kg·m², inertia of a tank's rigid liquid about its own axis
 FREQUENCY, ZETA = 0.08, 0.01
-"""Of the liquid on its diaphragm, weightless, craft held: Hz, 1."""
+"""Frequency and damping ratio of the liquid on its diaphragm, weightless, craft held: Hz, 1."""
 
 
 def parameters(slosh: bool = True, frequency: float = FREQUENCY) -> dict[str, float | int]:

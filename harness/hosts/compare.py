@@ -21,7 +21,7 @@ from hubslosh import TORQUE, FmuError, drive, read_table, setting
 SIGNALS = ["omega", "slosh_angle"]
 
 STEP = 0.02
-"""Of hosts that are driven by `sine`, s."""
+"""Duration for hosts that are driven by `sine`, s."""
 
 Signals = Mapping[str, np.ndarray]
 """Histories by the names of the FMU's variables, SI units."""

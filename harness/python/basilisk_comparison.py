@@ -52,7 +52,7 @@ Signals = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Start:
-    """How a run begins: sin(angle) = displacement/length per axis; y tangential, x radial."""
+    """Start of a run: sin(angle) = displacement/length per axis; y tangential, x radial."""
 
     text: str
     angle_x: float = 0.0  # rad
@@ -65,7 +65,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Case:
-    """What both codes are given."""
+    """Inputs of both codes."""
 
     start: Start
     h: float  # m, fill

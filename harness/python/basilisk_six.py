@@ -63,7 +63,7 @@ class Tank:
 
 @dataclass(frozen=True)
 class Case:
-    """What both codes are given; segments: end (s), force (N), torque (N·m), body axes."""
+    """Inputs of both codes; segments: end (s), force (N), torque (N·m), body axes."""
 
     text: str
     segments: list[tuple[float, tuple[float, float, float], tuple[float, float, float]]]
@@ -78,7 +78,7 @@ class Case:
 
     @property
     def duration(self) -> float:
-        """When the last segment ends, s."""
+        """End of the last segment, s."""
         return self.segments[-1][0]
 
 

@@ -1,4 +1,4 @@
-"""What pip calls to build this package from source (PEP 517): Cargo, and ``hubslosh pack``."""
+"""Build backend for pip (PEP 517): runs Cargo and ``hubslosh pack``."""
 
 import subprocess
 from pathlib import Path

@@ -44,8 +44,8 @@ TOLERANCES = {
     "off_axis_energy": 1e-6,
     "leakage": 1e-6,
 }
-"""How far the harness's value may be from ours, in the column's unit. The two fits leave residuals
-that differ a little, so skewness and kurtosis do; sums over the same samples do not."""
+"""Largest difference between the harness's value and ours, in the column's unit. The two fits leave
+residuals that differ a little, so skewness and kurtosis do; sums over the same samples do not."""
 
 
 @dataclass
@@ -80,14 +80,14 @@ class Sweep:
         return (f - self.f0) / (self.f1 - self.f0) * self.duration
 
     def rate(self, f: float) -> float:
-        """How fast the frequency changes at ``f``, Hz/s."""
+        """Rate of change of the frequency at ``f``, Hz/s."""
         if self.exponential:
             return abs(f * np.log(self.f1 / self.f0) / self.duration)
         return self.mean_rate
 
     @property
     def mean_rate(self) -> float:
-        """How fast the frequency changes on average, Hz/s."""
+        """Mean rate of change of the frequency, Hz/s."""
         return abs(self.f1 - self.f0) / self.duration
 
     @property

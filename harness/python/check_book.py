@@ -23,7 +23,7 @@ MEANT = {
     "frequncy response": "frequency response",
     "spherical pendulm": "spherical pendulum",
 }
-"""What is proposed where nothing is found."""
+"""Suggestions shown if a search finds nothing."""
 
 
 def titles(page: Page, text: str) -> list[str]:

@@ -61,7 +61,7 @@ LETTERS = """[...document.querySelectorAll(".live svg text")].map((text) => {
 """Size of the letters in plots, px."""
 
 FRAME = 1000 / 60
-"""What scripts may take of a frame, ms, where a graphics processor shows 60 a second."""
+"""Time budget of scripts in a frame, ms, at 60 frames a second."""
 
 TORQUE = "swirl.settings.values.torque"
 TABBED = "document.activeElement.name || document.activeElement.textContent"
@@ -73,8 +73,8 @@ MARGINS = """(settings) => {
 }"""
 
 TOLERANCE = 1e-6
-"""Of frequencies and delays their part, of others dB, degrees, 1: both find a crossing to rounding,
-of a linear model whose eigenvalues rounding moves by 1e-9 of their size (double poles at 0)."""
+"""Tolerance, relative for frequencies and delays, else in dB, degrees, 1: both find a crossing
+to rounding, of a linear model whose eigenvalues rounding moves by 1e-9 of their size (double poles at 0)."""
 
 AFTER = """([settings, from, to]) => {
   for (const { key, start } of slew.settings.all) slew.settings.set(key, settings[key] ?? start);

@@ -107,7 +107,7 @@ FAULTS = """
   return faults.map((fault) => `figure ${i + 1}: ${fault}`);
 })
 """
-"""What is wrong with the figures as they are drawn."""
+"""Faults of the figures as drawn."""
 
 
 def background(page: Page) -> int:

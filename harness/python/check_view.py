@@ -54,7 +54,7 @@ VIEWS = ((1400, "light"), (400, "light"), (1400, "dark"))
 
 @dataclass(frozen=True)
 class Drawn:
-    """What one tank's mode should look like, body axes, m."""
+    """Expected picture of one tank's mode, body axes, m."""
 
     hinge: Vector
     bob: Vector

@@ -63,7 +63,7 @@ TORQUE_COLUMNS = ("time", hubslosh.TORQUE, "tau_slope")
 
 
 class CampaignError(Exception):
-    """Why no run, or no further run, can be made."""
+    """Reason why no run, or no further run, can start."""
 
 
 class Harness:
@@ -277,7 +277,7 @@ def make_runs(
 def make_runs_in(
     folder: Folder, client: Client, harness: Harness, made: Callable[[Run], None]
 ) -> dict[str, str]:
-    """As `make_runs`, in a directory that is held."""
+    """`make_runs` in a locked directory."""
     todo = harness.listing()
     columns = todo["columns"]
     missing = []

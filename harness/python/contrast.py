@@ -1,4 +1,4 @@
-"""What axe-core finds on a page in a browser: contrast and all else that WCAG 2 A and AA ask for.
+"""Findings of axe-core on a page in a browser: contrast, and the rest of WCAG 2 A and AA.
 
 ``harness/web/axe`` has axe-core's version in npm's lock file; ``.ci/browser`` installs it.
 """

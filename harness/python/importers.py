@@ -1,4 +1,4 @@
-"""What others say of the packed FMU: XML schema, fmpy's validation, fmutool, FMI Library, CasADi.
+"""Checks of the packed FMU by others: XML schema, fmpy's validation, fmutool, FMI Library, CasADi.
 
 As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything.
 An FMU of FMI 3.0 is shown to CasADi in place of FMI Library, which reads FMI 2.0 here; one with

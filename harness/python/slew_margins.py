@@ -29,7 +29,7 @@ CASES: list[dict[str, Any]] = [
     {"zeta": 0.0005, "fill": 500, "thrust": 120, "delay": 0.35},
     {"notch": "on", "center": 0.3, "width": 1, "bandwidth": 0.12, "delay": 0.4},
 ]
-"""What differs from that."""
+"""Differences from the nominal case."""
 
 
 def parameters(values: dict[str, Any]) -> dict[str, Any]:

@@ -55,7 +55,7 @@ RUST = {
     "RK4, fixed step": ("rk4", ["5e-3", "1e-3", "2e-4"]),
 }
 RUNS = {"dopri5": 3, "dopri5@1e-8": 3, "dop853": 3}
-"""How often each motion is solved; 10 times where nothing else is said."""
+"""Number of solutions of each motion, 10 by default."""
 SCIPY = {"SciPy RK45": ("RK45", [1e-4, 1e-6]), "SciPy LSODA": ("LSODA", [1e-5, 1e-7])}
 
 

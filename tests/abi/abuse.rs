@@ -112,7 +112,7 @@ fn letter(variable: &Variable) -> char {
     }
 }
 
-/// How much of what is tried one version tries.
+/// Share of the cases that one version tries.
 #[derive(Clone, Copy)]
 struct Share {
     /// all; or part, and the other version another part
@@ -130,7 +130,7 @@ fn under_valgrind() -> bool {
     std::env::var_os("HUBSLOSH_VALGRIND").is_some()
 }
 
-/// Where fmi2Functions.h and fmi3Functions.h are: fmpy has the official headers among its files.
+/// Folder of fmi2Functions.h and fmi3Functions.h: fmpy contains the official headers.
 fn headers() -> PathBuf {
     let script = "import fmpy, pathlib; print(pathlib.Path(fmpy.__file__).parent / 'c-code')";
     let sentence = "fmpy does not say where it is";
@@ -398,7 +398,7 @@ fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     assert!(number(&said, " refused") <= 0.5 * number(&said, " runs"), "{said}");
 }
 
-/// What is set before, by the FMU's name.
+/// Settings before the test, by the FMU's name.
 #[cfg(target_os = "linux")]
 fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
     let few = ("solver.max_steps", "300");
@@ -538,7 +538,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// What the suite divides between the versions, each of them tries here: before a release, by hand.
+/// Each version tries all cases that the suite divides between the versions: before a release, by hand.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes"]
@@ -552,10 +552,10 @@ fn lives_traps_and_allowed_values_all_in_both_versions() {
     }
 }
 
-/// Of `rounding.c`, 20 ms each.
+/// Steps of `rounding.c`, 20 ms each.
 const STEPS: usize = 250;
 
-/// What else a host sets, by name, before a motion.
+/// Further settings of a host, by name, before a motion.
 type Settings<'a> = &'a [(&'a str, &'a str)];
 
 /// What a host's floating-point environment does to 5 s of a motion: the bits of all Reals, ten times. The motion is

@@ -19,11 +19,11 @@ fn open(name: &str) -> Fmu {
     fmu
 }
 
-/// What derivatives are taken of, and by what.
+/// Unknowns and knowns of the derivatives.
 struct Sides {
     unknowns: Vec<u32>,
     knowns: Vec<u32>,
-    /// How many of the knowns are inputs: these come first, then the states.
+    /// Number of knowns that are inputs: these come first, then the states.
     inputs: usize,
     names: Vec<String>,
 }
@@ -418,7 +418,7 @@ fn of_craft(name: &str) -> f64 {
     }
 }
 
-/// As a host adds the tank's wrench, and with the masses that it adds to its own.
+/// Adds the tank's wrench as a host does, with the tank's masses added to the host's.
 #[test]
 fn derivatives_of_sloshtank_are_transposed_and_those_of_differences() {
     let fmu = open("SloshTank");

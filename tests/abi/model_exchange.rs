@@ -14,7 +14,7 @@ fn open() -> Fmu {
 const STATES: usize = plant::STATES;
 const INDICATORS: usize = plant::INDICATORS;
 
-/// What changes the inputs or parameters and when, s.
+/// Changes of inputs or parameters, with their times, s.
 type Changes<'a> = &'a [(f64, &'a str, &'a str)];
 
 fn set_up<'fmu>(fmu: &'fmu Fmu, kind: i32, settings: &[(&str, &str)]) -> Instance<'fmu> {

@@ -424,7 +424,7 @@ fn random_step(rng: &mut fastrand::Rng, instance: &mut Instance) {
     instance.do_step(instance.time(), h).unwrap();
 }
 
-/// What a host with an adaptive or iterating master does.
+/// Calls of a host with an adaptive or iterating master.
 #[test]
 fn rollback_is_exact_in_a_thousand_random_sequences() {
     let mut rng = fastrand::Rng::with_seed(11);
@@ -874,7 +874,7 @@ fn a_state_of_the_other_interface_is_refused() {
     assert_eq!(exchange.interface(), Interface::ModelExchange);
 }
 
-/// What the model description promises: an importer breaks algebraic loops by it.
+/// The model description promises these dependencies; an importer breaks algebraic loops by them.
 #[test]
 fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {

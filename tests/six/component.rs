@@ -172,7 +172,7 @@ struct Bound {
     /// States and their derivatives in the order of the crate `craft`.
     states: Vec<u32>,
     derivatives: Vec<u32>,
-    /// Where each state in FMI's order stands there.
+    /// Position of each state of FMI's order.
     places: Vec<usize>,
 }
 
@@ -549,7 +549,7 @@ impl SloshTank {
         }
     }
 
-    /// What the instance has warned of.
+    /// Warnings of the instance.
     pub fn warning(&mut self) -> Option<String> {
         let mut messages = self.0.instance.take_messages();
         assert!(messages.len() < 2, "{messages:?}");

@@ -25,7 +25,7 @@ use super::component::{SloshTank, Spacecraft};
 
 const THRUST: f64 = 2400.0;
 
-/// What the body is given about the tank.
+/// Data about the tank that the body receives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Exchange {
     Total,
@@ -147,7 +147,7 @@ impl Pair {
         TankInputs { a: ramp(0), omega: self.w.into(), omega_dot: ramp(3), ..TankInputs::default() }
     }
 
-    /// What the body solves with: (M_body + matrix) x = rest + right-hand side.
+    /// System that the body solves: (M_body + matrix) x = rest + right-hand side.
     fn look(&mut self, u: &TankInputs) -> Given {
         let SloshTankOutputs { tank, bias, added_mass, .. } = self.tank.outputs(u);
         let wrench = Vector6::from_column_slice(&[tank.force, tank.torque].concat());
@@ -244,7 +244,7 @@ impl Pair {
     }
 }
 
-/// Whether a disturbance of 1e-6 of the wrench grows some ten thousand times within 1500 steps.
+/// Returns true if a disturbance of 1e-6 of the wrench grows some ten thousand times within 1500 steps.
 fn total_wrench_diverges(lambda: f64, order: Order, h: f64) -> bool {
     let tank = Tank::default();
     let p = parameters(ratio(tank) / lambda, tank);

@@ -136,7 +136,7 @@ fn a_step_refused_for_where_an_input_would_end_leaves_the_tank_as_it_was() {
     assert!(to_bytes(&tank) == before);
 }
 
-/// What is shown of an instance whose enumeration and its kind have been set, or why there is none.
+/// Outputs of an instance whose enumeration and its kind have been set, or the reason for its refusal.
 fn with_kind<M: runtime::Model>(
     settings: &[(&str, i32)],
     shown: &str,
@@ -203,7 +203,7 @@ fn wheels_that_move_without_a_torque_in_model_exchange_are_warned_of_once() {
     assert!(warning.text.contains("add -d(h_wheels)/dt to torque"), "{}", warning.text);
 }
 
-/// What the crate computes, bit for bit: flight, impacts, sliding and both hand-overs.
+/// The FMU computes flight, impacts, sliding and both hand-overs bit-identical to the crate.
 #[test]
 fn liquid_that_leaves_its_bottom_moves_through_the_packed_fmu_as_in_the_crate() {
     let mut p = Parameters::default();

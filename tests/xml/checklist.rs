@@ -39,7 +39,7 @@ fn missing(rows: &[String]) -> Vec<&str> {
         .collect()
 }
 
-/// What a row of the pages has in the font of code; single words, shorter than a test's name, are code.
+/// Code in a row of the pages; single words, shorter than a test's name, are code.
 fn named(row: &str) -> impl Iterator<Item = &str> {
     row.split('`').skip(1).step_by(2).filter(|name| name.contains('_'))
 }

@@ -18,7 +18,7 @@ const STEPS: usize = 3000;
 const PLANT: [(&str, &str); 3] =
     [("init.slosh_angle", "0.1"), ("tank.h", "0.05"), ("friction.kind", "2")];
 
-/// What is recorded of the plant.
+/// Recorded variables of the plant.
 const RECORDED: [&str; 3] = ["theta", "omega", "slosh_angle"];
 
 fn main() -> Result<()> {

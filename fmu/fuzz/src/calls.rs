@@ -10,7 +10,7 @@ use runtime::table::Layout;
 
 use crate::sizes;
 
-/// As in `host.h`.
+/// Same as in `host.h`.
 #[repr(C)]
 struct HostFmu {
     guid: *const c_char,

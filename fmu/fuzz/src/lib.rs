@@ -19,7 +19,7 @@ use runtime::v3::{self, Fmi3};
 use runtime::variable::{Access, Causality, Kind, Value};
 use runtime::version::Version;
 
-/// What the environment variable `HUBSLOSH_FUZZ_TARGET` names.
+/// Fuzz target named by the environment variable `HUBSLOSH_FUZZ_TARGET`.
 ///
 /// # Panics
 /// If it names no target, or if something happened that must not.
@@ -74,7 +74,7 @@ impl Values for Fmi3 {
         [&v3::SET_FLOAT64, &v3::SET_INT32, &v3::SET_INT64, &v3::SET_BOOLEAN];
 }
 
-/// Where a variable's call stands.
+/// Position of a variable's call.
 fn place<M: Model>(scalar: &Scalar<M>) -> usize {
     match scalar.variable.kind {
         Kind::Real(_) => 0,

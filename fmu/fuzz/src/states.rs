@@ -60,7 +60,7 @@ fn damaged<M: Model, V: Values>(which: usize, mut patches: &[u8]) {
     live(&mut instance);
 }
 
-/// How hosts may use a version.
+/// Interface types of a version.
 fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
     let interfaces = [Interface::CoSimulation, Interface::ModelExchange].into_iter();
     let all = interfaces.flat_map(|interface| {

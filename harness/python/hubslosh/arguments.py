@@ -1,4 +1,4 @@
-"""What arguments of the package's functions must be, and what is said of those that are not."""
+"""Checks of arguments, with messages for wrong ones."""
 
 from typing import Any
 

@@ -59,7 +59,7 @@ _NAMES_3 = (
     "fmi3GetInt32 or fmi3GetInt64",
     "fmi3GetBoolean",
 )
-"""What FMI 3.0 has in the places of FUNCTIONS."""
+"""Functions of FMI 3.0 in the order of FUNCTIONS."""
 
 CONTROLLER = "controller"
 """In the place of a function's name: the controller of a closed loop ended the run."""
@@ -98,7 +98,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a run stopped."""
+    """Point at which a run stopped."""
 
     row: int
     """Communication point, from 0; outputs are there for all rows before it, and for its own too
@@ -176,7 +176,7 @@ _kept = ExitStack()
 """Files that live as long as the program."""
 
 _VERSION = 3
-"""Of the library's interface."""
+"""Version of the library's interface."""
 
 
 def _load(path: Path) -> ctypes.CDLL:
@@ -261,7 +261,7 @@ def _instance(fmu: Any) -> tuple[int, Structure, Sequence[str]]:
 
 
 def step_by_step(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:
-    """As `run`, each call from Python."""
+    """Like `run`, with each call made from Python."""
     c = fmu.component
 
     def calls(name: str, signals: Signals, kind: Any, *more: Any, values: Any = None) -> Any:

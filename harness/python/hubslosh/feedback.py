@@ -83,7 +83,7 @@ class Feedback:
     """
 
     controller: "Linear | Callable[[int, float, Matrix], Any]"
-    """Of a function: cycle, time (s) and measurements to as many numbers as there are commands."""
+    """Type of a controller function: cycle, time (s) and measurements to one number per command."""
     measured: NDArray[np.uint32]
     """Value references."""
     command: NDArray[np.uint32]
@@ -93,7 +93,7 @@ class Feedback:
     switch: int
     latency: int
     error: BaseException | None = field(default=None, init=False)
-    """What the controller raised."""
+    """Exception that the controller raised."""
 
     def __post_init__(self) -> None:
         """Make room for the commands."""

@@ -11,7 +11,7 @@ from .arguments import check_table
 from .fmu import FmuError
 
 ITERATIONS = 30
-"""Of Sanathanan and Koerner's method, which settles within ten."""
+"""Iterations of Sanathanan and Koerner's method, which converges within ten."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ _ERROR = 3
 
 
 class Step(Structure):
-    """What a step is made with, and what it said; the environment that `Slave` instantiates with.
+    """Data and result of a step; the environment with which `Slave` instantiates.
 
     The library ``hubslosh_batch`` has the same structure (``CStep``).
     """
@@ -50,7 +50,7 @@ class Step(Structure):
 
 
 class _Calls:
-    """What the instances of both interfaces are called by; a part of one of fmpy's classes."""
+    """Interface of the instances of both interface types; a part of one of fmpy's classes."""
 
     _enumerations: Collection[int]
     _experiment: dict[str, Any]

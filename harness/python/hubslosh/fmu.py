@@ -57,11 +57,11 @@ class DefinedUnit(str):
 
 
 class FmuError(Exception):
-    """What went wrong, in the FMU's own words where it has any."""
+    """An error, with the FMU's own message if it has one."""
 
 
 class FmuWarning(UserWarning):
-    """What an FMU warns of, such as parameters beyond the range in which its model is known."""
+    """A warning of an FMU, such as parameters beyond the known range of its model."""
 
 
 def source_tree() -> Path | None:
@@ -124,7 +124,7 @@ class Fmu:
             version = self.description.fmiVersion
             raise FmuError(f"{path} is of FMI {version}; 2.0 or 3.0 is expected")
         self.is_fmi3 = self.description.fmiVersion == "3.0"
-        """Whether it is of FMI 3.0."""
+        """True for FMI 3.0."""
         self.intermediate: frozenset[str] = frozenset()
         """Names of the variables that take part in intermediate update."""
         if self.is_fmi3:
@@ -160,7 +160,7 @@ class Fmu:
 
     @property
     def directory(self) -> str:
-        """Where the FMU is unpacked until the program ends."""
+        """Folder of the unpacked FMU, kept until the program ends."""
         with self._unpacking:
             if self._directory is None:
                 try:

@@ -16,7 +16,7 @@ SHAPES = {
     "rod": "(radius, length): a solid cylinder across the bearing axis, m",
     "inertia": "the part's own inertia about its centre, parallel to the bearing axis, kg m2",
 }
-"""What a part may be, and what says how large it is."""
+"""Kinds of parts, and the names of their dimensions."""
 
 
 def _own(shape: str, mass: float, size: Any) -> float:

@@ -65,9 +65,9 @@ class LiquidModes:
     """
 
     mass: float
-    """Of the liquid, kg."""
+    """Mass of the liquid, kg."""
     center: tuple[float, float, float]
-    """Of its mass, m."""
+    """Centre of mass of the liquid, m."""
     surface: float
     """Height of the free surface, m."""
     gravity: float

@@ -26,7 +26,7 @@ from .simulation import (
 )
 
 Law = Callable[[float, NDArray[np.float64]], Any]
-"""What a controller computes in a cycle: the command, or one for each of several, from time (s) and
+"""Result of a controller in a cycle: the command, or one for each of several, from time (s) and
 measurements."""
 
 QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))

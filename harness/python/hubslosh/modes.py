@@ -1,4 +1,4 @@
-"""How many slosh modes a model needs: the force's error against their number."""
+"""Number of slosh modes that a model needs: the force's error against the number of modes."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ from .simulation import parameters_of
 Vector = NDArray[np.float64]
 
 TOLERANCES = (0.05, 0.01)
-"""Of which `mode_errors` says how many modes meet them, as the thesis does (4.2.1)."""
+"""Error limits for which `mode_errors` states the number of modes, as the thesis does (4.2.1)."""
 
 
 def impulse(masses: Vector, omegas: Vector, zetas: Vector, time: Vector) -> NDArray[np.float64]:

@@ -62,8 +62,9 @@ def _of_archive(archive: zipfile.ZipFile, size: int) -> Iterator[str]:
         # two entries of one folder overwrite nothing
         if other is not entry and not (entry.is_dir() and other.is_dir()):
             yield (
-                f"{name!r} and {other.orig_filename!r} have the same place on Windows or macOS (allowed: names that "
-                "differ in more than capitals, full stops and spaces at the end, and what follows a colon)"
+                f"{name!r} and {other.orig_filename!r} have the same place on Windows or macOS "
+                "(allowed: names that differ in more than capitals, full stops and spaces at the "
+                "end, and what follows a colon)"
             )
     most = UNPACKED + UNPACKED_PER_BYTE * size
     unpacked = sum(entry.file_size for entry in entries)
@@ -80,7 +81,7 @@ def _of_archive(archive: zipfile.ZipFile, size: int) -> Iterator[str]:
 
 
 def _place(name: str) -> str:
-    """Return the place that a file system can take for that of a name (`place` in ``archive.rs``)."""
+    """Return the place that a file system may give a name (`place` in ``archive.rs``)."""
     parts = name.rstrip("/").split("/")
     return "/".join(part.split(":")[0].rstrip(". ").lower() for part in parts)
 

@@ -30,14 +30,14 @@ TORQUE = "tau_cmd"
 """The input that carries the torque, N·m."""
 
 COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
-"""What `drive` records beside time and torque, unless told otherwise."""
+"""Default record of `drive` in addition to time and torque."""
 
 _INSTANCE = "hubslosh"
 """Name of our instances, by which the logger knows them."""
 
 
 class _Messages(threading.local):
-    """What FMUs said during the present call of this thread."""
+    """Messages of FMUs during the present call of this thread."""
 
     def __init__(self) -> None:
         self.said: list[str] = []
@@ -75,9 +75,9 @@ class RunError(FmuError):
         """Take what is said of it."""
         super().__init__(sentence)
         self.time = time
-        """Where the last step began, s."""
+        """Start of the last step, s."""
         self.columns = columns
-        """What was recorded until then."""
+        """Record up to the failure."""
 
 
 _LOADING = threading.Lock()

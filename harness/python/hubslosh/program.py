@@ -1,4 +1,4 @@
-"""What the program ``hubslosh`` does: campaigns and identification.
+"""Calls of the program ``hubslosh``: campaigns and identification.
 
 It comes with this package's wheel, or is built from the project's source.
 """
@@ -156,10 +156,10 @@ Method = Literal[
 
 @dataclass(frozen=True)
 class Identification:
-    """What ``hubslosh identify`` finds; `all` is its result.json as it is."""
+    """Result of ``hubslosh identify``; `all` is its result.json unchanged."""
 
     parameters: dict[str, Estimated]
-    """Of the FMU, by name."""
+    """Estimates of the FMU's parameters, by name."""
     measurement: dict[str, Estimated]
     """Delay, gyro scale and bias; poles and zeros of method "frequency"."""
     model: str | None

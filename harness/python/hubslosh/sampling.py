@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Outcome = Callable[[dict[str, Any]], Mapping[str, float]]
-"""What is found of one draw: numbers by name, from values by name."""
+"""Evaluation of one draw: numbers by name, from values by name."""
 
 Range = Any
 """(low, high): uniform; a list: one of its items; a frozen distribution of ``scipy.stats``."""

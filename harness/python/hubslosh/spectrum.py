@@ -13,7 +13,7 @@ BINS = 3
 """Half the width of the smoothing in lines of the spectrum, unless a resolution is given."""
 
 INPUT_FLOOR = 1e-4
-"""Where the input's power is below this part of its maximum there is no estimate."""
+"""Share of the input's maximum power below which there is no estimate."""
 
 
 def frequency_response(

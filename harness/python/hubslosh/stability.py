@@ -33,7 +33,7 @@ LIGHT = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """What `margins` finds; ``print`` it for a verdict in words and what matters of the table."""
+    """Result of `margins`; ``print`` shows a verdict in words and the main rows of the table."""
 
     crossings: "pd.DataFrame"
     """A row for each crossing, by frequency: ``loop`` (the command at which it was broken),
@@ -45,13 +45,13 @@ class Margins:
     stable: bool
     """The closed loop is: of a `Loop` the part that the commands move and the measurements show."""
     poles: NDArray[np.complex128]
-    """Of the closed loop by magnitude: rad/s, or in the z plane."""
+    """Poles of the closed loop by magnitude: rad/s, or in the z plane."""
     modulus_margin: float
     """Least distance of the loop gain to -1."""
     delay_margin: float
     """s, by which all commands may come later until the loop is unstable; 0 if it is so already."""
     modes: "pd.DataFrame"
-    """Of the plant, with damping ratios below 0.2: see `LinearModel.modes`."""
+    """Modes of the plant with damping ratios below 0.2: see `LinearModel.modes`."""
 
     @property
     def gain_margins(self) -> tuple[float, float]:

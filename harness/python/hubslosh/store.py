@@ -32,7 +32,7 @@ import numpy as np
 from .fmu import FmuError
 
 FORMAT = 2
-"""Of the files; 1: ``runs.csv`` without types and hashes (HubSlosh 0.5.0)."""
+"""Format of the files; 1: ``runs.csv`` without types and hashes (HubSlosh 0.5.0)."""
 
 STUDY, TABLE, RUNS, MANIFEST = "study.json", "runs.csv", "runs", "manifest.sha256"
 LOCK, UNFINISHED = ".lock", ".unfinished"

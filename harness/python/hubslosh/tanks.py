@@ -31,7 +31,7 @@ class Tank:
     """A tank at a fill, as `tank` gives it."""
 
     all: dict[str, Any]
-    """What ``hubslosh tank --out`` writes: ``m_liq`` (kg), ``z_cg``, ``I_eff_cg``, …"""
+    """Result that ``hubslosh tank --out`` writes: ``m_liq`` (kg), ``z_cg``, ``I_eff_cg``, …"""
     picture: str
     """Tank, free surface and mode shapes, SVG; a notebook shows it."""
     gravity: float

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 HEIGHT = 760
-"""Of the page in a notebook, px."""
+"""Height of the page in a notebook, px."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class View:
     html: str = field(repr=False)
     """The page: it needs nothing else, no network either."""
     path: Path | None = None
-    """Where it was written, if ``out`` was given."""
+    """Path of the page, if ``out`` was given."""
 
     def _repr_html_(self) -> str:
         """Return it in a frame of its own, which IPython shows."""

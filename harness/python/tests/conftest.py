@@ -1,4 +1,4 @@
-r"""What the tests share: the packed FMU and the harness's binary.
+r"""Fixtures: the packed FMU and the harness's binary.
 
     cargo run --release -- pack
     cargo run --release -- pack --python

@@ -134,7 +134,7 @@ def test_wrong_arguments_are_told_in_our_words(given: SimpleNamespace) -> None:
 def test_one_name_and_a_file_of_parameters_are_taken(
     given: SimpleNamespace, tmp_path: Path
 ) -> None:
-    """Where a list of names and a mapping are taken; the same bits."""
+    """Lists of names and mappings give bit-identical results."""
     file = tmp_path / "bench.toml"
     file.write_text('"friction.model" = "viscous"\n"hub.I" = 0.5\n')
     values = VISCOUS | {"hub.I": 0.5}

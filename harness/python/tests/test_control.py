@@ -106,7 +106,7 @@ def test_a_matrix_of_gains_is_the_function_that_it_stands_for(fmu: Path) -> None
 
 
 def test_a_continuous_controller_is_discretised_by_tustins_rule(fmu: Path) -> None:
-    """As python-control does it; a transfer function as well as a state space."""
+    """Compares with python-control, for a transfer function and a state space."""
     lead = control.tf([0.6, 0.4], [0.05, 1])
     start = VISCOUS | {"init.slosh_angle": (5, "deg")}
     runs = [

@@ -202,7 +202,7 @@ def test_a_run_that_stops_says_where_and_keeps_what_it_has(
     fmu: Path, loop: bool, torque: np.ndarray, hold: bool, sentence: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """As with FMI 2.0, by the name of the function that refused."""
+    """The message names the function that refused, as in FMI 2.0."""
     if not loop:
         monkeypatch.setattr(batch, "library", lambda: None)
     slopes = None if hold else {"tau_cmd": np.append(np.diff(torque) / STEP, 0.0)}

@@ -20,7 +20,7 @@ SIGNALS = {
     "heat": 1e-6,
     "work": 1e-6,
 }
-"""What is compared, and by how much it may differ, SI.
+"""Compared variables and their tolerances, SI.
 
 fmpy gives CVODE a tolerance of 1e-9 times the present value and 1e-9 times the nominal one
 (1e-11 to 1e-12 for the liquid) for each of the 1,000 to 10,000 steps of 20 s, and most errors of

@@ -50,7 +50,7 @@ def test_a_study_gives_what_single_runs_give_however_it_is_made(fmu: Path, tmp_p
     assert table["rate"][3] == outcome(draw(RANGES, 3, 1))["rate"]
 
     class StoppedError(Exception):
-        """What somebody does who stops it."""
+        """Simulates a user who stops the study."""
 
     count, lock = [0], threading.Lock()
 

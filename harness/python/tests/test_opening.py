@@ -1,4 +1,4 @@
-"""What is not opened: archives and descriptions beyond the budgets, or that lead outside."""
+"""Refused archives and descriptions: over budget, or with paths that lead outside."""
 
 import re
 import stat
@@ -71,7 +71,7 @@ def test_a_wrong_size_in_a_header_is_refused(tmp_path, fmu) -> None:
 
 
 def test_a_library_outside_the_archive_is_refused(tmp_path, fmu) -> None:
-    """By modelIdentifier."""
+    """The path comes from modelIdentifier."""
     with zipfile.ZipFile(fmu) as archive:
         text = archive.read("modelDescription.xml").decode()
     text = text.replace('modelIdentifier="HubSlosh"', 'modelIdentifier="../../outside"')

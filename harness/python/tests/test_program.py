@@ -1,4 +1,4 @@
-"""What the package has the program ``hubslosh`` do."""
+"""Calls of the program ``hubslosh`` by the package."""
 
 import json
 import subprocess
@@ -32,7 +32,7 @@ def test_a_campaign_comes_back_as_a_table(fmu: Path, tmp_path: Path, request) ->
 def test_a_recording_comes_back_as_a_row_beside_the_model(
     fmu: Path, tmp_path: Path, request
 ) -> None:
-    """As a logger has written it: other names, milliseconds, semicolons, decimal commas."""
+    """A logger's file: other names, milliseconds, semicolons, decimal commas."""
     binary = option(request, "--hubslosh")
     profile = "exp-sweep:f0=1.25,f1=3.5,duration=60"
     time, growth = 0.02 * np.arange(3001), np.log(3.5 / 1.25) / 60
@@ -213,7 +213,7 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
 def test_the_posterior_has_the_intervals_that_the_fit_states(
     fmu: Path, request: pytest.FixtureRequest
 ) -> None:
-    """Of a model that is nearly linear in its unknowns emcee samples a normal distribution."""
+    """For a model that is nearly linear in its unknowns emcee samples a normal distribution."""
     tables, binary = spun_down(), option(request, "--hubslosh")
     found = hubslosh.identify(tables, fmu=fmu, **SPUN_DOWN, program=binary)
     samples = hubslosh.posterior(

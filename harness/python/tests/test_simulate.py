@@ -107,7 +107,7 @@ def test_without_inputs_the_fmu_s_experiment_is_the_default(fmu: Path) -> None:
 
 
 def test_the_slope_of_a_torque_history_is_used(fmu: Path) -> None:
-    """As ``hubslosh torque`` writes it; here it is not that of the chords."""
+    """The file has the form that ``hubslosh torque`` writes; here it is not that of the chords."""
     table = TABLE.assign(tau_slope=np.full(len(TIME), 0.25))[:501]
     ours = simulate(fmu, inputs=table, outputs=["omega"])
     theirs = drive(fmu, TIME[:501], TORQUE[:501], slope=table["tau_slope"], columns=["omega"])
@@ -189,7 +189,7 @@ def test_a_run_that_stops_says_where_and_keeps_what_it_has(
 
 
 def test_an_unknown_model_is_told(tmp_path: Path) -> None:
-    """By name, by file, and a file that is no FMU."""
+    """Opens an FMU by name and by file, and refuses a file that is not an FMU."""
     with pytest.raises(FmuError, match='no FMU "HubSlush" here'):
         simulate("HubSlush")
     with pytest.raises(FmuError, match="pack makes it"):

@@ -68,7 +68,7 @@ def repaired(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_with_nothing_set_something_moves(fmu: Path, model: str, output: str, swing: float) -> None:
-    """What a host's first plot shows: rad, rad/s and N from peak to peak within 20 s."""
+    """First plot of a host: rad, rad/s and N from peak to peak within 20 s."""
     result = simulate_fmu(str(fmu.with_name(f"{model}.fmu")))
     assert np.isfinite([list(row) for row in result]).all()
     assert swing < np.ptp(result[output]) < 2 * swing
@@ -81,7 +81,7 @@ def test_held_input_is_what_the_harness_holds(fmu: Path) -> None:
 
 
 def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
-    """What example.py does.
+    """Runs example.py.
 
     Held values are late by half a step: ωH/2 = 0.15 of the torque. Taken half a step early, what
     is left is of second order: (ωH)²/24 = 0.004 of the torque's fundamental is missing, and

@@ -1,4 +1,4 @@
-"""How the host cuts time does not matter."""
+"""Results are independent of the communication steps."""
 
 from pathlib import Path
 

@@ -101,7 +101,7 @@ def edited(path: Path, change) -> None:
 
 
 def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
-    """By its values and those of the seed, or by its SHA-256; without the file it is made again."""
+    """The store compares values with the seed, then the SHA-256; a missing run is simulated."""
     whole = study(tmp_path)
     file = tmp_path / "runs" / "000007.json"
     original = file.read_bytes()

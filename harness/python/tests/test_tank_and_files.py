@@ -253,7 +253,7 @@ def test_units_of_a_parameter_set_are_converted(
 def test_a_unit_that_is_not_one_of_the_variable_is_refused(
     fmu: Path, tmp_path: Path, text: str, units: str, said: str
 ) -> None:
-    """So is what is not a parameter set."""
+    """A file that is not a parameter set is refused, too."""
     file = tmp_path / "bench.ssv"
     file.write_text(SSV.format(parameters=text, units=units))
     with pytest.raises(FmuError, match=said):

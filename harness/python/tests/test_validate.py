@@ -13,7 +13,7 @@ def test_the_validator_finds_no_problems(fmu: Path) -> None:
 
 
 def test_the_command_says_so_too(fmu: Path) -> None:
-    """As a user calls it."""
+    """Calls the command as a user does."""
     command = [sys.executable, "-m", "fmpy", "validate", str(fmu)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.strip()) == (0, "No problems found."), done.stderr

@@ -92,7 +92,7 @@ def test_a_run_is_a_pandas_table_also_after_a_loop_a_copy_and_a_pickle(fmu: Path
 def test_default_runs_are_shown(
     fmu: Path, request, name: str, parameters: dict, angles: int
 ) -> None:
-    """Of every FMU: what is recorded by default is what the page needs."""
+    """The default record of every FMU contains what the page needs."""
     path = fmu.with_name(f"{name}.fmu")
     run = hubslosh.simulate(path, parameters, stop=1.0, step=0.05)
     assert sum(".angle_" in column for column in run.columns) == angles

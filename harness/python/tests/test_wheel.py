@@ -53,7 +53,7 @@ def installed(wheel: Path, tmp_path_factory) -> Path:
 
 
 def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
-    """As any installer may check."""
+    """Checks RECORD as an installer does."""
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         record = names[-1]
@@ -86,7 +86,7 @@ for model in ("HubSlosh", "Spacecraft", "SloshTank"):
 
 
 def test_the_tag_is_of_this_machine_alone(wheel: Path) -> None:
-    """As pip reads it from the name, and as the wheel says itself."""
+    """Tags in the file's name and in the wheel's metadata agree."""
     tags = parse_wheel_filename(wheel.name)[3]
     assert set(tags) & set(sys_tags())
     with zipfile.ZipFile(wheel) as archive:
@@ -159,7 +159,7 @@ def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, req
 def test_every_fmu_of_the_wheel_runs(
     installed: Path, tmp_path: Path, model: str, parameters: dict, moves: str
 ) -> None:
-    """By its name, for a second, from where pip has put it: what swings at the start moves it."""
+    """Simulates an installed FMU by name for a second; its initial slosh moves it."""
     code = (
         "import hubslosh\n"
         f"run = hubslosh.simulate({model!r}, {parameters!r}, stop=1)\n"

@@ -1,5 +1,7 @@
-"""Writes the Parquet files of these tests: five rows 20 ms apart (1 s apart where the unit is s), with the libraries
-that users have: pyarrow 26, pandas 3, polars 2."""
+"""Writes the Parquet files of these tests with the libraries that users have.
+
+Five rows 20 ms apart (1 s apart if the unit is s); pyarrow 26, pandas 3, polars 2.
+"""
 
 import numpy as np
 import pandas as pd
@@ -14,6 +16,7 @@ start = 1_767_225_600 * 10**9  # 2026-01-01
 
 
 def write(name, time, torque=torque, rate=rate, **options):
+    """Write a table of time, torque and rate."""
     pq.write_table(pa.table({"time": time, "tau_cmd": torque, "omega": rate}), name, **options)
 
 
@@ -40,4 +43,5 @@ for name, values, kind in (
     ("polars_ns", ns, pl.Duration("ns")),
     ("polars_ts", ns // 1000, pl.Datetime("us")),
 ):
-    pl.DataFrame({"time": pl.Series(values).cast(kind)} | of_pandas).write_parquet(f"{name}.parquet")
+    time = pl.Series(values).cast(kind)
+    pl.DataFrame({"time": time} | of_pandas).write_parquet(f"{name}.parquet")
