@@ -2,12 +2,12 @@
 
 import os
 import re
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import temporary
 from .fmu import FmuError
 from .tables import write_table
 
@@ -38,8 +38,8 @@ def _columns(table: "pd.DataFrame") -> dict[str, Any]:
 def _beside(path: Path) -> "Iterator[Path]":
     """Yield a file in the same folder that takes the place of ``path`` when all is written."""
     try:
-        with tempfile.TemporaryDirectory(prefix=".hubslosh-", dir=path.parent) as folder:
-            new = Path(folder) / path.name
+        with temporary.folder(path.parent, ".hubslosh-") as folder:
+            new = folder / path.name
             yield new
             new.replace(path)
     except OSError as error:

@@ -1,9 +1,7 @@
 """A packed FMU, 2.0 or 3.0: where it is, what it says of itself, values in its variables' types."""
 
-import atexit
 import difflib
 import math
-import shutil
 import threading
 import zipfile
 from collections.abc import Callable, Iterable
@@ -16,6 +14,7 @@ from fmpy.model_description import ModelDescription, ScalarVariable
 
 from .fmi3 import KINDS
 from .opening import DESCRIPTION, faults, is_file_name
+from .temporary import until_the_end
 
 PLATFORM = platform_tuple if platform_tuple == "aarch64-linux" else platform
 """Folder of the binaries for this platform, as the program ``hubslosh`` names it.
@@ -164,10 +163,9 @@ class Fmu:
         with self._unpacking:
             if self._directory is None:
                 try:
-                    self._directory = str(extract(str(self.path)))
+                    self._directory = str(extract(str(self.path), str(until_the_end())))
                 except Exception as error:  # as in reading
                     raise FmuError(f"{self.path} cannot be unpacked: {error}") from None
-                atexit.register(shutil.rmtree, self._directory, ignore_errors=True)
             return self._directory
 
     def names(self, *causalities: str) -> list[str]:

@@ -5,13 +5,13 @@ maximises, with the noise that it has estimated. ``pip install "hubslosh[posteri
 """
 
 import json
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from . import temporary
 from .fmu import FmuError, find
 from .program import Free, Identification, Table, _asked, _file, _run, _settings, find_program
 
@@ -55,7 +55,7 @@ def posterior(
         raise FmuError("an unknown is not determined: there is nothing to start the walkers from")
     walkers = walkers or 4 * len(names)
     path = find_program(program)
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary.folder() as folder:
         result, points, answer = (
             Path(folder) / name for name in ("result.json", "points.csv", "deviance.json")
         )

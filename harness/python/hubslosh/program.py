@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sysconfig
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
+from . import temporary
 from .fmu import FmuError, find, source_tree
 
 
@@ -85,7 +85,7 @@ def campaign(
     ``.attrs["directory"]`` is where all of it is.
     """
     path = find_program(program)
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary.folder() as folder:
         text = str(plan)
         if "\n" in text:
             if out is None:
@@ -274,7 +274,7 @@ def identify(
         )
         flags += _asked(free, inputs, outputs, prior or {})
     flags += _settings(settings or {})
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary.folder() as folder:
         result = Path(folder) / "result.json" if out is None else Path(out)
         tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
         files = [

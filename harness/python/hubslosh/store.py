@@ -20,7 +20,6 @@ import math
 import os
 import re
 import shutil
-import sys
 import time
 from collections.abc import Mapping
 from io import RawIOBase
@@ -30,6 +29,7 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 
 from .fmu import FmuError
+from .temporary import try_lock
 
 FORMAT = 2
 """Format of the files; 1: ``runs.csv`` without types and hashes (HubSlosh 0.5.0)."""
@@ -152,7 +152,7 @@ class Store:
     def _hold(self) -> None:
         """Lock the folder, or say who holds it."""
         self._lock = (self.path / LOCK).open("a+b")
-        if not _locked(self._lock):
+        if not try_lock(self._lock):
             who, age = "", 0.0
             try:
                 who = (self.path / LOCK).read_text(encoding="utf-8").strip()
@@ -321,27 +321,3 @@ def _write(path: Path, data: bytes) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
-
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def _locked(file: BinaryIO) -> bool:
-        """Lock a file as ``std::fs::File::try_lock`` does; return whether nobody else has it."""
-        try:
-            file.seek(0)
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-
-else:
-    import fcntl
-
-    def _locked(file: BinaryIO) -> bool:
-        """Lock a file as ``std::fs::File::try_lock`` does; return whether nobody else has it."""
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True

@@ -3,8 +3,6 @@
 import argparse
 import json
 import math
-import os
-import tempfile
 import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import temporary
 from .fmu import DefinedUnit, FmuError, Quantity, Value
 
 
@@ -151,21 +150,13 @@ def write_table(
     columns = pyarrow.table(dict(table)).replace_schema_metadata(dict(notes or {}))
     ending = ending_of(path)
     try:
-        handle, name = tempfile.mkstemp(prefix=".hubslosh-", dir=path.parent)
-        os.close(handle)
-        beside = Path(name)
-        try:
+        with temporary.folder(path.parent, ".hubslosh-") as folder:
+            beside = folder / path.name
             if ending == "csv":
                 pyarrow.csv.write_csv(columns, beside)
             else:
                 pyarrow.parquet.write_table(columns, beside, compression="zstd")
-            # mkstemp's permissions are for secrets; give it those of any new file
-            mask = os.umask(0)
-            os.umask(mask)
-            beside.chmod(0o666 & ~mask)
             beside.replace(path)
-        finally:
-            beside.unlink(missing_ok=True)
     except OSError as error:
         raise FmuError(f"{path} cannot be written: {error}") from None
 

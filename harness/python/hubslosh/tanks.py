@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import temporary
 from .fmu import FmuError, FmuWarning
 from .program import find_program
 
@@ -223,7 +223,7 @@ def _is_number(value: Any) -> bool:
 @contextmanager
 def _folder(source: dict[str, Any] | Path) -> "Iterator[tuple[Path, Path]]":
     """Yield a folder for results, and the tank's file, which is there if it was a dict."""
-    with tempfile.TemporaryDirectory() as name:
+    with temporary.folder() as name:
         folder = Path(name)
         if isinstance(source, Path):
             yield folder, source

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from . import temporary
 from .arguments import check_table
 from .fmu import DefinedUnit, Fmu, FmuError, Quantity, find
 from .program import _run, find_program
@@ -79,7 +80,7 @@ def view(
     if out is not None and Path(out).suffix != ".html":
         raise FmuError(f"{out}: the name must end in .html")
     numbered = tanks if isinstance(tanks, Mapping) else dict(enumerate(tanks, 1))
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary.folder() as folder:
         if isinstance(run, str | os.PathLike):
             file, known = Path(run), {}
         else:

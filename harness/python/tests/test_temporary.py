@@ -1,0 +1,75 @@
+"""Temporary folders of a killed process go at the next start, of either program."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import option
+
+from hubslosh import temporary
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import hubslosh
+from hubslosh import temporary
+from hubslosh.fmu import Fmu
+
+assert Path(Fmu.open(sys.argv[1]).directory, "modelDescription.xml").is_file()
+with temporary.folder():
+    if sys.argv[2] == "kill":
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def started(fmu: Path, how: str, folder: Path) -> int:
+    """Unpack an FMU in a process that ends so, and return its exit code."""
+    environment = os.environ | {
+        "PYTHONPATH": str(Path(__file__).parents[1]),
+        "TMPDIR": str(folder),
+    }
+    command = [sys.executable, "-c", KILLED, fmu, how]
+    return subprocess.run(command, env=environment, check=False).returncode
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_folders_of_a_killed_process_go_at_the_next_start(
+    fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """In Python and of the program; a folder of a living process stays, and what is not ours."""
+    kept = tmp_path / "hubslosh-of-somebody"
+    kept.mkdir()
+    pipe = tmp_path / "hubslosh-pipe"
+    pipe.mkdir()
+    os.mkfifo(pipe / "alive")
+    with temporary.folder(tmp_path) as living:
+        there = {kept.name, pipe.name, living.parent.name}
+        for program in ("python", "hubslosh"):
+            assert started(fmu, "kill", tmp_path) == -signal.SIGKILL
+            assert len(list(tmp_path.iterdir())) == len(there) + 2
+            if program == "python":
+                assert started(fmu, "end", tmp_path) == 0
+            else:
+                command = [option(request, "--hubslosh"), "run", "--fmu", fmu, "--stop", "0.1"]
+                command += ["--profile", "zero", "--out", tmp_path.parent / "run.csv"]
+                environment = os.environ | {"TMPDIR": str(tmp_path)}
+                subprocess.run(command, env=environment, check=True, capture_output=True)
+            assert {path.name for path in tmp_path.iterdir()} == there
+    assert not living.parent.exists()
+
+
+def test_a_table_that_was_not_written_to_its_end_goes_with_the_next_one(tmp_path: Path) -> None:
+    """The draft lies in the folder of the file, for it is renamed."""
+    import pandas as pd
+
+    from hubslosh.files import to_csv
+
+    dead = tmp_path / ".hubslosh-dead"
+    (dead / "files").mkdir(parents=True)
+    (dead / "files" / "a.csv").write_text("half")
+    (dead / "alive").touch()
+    to_csv(pd.DataFrame({"a": [1.0]}), tmp_path / "a.csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
