@@ -4,7 +4,8 @@ use anyhow::Result;
 
 use super::Findings;
 use super::life::first;
-use super::under_test::{FmuUnderTest, STEPS};
+use super::under_test::{FmuUnderTest, Interface, STEPS};
+use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
 
 /// What an FMU says to several mistakes.
@@ -114,6 +115,23 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
+/// Makes an ordinary run with loggingOn and returns its messages.
+fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<Vec<Message>> {
+    fmu.doing("fmi2Instantiate, loggingOn");
+    let with =
+        Instantiation { kind: interface.kind(), ..fmu.binary(interface).instantiation("check") };
+    let mut session = fmu.session(interface)?;
+    session.instance = fmu.binary(interface).instantiate_with(&with)?;
+    session.initialise()?;
+    if changing {
+        session.advance(STEPS)?
+    } else {
+        session.coast(STEPS)?
+    }
+    session.instance.terminate()?;
+    Ok(session.instance.take_messages())
+}
+
 /// `log.quiet`. Inputs that this check makes up may lead a model out of its range, of which it may warn; with inputs
 /// at their start values there is nothing to warn of.
 pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -121,21 +139,7 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for (interface, (inputs, changing)) in
         fmu.interfaces().into_iter().flat_map(|i| runs.map(|run| (i, run)))
     {
-        fmu.doing("fmi2Instantiate, loggingOn");
-        let with = Instantiation {
-            kind: interface.kind(),
-            ..fmu.binary(interface).instantiation("check")
-        };
-        let mut session = fmu.session(interface)?;
-        session.instance = fmu.binary(interface).instantiate_with(&with)?;
-        session.initialise()?;
-        if changing {
-            session.advance(STEPS)?
-        } else {
-            session.coast(STEPS)?
-        }
-        session.instance.terminate()?;
-        let mut messages = session.instance.take_messages();
+        let mut messages = ordinary(fmu, interface, changing)?;
         messages.retain(|message| !changing || message.status == Status::Ok);
         if let Some(message) = messages.first() {
             findings.add(
@@ -143,6 +147,27 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 format!("{} messages, the first {:?}", messages.len(), message.text),
             );
         }
+    }
+    Ok(())
+}
+
+/// `log.environment`
+pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let complaints = complaints(fmu);
+    let runs = fmu.interfaces().into_iter().map(|interface| ordinary(fmu, interface, true));
+    let runs: Result<Vec<_>> = runs.collect();
+    match foreign_environments() {
+        0 if complaints?.is_empty() & runs?.iter().all(Vec::is_empty) => {
+            findings.skip("it logs nothing");
+        }
+        0 => {}
+        n => findings.add(
+            "the logger",
+            format!(
+                "{n} calls have another componentEnvironment than that given to fmi2Instantiate (allowed: the same \
+                 pointer; fmi2Component is not it)"
+            ),
+        ),
     }
     Ok(())
 }

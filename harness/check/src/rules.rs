@@ -106,6 +106,7 @@ pub static RULES: &[Rule] = &[
     rule("host.memory", Error, "fmi2FreeInstance and fmi2FreeFMUstate give back all memory; steps take less than 1 kB each", "2.1.5, 2.1.8; the host's memory", Calls(memory::memory)),
     rule("host.arrays", Error, "nothing is written beside an array that a call is given, nor into one that is only read", "2.1.7: the length is in the call; the host's memory", Calls(arrays::arrays)),
 
+    rule("log.environment", Error, "the logger is given the componentEnvironment of fmi2Instantiate", "2.1.5; hosts follow that pointer and crash", Calls(log::environment)),
     rule("log.percent", Error, "percent signs arrive as they are: the text is no format", "2.1.5; five exporters get it wrong, hosts crash", Calls(log::percent)),
     rule("log.categories", Error, "messages have declared categories", "2.1.5, 2.2.4", Calls(log::categories)),
     rule("log.text", Warning, "messages are UTF-8, not empty, without a line break at the end", "2.1.5; hosts that add their own", Calls(log::text)),

@@ -2,9 +2,12 @@
 //! library.
 #![allow(unsafe_code)]
 
-use std::ffi::{CStr, c_char, c_int};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use anyhow::{Context, Result, bail};
 use libloading::Library;
@@ -42,30 +45,123 @@ impl From<c_int> for Status {
     }
 }
 
-/// What the FMU's logger writes to. In FMI 2.0 it is the environment handed to the logger, whose shim in
-/// `logger.c` calls `write`.
-#[repr(C)]
-pub(crate) struct Sink {
-    write: extern "C" fn(*mut Sink, c_int, *const c_char, *const c_char),
+/// Collects the messages of one instance.
+#[derive(Default)]
+struct Sink {
     messages: Mutex<Vec<Message>>,
+    /// Messages whose category is NULL.
+    uncategorised: AtomicUsize,
+}
+
+/// The sinks of all living instances, by the environment that their FMUs hand back to the callbacks.
+///
+/// An FMU may hand back any pointer. The callbacks look the pointer up here and never follow it.
+static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
+
+/// Calls of a callback with another pointer than the environment of an instance.
+static FOREIGN: AtomicUsize = AtomicUsize::new(0);
+
+thread_local! {
+    /// Environment of the instance that this thread called last.
+    static CALLED: Cell<usize> = const { Cell::new(0) };
+}
+
+fn sinks() -> MutexGuard<'static, BTreeMap<usize, Arc<Sink>>> {
+    SINKS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+/// Returns how often FMUs have called a callback of this process with another pointer than the
+/// componentEnvironment (FMI 3.0: instanceEnvironment) of an instance.
+pub fn foreign_environments() -> usize {
+    FOREIGN.load(Ordering::Relaxed)
+}
+
+/// Counts a call of a callback with a pointer that is not an environment.
+pub(crate) fn count_foreign_environment() {
+    FOREIGN.fetch_add(1, Ordering::Relaxed);
+}
+
+/// Environment of an instance: receives its messages until it is dropped, which must be after the instance.
+pub(crate) struct Environment {
+    sink: Arc<Sink>,
+}
+
+impl Environment {
+    pub(crate) fn new() -> Environment {
+        let environment = Environment { sink: Arc::default() };
+        sinks().insert(environment.address(), environment.sink.clone());
+        environment
+    }
+
+    fn address(&self) -> usize {
+        Arc::as_ptr(&self.sink) as usize
+    }
+
+    /// Returns the pointer that the FMU hands back.
+    pub(crate) fn pointer(&self) -> *mut c_void {
+        Arc::as_ptr(&self.sink).cast_mut().cast()
+    }
+
+    /// Notes that a call of the instance begins on this thread.
+    pub(crate) fn begin_call(&self) {
+        CALLED.set(self.address());
+    }
+
+    /// Returns all messages since the last call of this function.
+    pub(crate) fn take(&self) -> Vec<Message> {
+        std::mem::take(&mut *self.sink.lock())
+    }
+
+    /// Returns how many messages had no category (NULL).
+    pub(crate) fn uncategorised(&self) -> usize {
+        self.sink.uncategorised.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Environment {
+    fn drop(&mut self) {
+        sinks().remove(&self.address());
+    }
 }
 
 impl Sink {
-    pub(crate) fn new() -> Sink {
-        Sink { write, messages: Mutex::default() }
+    fn lock(&self) -> MutexGuard<'_, Vec<Message>> {
+        self.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
+}
 
-    /// Keeps a message, of the first [`MESSAGES_KEPT`].
-    pub(crate) fn keep(&self, message: Message) {
-        let mut messages = self.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if messages.len() < MESSAGES_KEPT {
-            messages.push(message);
-        }
+/// Returns the sink that messages with this environment belong to. If no instance has that environment, the instance
+/// that this thread called last has logged, or the only instance there is.
+fn sink_of(environment: *mut c_void) -> Option<Arc<Sink>> {
+    let sinks = sinks();
+    if let Some(sink) = sinks.get(&(environment as usize)) {
+        return Some(sink.clone());
     }
+    count_foreign_environment();
+    let only = || sinks.values().next().filter(|_| sinks.len() == 1);
+    sinks.get(&CALLED.get()).or_else(only).cloned()
+}
 
-    /// Everything kept since the last time somebody asked.
-    pub(crate) fn take(&self) -> Vec<Message> {
-        std::mem::take(&mut *self.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
+/// Keeps a message of an FMU, of the first [`MESSAGES_KEPT`]: `logMessage` of FMI 3.0, which `logger.c` calls for FMI 2.0.
+pub(crate) extern "C" fn log_message(
+    environment: *mut c_void,
+    status: c_int,
+    category: *const c_char,
+    text: *const c_char,
+) {
+    let Some(sink) = sink_of(environment) else { return };
+    let string = |text: *const c_char| match text.is_null() {
+        true => String::new(),
+        // SAFETY: a terminated string of the FMU, or of the shim.
+        false => unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned(),
+    };
+    if category.is_null() {
+        sink.uncategorised.fetch_add(1, Ordering::Relaxed);
+    }
+    let mut messages = sink.lock();
+    if messages.len() < MESSAGES_KEPT {
+        let (category, text) = (string(category), string(text));
+        messages.push(Message { status: status.into(), category, text });
     }
 }
 
@@ -82,18 +178,6 @@ pub struct Message {
 
 /// Messages kept per instance; a chatty FMU shall not eat the memory.
 const MESSAGES_KEPT: usize = 1000;
-
-extern "C" fn write(sink: *mut Sink, status: c_int, category: *const c_char, text: *const c_char) {
-    // SAFETY: the shim passes on the environment given to fmi2Instantiate, which the instance
-    // keeps alive, and two strings that it terminated itself or got from the FMU.
-    let (sink, category, text) =
-        unsafe { (&*sink, CStr::from_ptr(category), CStr::from_ptr(text)) };
-    sink.keep(Message {
-        status: status.into(),
-        category: category.to_string_lossy().into_owned(),
-        text: text.to_string_lossy().into_owned(),
-    });
-}
 
 unsafe extern "C" {
     fn hubslosh_float_control() -> u32;

@@ -10,12 +10,13 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
+use std::sync::Once;
 
 use anyhow::{Context, Result, bail};
 use libloading::Library;
 
 use crate::archive::Archive;
-use crate::c_abi::{self, Loaded, Sink, functions};
+use crate::c_abi::{self, Environment, Loaded, functions};
 pub use crate::c_abi::{CallError, Called, HostState, Message, Status};
 use crate::description::{ModelDescription, Type, Value, Variable};
 use crate::guard::Calls;
@@ -53,6 +54,9 @@ unsafe extern "C" {
         category: *const c_char,
         format: *const c_char,
         ...
+    );
+    fn hubslosh_set_log_message(
+        function: extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char),
     );
     fn calloc(count: usize, size: usize) -> *mut c_void;
     fn free(memory: *mut c_void);
@@ -348,7 +352,10 @@ impl Fmu {
         let (name, guid, resources) =
             (c_string(with.name), c_string(with.guid), c_string(with.resources));
         let pointer = |text: &Option<CString>| text.as_ref().map_or(null(), |t| t.as_ptr());
-        let sink = Box::into_raw(Box::new(Sink::new()));
+        static ONCE: Once = Once::new();
+        // SAFETY: the function lives as long as the program.
+        ONCE.call_once(|| unsafe { hubslosh_set_log_message(c_abi::log_message) });
+        let environment = Environment::new();
         let full = matches!(with.callbacks, Callbacks::Full | Callbacks::Fleeting);
         let logs = full || with.callbacks == Callbacks::Logger;
         let callbacks = Box::into_raw(Box::new(CallbackFunctions {
@@ -356,10 +363,11 @@ impl Fmu {
             allocate_memory: full.then_some(calloc),
             free_memory: full.then_some(free),
             step_finished: None,
-            environment: if logs { sink.cast() } else { null_mut() },
+            environment: if logs { environment.pointer() } else { null_mut() },
         }));
         let calls = Calls::one();
-        // SAFETY: strings and callbacks outlive the call; sink and callbacks outlive the instance.
+        environment.begin_call();
+        // SAFETY: strings and callbacks outlive the call; the callbacks outlive the instance.
         let component = unsafe {
             (self.functions.instantiate)(
                 pointer(&name),
@@ -376,11 +384,11 @@ impl Fmu {
             // SAFETY: made above, read by nobody any more.
             unsafe { callbacks.write_bytes(0, 1) };
         }
-        // A NULL component never reaches the FMU again: Drop frees only the sink.
+        // A NULL component never reaches the FMU again: Drop frees only the callbacks.
         let instance = Instance {
             fmu: self,
             component,
-            sink,
+            environment,
             callbacks,
             warned: Cell::new(None),
             calls,
@@ -526,7 +534,7 @@ pub enum Callbacks {
 pub struct Instance<'fmu> {
     fmu: &'fmu Fmu,
     component: Component,
-    sink: *mut Sink,
+    environment: Environment,
     callbacks: *mut CallbackFunctions,
     warned: Cell<Option<&'static str>>,
     calls: Calls,
@@ -542,7 +550,6 @@ impl Drop for Instance<'_> {
                 (self.functions().free_instance)(self.component);
             }
             drop(Box::from_raw(self.callbacks));
-            drop(Box::from_raw(self.sink));
         }
     }
 }
@@ -557,10 +564,14 @@ impl<'fmu> Instance<'fmu> {
         self.fmu
     }
 
+    fn begin_call(&self) {
+        self.environment.begin_call();
+        self.calls.begin();
+    }
+
     /// Everything logged since the last time somebody asked.
     pub fn take_messages(&self) -> Vec<Message> {
-        // SAFETY: the sink lives as long as the instance.
-        unsafe { &*self.sink }.take()
+        self.environment.take()
     }
 
     /// What the FMU has warned of, of everything logged since the last time somebody asked.
@@ -685,7 +696,7 @@ impl<'fmu> Instance<'fmu> {
         values: &mut [T],
     ) -> Called {
         assert_eq!(references.len(), values.len());
-        self.calls.begin();
+        self.begin_call();
         // SAFETY: two slices of the length given.
         let status = unsafe {
             function(self.component, references.as_ptr(), references.len(), values.as_mut_ptr())
@@ -702,7 +713,7 @@ impl<'fmu> Instance<'fmu> {
         values: &[T],
     ) -> Called {
         assert_eq!(references.len(), values.len());
-        self.calls.begin();
+        self.begin_call();
         // SAFETY: two slices of the length given.
         let status = unsafe {
             function(self.component, references.as_ptr(), references.len(), values.as_ptr())
@@ -1014,18 +1025,18 @@ impl<'fmu> Instance<'fmu> {
 
     /// The functions that every FMU has, for a call.
     fn functions(&self) -> &'fmu Functions {
-        self.calls.begin();
+        self.begin_call();
         &self.fmu.functions
     }
 
     fn stepping(&self) -> &'fmu StepFunctions {
-        self.calls.begin();
+        self.begin_call();
         let functions = self.fmu.stepping.as_ref();
         functions.expect("the FMU exports the functions of co-simulation")
     }
 
     fn exchange(&self) -> &'fmu ExchangeFunctions {
-        self.calls.begin();
+        self.begin_call();
         let functions = self.fmu.exchange.as_ref();
         functions.expect("the FMU exports the functions of model exchange")
     }

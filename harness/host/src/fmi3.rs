@@ -14,7 +14,9 @@ use std::slice;
 use anyhow::{Context, Result, bail};
 use libloading::Library;
 
-use crate::c_abi::{self, CallError, Called, Loaded, Message, Sink, Status, functions};
+use crate::c_abi::{
+    self, CallError, Called, Environment, Loaded, Message, Status, functions, log_message,
+};
 use crate::description::{CType, ModelDescription, Type, Value, Variable};
 use crate::guard::Calls;
 use crate::temporary;
@@ -191,47 +193,25 @@ exchanged! {
 
 // ---------------------------------------------------------------- callbacks
 
-/// What the FMU's callbacks are given: the sink of its messages, and who hears of points within a step.
-struct Environment {
-    sink: Sink,
-    /// Messages without a category.
-    uncategorised: Cell<usize>,
+/// What happens within the steps of an instance.
+struct Stepping {
     component: Cell<Component>,
     functions: *const Functions,
     /// Alive during one call of fmi3DoStep; NULL outside of it.
     within: Cell<*mut Within<'static>>,
     /// Calls of intermediateUpdate.
     updates: Cell<usize>,
+    /// The pointer that the FMU hands back to intermediateUpdate.
+    environment: *mut c_void,
+}
+
+thread_local! {
+    /// The instance whose fmi3DoStep runs on this thread; NULL if none does.
+    static STEPPING: Cell<*const Stepping> = const { Cell::new(null()) };
 }
 
 /// Hears of a point within a step, and says when to return early, if at all.
 type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
-
-extern "C" fn log_message(
-    environment: *mut c_void,
-    status: c_int,
-    category: *const c_char,
-    text: *const c_char,
-) {
-    if environment.is_null() {
-        return;
-    }
-    // SAFETY: the environment given when the instance was made, which outlives it.
-    let environment = unsafe { &*environment.cast::<Environment>() };
-    let string = |text: *const c_char| match text.is_null() {
-        true => String::new(),
-        // SAFETY: a terminated string of the FMU.
-        false => unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned(),
-    };
-    if category.is_null() {
-        environment.uncategorised.set(environment.uncategorised.get() + 1);
-    }
-    environment.sink.keep(Message {
-        status: status.into(),
-        category: string(category),
-        text: string(text),
-    });
-}
 
 #[allow(clippy::too_many_arguments)]
 extern "C" fn intermediate_update(
@@ -244,23 +224,26 @@ extern "C" fn intermediate_update(
     early_return_requested: *mut Byte,
     early_return_time: *mut f64,
 ) {
-    if environment.is_null() {
-        return;
+    // SAFETY: set for the duration of fmi3DoStep, which is on the stack now, on this thread. The pointer that the FMU
+    // hands back is compared and never followed.
+    let stepping = unsafe { STEPPING.get().as_ref() };
+    if stepping.is_none_or(|stepping| stepping.environment != environment) {
+        c_abi::count_foreign_environment();
     }
-    // SAFETY: as in log_message.
-    let environment = unsafe { &*environment.cast::<Environment>() };
-    environment.updates.set(environment.updates.get() + 1);
-    let update = Update {
-        time,
-        set_requested: set_requested != 0,
-        get_allowed: get_allowed != 0,
-        step_finished: step_finished != 0,
-        can_return_early: can_return_early != 0,
-        environment,
-    };
-    let within = environment.within.get();
-    // SAFETY: set for the duration of fmi3DoStep, which is on the stack now, on this thread.
-    let answer = if within.is_null() { None } else { unsafe { (*within)(&update) } };
+    let answer = stepping.and_then(|stepping| {
+        stepping.updates.set(stepping.updates.get() + 1);
+        let update = Update {
+            time,
+            set_requested: set_requested != 0,
+            get_allowed: get_allowed != 0,
+            step_finished: step_finished != 0,
+            can_return_early: can_return_early != 0,
+            stepping,
+        };
+        let within = stepping.within.get();
+        // SAFETY: set for the duration of fmi3DoStep, too.
+        if within.is_null() { None } else { unsafe { (*within)(&update) } }
+    });
     // SAFETY: two places for the answers, if they are given.
     unsafe {
         if !early_return_requested.is_null() {
@@ -284,7 +267,7 @@ pub struct Update<'a> {
     pub step_finished: bool,
     /// An early return may be asked for.
     pub can_return_early: bool,
-    environment: &'a Environment,
+    stepping: &'a Stepping,
 }
 
 impl Update<'_> {
@@ -293,8 +276,8 @@ impl Update<'_> {
         let n = references.len();
         // SAFETY: two slices of the lengths given; the FMU has called and expects such a call.
         let status = unsafe {
-            ((*self.environment.functions).set_float64)(
-                self.environment.component.get(),
+            ((*self.stepping.functions).set_float64)(
+                self.stepping.component.get(),
                 references.as_ptr(),
                 n,
                 values.as_ptr(),
@@ -308,8 +291,8 @@ impl Update<'_> {
     pub fn get(&self, references: &[u32], values: &mut [f64]) -> Status {
         // SAFETY: as in set.
         let status = unsafe {
-            ((*self.environment.functions).get_float64)(
-                self.environment.component.get(),
+            ((*self.stepping.functions).get_float64)(
+                self.stepping.component.get(),
                 references.as_ptr(),
                 references.len(),
                 values.as_mut_ptr(),
@@ -568,16 +551,17 @@ impl Fmu {
         let (name, token, resources) =
             (c_string(with.name), c_string(with.token), c_string(with.resources));
         let pointer = |text: &Option<CString>| text.as_ref().map_or(null(), |t| t.as_ptr());
-        let environment = Box::into_raw(Box::new(Environment {
-            sink: Sink::new(),
-            uncategorised: Cell::new(0),
+        let environment = Environment::new();
+        let stepping = Box::new(Stepping {
+            environment: environment.pointer(),
             component: Cell::new(null_mut()),
             functions: &self.functions,
             within: Cell::new(null_mut::<Nobody>() as *mut Within<'static>),
             updates: Cell::new(0),
-        }));
+        });
         let logger = with.logger.then_some(log_message as LogMessage);
         let calls = Calls::one();
+        environment.begin_call();
         let required = &with.required;
         // SAFETY: strings outlive the call, the environment the instance.
         let (call, component) = unsafe {
@@ -594,7 +578,7 @@ impl Fmu {
                         with.early_return.into(),
                         if required.is_empty() { null() } else { required.as_ptr() },
                         required.len(),
-                        environment.cast(),
+                        environment.pointer(),
                         logger,
                         with.intermediate_update.then_some(intermediate_update as Intermediate),
                     ),
@@ -607,19 +591,19 @@ impl Fmu {
                         pointer(&resources),
                         0,
                         with.logging.into(),
-                        environment.cast(),
+                        environment.pointer(),
                         logger,
                     ),
                 ),
             }
         };
         calls.end();
-        // SAFETY: made above.
-        unsafe { (*environment).component.set(component) };
+        stepping.component.set(component);
         let instance = Instance {
             fmu: self,
             component,
             environment,
+            stepping,
             warned: Cell::new(None),
             calls,
             arrays: RefCell::default(),
@@ -683,7 +667,8 @@ pub struct Instantiation<'a> {
 pub struct Instance<'fmu> {
     fmu: &'fmu Fmu,
     component: Component,
-    environment: *mut Environment,
+    environment: Environment,
+    stepping: Box<Stepping>,
     warned: Cell<Option<&'static str>>,
     calls: Calls,
     /// Values of the arrays of which elements were set, before they can be read.
@@ -693,15 +678,11 @@ pub struct Instance<'fmu> {
 
 impl Drop for Instance<'_> {
     fn drop(&mut self) {
-        // SAFETY: made by the FMU and Box::into_raw, freed here alone; the instance goes first, because it may
-        // still log.
-        unsafe {
-            if !self.component.is_null() {
-                self.calls.begin();
-                (self.fmu.functions.free_instance)(self.component);
-                self.calls.end();
-            }
-            drop(Box::from_raw(self.environment));
+        if !self.component.is_null() {
+            self.begin_call();
+            // SAFETY: made by the FMU, freed here alone; the environment goes after it, because it may still log.
+            unsafe { (self.fmu.functions.free_instance)(self.component) };
+            self.calls.end();
         }
     }
 }
@@ -757,14 +738,14 @@ impl<'fmu> Instance<'fmu> {
         self.fmu
     }
 
-    fn environment(&self) -> &Environment {
-        // SAFETY: lives as long as the instance.
-        unsafe { &*self.environment }
+    fn begin_call(&self) {
+        self.environment.begin_call();
+        self.calls.begin();
     }
 
     /// Everything logged since the last time somebody asked.
     pub fn take_messages(&self) -> Vec<Message> {
-        self.environment().sink.take()
+        self.environment.take()
     }
 
     /// What the FMU has warned of, of everything logged since the last time somebody asked.
@@ -776,12 +757,12 @@ impl<'fmu> Instance<'fmu> {
 
     /// How many messages had no category (NULL).
     pub fn uncategorised(&self) -> usize {
-        self.environment().uncategorised.get()
+        self.environment.uncategorised()
     }
 
     /// How often the FMU has called intermediateUpdate.
     pub fn updates(&self) -> usize {
-        self.environment().updates.get()
+        self.stepping.updates.get()
     }
 
     /// The last call that returned fmi3Warning since somebody asked.
@@ -802,23 +783,23 @@ impl<'fmu> Instance<'fmu> {
     }
 
     fn functions(&self) -> &'fmu Functions {
-        self.calls.begin();
+        self.begin_call();
         &self.fmu.functions
     }
 
     fn stepping(&self) -> &'fmu StepFunctions {
-        self.calls.begin();
+        self.begin_call();
         self.fmu.stepping.as_ref().expect("the FMU exports the functions of co-simulation")
     }
 
     fn exchange(&self) -> &'fmu ExchangeFunctions {
-        self.calls.begin();
+        self.begin_call();
         self.fmu.exchange.as_ref().expect("the FMU exports the functions of model exchange")
     }
 
     /// A function that takes the instance alone.
     fn plain(&mut self, name: &'static str, function: Call) -> Called {
-        self.calls.begin();
+        self.begin_call();
         // SAFETY: plain call on a live instance.
         let status = unsafe { function(self.component) };
         self.check(name, status)
@@ -941,11 +922,12 @@ impl<'fmu> Instance<'fmu> {
             // SAFETY: the lifetime alone changes; the pointer is taken back before this function returns.
             let within =
                 unsafe { std::mem::transmute::<*mut Within<'_>, *mut Within<'static>>(within) };
-            self.environment().within.set(within);
+            self.stepping.within.set(within);
         }
         let mut bytes = [UNWRITTEN; 3];
         let mut last_time = f64::NAN;
         let [event, terminate, early_return] = &mut bytes;
+        let before = STEPPING.replace(&raw const *self.stepping);
         // SAFETY: places for the four answers.
         let status = unsafe {
             (self.stepping().do_step)(
@@ -959,7 +941,8 @@ impl<'fmu> Instance<'fmu> {
                 &mut last_time,
             )
         };
-        self.environment().within.set(null_mut::<Nobody>() as *mut Within<'static>);
+        STEPPING.set(before);
+        self.stepping.within.set(null_mut::<Nobody>() as *mut Within<'static>);
         let [event, terminate, early_return] = bytes;
         self.check("fmi3DoStep", status).map(|()| Step {
             event,

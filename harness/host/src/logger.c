@@ -1,26 +1,28 @@
 /* FMI 2.0's logger callback is variadic (printf style), which stable Rust
- * cannot define. This shim formats the message and hands on a plain string. */
+ * cannot define. This shim formats the message and hands on a plain string.
+ * The FMU may hand back any pointer as environment: nobody follows it. */
 #include <stdarg.h>
 #include <stdio.h>
 
-/* First member of the object behind componentEnvironment (see fmi2.rs). */
-struct hubslosh_sink {
-    void (*write)(struct hubslosh_sink *sink, int status, const char *category,
-                  const char *text);
-};
+typedef void (*log_message)(void *environment, int status, const char *category,
+                            const char *text);
+
+static log_message hubslosh_log_message;
+
+void hubslosh_set_log_message(log_message function) { hubslosh_log_message = function; }
 
 void hubslosh_logger(void *environment, const char *instance, int status,
                      const char *category, const char *format, ...)
 {
     char text[4096];
     va_list arguments;
-    struct hubslosh_sink *sink = environment;
 
     (void)instance;
-    if (!sink || !format)
+    if (!format)
         return;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    if (vsnprintf(text, sizeof text, format, arguments) < 0)
+        text[0] = 0;
     va_end(arguments);
-    sink->write(sink, status, category ? category : "", text);
+    hubslosh_log_message(environment, status, category ? category : "", text);
 }

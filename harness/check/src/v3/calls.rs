@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::Subject;
 use super::subject::{STEPS, Use, difference, start_values};
 use crate::Findings;
-use host::c_abi::{CallError, Status};
+use host::c_abi::{CallError, Status, foreign_environments};
 use host::description::{CType, Type, Value};
 use host::fmi3::Interface;
 
@@ -447,6 +447,39 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
 }
 
 // ---------------------------------------------------------------- log
+
+/// `log.environment`
+pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let mut heard = 0;
+    let mut run = |mut using: Use| -> Result<()> {
+        let stepping = using.interface == Interface::CoSimulation;
+        using.updates = stepping && subject.can(using.interface, "providesIntermediateUpdate");
+        let mut session = subject.running(using)?;
+        session.advance(2)?;
+        subject.doing("fmi3GetFloat64 of a valueReference that no variable has");
+        let refused = session.instance.fetch(&[u32::MAX], &mut [0.0f64]);
+        heard += refused.err().map_or(0, |error| error.messages.len());
+        heard += session.instance.take_messages().len() + session.instance.updates();
+        Ok(())
+    };
+    let done: Result<()> = subject.plain_uses().into_iter().try_for_each(&mut run);
+    match foreign_environments() {
+        0 => {
+            done?;
+            if heard == 0 {
+                findings.skip("it calls no callback");
+            }
+        }
+        n => findings.add(
+            "the callbacks",
+            format!(
+                "{n} calls have another instanceEnvironment than that given when the instance was made (allowed: the \
+                 same pointer; fmi3Instance is not it)"
+            ),
+        ),
+    }
+    Ok(())
+}
 
 /// `log.categories`
 pub fn log_categories(subject: &Subject, findings: &mut Findings) -> Result<()> {

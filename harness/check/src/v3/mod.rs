@@ -106,6 +106,7 @@ pub static RULES: &[Rule] = &[
     rule("states.restore", Error, "after fmi3SetFMUState values and the run from there are the same to the last bit", "2.2.7.4", Calls3(calls::restore)),
     rule("states.serialize", Error, "a serialised state is the state; bytes cut short are refused", "2.2.7.4", Calls3(calls::serialize)),
 
+    rule("log.environment", Error, "logMessage and intermediateUpdate are given the instanceEnvironment of the instance", "2.3.1, 4.2.2; hosts follow that pointer and crash", Calls3(calls::log_environment)),
     rule("log.categories", Error, "messages have a declared category", "2.3.1, 2.4.5", Calls3(calls::log_categories)),
     rule("log.errors", Warning, "an error comes with a message", "2.2.3", Calls3(calls::log_errors)),
 

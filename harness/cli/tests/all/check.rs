@@ -843,6 +843,41 @@ fn misbehaving(word: &str) -> Vec<u8> {
     zipped(&files, CompressionMethod::Stored)
 }
 
+/// The shim hands the address of a variable of its own back; a host that follows it jumps into the logger.
+#[test]
+fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("Mutant.fmu");
+    std::fs::write(&path, misbehaving("hands_its_own")).unwrap();
+    let report = look_at(&path, &["log", "instantiate", "life.order", "values.unknown"], 60.0);
+    assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
+    let run = |set: &str| {
+        Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+            .current_dir(folder.path())
+            .args([
+                "run",
+                "--fmu",
+                "Mutant.fmu",
+                "--profile",
+                "exp-sweep:amplitude=0.1",
+                "--stop",
+                "1",
+                "--out",
+                "out.csv",
+                "--set",
+                set,
+            ])
+            .output()
+            .unwrap()
+    };
+    assert!(run("friction.b=0.1").status.success());
+    let refused = run("friction.b=-1");
+    assert_eq!(refused.status.code(), Some(1));
+    // the message still belongs to the instance whose call it explains
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert!(stderr.contains("friction.b = -1"), "{stderr}");
+}
+
 /// Each misbehaviour, and the rule that must tell it.
 const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("crashes_when_loaded", "load.opens"),
@@ -881,6 +916,7 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("frees_nothing", "host.memory"),
     ("leaks_in_steps", "host.memory"),
     ("keeps_states", "host.memory"),
+    ("hands_its_own", "log.environment"),
     ("text_as_format", "log.percent"),
     ("odd_category", "log.categories"),
     ("line_break", "log.text"),

@@ -317,6 +317,7 @@ const BEHAVIOUR: &[(u32, &str)] = &[
     (32, "intermediate.early_return"),
     (33, "steps.answers"),
     (34, "steps.answers"),
+    (35, "log.environment"),
 ];
 
 #[test]
@@ -332,6 +333,16 @@ fn an_fmu_3_that_misbehaves_is_told_by_the_rule_that_is_meant() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("Mutant.fmu");
+    pack(&files(&library(folder.path(), 35)), &path);
+    let report = look(&path, &["log", "instantiate", "intermediate", "steps", "values"]);
+    assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
+    follows_its_closed_solution(&path, folder.path());
 }
 
 #[test]
@@ -367,13 +378,17 @@ fn findings_are_written_as_sarif() {
 #[test]
 fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     let folder = tempfile::tempdir().unwrap();
-    let path = model(folder.path());
-    let input = folder.path().join("u.csv");
+    follows_its_closed_solution(&model(folder.path()), folder.path());
+}
+
+/// Runs the model with an input along lines, which intermediateUpdate sets, and compares its outputs.
+fn follows_its_closed_solution(path: &Path, folder: &Path) {
+    let input = folder.join("u.csv");
     std::fs::write(&input, "time,u\n0,0\n10,5\n").unwrap();
-    let out = folder.path().join("out.csv");
+    let out = folder.join("out.csv");
     let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
         .args(["run", "--fmu"])
-        .arg(&path)
+        .arg(path)
         .arg("--input")
         .arg(&input)
         .args([

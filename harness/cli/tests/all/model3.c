@@ -46,7 +46,7 @@ typedef struct {
 static Status refuse(Instance m, String text)
 {
     if (m && m->log && !IS(18))
-        m->log(m->environment, ERROR, IS(19) ? NULL : "logStatusError", text);
+        m->log(IS(35) ? m : m->environment, ERROR, IS(19) ? NULL : "logStatusError", text);
     return ERROR;
 }
 
@@ -380,7 +380,7 @@ Status fmi3DoStep(Instance m, double t, double h, bool forget, bool *event, bool
             double u0 = s->u, piece = to - s->t;
             if (IS(26))
                 time = s->t - 1;
-            m->update(m->environment, time, true, false, false, m->early, &requested, &time);
+            m->update(IS(35) ? m : m->environment, time, true, false, false, m->early, &requested, &time);
             double u1 = s->u;
             wanted = requested, requested = false;
             if (IS(27))
@@ -389,7 +389,7 @@ Status fmi3DoStep(Instance m, double t, double h, bool forget, bool *event, bool
             advance(s, piece, IS(28) ? 0 : (u1 - u0) / piece);
             s->u = u1;
             time = to;
-            m->update(m->environment, time, false, true, true, m->early, &requested, &time);
+            m->update(IS(35) ? m : m->environment, time, false, true, true, m->early, &requested, &time);
             wanted = wanted || requested;
         } else {
             advance(s, to - s->t, 0);
