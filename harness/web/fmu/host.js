@@ -442,9 +442,9 @@ function printf(format, rest, textAt) {
     at += size;
     return value;
   };
-  return format.replace(/%[-+ #0]*\d*(?:\.(\d+))?(hh|h|ll|l|z|j|t|L)?([diuxXcsgGeEfFp%])/g, (_, digits, length, kind) => {
+  return format.replace(/%[-+ #\d]*(?:\.(\d+))?(hh|h|ll|l|z|j|t|L)?([diuxXcsgGeEfFp%])/g, (_, digits, length, kind) => {
     const wide = length === "ll" || length === "j";
-    const precision = digits === undefined ? 6 : Number(digits);
+    const precision = digits === undefined ? 6 : Math.min(Number(digits), 100); // what toFixed allows
     switch (kind) {
       case "%": return "%";
       case "s": return textAt(next(4, "getUint32"));
