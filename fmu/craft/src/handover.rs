@@ -74,8 +74,7 @@ pub(crate) trait Carrier {
             Due::Leave => self.leave(lump, t),
             Due::Impact => self.throw_back(lump, t),
             Due::Release => {
-                let drags = self.lump(lump).state == BallState::Sliding;
-                if !(drags && self.try_on_wall(lump, BallState::Light, t)) {
+                if !(self.lump(lump).drags() && self.try_on_wall(lump, BallState::Light, t)) {
                     *self.ball_state(lump) = BallState::Flying;
                 }
             }
@@ -153,6 +152,9 @@ pub(crate) trait Carrier {
         let before = self.memory();
         let (e, contact_speed) = self.lump(lump).restitution();
         if e * self.lump(lump).approach() <= contact_speed {
+            if self.lump(lump).is_outside() {
+                self.bring_to_wall(lump, t);
+            }
             self.strike(lump, 0.0, t);
             let stays = [BallState::Sliding, BallState::Light];
             if stays.into_iter().any(|state| self.try_on_wall(lump, state, t)) {
@@ -162,6 +164,26 @@ pub(crate) trait Carrier {
             self.evaluate_at(t);
         }
         self.strike(lump, e, t);
+    }
+
+    /// Puts a lump that a host has integrated through the wall on it. Its velocity, the centre of mass of the whole and the angular
+    /// momentum stay.
+    fn bring_to_wall(&mut self, lump: usize, t: f64) {
+        let before = self.energy_with([0.0; 3]);
+        let (mass, of_center) = self.drift_of_center();
+        let (strayed, w) = (self.lump(lump), self.motion()[1][0]);
+        let moved = sub(strayed.on_wall_beside(), strayed.position());
+        let velocity = add(cross(w, strayed.position()), strayed.rate());
+        let lever = scale(-strayed.m, cross(moved, sub(velocity, of_center)));
+        let rate = sub(strayed.rate(), cross(w, moved));
+        let numbers = strayed.numbers(strayed.on_wall_beside(), rate);
+        let share = -strayed.m / mass;
+        self.ball(lump).copy_from_slice(&numbers);
+        self.shift(scale(share, moved));
+        let [dv, _] = self.kick([[0.0; 3], lever], t);
+        self.evaluate_at(t);
+        let loss = before - self.energy_with(dv);
+        *self.dissipated() += loss;
     }
 
     /// Puts the lump on the wall in the state `on_wall`. Returns whether it is pressed there.

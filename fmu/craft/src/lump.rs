@@ -1,6 +1,7 @@
 //! The "ball" regime: liquid that has left the bottom of its tank, as one lump.
 //!
-//! Where thrust reverses, or a bob passes 45 degrees, no pendulum stands for the liquid. Of a tank with
+//! Where thrust reverses, or the bobs pass 45 degrees (the mean cosine of their angles by modal mass), no pendulum stands for the
+//! liquid. Of a tank with
 //! `ball.travel` > 0 all liquid is then one body: its centre flies freely, is thrown back by the wall with losses,
 //! slides on it, and is handed back to the pendulums where it comes to lie at the bottom again.
 //!
@@ -42,7 +43,8 @@
 //! **Hand-over.** Both ways each part of the liquid keeps its momentum until it is caught, plastically, by what it
 //! becomes a part of; so the whole keeps linear and angular momentum and its centre of mass, and loses energy (Carnot).
 //! Away: relative motions within the liquid are caught by the shape. Back: m_0 is caught by the tank, the bobs keep what
-//! their rods allow. They take it while |p_perp|^2 + |x'|^2/(g l) <= sin^2 30 deg. A hand-over that would raise the energy (of
+//! their rods allow. They take it while |p_perp|^2 + |x'|^2/(g l_s) <= sin^2 30 deg, 1/l_s = sum of (m/l)/sum of m. This is the mean over
+//! the modes by modal mass of the energy that each takes over, so the mean cosine stays far above that of 45 degrees. A hand-over that would raise the energy (of
 //! centring, or because the shape changes while the craft turns) waits until the lump is nearest to the axis.
 //!
 //! What it is worth: times and momenta of crossings, their order at impacts; not the wall's pressure, sprays, films or the
@@ -118,9 +120,11 @@ pub(crate) struct Lump {
     d: Mat3,
     /// R_p
     gyration: f64,
-    /// Mode 1.
+    /// Of mode 1.
     hinge: Vec3,
-    length: f64,
+    /// Each mode's share of the modal mass, and the length l_s whose inverse is the mean of 1/l by these shares.
+    shares: [f64; MODES],
+    swing_length: f64,
     /// The rigid liquid, its centre from O, and its inertia about it.
     pub rigid: Rigid,
     m_0: f64,
@@ -195,6 +199,11 @@ impl Lump {
             }
         }
         let ball = &tank.ball;
+        let modal: f64 = tank.mass[..tank.modes].iter().sum();
+        let shares =
+            core::array::from_fn(|n| if n < tank.modes { tank.mass[n] / modal } else { 0.0 });
+        let shorter = (0..tank.modes).map(|n| shares[n] * (tank.length[0] / tank.length[n]));
+        let swing_length = tank.length[0] / shorter.sum::<f64>();
         Some(Lump {
             tank: index,
             state: BallState::Settled,
@@ -212,7 +221,8 @@ impl Lump {
             d,
             gyration: surface.gyration,
             hinge: on_axis(tank.hinge[0]),
-            length: tank.length[0],
+            shares,
+            swing_length,
             rigid: tank.rigid(),
             m_0: tank.m_0,
             s: on_axis(tank.h_0),
@@ -255,6 +265,11 @@ impl Lump {
     /// d while it drags, 1/s.
     fn drag(&self) -> f64 {
         if self.state == BallState::Sliding { self.drag } else { 0.0 }
+    }
+
+    /// Whether a drag acts. Without one a lump that is released would alternate between sliding and light by rounding.
+    pub fn drags(&self) -> bool {
+        self.drag() > 0.0
     }
 
     fn slides(&self) -> bool {
@@ -613,14 +628,15 @@ impl Lump {
         }
         left[0] += SWING;
         for k in 0..n {
-            swing[k] = product(&thrust, &left, k) - dots(&self.x_d, &self.x_d, 0, k) / self.length;
+            swing[k] =
+                product(&thrust, &left, k) - dots(&self.x_d, &self.x_d, 0, k) / self.swing_length;
         }
         // What rounds: the specific force of everything that turns, and what it is multiplied by.
         let arm = largest(self.hinge);
         let turning = largest(w[0]) * largest(w[0]) + largest(w_d[0]);
         let of_thrust = 1e-10 * self.floor + 1e-12 * (largest(a[0]) + turning * arm);
         let far = SWING + left[0].abs();
-        let speed = dot(self.x_d[0], self.x_d[0]) / self.length;
+        let speed = dot(self.x_d[0], self.x_d[0]) / self.swing_length;
         let of_swing = 1e-10 * (thrust[0].abs() * far + speed) + of_thrust * far;
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
@@ -639,11 +655,8 @@ impl Lump {
                 let mut above = self.axial(n, a, w, w_d);
                 above[0] -= self.lowest;
                 let first = first_root(&above[..n], h);
-                let leave = bobs.fold(first, |first, bob| {
-                    let mut below: Series = core::array::from_fn(|k| -dot(self.e, bob.p[k]));
-                    below[0] -= COS_45;
-                    earlier(first, first_root(&below[..=n], first.unwrap_or(h)))
-                });
+                let upright = self.upright(bobs, n);
+                let leave = earlier(first, first_root(&upright[..=n], first.unwrap_or(h)));
                 leave.map(|t| (t, Due::Leave))
             }
             BallState::Flying => self.next_contact(n, h).map(|t| (t, Due::Impact)),
@@ -669,6 +682,18 @@ impl Lump {
         }
     }
 
+    /// Coefficients up to n of the mean cosine of the bobs' angles from the axis, by modal mass, less that of 45 degrees.
+    fn upright<'a>(&self, bobs: impl Iterator<Item = &'a Bob>, n: usize) -> Series {
+        let mut upright = ZERO;
+        for bob in bobs {
+            for (k, x) in upright.iter_mut().enumerate().take(n + 1) {
+                *x -= self.shares[bob.mode] * dot(self.e, bob.p[k]);
+            }
+        }
+        upright[0] -= COS_45;
+        upright
+    }
+
     fn next_contact(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
         let mut f = ZERO;
@@ -683,16 +708,56 @@ impl Lump {
             // The root at 0 is behind.
             return first_root(&f[1..=n], h);
         }
-        // What f'' is the sum of rounds.
-        let g = times(&self.d, self.x_0);
-        let size = 1.0
-            + 2.0 * largest(g) * largest(self.rho[2])
-            + dot(self.rho[1], times(&self.d, self.rho[1]));
-        if f[1] < -RESTING || f[2] < -PRESSING * size {
+        if self.meets_wall([f[0], f[1], f[2]], self.rho[2]) {
             return Some(0.0);
         }
         f[0] = TOUCHING;
         first_root(&f[..=n], h)
+    }
+
+    /// Whether a lump on the wall or outside moves outwards or is pressed outwards. `f` has coefficients 0 to 2 of f, and `x_2` is
+    /// coefficient 2 of the position.
+    fn meets_wall(&self, f: [f64; 3], x_2: Vec3) -> bool {
+        if f[0] > TOUCHING || f[1] > RESTING {
+            return false;
+        }
+        // What f'' is the sum of rounds.
+        let g = times(&self.d, self.x_0);
+        let size =
+            1.0 + 2.0 * largest(g) * largest(x_2) + dot(self.rho[1], times(&self.d, self.rho[1]));
+        f[1] < -RESTING || f[2] < -PRESSING * size
+    }
+
+    /// f for hosts that integrate themselves, after order 0 of the expansion: below zero only where an impact is due. After an
+    /// impact the lump may be outside by rounding and on its way inwards, or on the wall and not pressed: the value is above zero
+    /// there. So a bounce that is shorter than a host's step does not hide from a host that compares signs.
+    fn distance_to_wall(&self, w: &Vector, w_d: &Vector) -> f64 {
+        let (x, x_d, g) = (self.x_0, self.x_d[0], times(&self.d, self.x_0));
+        let f = 1.0 - dot(x, g);
+        if f > TOUCHING {
+            return f;
+        }
+        let turned = add(cross(w_d[0], self.rho[0]), cross(w[0], x_d));
+        let x_2 = scale(0.5, sub(self.u[1], turned));
+        let bent = dot(x_d, times(&self.d, x_d)) + 2.0 * dot(g, x_2);
+        if self.meets_wall([f, -2.0 * dot(g, x_d), -bent], x_2) { f } else { TOUCHING }
+    }
+
+    /// Whether a host that has integrated up to here has passed an event, by its indicators here.
+    pub fn is_overdue(&self, [leaves, ends]: [f64; 2]) -> bool {
+        // Past the nearest passage of the axis that indicator of a held lump stays below zero.
+        leaves <= 0.0 || ends < 0.0 && self.state != BallState::Held
+    }
+
+    /// Whether a host has integrated the lump through the wall.
+    pub fn is_outside(&self) -> bool {
+        1.0 - dot(self.x_0, times(&self.d, self.x_0)) < -TOUCHING
+    }
+
+    /// The point of the wall in the lump's direction from the surface's centre, from O.
+    pub fn on_wall_beside(&self) -> Vec3 {
+        let size = libm::sqrt(dot(self.x_0, times(&self.d, self.x_0)));
+        add(self.center, scale(1.0 / size, self.x_0))
     }
 
     /// Coefficients below n of the square of the wall's force over that of twice the drag that there would be, minus 1, times
@@ -750,10 +815,9 @@ impl Lump {
         match self.state {
             BallState::Settled => {
                 let above = self.axial(1, a, w, w_d)[0] - self.lowest;
-                let upright = |bob: &Bob| -dot(self.e, bob.p[0]) - COS_45;
-                [bobs.fold(above, |least, bob| least.min(upright(bob))), 1.0]
+                [above.min(self.upright(bobs, 0)[0]), 1.0]
             }
-            BallState::Flying => [1.0 - dot(self.x_0, times(&self.d, self.x_0)), 1.0],
+            BallState::Flying => [self.distance_to_wall(w, w_d), 1.0],
             BallState::Held => {
                 let out = dot(sub(self.x_0, scale(dot(self.e, self.x_0), self.e)), self.x_d[0]);
                 [self.pull[0] / self.m, -out]

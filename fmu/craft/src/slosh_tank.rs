@@ -1112,6 +1112,13 @@ impl SloshTank {
         self.motion.loose().lump.indicators([a, w, w_d], bobs.iter())
     }
 
+    /// Whether a host that integrates itself has passed an event of the liquid, whatever the indicators of its last steps have
+    /// shown.
+    pub fn is_event_overdue(&mut self, inputs: &TankInputs) -> bool {
+        let now = self.event_indicators(inputs);
+        self.has_ball() && self.motion.loose().lump.is_overdue(now)
+    }
+
     /// Does what is due at an event: liquid leaves its bottom, meets the wall or settles, and the ranges are those of the present
     /// motion from now on. Returns whether continuous states have changed. On an error nothing has.
     pub fn take_event(&mut self, inputs: &TankInputs) -> Result<bool, StepError> {

@@ -308,6 +308,15 @@ impl Spacecraft {
         self.motion.indicators(inputs, indicators);
     }
 
+    /// Whether a host that integrates itself has passed an event of a liquid, whatever the indicators of its last steps have
+    /// shown: the liquid is outside its wall and moves out, or has to leave its bottom or the wall, or may settle.
+    pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
+        let mut now = [1.0; 2 * TANKS];
+        self.event_indicators(inputs, &mut now);
+        let at = |tank: usize| [now[2 * tank], now[2 * tank + 1]];
+        self.motion.lumps.iter().any(|lump| lump.is_overdue(at(lump.tank)))
+    }
+
     /// Does what is due at an event: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid leaves its bottom, meets
     /// the wall or settles. Returns
     /// whether continuous states have changed. On an error nothing has.

@@ -191,13 +191,18 @@ impl Plant {
     }
 
     /// Returns true if an event is overdue that no indicator showed in the host's last step: the
-    /// host has integrated past a change of the contact, or the wave has reached another
-    /// regime.
+    /// host has integrated past a change of the contact or past a speed limit of the rotor, or the wave has
+    /// reached another regime.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let z = self.indicators(inputs);
-        let of_contact =
-            [indicator::REST, indicator::BREAK_AWAY_FORWARD, indicator::BREAK_AWAY_BACKWARD];
-        of_contact.iter().any(|place| z[*place] < 0.0)
+        let lasting = [
+            indicator::REST,
+            indicator::BREAK_AWAY_FORWARD,
+            indicator::BREAK_AWAY_BACKWARD,
+            indicator::SPEED_MAX,
+            indicator::SPEED_MIN,
+        ];
+        lasting.iter().any(|place| z[*place] < 0.0)
             || self.present_ranges(inputs) != self.state.ranges
     }
 
@@ -346,6 +351,26 @@ mod tests {
             assert_eq!(plant.derivatives(&inputs)[x::STUCK_TIME], rate);
             let slopes = plant.directional_derivative(&inputs, &[1.0; STATES], &[1.0; 3]);
             assert_eq!(slopes[x::STUCK_TIME], 0.0);
+        }
+    }
+
+    /// A host whose step has passed a speed limit of the rotor has to handle an event, which brings the rotor back to it.
+    #[test]
+    fn a_rotor_beyond_its_speed_limits_is_an_overdue_event() {
+        let mut p = Parameters::default();
+        p.wheel.enabled = true;
+        let inputs = Inputs::default();
+        let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
+        let is_overdue_at = |speed: f64, plant: &mut Plant| {
+            plant.state.x[x::WHEEL_SPEED] = speed;
+            plant.is_event_overdue(&inputs)
+        };
+        let (low, high) = (p.wheel.speed_min, p.wheel.speed_max);
+        for (speed, limit) in [(high + 1e-3, high), (low - 1e-3, low)] {
+            assert!(is_overdue_at(speed, &mut plant));
+            plant.take_event(&inputs).unwrap();
+            assert_eq!(plant.state.x[x::WHEEL_SPEED], limit);
+            assert!(!is_overdue_at(limit, &mut plant));
         }
     }
 

@@ -241,7 +241,7 @@ impl runtime::Model for Model {
         let ranges = self.tank.ranges(&inputs.tank);
         self.has_left_range |= !ranges.in_range && !self.tank.has_ball();
         self.has_had_lump |= self.tank.has_lump();
-        Ok(ranges != self.tank.ranges_held())
+        Ok(ranges != self.tank.ranges_held() || self.tank.is_event_overdue(&inputs.tank))
     }
 
     fn step_warning(&self) -> Option<&'static str> {
@@ -297,5 +297,37 @@ impl runtime::Model for Model {
         du[9] = along.tank.mass_flow.slope;
         dx_dot.copy_from_slice(&self.tank.directional_derivative(&inputs.tank, &direction, &du));
         self.tank.output_derivatives(&inputs.tank, &direction, &du)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use runtime::Model as _;
+
+    use super::*;
+
+    /// The host is pushed backwards; the liquid is half a metre above its tank, where the host has integrated it to.
+    #[test]
+    fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
+        let mut parameters = Parameters::default();
+        parameters.host.mass = 1000.0;
+        parameters.tank.tank.ball.travel = 0.6;
+        let mut inputs = Inputs::default();
+        inputs.tank.a.value = [0.0, 0.0, -0.1];
+        let mut model = Model::new(&parameters, &inputs, 0.0, 1e-6).unwrap();
+        assert!(model.accept_step(&inputs).unwrap(), "liquid that has to leave its bottom");
+        model.handle_event(&inputs).unwrap();
+        assert!(!model.accept_step(&inputs).unwrap());
+        let ball = TANK_STATES - 6;
+        let mut x = model.continuous_states().to_vec();
+        x[ball + 2] += 1.1;
+        for (speed, is_overdue) in [(-0.3, false), (0.3, true)] {
+            x[ball + 5] = speed;
+            model.set_continuous_states(&x);
+            assert_eq!(model.accept_step(&inputs).unwrap(), is_overdue);
+        }
+        assert!(model.handle_event(&inputs).unwrap());
+        assert!(model.continuous_states()[ball + 5] < 0.0);
+        assert!(!model.accept_step(&inputs).unwrap());
     }
 }

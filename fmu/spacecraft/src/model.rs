@@ -265,7 +265,7 @@ impl runtime::Model for Model {
         let ranges = self.craft.ranges(inputs);
         self.has_left_range |= self.craft.leaves_range(&ranges);
         self.has_had_lump |= self.craft.has_lump();
-        Ok(ranges != self.craft.ranges_held())
+        Ok(ranges != self.craft.ranges_held() || self.craft.is_event_overdue(inputs))
     }
 
     fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
@@ -337,5 +337,32 @@ mod tests {
         let reaction = |t: f64| if (0.5..0.6).contains(&t) { -10.0 } else { 0.0 };
         assert!(!is_warned(ramp, reaction, false));
         assert!(is_warned(ramp, |_| 0.0, false));
+    }
+
+    /// Reversed thrust; the liquid is half a metre above its tank, where a host has integrated it to, and moves up or down.
+    #[test]
+    fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
+        let mut parameters = Parameters::default();
+        parameters.tank[0].ball.travel = 0.6;
+        let mut inputs = Inputs::default();
+        inputs.force.value[2] = -100.0;
+        let mut model = Model::new(&parameters, &inputs, 0.0, 1e-6).unwrap();
+        assert!(model.accept_step(&inputs).unwrap(), "liquid that has to leave its bottom");
+        model.handle_event(&inputs).unwrap();
+        assert!(!model.accept_step(&inputs).unwrap());
+        let ball = craft::index::ball(0);
+        let mut x = model.continuous_states().to_vec();
+        x[ball + 2] += 1.1;
+        for (speed, is_overdue) in [(-0.3, false), (0.3, true)] {
+            x[ball + 5] = speed;
+            model.set_continuous_states(&x);
+            let mut z = [0.0; 2 * TANKS];
+            model.event_indicators(&inputs, &mut z);
+            assert_eq!(z[0] < 0.0, is_overdue);
+            assert_eq!(model.accept_step(&inputs).unwrap(), is_overdue);
+        }
+        assert!(model.handle_event(&inputs).unwrap());
+        assert!(model.continuous_states()[ball + 5] < 0.0);
+        assert!(!model.accept_step(&inputs).unwrap());
     }
 }

@@ -93,10 +93,10 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     assert!(height.abs() < 1e-8);
 }
 
-/// Of settled liquid: the least of what the axial acceleration exceeds its limit by and of how far every bob of the tank is
-/// within 45 degrees. Without thrust it is at its limit, 0; a tank that stays has 1.
+/// The indicator of settled liquid is the lesser of what the axial acceleration exceeds its limit by and of the bobs' mean cosine, by
+/// modal mass, less that of 45 degrees. A tank without a ball regime has 1.
 #[test]
-fn a_host_sees_a_bob_pass_45_degrees() {
+fn a_host_sees_the_bobs_pass_45_degrees_by_modal_mass() {
     for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         for angle in [0.6, 0.7, 0.9f64] {
             let mut p = Parameters { tanks: 2, ..Parameters::default() };
@@ -109,8 +109,9 @@ fn a_host_sees_a_bob_pass_45_degrees() {
             let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
             let mut seen = [0.0; 2 * TANKS];
             craft.event_indicators(&inputs, &mut seen);
-            let [upright, hangs] = [1.0, angle.cos()].map(|cos| cos - 0.5f64.sqrt());
-            let expected = if tank == 1 { hangs } else { upright };
+            let mass = p.tank[1].mass;
+            let share = if tank == 1 { mass[mode] / (mass[0] + mass[1]) } else { 0.0 };
+            let expected = 1.0 - share * (1.0 - angle.cos()) - 0.5f64.sqrt();
             assert!((seen[2] - expected).abs() < 1e-15, "{tank} {mode} {angle}: {seen:?}");
             assert_eq!([seen[0], seen[1], seen[3]], [1.0; 3]);
             // A host's directions need not be of unit length.

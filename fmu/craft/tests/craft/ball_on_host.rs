@@ -29,16 +29,16 @@ struct Host {
 }
 
 /// A rigid body with one tank.
-struct Craft {
+pub(super) struct Craft {
     p: Parameters,
     tank: SloshTank,
     host: Host,
     taken: [f64; 6],
-    impulses: usize,
+    pub(super) impulses: usize,
 }
 
 impl Craft {
-    fn new(p: &Parameters) -> Craft {
+    pub(super) fn new(p: &Parameters) -> Craft {
         let [a, b, c, d] = p.init.q;
         let q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(a, b, c, d));
         let host = Host {
@@ -117,7 +117,7 @@ impl Craft {
     }
 
     /// What a Spacecraft shows in the same state.
-    fn shown(&self, u: &Inputs) -> Outputs {
+    pub(super) fn shown(&self, u: &Inputs) -> Outputs {
         let spacecraft = Spacecraft::new(&self.p, u, 0.0, 1e-12).unwrap();
         let tank = self.tank.continuous_states();
         let Host { q, w, r, velocity, work } = self.host;
@@ -140,14 +140,14 @@ impl Craft {
         Spacecraft::resume(&self.p, &state, 1e-12).outputs_held(u)
     }
 
-    fn ball(&self) -> BallState {
+    pub(super) fn ball(&self) -> BallState {
         let words = self.tank.state().to_words();
         BallState::ALL[words[TankState::WORDS - 1] as usize - 1]
     }
 
     // A host that integrates itself: Runge-Kutta of all, bisections where an indicator changes its sign.
 
-    fn pack(&self) -> Vec<f64> {
+    pub(super) fn pack(&self) -> Vec<f64> {
         let Host { q, w, r, velocity, work } = self.host;
         let mut x = q.to_vec();
         x.extend(w.iter().chain(&r).chain(&velocity));
@@ -156,7 +156,7 @@ impl Craft {
         x
     }
 
-    fn unpack(&mut self, x: &[f64]) {
+    pub(super) fn unpack(&mut self, x: &[f64]) {
         let q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(x[0], x[1], x[2], x[3]));
         self.host = Host {
             q: [q.w, q.i, q.j, q.k],
@@ -168,7 +168,7 @@ impl Craft {
         self.tank.set_continuous_states(x[14..].try_into().unwrap());
     }
 
-    fn rates(&mut self, u: &Inputs, x: &[f64]) -> Vec<f64> {
+    pub(super) fn rates(&mut self, u: &Inputs, x: &[f64]) -> Vec<f64> {
         self.unpack(x);
         let given = self.inputs(u);
         let (a, w_d) = (given.a.value, given.omega_dot.value);
@@ -182,13 +182,23 @@ impl Craft {
         runge_kutta(x, h, |_, x| self.rates(u, x))
     }
 
-    fn indicators(&mut self, u: &Inputs, x: &[f64]) -> [bool; 2] {
+    pub(super) fn event_indicators(&mut self, u: &Inputs, x: &[f64]) -> [f64; 2] {
         self.unpack(x);
         let given = self.inputs(u);
-        self.tank.event_indicators(&given).map(|z| z > 0.0)
+        self.tank.event_indicators(&given)
     }
 
-    fn event(&mut self, u: &Inputs) {
+    pub(super) fn is_event_overdue(&mut self, u: &Inputs, x: &[f64]) -> bool {
+        self.unpack(x);
+        let given = self.inputs(u);
+        self.tank.is_event_overdue(&given)
+    }
+
+    fn indicators(&mut self, u: &Inputs, x: &[f64]) -> [bool; 2] {
+        self.event_indicators(u, x).map(|z| z > 0.0)
+    }
+
+    pub(super) fn event(&mut self, u: &Inputs) {
         for _ in 0..8 {
             let given = self.inputs(u);
             let changed = self.tank.take_event(&given).unwrap();
