@@ -211,8 +211,7 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
 
 /// The library that wrote a Parquet file, as the file says.
 pub fn writer(path: &Path) -> Option<String> {
-    let reader = SerializedFileReader::new(File::open(path).ok()?).ok()?;
-    reader.metadata().file_metadata().created_by().map(String::from)
+    parquet_file::writer(path).ok()?
 }
 
 /// Names of the columns of a file.

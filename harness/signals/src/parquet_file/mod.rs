@@ -62,6 +62,14 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     guarded(|| Ok(pairs(&open(path)?)))
 }
 
+/// The library that wrote the file, if the file names it.
+///
+/// # Errors
+/// If the file is not complete.
+pub fn writer(path: &Path) -> Result<Option<String>> {
+    guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
+}
+
 /// Reads the columns at the places that `positions` finds among the names of all.
 ///
 /// # Errors
