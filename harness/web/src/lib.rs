@@ -1,4 +1,5 @@
-//! JavaScript that several of the project's pages hold, as text to be put between `<script>` and `</script>`.
+//! JavaScript that several of the project's pages hold, as text to be put between `<script>` and `</script>`; data for it
+//! goes through [`json_in_script`].
 
 /// The part of three.js that [`SCENE`] uses, as the global `THREE` (MIT: [`THREE_LICENSE`] goes with it).
 pub const THREE: &str = include_str!("../three/three.min.js");
@@ -26,6 +27,20 @@ pub const SLEW: &str = include_str!("../pages/slew.js");
 
 /// The live page "Your tank"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and the solver in the global `MODULES`.
 pub const YOUR_TANK: &str = include_str!("../pages/your_tank.js");
+
+/// Escapes JSON so that it can stand in a script element of any page or in a script: no text in it ends the element
+/// (`</script`), keeps the end from being seen (`<!--<script`: HTML, 13.2.5.20), becomes an entity, or ends a line of
+/// JavaScript. JSON has these characters in strings alone, so its value stays the same.
+pub fn json_in_script(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    for c in json.chars() {
+        match c {
+            '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => text += &format!("\\u{:04x}", c as u32),
+            c => text.push(c),
+        }
+    }
+    text
+}
 
 /// The host of FMUs compiled to WebAssembly (`fmu/host.js`) as one script without modules, which a page from the disk
 /// can load: the global `FmuHost` with `Fmu`, `FmiError` and `unzip`.
@@ -61,6 +76,15 @@ mod tests {
         for text in [THREE, THREE_LICENSE, SCENE] {
             assert!(!text.contains("</script") && !text.contains("<!--"));
         }
+    }
+
+    #[test]
+    fn json_in_a_script_has_no_character_of_markup() {
+        let text = json_in_script("{\"unit\":\"<!--<script>&amp;\u{2028}\u{2029}</script>é\"}");
+        assert_eq!(
+            text,
+            "{\"unit\":\"\\u003c!--\\u003cscript\\u003e\\u0026amp;\\u2028\\u2029\\u003c/script\\u003eé\"}"
+        );
     }
 
     /// esbuild takes what `used.js` names and nothing else: a name that is missing there fails in the browser.

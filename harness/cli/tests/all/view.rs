@@ -1,5 +1,6 @@
 //! A run as a page, from outside; what is drawn of it in a browser is compared by `.ci/browser`.
 
+use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -241,4 +242,44 @@ fn a_run_of_a_tank_that_drains_records_by_default_what_its_page_needs() {
     assert!(done.status.success() && said(&done).is_empty(), "{}", said(&done));
     let liquid = column(&drawn(directory, "drain.html"), "tank.liquid");
     assert!(liquid[0] - liquid[liquid.len() - 1] > 0.1);
+}
+
+/// HTML takes no `</script>` for the end of the element after `<!--<script`.
+#[test]
+fn a_unit_that_is_markup_leaves_the_page_whole() {
+    const UNIT: &str = "<!--<script></script>&\u{2028}";
+    let folder = tempfile::tempdir().unwrap();
+    let mut from =
+        zip::ZipArchive::new(std::fs::File::open(pack::packed_for_tests()).unwrap()).unwrap();
+    let mut to = zip::ZipWriter::new(std::fs::File::create(folder.path().join("a.fmu")).unwrap());
+    for i in 0..from.len() {
+        let mut file = from.by_index(i).unwrap();
+        let name = file.name().unwrap().into_owned();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        if name == "modelDescription.xml" {
+            let escaped = UNIT.replace('&', "&amp;").replace('<', "&lt;");
+            bytes = String::from_utf8(bytes)
+                .unwrap()
+                .replace("\"rad/s\"", &format!("\"{escaped}\""))
+                .into();
+        }
+        to.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+        to.write_all(&bytes).unwrap();
+    }
+    to.finish().unwrap();
+    for arguments in [
+        "run --fmu a.fmu --profile exp-sweep:amplitude=0.1 --stop 1 --out run.parquet",
+        "view run.parquet --fmu a.fmu",
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
+        let done = command.current_dir(folder.path()).args(arguments.split(' ')).output().unwrap();
+        assert!(done.status.success(), "{}", said(&done));
+    }
+    let page = std::fs::read_to_string(folder.path().join("run.html")).unwrap();
+    let (_, data) = page.split_once("id=\"run\">").unwrap();
+    let (data, _) = data.split_once("</script>").unwrap();
+    assert!(!data.contains(['<', '>', '&', '\u{2028}', '\u{2029}']));
+    let data: serde_json::Value = serde_json::from_str(data).unwrap();
+    assert!(data.to_string().contains("<!--<script></script>&"), "{data}");
 }

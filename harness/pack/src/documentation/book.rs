@@ -181,5 +181,6 @@ fn search_index(pages: &[Page], titles: &[String]) -> Result<String> {
             sections.push(json!({ "at": address, "title": title, "words": section.words }));
         }
     }
-    Ok(format!("const SECTIONS = {};\n", serde_json::to_string(&sections)?))
+    let json = serde_json::to_string(&sections)?;
+    Ok(format!("const SECTIONS = {};\n", web::json_in_script(&json)))
 }

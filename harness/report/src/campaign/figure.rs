@@ -128,10 +128,9 @@ impl Figures {
         }
     }
 
-    /// The specifications, as they stand in a script element: without `<`, since `</script` ends it
-    /// and `<!--<script` keeps its end from being seen (HTML, 13.2.5.20).
+    /// Returns the specifications as JSON for a script element.
     pub fn json(&self) -> String {
-        Value::Array(self.specifications.clone()).to_string().replace('<', "\\u003c")
+        web::json_in_script(&Value::Array(self.specifications.clone()).to_string())
     }
 }
 

@@ -652,7 +652,7 @@ fn panels(kind: Kind, table: &Table) -> Vec<(String, Vec<String>)> {
 }
 
 fn markup(title: &str, facts: &str, kind: Kind, page: &Value, notes: &[String]) -> String {
-    let data = page.to_string().replace("</", "<\\/");
+    let data = web::json_in_script(&page.to_string());
     let body_frame = match kind {
         Kind::Bench => Some("View turns with the hub"),
         Kind::Craft => Some("View turns with the craft"),
