@@ -7,6 +7,8 @@
 
 use std::ffi::{c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard};
+use std::thread::{self, ThreadId};
 
 use crate::feedback::{Closed, Controller, Feedback, Linear, Open};
 use crate::instance::{DISCARD, ERROR, Function, Instance, OK, WARNING};
@@ -78,7 +80,8 @@ pub struct CInstance3 {
 }
 
 /// What a step of FMI 3.0 is made with, and what it said: the environment with which the instance was made if its
-/// intermediateUpdate is [`hubslosh_batch_intermediate_update`].
+/// intermediateUpdate is [`hubslosh_batch_intermediate_update`]. Between [`hubslosh_batch_begin_step`] and
+/// [`hubslosh_batch_end_step`] it stays where it is.
 #[repr(C)]
 pub struct CStep {
     /// `fmi3Instance`.
@@ -201,7 +204,7 @@ pub const STOPPED: c_int = 1;
 pub const BAD_ARGUMENTS: c_int = 2;
 
 /// Version of this interface; another one has other structures.
-pub const VERSION: c_int = 3;
+pub const VERSION: c_int = 4;
 
 /// The version of this interface.
 #[unsafe(no_mangle)]
@@ -209,11 +212,35 @@ pub extern "C" fn hubslosh_batch_version() -> c_int {
     VERSION
 }
 
+/// The steps that are being made, each with the thread that makes it.
+///
+/// An FMU may hand back any pointer. intermediateUpdate looks the pointer up here and never follows it.
+static STEPPING: Mutex<Vec<(ThreadId, usize)>> = Mutex::new(Vec::new());
+
+fn stepping() -> MutexGuard<'static, Vec<(ThreadId, usize)>> {
+    STEPPING.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+/// Says that fmi3DoStep is called next, on this thread, with this step as the environment of its instance. A host that calls
+/// fmi3DoStep itself calls this function before, and [`hubslosh_batch_end_step`] after it.
+#[unsafe(no_mangle)]
+pub extern "C" fn hubslosh_batch_begin_step(step: *mut CStep) {
+    stepping().push((thread::current().id(), step as usize));
+}
+
+/// Says that fmi3DoStep has returned.
+#[unsafe(no_mangle)]
+pub extern "C" fn hubslosh_batch_end_step(step: *mut CStep) {
+    stepping().retain(|(_, other)| *other != step as usize);
+}
+
 /// The callback intermediateUpdate of an instance of FMI 3.0: sets the inputs that go in lines to where they are at
-/// `time`, s; asks for no early return.
+/// `time`, s; asks for no early return. If no step that is being made has this environment, the step of this thread is
+/// meant.
 ///
 /// # Safety
-/// `environment` must be NULL or a [`CStep`] whose arrays have the lengths it says; the other pointers NULL or writable.
+/// The two answers must be NULL or writable, and the arrays of a step between [`hubslosh_batch_begin_step`] and
+/// [`hubslosh_batch_end_step`] must have the lengths that it says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hubslosh_batch_intermediate_update(
     environment: *mut c_void,
@@ -233,7 +260,12 @@ pub unsafe extern "C" fn hubslosh_batch_intermediate_update(
         if let Some(when) = early_return_time.as_mut() {
             *when = time;
         }
-        let Some(step) = environment.cast::<CStep>().as_mut() else { return };
+        let step = {
+            let (all, thread) = (stepping(), thread::current().id());
+            let meant = all.iter().find(|(_, step)| *step == environment as usize);
+            meant.or_else(|| all.iter().rev().find(|(of, _)| *of == thread)).map(|(_, step)| *step)
+        };
+        let Some(step) = step.and_then(|step| (step as *mut CStep).as_mut()) else { return };
         if set_requested == 0 || step.count == 0 {
             return;
         }
@@ -631,7 +663,12 @@ impl Instance for Caller3<'_> {
             (*within).start = time;
             (*within).status = OK;
             ((*within).terminate, (*within).early_return) = (0, 0);
-            do_step(
+            // without inputs in lines intermediateUpdate has nothing to do
+            let lines = (*within).count > 0;
+            if lines {
+                hubslosh_batch_begin_step(within);
+            }
+            let status = do_step(
                 component,
                 time,
                 step,
@@ -640,7 +677,11 @@ impl Instance for Caller3<'_> {
                 &raw mut (*within).terminate,
                 &raw mut (*within).early_return,
                 &raw mut (*within).reached,
-            )
+            );
+            if lines {
+                hubslosh_batch_end_step(within);
+            }
+            status
         };
         let within = unsafe { &mut *within };
         within.count = 0;
@@ -684,5 +725,92 @@ impl Instance for Caller3<'_> {
             values[i] = c_int::from(byte != 0);
             status
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::ptr::{null, null_mut};
+
+    use super::*;
+
+    thread_local! {
+        static SET: Cell<f64> = const { Cell::new(0.0) };
+    }
+
+    extern "C" fn set(
+        _: *mut c_void,
+        _: *const u32,
+        _: usize,
+        values: *const f64,
+        _: usize,
+    ) -> c_int {
+        // SAFETY: one value, by `update` below.
+        SET.set(unsafe { *values });
+        OK
+    }
+
+    /// intermediateUpdate at 0.5 s of a step from 0 s whose input has the value 1 and the slope 2 per s.
+    fn update(environment: impl Fn(*mut CStep) -> *mut c_void) -> f64 {
+        let (mut reference, mut value, mut slope, mut at) = (7, 1.0, 2.0, 0.0);
+        let mut step = CStep {
+            component: null_mut(),
+            set_float64: set,
+            taken: 1,
+            taken_references: null(),
+            count: 1,
+            references: &mut reference,
+            values: &mut value,
+            slopes: &mut slope,
+            at: &mut at,
+            start: 0.0,
+            status: OK,
+            event: 0,
+            terminate: 0,
+            early_return: 0,
+            reached: 0.0,
+        };
+        let step = &raw mut step;
+        SET.set(f64::NAN);
+        hubslosh_batch_begin_step(step);
+        // SAFETY: the step lives, its arrays have one place each; NULL takes no answer.
+        unsafe {
+            hubslosh_batch_intermediate_update(
+                environment(step),
+                0.5,
+                1,
+                0,
+                0,
+                0,
+                null_mut(),
+                null_mut(),
+            );
+        }
+        hubslosh_batch_end_step(step);
+        SET.get()
+    }
+
+    #[test]
+    fn intermediate_update_never_follows_the_pointer_that_an_fmu_hands_back() {
+        assert_eq!(update(|step| step.cast()), 2.0);
+        for foreign in [0usize, 1, 0x10] {
+            assert_eq!(update(|_| foreign as *mut c_void), 2.0, "{foreign}");
+        }
+        SET.set(f64::NAN);
+        // SAFETY: no step is being made.
+        unsafe {
+            hubslosh_batch_intermediate_update(
+                8 as *mut c_void,
+                0.5,
+                1,
+                0,
+                0,
+                0,
+                null_mut(),
+                null_mut(),
+            );
+        }
+        assert!(SET.get().is_nan());
     }
 }

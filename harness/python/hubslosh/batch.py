@@ -21,7 +21,7 @@ from fmpy import sharedLibraryExtension
 from fmpy.fmi1 import FMICallException
 
 from .feedback import Feedback, Linear
-from .fmi3 import Slave, Step
+from .fmi3 import Slave, Step, Within
 from .fmu import PLATFORM, FmuError, source_tree
 
 FUNCTIONS = (
@@ -175,7 +175,7 @@ def library() -> ctypes.CDLL | None:
 _kept = ExitStack()
 """Files that live as long as the program."""
 
-_VERSION = 3
+_VERSION = 4
 """Version of the library's interface."""
 
 
@@ -192,12 +192,13 @@ def _load(path: Path) -> ctypes.CDLL:
     return loaded
 
 
-def intermediate_update() -> int | None:
-    """Return the address of the library's intermediateUpdate, for `Slave`; None without one."""
+def intermediate_update() -> Within | None:
+    """Return the library's intermediateUpdate, for `Slave`; None without a library."""
     loaded = library()
     if loaded is None:
         return None
-    return ctypes.cast(loaded.hubslosh_batch_intermediate_update, c_void_p).value
+    address = ctypes.cast(loaded.hubslosh_batch_intermediate_update, c_void_p).value
+    return Within(address, loaded.hubslosh_batch_begin_step, loaded.hubslosh_batch_end_step)
 
 
 def run(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:

@@ -9,7 +9,7 @@ hears of in intermediate update.
 import ctypes
 from collections.abc import Callable, Collection, Mapping, Sequence
 from ctypes import Structure, byref, c_double, c_int, c_size_t, c_uint8, c_void_p
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -94,6 +94,19 @@ class _Calls:
         ]
 
 
+class Within(NamedTuple):
+    """The library's functions for a step with inputs that go in lines."""
+
+    address: int
+    """Address of intermediateUpdate."""
+
+    begin: Callable[[Any], Any]
+    """Called with a pointer to the `Step` before fmi3DoStep: no other pointer is followed."""
+
+    end: Callable[[Any], Any]
+    """Called with the same pointer after fmi3DoStep."""
+
+
 def _logger(say: Callable[[str], None]) -> Callable[..., None]:
     """Return a callback that hands the texts of messages on."""
     return lambda environment, status, category, text: say(text.decode(errors="replace"))
@@ -107,7 +120,7 @@ class Model(_Calls, FMU3Model):
         variables: Mapping[str, ScalarVariable],
         intermediate: Collection[str],
         say: Callable[[str], None],
-        update: int | None = None,
+        update: Within | None = None,
     ) -> None:
         """Instantiate, as `Slave.instantiate`; nothing is intermediate here."""
         self._begin(variables)
@@ -126,15 +139,15 @@ class Slave(_Calls, FMU3Slave):
         variables: Mapping[str, ScalarVariable],
         intermediate: Collection[str],
         say: Callable[[str], None],
-        update: int | None = None,
+        update: Within | None = None,
     ) -> None:
         """Instantiate; ``say`` is given what the FMU logs.
 
         variables: of the FMU by name. intermediate: those that take part in intermediate update.
-        update: address of a function of C that does what `_update` does, faster; None: there is
-        none.
+        update: functions of C that do what `_update` does, faster; None: there are none.
         """
         self._say = say
+        self._within = update
         self._begin(variables)
         taken = sorted(
             variables[name].valueReference
@@ -156,7 +169,9 @@ class Slave(_Calls, FMU3Slave):
         )
         super().instantiate(
             logMessage=_logger(say),
-            intermediateUpdate=(self._update if update is None else update) if taken else None,
+            intermediateUpdate=(self._update if update is None else update.address)
+            if taken
+            else None,
             requiredIntermediateVariables=taken,
         )
         self.made.component = self.component
@@ -215,6 +230,9 @@ class Slave(_Calls, FMU3Slave):
         made.start, made.status = currentCommunicationPoint, 0
         event, terminate, early = fmi3Boolean(), fmi3Boolean(), fmi3Boolean()
         reached = fmi3Float64()
+        within = self._within if made.count else None
+        if within:
+            within.begin(byref(made))
         try:
             self.fmi3DoStep(
                 self.component,
@@ -228,6 +246,8 @@ class Slave(_Calls, FMU3Slave):
             )
         finally:
             made.count = 0
+            if within:
+                within.end(byref(made))
         made.terminate, made.early_return = terminate.value, early.value
         made.reached = reached.value
         if made.status > _WARNING:
