@@ -70,6 +70,10 @@ impl Model {
 
     /// Frequency (Hz) and damping ratio of the least damped pair of poles between two frequencies, from rows `step` s apart.
     pub fn poles(&self, step: f64, (from, to): (f64, f64)) -> Option<(f64, f64)> {
+        // the iteration for the eigenvalues would never end
+        if !self.a.iter().all(|a| a.is_finite()) {
+            return None;
+        }
         let roots = companion(&self.a).complex_eigenvalues();
         let pairs = roots.iter().filter(|z| z.im > 0.0).map(|z| {
             let s = z.ln() / step;
@@ -151,6 +155,10 @@ fn is_stable(c: &[f64]) -> bool {
 
 /// The polynomial with its zeros drawn towards 0 until they are stable.
 fn stable(mut c: Vec<f64>) -> Vec<f64> {
+    // zeros that are not finite are never drawn in
+    if !c.iter().all(|c| c.is_finite()) {
+        return vec![0.0; c.len()];
+    }
     while !is_stable(&c) {
         let mut factor = 1.0;
         for c in &mut c {

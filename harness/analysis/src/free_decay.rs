@@ -23,7 +23,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 
 use crate::Complex64;
-use crate::least_squares::{differences, minimise};
+use crate::least_squares::{differences, minimise, smallest};
 use crate::statistics::{deviation, mean};
 
 /// Fewest periods from which frequency and damping are told.
@@ -352,7 +352,7 @@ impl Start {
         let fit = |columns: &dyn Fn(&Row) -> [f64; 3], of: &dyn Fn(&Row) -> f64| {
             let matrix = DMatrix::from_fn(rows.len(), 3, |i, j| rows[i].3 * columns(&rows[i])[j]);
             let right = DVector::from_fn(rows.len(), |i, _| rows[i].3 * of(&rows[i]));
-            matrix.svd(true, true).solve(&right, 1e-10).ok()
+            smallest(matrix, &right, 1e-10)
         };
         let decay = fit(&|r| [1.0, -omega * r.0, -omega * r.1], &|r| r.3.ln())?;
         let turning = fit(&|r| [1.0, r.0, omega * r.2], &|r| r.4)?;

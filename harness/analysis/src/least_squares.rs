@@ -21,6 +21,15 @@ pub struct Minimum {
     pub reason: String,
 }
 
+/// The smallest x for which |a x − b| is least; singular values up to `least` count as 0. `None` if an entry is not finite:
+/// the iteration for the singular values would never end.
+pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector<f64>> {
+    if !a.iter().chain(b.iter()).all(|entry| entry.is_finite()) {
+        return None;
+    }
+    a.svd(true, true).solve(b, least).ok()
+}
+
 /// The minimum of the sum of squares near `x`.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
     minimise_by(&tolerances(1e-9, 1e-9), residuals, derivatives, x)

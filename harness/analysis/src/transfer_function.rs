@@ -15,6 +15,7 @@ use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, U6, Vector3, Vector6};
 
 use crate::features::Features;
+use crate::least_squares;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::statistics::mean;
 use crate::{Complex64, FrequencyResponse};
@@ -185,7 +186,7 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
         }
         (b[2 * k], b[2 * k + 1]) = (h.re, h.im);
     }
-    let x = a.svd(true, true).solve(&b, 1e-14).ok()?;
+    let x = least_squares::smallest(a, &b, 1e-14)?;
     let numerator = [x[0] / pole_omega.powi(2), x[1] / pole_omega, x[2]];
     Some(TransferFunction { numerator, ..start })
 }
@@ -208,7 +209,7 @@ fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunctio
         .collect();
     // a response may leave coefficients open: the smallest that do
     let solve =
-        |a: DMatrix<f64>, b: DVector<f64>| Some((a.svd(true, true).solve(&b, 1e-14).ok()?, ()));
+        |a: DMatrix<f64>, b: DVector<f64>| Some((least_squares::smallest(a, &b, 1e-14)?, ()));
     let (Coefficients { numerator: [b2, b1, b0], denominator }, ()) =
         sanathanan_koerner::fit(&lines, false, ROUNDS, solve)?;
     let (p, w, z) = stable_poles(denominator)?;

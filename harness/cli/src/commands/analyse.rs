@@ -94,6 +94,12 @@ impl AnalyseArgs {
             let recorded = Recorded { path: path.clone(), columns: self.columns.clone() };
             // what is done to it is told when it is analysed
             let (each, table) = recorded::read(&recorded, &mut |_| {})?;
+            ensure!(
+                each >= 1e-6,
+                "{}: its rows are {each:.3e} s apart (allowed: at least 1e-6 s). Is the time in another unit? --columns \
+                 time=COLUMN:UNIT states it",
+                path.display()
+            );
             step.get_or_insert(each);
             let torque = table.column("tau_cmd").unwrap_or_default();
             let amplitude = torque.iter().fold(0.0, |most: f64, tau| most.max(tau.abs()));
@@ -107,7 +113,7 @@ impl AnalyseArgs {
             // to four digits: what a command was meant to be
             let digits = 10f64.powi(3 - amplitude.log10().floor() as i32);
             runs.push_str(&format!(
-                "profile.amplitude = {}\n",
+                "profile.amplitude = {:?}\n",
                 (amplitude * digits).round() / digits
             ));
         }

@@ -1,6 +1,7 @@
 //! A recording as the run that it is of: on an even grid, from the torque's beginning to its end.
 
 use anyhow::{Context, Result, ensure};
+use host::budget;
 use signals::fourier::{Forward, Inverse};
 use signals::recording::{self, Between, Signal, Wanted, even};
 use signals::table::Table;
@@ -54,6 +55,15 @@ pub(super) fn table(
     let to = to.min(case.stop);
     let first = match &*case.torque {
         Torque::Profile(profile) if profile.sweep().is_some() => {
+            let highest = profile.band().map_or(0.0, |band| band.1);
+            ensure!(
+                step * highest < 0.5,
+                "{name}: its rows are {step:.3e} s apart, and {} goes to {highest} Hz (allowed: less than {:.3e} s). Is the time in \
+                 another unit? --columns time=COLUMN:UNIT states it",
+                case.profile,
+                0.5 / highest
+            );
+            budget::table(budget::steps(to - from, step).with_context(|| name.to_string())?, 4)?;
             let count = ((to - from) / step).round() as usize;
             let wanted: Vec<f64> =
                 (0..=count).map(|k| case.torque.at(from + k as f64 * step)).collect();

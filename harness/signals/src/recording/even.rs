@@ -1,6 +1,7 @@
 //! Rows on an even grid, for what needs one: spectra, Allan variances.
 
 use anyhow::{Result, ensure};
+use host::budget;
 
 use super::SHORT;
 use crate::table::Table;
@@ -9,6 +10,8 @@ use crate::table::Table;
 const OFF: f64 = 1e-3;
 /// Part of the record that may be missing and is joined by lines.
 const MISSING: f64 = 0.01;
+/// Rows of the grid for each row of the table, at most.
+const MOST_ROWS: f64 = 10.0;
 
 /// The table on an even grid, and its step, s. Values of rows that lie on one are as they are; else they are
 /// joined by lines, over gaps too, as long as these are little of the whole. `done` hears it.
@@ -46,6 +49,14 @@ pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> 
     let lost = time.windows(2).filter(|pair| pair[1] - pair[0] > 1.5 * usual).count();
     // the whole number of steps that is nearest
     let count_of = ((last - first) / usual).round().max(1.0);
+    // whatever the spacing, the grid has no more rows than fit
+    ensure!(
+        count_of <= MOST_ROWS * rows as f64,
+        "its rows are {usual:e} s apart mostly, and {count_of:.1e} of these steps are in the {:.3e} s of it: they make no even \
+         grid (allowed: at most {MOST_ROWS} times its {rows} rows)",
+        last - first
+    );
+    budget::table(count_of as usize, table.names().len())?;
     let step = (last - first) / count_of;
     done(format!(
         "its rows are not equally spaced ({usual:.6} s mostly, in {lost} places more than 1.5 times that): they are joined by \

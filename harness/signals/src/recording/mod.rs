@@ -124,6 +124,8 @@ pub struct Wanted<'a> {
 
 /// Times from here on, s, are counted from the recording's beginning: seconds since 1970, say.
 const LATE: f64 = 1e6;
+/// Largest magnitude of a value in SI: its fourth power, which statistics take, is finite in sums over all rows.
+const LARGEST: f64 = 1e60;
 /// Rows that a slow signal may miss in succession, in units of its usual spacing, and at least [`SHORT`].
 const LOST: f64 = 10.0;
 /// Spacing, in units of the usual one, from which on a value in between must have been lost.
@@ -255,6 +257,16 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     for (k, (column, factor)) in columns.iter_mut().zip(&factors).enumerate() {
         if *factor != 1.0 && !(seconds && k == 0) {
             column.iter_mut().for_each(|value| *value *= factor);
+        }
+    }
+    for (signal, column) in signals.iter().zip(&columns) {
+        if let Some(row) = column.iter().position(|value| value.abs() > LARGEST) {
+            bail!(
+                "row {} of its values: {} is {:e} (allowed: magnitudes up to {LARGEST:e})",
+                row + 1,
+                signal.name,
+                column[row]
+            );
         }
     }
     if let Some(origin) = origin {
