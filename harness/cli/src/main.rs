@@ -23,6 +23,7 @@ macro_rules! done {
 
 mod commands;
 mod fmu;
+mod outputs;
 mod progress;
 mod set_file;
 mod terminal;
@@ -32,11 +33,12 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use commands::*;
 use experiments::campaign::Campaign;
 use experiments::plan::Plan;
+use host::bug;
 use host::guard::{self, Cause, Limits, Output};
 use terminal::Terminal;
 
@@ -53,6 +55,9 @@ struct Cli {
     /// Memory that an FMU may take in run and campaign, MiB.
     #[arg(long, global = true, hide_short_help = true, value_name = "MIB", default_value_t = guard::MEMORY >> 20)]
     memory: u64,
+    /// Understands the command line, and does nothing: for the tests of examples.
+    #[arg(long, hide = true)]
+    parse_only: bool,
     /// How a process that runs FMUs is started.
     #[arg(long, hide = true)]
     guarded: Option<String>,
@@ -164,13 +169,23 @@ fn clean_up_on_signals() {
 fn main() -> ExitCode {
     #[cfg(unix)]
     clean_up_on_signals();
-    let cli = Cli::from_arg_matches(&command_line().get_matches()).unwrap_or_else(|e| e.exit());
+    bug::keep_panics();
+    let mut command = command_line();
+    let matches = command.get_matches_mut();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     cli.terminal.set();
-    let code = match (&cli.guarded, cli.command.is_none() || cli.fmu().is_some()) {
-        (None, true) => guarded(&cli),
-        (Some(spec), _) => guard::enter(spec).map(|()| carry_out(cli)),
-        (None, false) => Ok(carry_out(cli)),
+    let work = || {
+        outputs::check(&command, &matches)?;
+        if cli.parse_only {
+            return Ok(0);
+        }
+        match (&cli.guarded, cli.command.is_none() || cli.fmu().is_some()) {
+            (None, true) => guarded(&cli),
+            (Some(spec), _) => guard::enter(spec).map(|()| carry_out(cli)),
+            (None, false) => Ok(carry_out(cli)),
+        }
     };
+    let code = bug::caught(work).unwrap_or_else(|panic| Err(anyhow!(bug::report(&panic))));
     let code = code.unwrap_or_else(|error| {
         terminal::error(format_args!("{error:#}"));
         1

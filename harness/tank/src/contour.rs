@@ -1,5 +1,7 @@
 //! The generating curve of a tank: checks, and the part that the liquid wets.
 
+use std::path::Path;
+
 use core::fmt;
 
 use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
@@ -8,6 +10,23 @@ use crate::gauss::Gauss;
 /// Everything that is wrong with an input, one sentence each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problems(pub Vec<String>);
+
+/// Largest file of a tank or of a drawing, bytes.
+const LARGEST_FILE: u64 = 64 << 20;
+
+/// The text of a regular file: a named pipe would be waited for, a device may never end.
+pub(crate) fn read_text(path: &Path) -> Result<String, Problems> {
+    let problem =
+        |why: String| Problems::from(format!("Could not read {}: {why}.", path.display()));
+    let about = std::fs::metadata(path).map_err(|error| problem(error.to_string()))?;
+    if !about.is_file() {
+        return Err(problem("it is not a regular file".into()));
+    }
+    if about.len() > LARGEST_FILE {
+        return Err(problem(format!("it is larger than {} MB", LARGEST_FILE / 1_000_000)));
+    }
+    std::fs::read_to_string(path).map_err(|error| problem(error.to_string()))
+}
 
 impl fmt::Display for Problems {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -14,8 +14,7 @@ use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 /// # Errors
 /// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
 pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
+    let text = crate::contour::read_text(path)?;
     let data = first_path(&text).map_err(|problem| format!("{}: {problem}", path.display()))?;
     segments(&data, scale)
         .map_err(|problem| Problems::from(format!("{}: {problem}", path.display())))

@@ -272,8 +272,7 @@ impl Tank {
     /// # Errors
     /// Everything that is wrong with it.
     pub fn read(path: &Path) -> Result<Tank, Problems> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
+        let text = crate::contour::read_text(path)?;
         Tank::parse(&text, path.parent().unwrap_or(Path::new("")))
     }
 

@@ -125,6 +125,13 @@ impl AnyFmuArgs {
         let names = |flags: &[String]| -> Vec<String> {
             flags.iter().flat_map(|flag| list(flag)).map(String::from).collect()
         };
+        for (flag, flags) in
+            [("inputs", &self.inputs), ("held", &self.held), ("outputs", &self.outputs)]
+        {
+            let names = names(flags);
+            let twice = (1..names.len()).find(|i| names[..*i].contains(&names[*i]));
+            problems.extend(twice.map(|i| format!("--{flag} names {} twice", names[i])));
+        }
         let settings: Vec<String> =
             told.settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
         let settings: Vec<Result<Setting>> = settings.iter().map(|text| text.parse()).collect();
@@ -198,7 +205,7 @@ impl AnyFmuArgs {
             let rows = (0..table.rows())
                 .map(|k| columns.iter().map(|c| c[k]).collect())
                 .collect::<Vec<_>>();
-            let result = std::fs::read_to_string(found)
+            let result = host::input::text(found)
                 .with_context(|| format!("{} cannot be read", found.display()))?;
             let deviances = deviances(&model, &question, &records, &result, &rows)?;
             let text = serde_json::to_string(&deviances)? + "\n";

@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
-use host::output::{self, sha256};
+use host::input;
+use host::output::{self, sha256, sha256_of};
 use host::temporary::{self, Registered};
 use signals::table::{self, Table};
 
@@ -215,6 +216,7 @@ impl Folder {
     pub fn store(&self, run: &str, table: &Table, recipe: &BTreeMap<String, String>) -> Result<()> {
         let (file, draft) = (file_of(run), self.unfinished.join(format!("{run}.parquet")));
         let store = || -> Result<()> {
+            input::check_replaceable(&self.path.join(&file))?;
             table.write(&draft, recipe)?;
             self.add(file.clone(), sha256(&fs::read(&draft)?))?;
             Ok(fs::rename(&draft, self.path.join(&file))?)
@@ -225,6 +227,13 @@ impl Folder {
     /// Publishes files by name, and the manifest. What an earlier campaign published and this one
     /// does not is removed.
     pub fn publish(self, files: Vec<(&str, Vec<u8>)>) -> Result<()> {
+        for (name, bytes) in &files {
+            let place = self.path.join(name);
+            // a plan that is carried out where it lies stays as it is
+            if !input::bytes(&place).is_ok_and(|there| there == *bytes) {
+                input::check_replaceable(&place)?;
+            }
+        }
         let mut manifest = self.manifest();
         let runs = manifest.sums.iter().filter(|(name, _)| name.starts_with(RUNS));
         let mut sums: BTreeMap<String, String> =
@@ -268,7 +277,9 @@ impl Folder {
     }
 
     fn hash(&self, file: &str) -> Result<String> {
-        Ok(sha256(&bytes(&self.path.join(file))?))
+        let path = self.path.join(file);
+        let hash = input::open(&path).and_then(sha256_of);
+        hash.with_context(|| format!("{} cannot be read", path.display()))
     }
 
     fn add(&self, file: String, sum: String) -> Result<()> {

@@ -221,7 +221,7 @@ impl Campaign {
 
     /// Returns true if the directory holds the results of another plan.
     pub fn holds_another(&self) -> bool {
-        std::fs::read_to_string(self.plan_file()).is_ok_and(|text| text != self.plan.text)
+        host::input::text(&self.plan_file()).is_ok_and(|text| text != self.plan.text)
     }
 
     /// The copy of the plan beside the results.

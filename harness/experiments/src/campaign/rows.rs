@@ -6,7 +6,8 @@ use serde::Serialize;
 use super::outcome::{Estimate, Outcome};
 use super::{Case, Failure};
 use analysis::features::Features;
-use host::output::sha256;
+use host::input;
+use host::output::sha256_of;
 
 /// A row of `features.csv`; what is not found, or what the torque cannot show, stays empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -134,7 +135,7 @@ impl MadeFrom {
     /// Row of a run, with the reason if it failed.
     pub fn of(case: &Case, failure: Option<&Failure>, fmu: &host::fmu::Fmu) -> MadeFrom {
         let recording = case.recording.as_ref();
-        let bytes = recording.and_then(|recording| std::fs::read(&recording.path).ok());
+        let file = recording.and_then(|recording| input::open(&recording.path).ok());
         MadeFrom {
             name: case.name.clone(),
             error: failure.map_or(String::new(), |failure| failure.reason.clone()),
@@ -145,7 +146,7 @@ impl MadeFrom {
             stop_s: case.stop,
             tolerance: case.tolerance,
             recording: recording.map(|recording| recording.path.display().to_string()),
-            recording_sha256: bytes.map(|bytes| sha256(&bytes)),
+            recording_sha256: file.and_then(|file| sha256_of(file).ok()),
         }
     }
 }

@@ -6,7 +6,7 @@ mod problems;
 mod random;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -15,9 +15,9 @@ use crate::profile::{Torque, Written};
 use crate::rounding::thousandths;
 use crate::run::{Run, driven};
 use crate::sensors::{Sensor, Sensors};
-use host::budget;
 use host::description::{ModelDescription, Value, did_you_mean};
-use host::output::sha256;
+use host::output::{sha256, sha256_of};
+use host::{budget, input};
 use signals::recording::Columns;
 
 use self::problems::{Lines, Problems};
@@ -188,7 +188,7 @@ impl Plan {
     /// Reads a plan file, or takes the built-in plan of that name.
     pub fn read(file: &str) -> Result<Self> {
         let built_in = BUILT_IN.iter().find(|(name, _)| *name == file);
-        let text = match (std::fs::read_to_string(file), built_in) {
+        let text = match (input::text(Path::new(file)), built_in) {
             (Ok(text), _) => text,
             (Err(_), Some((_, text))) => text.to_string(),
             (Err(error), None) => {
@@ -490,8 +490,8 @@ impl Plan {
         if !torques.contains_key(&key) {
             let hash = written
                 .path()
-                .and_then(|path| std::fs::read(path).ok())
-                .map(|bytes| sha256(&bytes));
+                .and_then(|path| input::open(path).ok())
+                .and_then(|file| sha256_of(file).ok());
             let torque = problems.take(&lines, written.torque())?;
             torques.insert(key.clone(), (Arc::new(torque), hash));
         }

@@ -1,0 +1,134 @@
+//! Outputs never overwrite inputs: checked here for every command, before it reads or writes anything.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, ensure};
+use clap::ArgMatches;
+use clap::parser::ValueSource;
+use host::input;
+
+/// Options whose values are files or directories that a command writes: command, option, and the endings of files that
+/// it writes there. Every other value that names a file is an input.
+const OUTPUTS: [(&str, &str, &[&str]); 20] = [
+    ("analyse", "out", &[]),
+    ("book", "out", &[]),
+    ("campaign", "out", &[]),
+    ("check", "json", &["json"]),
+    ("check", "junit", &["xml"]),
+    ("check", "sarif", &["sarif", "json"]),
+    ("design", "out", &["csv", "parquet"]),
+    ("gyro", "out", &[]),
+    ("identify", "out", &["json"]),
+    ("identify", "report", &["html"]),
+    ("pack", "out", &["fmu"]),
+    ("release", "out", &[]),
+    ("release", "wheels", &[]),
+    ("run", "out", &["csv", "parquet"]),
+    ("tank", "out", &["json", "csv"]),
+    ("tank", "parameters", &["toml", "ssv"]),
+    ("tank", "picture", &["svg"]),
+    ("torque", "out", &["csv", "parquet"]),
+    ("view", "out", &["html"]),
+    ("view", "video", &["mp4"]),
+];
+
+/// Endings of files that commands read.
+const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat", "json", "svg"];
+
+/// Protects the inputs that the command line names, and refuses outputs that would replace one of them, that are
+/// probably meant as inputs, or that are one file twice.
+///
+/// # Errors
+/// As said; the message names the option and its value.
+pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
+    let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
+    let Some(command) = command.find_subcommand(name) else { return Ok(()) };
+    let mut outputs: Vec<(&str, PathBuf, &[&str])> = Vec::new();
+    for argument in command.get_arguments() {
+        let option = argument.get_id().as_str();
+        let output = OUTPUTS.iter().find(|(of, id, _)| *of == name && *id == option);
+        if output.is_none() && matches.value_source(option) != Some(ValueSource::CommandLine) {
+            continue;
+        }
+        for value in matches.try_get_raw(option).ok().flatten().into_iter().flatten() {
+            match output {
+                Some((_, _, endings)) if value != "-" && !value.is_empty() => {
+                    outputs.push((option, value.into(), endings));
+                }
+                Some(_) => {}
+                None => files_in(value).iter().for_each(|path| protect(path)),
+            }
+        }
+    }
+    for (k, (option, path, endings)) in outputs.iter().enumerate() {
+        input::check_replaceable(path).map_err(|error| error.context(format!("--{option}")))?;
+        let ending = path.extension().and_then(OsStr::to_str).map(str::to_lowercase);
+        let ending = ending.unwrap_or_default();
+        let is_input = INPUTS.contains(&&*ending) && !endings.contains(&&*ending);
+        ensure!(
+            !(is_input && path.is_file()),
+            "--{option} would replace {}, an existing .{ending} file, which is probably an input (allowed: a name that ends \
+             in {}, or a file that does not exist yet)",
+            path.display(),
+            if endings.is_empty() {
+                "no such ending".into()
+            } else {
+                format!(".{}", endings.join(" or ."))
+            }
+        );
+        let other = outputs[..k].iter().find(|(_, other, _)| place(other) == place(path));
+        if let Some((other, _, _)) = other {
+            anyhow::bail!("{} is to be two files at once (--{other}, --{option})", path.display());
+        }
+    }
+    Ok(())
+}
+
+/// Protects a file and, of a plan or a tank, the files that it names: recordings, torques, drawings.
+fn protect(path: &Path) {
+    input::protect(path);
+    if !path.extension().is_some_and(|ending| ending == "toml") || !path.is_file() {
+        return;
+    }
+    // what is wrong with the file is for the command to say
+    let read = input::text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut values: Vec<toml::Value> = read.into_iter().map(toml::Value::Table).collect();
+    while let Some(value) = values.pop() {
+        match value {
+            toml::Value::Table(inside) => values.extend(inside.into_iter().map(|(_, value)| value)),
+            toml::Value::Array(inside) => values.extend(inside),
+            toml::Value::String(text) => {
+                for named in files_in(OsStr::new(&text)) {
+                    input::protect(&named);
+                    input::protect(&folder.join(named));
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Paths that a value may name: itself, and what follows a colon or a sign of equality, as in `2:fuel.toml` and
+/// `file:path=torque.csv,hold=true`.
+fn files_in(value: &OsStr) -> Vec<PathBuf> {
+    let mut paths = vec![PathBuf::from(value)];
+    let text = value.to_str().unwrap_or_default();
+    for (at, _) in text.match_indices([':', '=']) {
+        let rest = &text[at + 1..];
+        paths.push(rest.into());
+        paths.extend(rest.split(',').next().map(PathBuf::from));
+    }
+    paths
+}
+
+/// The place that a path leads to, whether or not a file is there.
+fn place(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize();
+    match (folder, path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_path_buf(),
+    }
+}
