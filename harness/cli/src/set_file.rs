@@ -4,19 +4,24 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
+use host::description::{BaseUnit, ModelDescription, Type, Value};
+use host::input;
 use host::xml::Element;
 
-/// Names and values of a set file, in its order, by its ending.
-pub fn read(path: &Path) -> Result<Vec<(String, String)>> {
+/// Reads the description of the FMU that the parameters are for: units are converted to its own.
+pub type Describe<'a> = &'a dyn Fn() -> Result<ModelDescription>;
+
+/// Names and values of a set file, in its order, by its ending; numbers in the units of the FMU.
+pub fn read(path: &Path, description: Describe) -> Result<Vec<(String, String)>> {
     let shown = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("could not read {shown}"))?;
-    let parse = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("toml") => from_toml,
-        Some("ssv") => from_ssv,
-        Some("json") => from_json,
+    let text = input::text(path).with_context(|| format!("could not read {shown}"))?;
+    let settings = match path.extension().and_then(|ending| ending.to_str()) {
+        Some("toml") => from_toml(&text),
+        Some("ssv") => from_ssv(&text, description),
+        Some("json") => from_json(&text),
         _ => bail!("{shown}: the name must end in .toml, .ssv or .json"),
     };
-    let settings = parse(&text).with_context(|| shown.to_string())?;
+    let settings = settings.with_context(|| shown.to_string())?;
     ensure!(!settings.is_empty(), "{shown} sets nothing");
     Ok(settings)
 }
@@ -82,27 +87,77 @@ fn from_json(text: &str) -> Result<Vec<(String, String)>> {
     Ok(settings)
 }
 
-fn from_ssv(text: &str) -> Result<Vec<(String, String)>> {
+/// SSP 1.0 and 2.0, "SystemStructureParameterValues": a value with a `unit` is converted by the definition that the file
+/// has of it in `Units`; without one it must be a unit that the FMU knows.
+fn from_ssv(text: &str, description: Describe) -> Result<Vec<(String, String)>> {
     let root = Element::parse(text.as_bytes()).map_err(anyhow::Error::msg)?;
     ensure!(root.name == "ParameterSet", "its root is {}, not ParameterSet", root.name);
-    let groups = root.children.iter().filter(|group| group.name == "Parameters");
     let attribute = |element: &Element, name: &str| {
-        let found = element.attributes.iter().find(|(n, _)| n == name);
-        found.map(|(_, value)| value.clone()).with_context(|| {
+        element.get(name).map(String::from).with_context(|| {
             format!("line {}: {} has no attribute {name}", element.line, element.name)
         })
     };
-    let parameter = |parameter: &Element| {
+    let inside = |group: &'static str, name: &'static str| {
+        let groups = root.children.iter().filter(move |element| element.name == group);
+        groups.flat_map(|element| &element.children).filter(move |element| element.name == name)
+    };
+    let mut of_fmu = None;
+    let mut settings = Vec::new();
+    for parameter in inside("Parameters", "Parameter") {
         let name = attribute(parameter, "name")?;
         let value = parameter
             .children
             .first()
             .with_context(|| format!("line {}: {name} has no value", parameter.line))?;
-        Ok((name, attribute(value, "value")?))
+        let mut text = attribute(value, "value")?;
+        if let Some(unit) = value.get("unit") {
+            let description: &ModelDescription = match &mut of_fmu {
+                Some(description) => description,
+                none => none.insert(description()?),
+            };
+            let at = || format!("line {}", parameter.line);
+            let definition =
+                inside("Units", "Unit").find(|defined| defined.get("name") == Some(unit));
+            text = with_unit(description, &name, &text, unit, definition).with_context(at)?;
+        }
+        settings.push((name, text));
+    }
+    Ok(settings)
+}
+
+/// A value with a unit as a number in the unit of the FMU's variable.
+fn with_unit(
+    description: &ModelDescription,
+    name: &str,
+    text: &str,
+    unit: &str,
+    definition: Option<&Element>,
+) -> Result<String> {
+    let variable = description.variable(name)?;
+    ensure!(
+        variable.kind() == Type::Real,
+        "{name} is a {:?} and has no unit, but \"{unit}\" is given",
+        variable.kind()
+    );
+    let number: f64 = text
+        .trim()
+        .parse()
+        .ok()
+        .with_context(|| format!("{name} expects a number, not \"{text}\""))?;
+    let value = match definition {
+        Some(element) => {
+            let base = BaseUnit::of(element).with_context(|| {
+                format!(
+                    "{name}: the file defines \"{unit}\" in line {} without a valid BaseUnit",
+                    element.line
+                )
+            })?;
+            description.converted(variable, number, unit, &base)?
+        }
+        None => match description.value(variable, &format!("{number:?} {unit}"))? {
+            Value::Real(value) => value,
+            _ => number,
+        },
     };
-    groups
-        .flat_map(|group| &group.children)
-        .filter(|p| p.name == "Parameter")
-        .map(parameter)
-        .collect()
+    Ok(format!("{value:?}"))
 }

@@ -268,7 +268,8 @@ impl Run {
         Ok(instance)
     }
 
-    /// These columns and, after them, what else must be recorded because something `needs` it; what is driven is in the table anyway.
+    /// These columns and, after them, what else must be recorded because something `needs` it, each once; time and what is
+    /// driven are in the table anyway.
     pub fn columns_with<'n>(
         &self,
         columns: &[&'n str],
@@ -277,7 +278,10 @@ impl Run {
         let driven = self.driven();
         let mut all = columns.to_vec();
         for name in needs {
-            if !all.contains(&name) && driven.iter().all(|(driven, _)| *driven != name) {
+            if name != "time"
+                && !all.contains(&name)
+                && driven.iter().all(|(driven, _)| *driven != name)
+            {
                 all.push(name);
             }
         }

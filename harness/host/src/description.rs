@@ -96,6 +96,39 @@ pub struct Unit {
     pub name: String,
     /// Elements `DisplayUnit`.
     pub display: Vec<DisplayUnit>,
+    /// Element `BaseUnit`: what it is in SI.
+    pub base: Option<BaseUnit>,
+}
+
+/// Element `BaseUnit` of FMI and SSP: a value in SI is `factor` times the number, plus `offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseUnit {
+    /// Exponents of [`BaseUnit::NAMES`].
+    pub exponents: [i32; 8],
+    /// What multiplies the number.
+    pub factor: f64,
+    /// What is added then.
+    pub offset: f64,
+}
+
+impl BaseUnit {
+    /// The base units of SI that FMI and SSP have, and rad.
+    pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+
+    /// The one in an element `Unit`; `None` if the element has none, or one that is not of numbers.
+    pub fn of(unit: &Element) -> Option<BaseUnit> {
+        let base = unit.child("BaseUnit")?;
+        let mut exponents = [0; 8];
+        for (exponent, name) in exponents.iter_mut().zip(BaseUnit::NAMES) {
+            *exponent = base.get(name).map_or(Some(0), |text| text.trim().parse().ok())?;
+        }
+        let number = |name: &str, absent: f64| match base.get(name) {
+            Some(_) => base.number(name).filter(|number| number.is_finite()),
+            None => Some(absent),
+        };
+        let (factor, offset) = (number("factor", 1.0)?, number("offset", 0.0)?);
+        (factor != 0.0).then_some(BaseUnit { exponents, factor, offset })
+    }
 }
 
 /// Element `DisplayUnit`: a number in it is `factor` times the value, plus `offset`.
@@ -353,7 +386,8 @@ impl Reader {
             factor: shown.number("factor").unwrap_or(1.0),
             offset: shown.number("offset").unwrap_or(0.0),
         });
-        Unit { display: display.collect(), name: self.text(element, "name") }
+        let base = BaseUnit::of(element);
+        Unit { display: display.collect(), name: self.text(element, "name"), base }
     }
 
     fn item(&mut self, element: &Element) -> Item {
@@ -756,6 +790,43 @@ impl ModelDescription {
         defined.map_or(&[], |unit| &unit.display)
     }
 
+    /// A number of a Real in a unit that is defined by its base units, in the variable's own unit.
+    ///
+    /// # Errors
+    /// If the two units are not of one quantity, or the FMU does not define its own.
+    pub fn converted(
+        &self,
+        variable: &Variable,
+        number: f64,
+        unit: &str,
+        base: &BaseUnit,
+    ) -> Result<f64> {
+        let (name, own) = (&variable.name, self.unit(variable));
+        let known = self.units.iter().find(|unit| unit.name == own).and_then(|unit| unit.base);
+        // a variable without a unit is a plain number
+        let plain = BaseUnit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
+        let known = if own.is_empty() { Some(plain) } else { known };
+        let Some(known) = known else {
+            bail!("{name}: {unit} cannot be converted, the FMU does not define {own} by base units")
+        };
+        ensure!(
+            base.exponents == known.exponents,
+            "{name}: {unit} cannot be converted to {} (allowed: {})",
+            if own.is_empty() { "a number without unit" } else { own },
+            self.units_of(variable)
+        );
+        let si = base.factor * number + base.offset;
+        Ok((si - known.offset) / known.factor)
+    }
+
+    /// The units in which a variable may be given, by name.
+    pub fn units_of(&self, variable: &Variable) -> String {
+        let own = self.unit(variable);
+        let all = self.display_units(variable).iter().map(|shown| shown.name.as_str());
+        let all: Vec<&str> = [own].into_iter().chain(all).filter(|unit| !unit.is_empty()).collect();
+        if all.is_empty() { "a number without unit".into() } else { all.join(", ") }
+    }
+
     /// A number of a Real: `0.05`, or with its own unit or one of its display units, `50mm`, `50 mm`.
     fn real(&self, variable: &Variable, text: &str) -> Result<f64> {
         if let Ok(number) = text.parse() {
@@ -777,11 +848,9 @@ impl ModelDescription {
         if let Some(shown) = display.iter().find(|shown| shown.name == unit) {
             return Ok((number - shown.offset) / shown.factor);
         }
-        let all = [own].into_iter().chain(display.iter().map(|shown| shown.name.as_str()));
-        let all: Vec<&str> = all.filter(|unit| !unit.is_empty()).collect();
-        match all[..] {
-            [] => bail!("{name} has no unit; it expects a number, not \"{text}\""),
-            _ => bail!("{name} has no unit \"{unit}\" (allowed: {})", all.join(", ")),
+        match own.is_empty() && display.is_empty() {
+            true => bail!("{name} has no unit; it expects a number, not \"{text}\""),
+            false => bail!("{name} has no unit \"{unit}\" (allowed: {})", self.units_of(variable)),
         }
     }
 

@@ -7,6 +7,7 @@ import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,11 @@ from .fmu import DefinedUnit, FmuError, Quantity, Value
 
 
 def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
-    """Read columns of numbers from a .csv or .parquet file."""
+    """Read columns of numbers from a .csv or .parquet file.
+
+    A column ``time`` of dates or durations is read in seconds, dates from the first row. Integers
+    of a Parquet file are refused as times: their unit is not known.
+    """
     import pyarrow.csv
     import pyarrow.parquet
 
@@ -30,7 +35,32 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
     if missing:
         there = ", ".join(table.column_names)
         raise FmuError(f"{path} has no column {', '.join(missing)} (columns in it: {there})")
-    return {name: table[name].to_numpy().astype(float) for name in columns}
+    return {name: _numbers(path, name, table[name]) for name in columns}
+
+
+def _numbers(path: Path, name: str, column: Any) -> np.ndarray:
+    """Return the numbers in a column of Arrow, times in s."""
+    import pyarrow.compute
+    import pyarrow.types
+
+    kind, of = column.type, pyarrow.types
+    if of.is_temporal(kind):
+        if name != "time":
+            raise FmuError(f"{path}: column {name} holds {kind} (allowed: numbers)")
+        if of.is_date(kind) or of.is_timestamp(kind):
+            first = pyarrow.compute.min_max(column.slice(0, 1))["min"]
+            column = pyarrow.compute.subtract(column, first)
+        elif of.is_time(kind):
+            column = column.cast("time64[ns]").cast("int64").cast("duration[ns]")
+        return column.cast("duration[ns]").cast("int64").to_numpy() / 1e9
+    if name == "time" and of.is_integer(kind) and ending_of(path) == "parquet":
+        raise FmuError(
+            f"{path}: column time holds integers, and their unit is not known (allowed: "
+            "floating-point numbers in s, dates, durations)"
+        )
+    if not (of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind)):
+        raise FmuError(f"{path}: column {name} holds {kind} (allowed: numbers)")
+    return column.cast("float64").to_numpy()
 
 
 def read_parameters(path: str | Path) -> dict[str, Quantity]:

@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from hubslosh import (
@@ -92,6 +94,22 @@ def test_a_file_of_parameters_is_as_good_as_a_mapping(fmu: Path, tmp_path: Path)
     toml.write_text("a = [1]")
     with pytest.raises(FmuError, match="a must be numbers"):
         read_parameters(toml)
+
+
+def test_times_of_a_table_are_in_seconds(tmp_path: Path) -> None:
+    """Dates and durations by their type; integers of a Parquet file have no unit."""
+    path = tmp_path / "a.parquet"
+    ticks = np.arange(3) * 20
+    for kind in ("duration[ms]", "timestamp[ms]", "time32[ms]"):
+        time = pa.array(ticks).cast("int32" if kind == "time32[ms]" else "int64").cast(kind)
+        pq.write_table(pa.table({"time": time, "omega": ticks}), path)
+        assert read_table(path, ["time"])["time"].tolist() == [0.0, 0.02, 0.04]
+        with pytest.raises(FmuError, match="omega holds"):
+            pq.write_table(pa.table({"time": [0.0, 1.0, 2.0], "omega": time}), path)
+            read_table(path, ["omega"])
+    pq.write_table(pa.table({"time": ticks}), path)
+    with pytest.raises(FmuError, match="their unit is not known"):
+        read_table(path, ["time"])
 
 
 @pytest.mark.parametrize(

@@ -125,6 +125,15 @@ impl Table {
         Ok(())
     }
 
+    /// Fails unless the table can be written and read again: all values finite, no name twice.
+    fn check(&self) -> Result<()> {
+        let mut names = BTreeSet::new();
+        if let Some(twice) = self.names.iter().find(|name| !names.insert(*name)) {
+            bail!("two of its columns are called {twice} (allowed: each name once)");
+        }
+        self.all_finite()
+    }
+
     /// Writes the table, if all its values are finite or may be missing; `metadata` are a Parquet file's key-value
     /// pairs.
     pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
@@ -137,7 +146,7 @@ impl Table {
 
     /// Writes the table as CSV, if all its values are finite.
     pub fn write_csv(&self, file: impl Write) -> Result<()> {
-        self.all_finite()?;
+        self.check()?;
         let mut out = BufWriter::new(file);
         // a comma within the name of an element, p[1,2], divides no columns (RFC 4180)
         let quoted = |name: &String| match name.contains([',', '"']) {
@@ -161,7 +170,7 @@ impl Table {
     }
 
     fn write_parquet(&self, file: &mut File, metadata: &BTreeMap<String, String>) -> Result<()> {
-        self.all_finite()?;
+        self.check()?;
         let fields = self
             .names
             .iter()

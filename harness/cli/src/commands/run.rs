@@ -83,7 +83,9 @@ impl RunArgs {
     pub fn run(self) -> Result<()> {
         check_out(&self.out)?;
         let mut settings = match &self.parameters {
-            Some(path) => set_file::read(path)?,
+            Some(path) => set_file::read(path, &|| {
+                ModelDescription::of_packed(&crate::fmu::find(&self.fmu)?)
+            })?,
             None => Vec::new(),
         };
         settings.extend(self.settings);
@@ -128,10 +130,11 @@ impl RunArgs {
             true => default_columns(description, &parameters),
             false => whole_names(self.columns),
         };
-        let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
         if let Some(i) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
             bail!("--columns names {} twice", columns[i]);
         }
+        // time and what is driven stand in the table anyway
+        let columns = run.columns_with(&[], columns.iter().map(String::as_str));
         let asked = columns.len();
         // read along, to say at the end whether the model still meant something
         let range = Range::of(description, &mut instance)?;

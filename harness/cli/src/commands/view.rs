@@ -106,7 +106,7 @@ impl ViewArgs {
         let parameters_known =
             !parameters.is_empty() || self.parameters.is_some() || !self.settings.is_empty();
         if let Some(path) = &self.parameters {
-            parameters.extend(set_file::read(path)?);
+            parameters.extend(set_file::read(path, &|| Ok(description.clone()))?);
         }
         parameters.extend(self.settings.iter().cloned());
         for (name, value) in &parameters {
