@@ -203,10 +203,12 @@ pub fn parameters(
     if let (Some(low), Some(high)) = (ratio(&least), ratio(&set))
         && low != high
     {
-        set.warnings.push(format!(
-            "damping ratios and stiffnesses stay those of the largest fill: zeta[1] is {high:.4} there, {low:.4} at the \
-             least"
-        ));
+        let text = format!(
+            "damping ratios and stiffnesses stay those of the largest fill while the tank drains: zeta[1] is {high:.4} there, \
+             {low:.4} at the least fill"
+        );
+        set.notes.push(text.clone());
+        set.warnings.push(text);
     }
     set.notes.push(format!(
         "table of {} fills, {} to {} m; liquid_0 is the largest, outlet the tank's lowest point",

@@ -22,7 +22,8 @@ use crate::terminal;
     hubslosh tank tank.toml --sweep 20%,40%,60%,80% --out sweep.csv --picture sweep.svg\n  \
     hubslosh tank tank.toml --fill 1.2 --modes 3 --nu 1e-6 --parameters tank-1.2.toml\n  \
     hubslosh tank tank.toml --sweep 2%,98% --model SloshTank --nu 1e-6 --parameters draining.toml\n  \
-    hubslosh tank tank.toml --fill 1.2 --gravity 0.001 --sigma 0.013 --contact-angle 5 --parameters coast.toml\n  \
+    hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \\\n      \
+    --contact-angle 5 --parameters coast.toml\n  \
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
 pub struct TankArgs {
@@ -67,12 +68,13 @@ pub struct TankArgs {
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
     /// Kinematic viscosity of the liquid, m2/s, for the damping ratios and between what they are to be expected, at
-    /// --gravity: in the table, in --out and in --parameters [default: none, the ratios are 0].
-    #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
+    /// --gravity: in the table, in --out and in --parameters; with --sweep in --parameters alone, where the ratios are those
+    /// at the largest fill [default: none, the ratios are 0].
+    #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
     /// Surface tension, N/m, for the centring stiffness of --parameters and the frequencies that damping follows
-    /// [default: none].
-    #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
+    /// [default: none]; with --sweep in --parameters alone, at the largest fill.
+    #[arg(long, value_name = "NUMBER")]
     sigma: Option<f64>,
     /// Contact angle between surface and wall, degrees: the centring stiffness of an upright cylinder's first mode is
     /// then that of the meniscus that --gravity and --sigma make. 90 is a flat surface.
@@ -105,6 +107,10 @@ impl TankArgs {
         for (flag, value) in [("--nu", self.nu), ("--sigma", self.sigma)] {
             let allowed = value.is_none_or(|value| value.is_finite() && value >= 0.0);
             ensure!(allowed, "{flag} {} (allowed: 0 or more, finite)", value.unwrap_or_default());
+            ensure!(
+                value.is_none() || self.sweep.is_empty() || self.parameters.is_some(),
+                "{flag} is of no use with --sweep alone (allowed: with --fill, or with --parameters)"
+            );
         }
         ensure!(
             (0.0..=180.0).contains(&self.contact_angle),

@@ -7,6 +7,7 @@ mod command_line;
 mod documents;
 mod folder;
 mod identify;
+mod outputs;
 mod plans;
 mod recordings;
 mod report;

@@ -1,0 +1,397 @@
+//! Outputs never replace inputs, and inputs that would hang a command are refused.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use pack::packed_for_tests;
+
+fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_hubslosh");
+    Command::new(program).current_dir(directory).args(arguments).output().unwrap()
+}
+
+/// What the command says where it fails, in one line.
+fn refused(directory: &Path, arguments: &[&str]) -> String {
+    let output = hubslosh(directory, arguments);
+    let said = String::from_utf8_lossy(&output.stderr).trim().to_string();
+    assert!(!output.status.success(), "{arguments:?} succeeded: {said}");
+    said
+}
+
+/// Commands with an input IN and an output OUT, one for each option that names an output.
+const CASES: [&str; 15] = [
+    "run --input IN --out OUT",
+    "run --profile zero --parameters IN --out OUT",
+    "torque --profile file:path=IN --out OUT",
+    "view IN --out OUT",
+    "view IN --out page.html --video OUT",
+    "check IN --json OUT",
+    "check IN --junit OUT",
+    "check IN --sarif OUT",
+    "tank IN --fill 1 --out OUT",
+    "tank IN --fill 1 --picture OUT",
+    "tank IN --fill 1 --parameters OUT",
+    "identify IN --out OUT",
+    "identify IN --out result.json --report OUT",
+    "design IN --free a=1 --out OUT",
+    "analyse IN --fmu IN --out OUT",
+];
+
+#[cfg(unix)]
+#[test]
+fn no_output_option_replaces_an_input_under_any_of_its_names() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    std::fs::write(at("input.csv"), "input").unwrap();
+    std::fs::create_dir(at("folder")).unwrap();
+    std::fs::hard_link(at("input.csv"), at("hard.csv")).unwrap();
+    std::os::unix::fs::symlink("input.csv", at("symbolic.csv")).unwrap();
+    let names = ["input.csv", "./input.csv", "hard.csv", "symbolic.csv", "folder/../input.csv"];
+    for (k, case) in CASES.iter().enumerate() {
+        let name = names[k % names.len()];
+        let arguments: Vec<&str> = case
+            .split(' ')
+            .map(|word| if word == "OUT" { name } else { word })
+            .map(|word| if word == "IN" { "input.csv" } else { word })
+            .map(|word| if word == "file:path=IN" { "file:path=input.csv" } else { word })
+            .collect();
+        let said = refused(directory.path(), &arguments);
+        assert!(
+            said.contains("is not written: it is the input input.csv") && said.contains(name),
+            "{case}: {said}"
+        );
+        assert_eq!(std::fs::read_to_string(at("input.csv")).unwrap(), "input", "{case}");
+    }
+}
+
+#[test]
+fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    std::fs::write(at("tank.toml"), "density = 1000\nsvg = \"drawing.svg\"\n").unwrap();
+    std::fs::write(at("drawing.svg"), "<svg/>").unwrap();
+    let said = refused(
+        directory.path(),
+        &["tank", "tank.toml", "--fill", "1", "--picture", "drawing.svg"],
+    );
+    assert!(said.contains("it is the input"), "{said}");
+}
+
+#[test]
+fn an_existing_file_that_looks_like_an_input_is_not_replaced() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    std::fs::write(at("A.fmu"), "an FMU").unwrap();
+    std::fs::write(at("B.fmu"), "an FMU").unwrap();
+    for option in ["--json", "--junit", "--sarif"] {
+        let said = refused(directory.path(), &["check", option, "A.fmu", "B.fmu"]);
+        assert!(
+            said.contains(&format!("{option} would replace A.fmu, an existing .fmu file")),
+            "{said}"
+        );
+    }
+    let said =
+        refused(directory.path(), &["check", "B.fmu", "--json", "c.json", "--sarif", "./c.json"]);
+    assert!(said.contains("is to be two files at once (--json, --sarif)"), "{said}");
+    assert_eq!(std::fs::read_to_string(at("A.fmu")).unwrap(), "an FMU");
+}
+
+/// Text of the help of a command and of those within it, by name.
+fn helps(command: &[&str], texts: &mut Vec<(String, String)>) {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_hubslosh")).args(command).arg("--help").output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let commands = text.split("\nCommands:\n").nth(1).unwrap_or_default();
+    let names = commands.lines().take_while(|line| !line.is_empty());
+    for name in names.filter(|line| line.starts_with("  ") && !line.starts_with("   ")) {
+        let name = name.split_whitespace().next().unwrap();
+        if name != "help" {
+            helps(&[command, &[name]].concat(), texts);
+        }
+    }
+    texts.push((command.join(" "), text));
+}
+
+/// Options that name files which a command reads.
+const INPUTS: &str = "analyse --plan, analyse --fmu, campaign --plan, campaign --fmu, campaign --compare, design --fmu, \
+    example --fmu, gyro --recording, gyro --fmu, identify --fmu, run --input, run --parameters, run --fmu, \
+    step-cost --fmu, variables --fmu, view --parameters, view --fmu, book --theme";
+
+#[test]
+fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
+    let source = include_str!("../../src/outputs.rs");
+    let mut texts = Vec::new();
+    helps(&[], &mut texts);
+    let (mut found, mut unknown) = (0, Vec::new());
+    for (command, text) in &texts {
+        for line in text.lines().filter(|line| line.trim_start().starts_with('-')) {
+            let Some(option) = line.split_whitespace().find(|word| word.starts_with("--")) else {
+                continue;
+            };
+            if !["<FILE", "[<FILE", "<DIRECTORY", "<FOLDER"].iter().any(|kind| line.contains(kind))
+            {
+                continue;
+            }
+            found += 1;
+            let output = format!("(\"{command}\", \"{}\",", option.trim_start_matches("--"));
+            let input = format!("{command} {option}");
+            if !source.contains(&output) && !INPUTS.split(", ").any(|known| known == input) {
+                unknown.push(input);
+            }
+        }
+    }
+    assert!(found > 30, "{found}");
+    assert!(unknown.is_empty(), "neither in INPUTS here nor in OUTPUTS of outputs.rs: {unknown:?}");
+}
+
+/// The examples of a help, continued lines joined, and what follows a pipe or a redirection left out.
+fn examples(text: &str) -> Vec<String> {
+    let joined = text.replace("\\\n", " ");
+    let lines = joined.lines().filter(|line| line.starts_with("  hubslosh "));
+    let commands =
+        lines.flat_map(|line| line.split(" && ").map(|command| command.trim().to_string()));
+    commands
+        .filter(|command| command.starts_with("hubslosh "))
+        .map(|command| command.split(['|', '>']).next().unwrap().to_string())
+        .collect()
+}
+
+/// Beginnings of examples that run in a second or less each, in a folder with the files that they name.
+const CHEAP: [&str; 7] = [
+    "hubslosh scale",
+    "hubslosh tank",
+    "hubslosh torque",
+    "hubslosh variables",
+    "hubslosh check --rules",
+    "hubslosh run --profile zero",
+    "hubslosh run --input torque.csv",
+];
+
+#[test]
+fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    let tank = concat!(env!("CARGO_MANIFEST_DIR"), "/../tank/examples/capsule.toml");
+    std::fs::create_dir_all(at("dist")).unwrap();
+    std::fs::create_dir_all(at("harness/tank/examples")).unwrap();
+    for place in ["tank.toml", "harness/tank/examples/capsule.toml"] {
+        std::fs::copy(tank, at(place)).unwrap();
+    }
+    let bench = tank.replace("capsule", "bench");
+    std::fs::copy(bench, at("harness/tank/examples/bench.toml")).unwrap();
+    for fmu in ["HubSlosh.fmu", "Spacecraft.fmu"] {
+        std::fs::copy(packed_for_tests(), at("dist").join(fmu)).unwrap();
+    }
+    std::fs::write(at("torque.csv"), "time,tau_cmd\n0,0.1\n1,0\n").unwrap();
+    let mut texts = Vec::new();
+    helps(&[], &mut texts);
+    let (mut understood, mut run) = (0, 0);
+    for (command, text) in &texts {
+        for example in examples(text) {
+            let words = shlex::split(&example).unwrap();
+            let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
+            let only_parsed = [&["--parse-only"][..], &words].concat();
+            let output = hubslosh(directory.path(), &only_parsed);
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{command}: {example}\n{said}");
+            understood += 1;
+            if CHEAP.iter().any(|cheap| example.starts_with(cheap)) {
+                let output = hubslosh(directory.path(), &words);
+                let said = String::from_utf8_lossy(&output.stderr);
+                assert!(output.status.success(), "{command}: {example}\n{said}");
+                run += 1;
+            }
+        }
+    }
+    assert!(understood > 50 && run > 15, "{understood} {run}");
+}
+
+#[test]
+fn a_draining_tank_gets_the_damping_of_its_largest_fill_and_says_so() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    let shape = "density = 1000\nshape = { cylinder = { radius = 0.5, height = 2 } }\n";
+    std::fs::write(at("tank.toml"), shape).unwrap();
+    let written = |extra: &[&str]| {
+        let arguments = ["tank", "tank.toml", "--sweep", "0.2,0.5,1", "--model", "SloshTank"];
+        let output = hubslosh(
+            directory.path(),
+            &[&arguments[..], &["--modes", "1", "--parameters", "draining.toml"], extra].concat(),
+        );
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{said}");
+        let text = std::fs::read_to_string(at("draining.toml")).unwrap();
+        let zeta = text
+            .lines()
+            .find(|line| line.starts_with("\"tank.zeta[1]\""))
+            .map(|line| line.split('=').nth(1).unwrap().trim().parse::<f64>().unwrap());
+        (zeta, text, said)
+    };
+    let (zeta, text, said) = written(&["--nu", "1e-6"]);
+    // a clean wall of this size: some 0.1 %
+    assert!(zeta.is_some_and(|zeta| (1e-4..1e-2).contains(&zeta)), "{zeta:?}");
+    let words =
+        "damping ratios and stiffnesses stay those of the largest fill while the tank drains";
+    assert!(text.contains(words) && said.contains(words), "{said}\n{text}");
+    let alone =
+        refused(directory.path(), &["tank", "tank.toml", "--sweep", "0.2,0.5", "--nu", "1e-6"]);
+    assert!(alone.contains("--nu is of no use with --sweep alone"), "{alone}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_refused_as_any_input() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    for ending in ["csv", "parquet", "mat", "toml", "ssv", "json"] {
+        let made = Command::new("mkfifo").arg(at(&format!("pipe.{ending}"))).status().unwrap();
+        assert!(made.success());
+    }
+    let fmu = packed_for_tests().to_str().unwrap();
+    for arguments in [
+        "run --fmu FMU --input pipe.csv --out a.csv",
+        "run --fmu FMU --input pipe.parquet --out a.csv",
+        "run --fmu FMU --profile zero --parameters pipe.toml --out a.csv",
+        "run --fmu FMU --profile zero --parameters pipe.ssv --out a.csv",
+        "run --fmu FMU --profile file:path=pipe.csv --out a.csv",
+        "campaign --fmu FMU --plan pipe.toml --out a",
+        "gyro --recording pipe.mat --out a",
+        "gyro --recording pipe.csv --out a",
+        "identify pipe.parquet --method frequency --fmu FMU --out a.json",
+        "tank pipe.toml --fill 1",
+        "view pipe.parquet --fmu FMU",
+    ] {
+        let words: Vec<&str> =
+            arguments.split(' ').map(|word| if word == "FMU" { fmu } else { word }).collect();
+        let said = refused(directory.path(), &words);
+        assert!(said.contains("pipe.") && (said.contains("regular file")), "{arguments}: {said}");
+    }
+}
+
+#[test]
+fn what_is_driven_stands_once_in_the_table() {
+    let directory = tempfile::tempdir().unwrap();
+    let fmu = packed_for_tests().to_str().unwrap();
+    let run = ["run", "--fmu", fmu, "--profile", "zero", "--stop", "0.1", "--out", "-"];
+    let output = hubslosh(directory.path(), &[&run[..], &["--columns", "tau_cmd,omega"]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(text.lines().next().unwrap(), "time,tau_cmd,omega");
+}
+
+/// A parameter set of SSP with one value and, perhaps, units.
+fn ssv(name: &str, value: &str, units: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"p\" \
+         xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\" \
+         xmlns:ssc=\"http://ssp-standard.org/SSP1/SystemStructureCommon\"><ssv:Parameters>\
+         <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter></ssv:Parameters>{units}</ssv:ParameterSet>"
+    )
+}
+
+#[test]
+fn units_of_a_parameter_set_are_converted_or_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let fmu = packed_for_tests().to_str().unwrap();
+    let run = |text: &str| {
+        std::fs::write(directory.path().join("set.ssv"), text).unwrap();
+        let arguments = ["run", "--fmu", fmu, "--profile", "sine", "--stop", "0.1"];
+        let output = hubslosh(
+            directory.path(),
+            &[&arguments[..], &["--parameters", "set.ssv", "--out", "-"]].concat(),
+        );
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.success(), text(output.stdout), text(output.stderr))
+    };
+    let units = |unit: &str, base: &str| {
+        format!(
+            "<ssv:Units><ssc:Unit name=\"{unit}\"><ssc:BaseUnit {base}/></ssc:Unit></ssv:Units>"
+        )
+    };
+    let (_, expected, _) = run(&ssv("tank.h", "<ssv:Real value=\"0.05\"/>", ""));
+    for text in [
+        // by the FMU's own unit, by one of its display units, and by units that the file defines
+        ssv("tank.h", "<ssv:Real value=\"0.05\" unit=\"m\"/>", ""),
+        ssv("tank.h", "<ssv:Real value=\"50\" unit=\"mm\"/>", ""),
+        ssv(
+            "tank.h",
+            "<ssv:Real value=\"50\" unit=\"mm\"/>",
+            &units("mm", "m=\"1\" factor=\"0.001\""),
+        ),
+        ssv(
+            "tank.h",
+            "<ssv:Real value=\"5\" unit=\"finger\"/>",
+            &units("finger", "m=\"1\" factor=\"0.01\""),
+        ),
+    ] {
+        let (ok, found, said) = run(&text);
+        assert!(ok, "{said}\n{text}");
+        assert_eq!(found, expected, "{text}");
+    }
+    for (text, words) in [
+        (
+            ssv("tank.h", "<ssv:Real value=\"50\" unit=\"furlong\"/>", ""),
+            "tank.h has no unit \"furlong\" (allowed: m, ",
+        ),
+        (
+            ssv("tank.h", "<ssv:Real value=\"50\" unit=\"kg\"/>", &units("kg", "kg=\"1\"")),
+            "tank.h: kg cannot be converted to m (allowed: m, ",
+        ),
+        (
+            ssv("tank.h", "<ssv:Real value=\"50\" unit=\"mm\"/>", &units("mm", "m=\"one\"")),
+            "defines \"mm\" in line 2 without a valid BaseUnit",
+        ),
+        (
+            ssv("slosh.model", "<ssv:Enumeration value=\"linear\" unit=\"m\"/>", ""),
+            "slosh.model is a Enumeration and has no unit",
+        ),
+    ] {
+        let (ok, _, said) = run(&text);
+        assert!(!ok && said.contains(words) && said.contains("set.ssv"), "{words}: {said}");
+    }
+}
+
+/// A sweep from 1 to 3 Hz in 100 s and an answer, with other times and values.
+fn sweep(times: f64, values: f64) -> String {
+    let mut text = String::from("time,tau_cmd,omega\n");
+    for k in 0..=5000 {
+        let t = 0.02 * f64::from(k);
+        let phase = std::f64::consts::TAU * (t + 0.01 * t * t);
+        let (torque, rate) = (0.1 * phase.sin(), 0.01 * values * (phase - 0.5).sin());
+        text += &format!("{:?},{torque:?},{rate:?}\n", t * times);
+    }
+    text
+}
+
+#[test]
+fn a_recording_in_another_unit_or_of_absurd_values_is_refused_at_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let fmu = packed_for_tests().to_str().unwrap();
+    for (times, values, words) in [
+        (1e12, 1.0, "its rows are 2.000e10 s apart, and lin-sweep"),
+        (1e-9, 1.0, "its rows are 2.000e-11 s apart (allowed: at least 1e-6 s)"),
+        (1.0, 1e300, "(allowed: magnitudes up to 1e60)"),
+    ] {
+        std::fs::write(directory.path().join("a.csv"), sweep(times, values)).unwrap();
+        let profile = "lin-sweep:f0=1,f1=3,duration=100";
+        let arguments =
+            ["analyse", "a.csv", "--profile", profile, "--model", "linear", "--fmu", fmu];
+        let said = refused(directory.path(), &[&arguments[..], &["--out", "a"]].concat());
+        assert!(said.contains(words) && said.contains("a.csv"), "{words}: {said}");
+    }
+}
+
+#[test]
+fn a_sweep_that_is_shorter_than_a_step_ends_without_a_response() {
+    let directory = tempfile::tempdir().unwrap();
+    let fmu = packed_for_tests().to_str().unwrap();
+    let plan = "title = \"t\"\nprofile = \"lin-sweep:duration=1e-9,f0=1,f1=3\"\n[vary]\nprofile.amplitude = [0.1]\n";
+    std::fs::write(directory.path().join("plan.toml"), plan).unwrap();
+    let output = hubslosh(
+        directory.path(),
+        &["campaign", "--plan", "plan.toml", "--fmu", fmu, "--out", "a"],
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
