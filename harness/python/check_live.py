@@ -74,7 +74,8 @@ MARGINS = """(settings) => {
 
 TOLERANCE = 1e-6
 """Tolerance, relative for frequencies and delays, else in dB, degrees, 1: both find a crossing
-to rounding, of a linear model whose eigenvalues rounding moves by 1e-9 of their size (double poles at 0)."""
+to rounding, of a linear model whose eigenvalues rounding moves by 1e-9 of their size (double
+poles at 0)."""
 
 AFTER = """([settings, from, to]) => {
   for (const { key, start } of slew.settings.all) slew.settings.set(key, settings[key] ?? start);
