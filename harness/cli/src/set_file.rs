@@ -69,6 +69,12 @@ fn from_json(text: &str) -> Result<Vec<(String, String)>> {
         .context("it has no \"parameters\": it is not a result of hubslosh identify, or one of a --method without any")?;
     let no = |key: &str| root.get(key).and_then(serde_json::Value::as_bool) == Some(false);
     // "described" is what versions until 0.2 wrote
+    let decided = root.get("decided_by_solver").and_then(serde_json::Value::as_array);
+    if decided.is_some_and(|names| !names.is_empty()) {
+        crate::terminal::warn(
+            "the errors of the FMU's solver decided some of these parameters; see the verdict in the file",
+        );
+    }
     if no("fits") || no("described") || no("converged") {
         crate::terminal::warn(
             "these parameters do not fit the recording that they are from; see its verdict",

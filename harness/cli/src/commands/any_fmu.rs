@@ -57,6 +57,9 @@ pub struct AnyFmuArgs {
     /// The host steps the FMU (Model Exchange) with this relative tolerance, in place of the FMU's own solver.
     #[arg(long, value_name = "TOLERANCE", requires = "free", num_args = 0..=1, default_missing_value = "1e-8")]
     exchange: Option<f64>,
+    /// Relative tolerance that the FMU's own solver is given [default: the FMU's own].
+    #[arg(long, value_name = "TOLERANCE", requires = "free", conflicts_with = "exchange")]
+    solver_tolerance: Option<f64>,
     /// Starts that are drawn within the bounds where the search from the first one ends at no good fit.
     #[arg(long, value_name = "NUMBER", requires = "free", default_value_t = 8)]
     tries: usize,
@@ -149,14 +152,20 @@ impl AnyFmuArgs {
             triads: kept(triads, &mut problems),
             drift: self.drift,
             solver: self.exchange.map_or(Solver::Own, Solver::Host),
+            tolerance: self.solver_tolerance,
             starts: self.tries,
         };
         let unread = |sensor: &&Sensor| !question.outputs.iter().any(|output| sensor.has(output));
         for sensor in self.sensors.iter().filter(unread) {
             problems.push(format!("--sensor {}: it is not among the --outputs", sensor.name));
         }
-        if self.exchange.is_some_and(|tolerance| !(1e-13..=1e-2).contains(&tolerance)) {
-            problems.push("--exchange (allowed: tolerances from 1e-13 to 1e-2)".into());
+        for (flag, tolerance) in
+            [("--exchange", self.exchange), ("--solver-tolerance", self.solver_tolerance)]
+        {
+            if let Some(tolerance) = tolerance.filter(|t| !(1e-13..=1e-2).contains(t)) {
+                problems
+                    .push(format!("{flag} {tolerance:e} (allowed: tolerances from 1e-13 to 1e-2)"));
+            }
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
         Ok(question)
@@ -227,7 +236,7 @@ impl AnyFmuArgs {
         } else {
             tell(&found);
         }
-        if found.fits == Some(false) || !found.converged {
+        if found.fits != Some(true) || !found.converged {
             terminal::warn("the result is not to be trusted; its verdict says why");
         }
         if let Some(path) = out.report {
@@ -309,13 +318,29 @@ fn foreseen(bounds: &[Bound]) {
             0.0 => "–".into(),
             value => format!("{:.3}", (100.0 * b.std / value).abs()),
         };
-        let with = b.with.as_ref().map_or(String::new(), |(name, r)| format!("{name} ({r:+.3})"));
+        let with = match &b.with {
+            _ if b.decided_by_solver => "(the errors of the solver decide)".into(),
+            _ if !b.inseparable_from.is_empty() => {
+                format!("(cannot be told apart from {})", b.inseparable_from.join(", "))
+            }
+            with => with.as_ref().map_or(String::new(), |(name, r)| format!("{name} ({r:+.3})")),
+        };
         println!(
             "{:28} {:>12.5} {:>10.2e} {percent:>9} {:>10.1e}  {with}",
             b.name, b.value, b.std, b.std_alone
         );
     }
+    let decided: Vec<&str> =
+        bounds.iter().filter(|b| b.decided_by_solver).map(|b| b.name.as_str()).collect();
+    if !decided.is_empty() {
+        println!(
+            "No bound is given for {}: the errors of the FMU's solver decide. --exchange (of an FMU 2.0 with Model Exchange) or a \
+             smaller --solver-tolerance make them smaller.",
+            decided.join(", ")
+        );
+    }
     let told = |b: &&Bound| match b.prior {
+        _ if b.decided_by_solver => false,
         Some(prior) => b.std > 0.9 * prior,
         None => b.std.is_nan() || b.std > b.value.abs(),
     };

@@ -12,8 +12,8 @@ use host::fmi2::Instance;
 const LOCATED: f64 = 1e-13;
 /// Part of the way to the next row that lies between two events at least.
 const APART: f64 = 1e-6;
-/// Steps from one row to the next.
-const MOST_STEPS: usize = 100_000;
+/// Steps from one row to the next, unless fewer are allowed.
+pub const MOST_STEPS: usize = 100_000;
 
 const C: [f64; 6] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
 const A: [[f64; 5]; 6] = [
@@ -58,17 +58,20 @@ pub struct Run<'fmu> {
     tolerance: f64,
     h: f64,
     next_event: Option<f64>,
+    most_steps: usize,
     /// References, values and slopes of the inputs since `from`.
     inputs: (Vec<u32>, Vec<f64>, Vec<f64>, f64),
 }
 
 impl<'fmu> Run<'fmu> {
-    /// From an instance in event mode, as initialization leaves it; `sizes`: states and event indicators.
+    /// From an instance in event mode, as initialization leaves it; `sizes`: states and event indicators; `most_steps`: from one row
+    /// to the next.
     pub fn new(
         instance: Instance<'fmu>,
         sizes: (usize, usize),
         tolerance: f64,
         start: f64,
+        most_steps: usize,
     ) -> Result<Self> {
         let mut run = Run {
             instance,
@@ -79,6 +82,7 @@ impl<'fmu> Run<'fmu> {
             tolerance,
             h: f64::INFINITY,
             next_event: None,
+            most_steps,
             inputs: (Vec::new(), Vec::new(), Vec::new(), start),
         };
         run.update()?;
@@ -176,11 +180,11 @@ impl<'fmu> Run<'fmu> {
     /// Integrates to `end`, s.
     ///
     /// # Errors
-    /// What the FMU refuses; if more than [`MOST_STEPS`] steps are needed.
+    /// What the FMU refuses; if more steps are needed than are allowed.
     pub fn integrate(&mut self, end: f64) -> Result<()> {
         let apart = APART * (end - self.t);
         self.h = self.h.min(end - self.t);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..self.most_steps {
             if self.t >= end {
                 return Ok(());
             }
@@ -249,7 +253,8 @@ impl<'fmu> Run<'fmu> {
             }
         }
         bail!(
-            "{MOST_STEPS} steps were not enough from one row to the next, before t = {end} s: a stiff model needs its own solver"
+            "{} steps were not enough from one row to the next, before t = {end} s: a stiff model needs its own solver",
+            self.most_steps
         )
     }
 }

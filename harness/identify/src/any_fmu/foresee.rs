@@ -3,11 +3,12 @@
 use anyhow::{Result, ensure};
 use serde::Serialize;
 
-use super::covariance;
+use super::knowledge;
 use super::problem::Problem;
 use super::question::Question;
 use super::record::Record;
 use super::simulate::{Model, Setup};
+use super::solver_error::measure;
 use super::unknown::What;
 use analysis::gauss_markov::Noise;
 
@@ -20,6 +21,10 @@ pub struct Bound {
     pub value: f64,
     /// The least standard deviation of an unbiased estimate; NaN: none can be made.
     pub std: f64,
+    /// Whether the errors of the solver decide it: neither bound is known then.
+    pub decided_by_solver: bool,
+    /// The unknowns that it cannot be told apart from.
+    pub inseparable_from: Vec<String>,
     /// The same if all others were known.
     pub std_alone: f64,
     /// Standard deviation beforehand.
@@ -60,7 +65,9 @@ pub fn foresee(
     problem.jacobian(&x, &motion, &mut steps)?;
     let jacobian = problem.jacobian(&x, &motion, &mut steps)?;
     let all: Vec<usize> = (0..x.len()).collect();
-    let covariance = covariance(&jacobian, &all, x.len());
+    let solver = measure(&problem, &x, &motion, &jacobian, &steps, &all);
+    let known = knowledge(&problem, &jacobian, &all, &solver);
+    let covariance = &known.covariance;
     let bound = |j: usize| {
         let unknown = &problem.unknowns[j];
         let std = covariance[(j, j)].sqrt();
@@ -71,11 +78,17 @@ pub fn foresee(
             .filter(|(_, r)| r.is_finite())
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
             .map(|(k, r)| (problem.unknowns[k].name.clone(), r));
+        let is_lost = known.decided_by_solver[j];
+        let sets = known.inseparable.iter().filter(|set| set.direction.contains_key(&unknown.name));
+        let others =
+            sets.flat_map(|set| set.direction.keys()).filter(|name| **name != unknown.name);
         Bound {
+            decided_by_solver: is_lost,
+            inseparable_from: others.cloned().collect(),
             name: unknown.name.clone(),
             value: x[j],
-            std: if std.is_finite() { std } else { f64::NAN },
-            std_alone: 1.0 / jacobian.column(j).norm(),
+            std: if std.is_finite() && !is_lost { std } else { f64::NAN },
+            std_alone: if is_lost { f64::NAN } else { 1.0 / jacobian.column(j).norm() },
             prior: unknown.prior.map(|(_, std)| std),
             unit: unknown.unit.clone(),
             with,

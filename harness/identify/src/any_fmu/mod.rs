@@ -1,7 +1,8 @@
 //! Identification of any FMU by output error: which values of its parameters and starts make its outputs those of the recordings.
 //!
 //! [`question`] says what is asked and with which unknowns, [`record`] reads, [`simulate`] runs the FMU (by its own solver, or by
-//! the host's in [`exchange`]), [`problem`] has the sum of squares, [`search`] its minimum and [`profile`] how sure it is;
+//! the host's in [`exchange`]), [`problem`] has the sum of squares, [`search`] its minimum, [`profile`] how sure it is and
+//! [`solver_error`] what the solver's errors do to it;
 //! [`page`] shows it. What a planned recording will tell is in [`foresee`], the likelihood
 //! at other points in [`likelihood`].
 
@@ -15,7 +16,10 @@ pub mod question;
 pub mod record;
 pub mod search;
 pub mod simulate;
+pub mod solver_error;
 pub mod unknown;
+
+use std::collections::BTreeMap;
 
 use anyhow::{Result, ensure};
 use nalgebra::DMatrix;
@@ -27,6 +31,7 @@ use self::question::Question;
 use self::record::Record;
 use self::search::{Curvature, DECREMENT, Minimum};
 use self::simulate::{Model, Setup};
+use self::solver_error::{ADDED, DECIDES, SolverError};
 use self::unknown::{Unknown, What};
 use crate::estimate::{Estimated, prose};
 use crate::methods::{Identified, Residual};
@@ -39,6 +44,10 @@ use analysis::statistics::{mean, variance};
 const CORRELATED: f64 = 0.98;
 /// Part of the prior's standard deviation that is left where the recordings say nothing.
 const PRIOR_ALONE: f64 = 0.9;
+/// Part of a unit direction from which on an unknown belongs to it.
+const PART: f64 = 1e-2;
+/// How the sentence begins that says that the solver's errors leave no judgement.
+pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
 /// Turns of noise and fit.
 const TURNS: usize = 4;
 
@@ -49,6 +58,12 @@ pub struct Details {
     pub outputs: Vec<Output>,
     /// Estimates that the recordings do not determine.
     pub not_determined: Vec<String>,
+    /// Sets of estimates that the recordings cannot tell apart.
+    pub cannot_tell_apart: Vec<Inseparable>,
+    /// Estimates that the errors of the solver decide: they have no interval.
+    pub decided_by_solver: Vec<String>,
+    /// By how much the errors of the solver move each estimate, in its unit.
+    pub solver_shift: BTreeMap<String, f64>,
     /// Estimates at a bound.
     pub at_bound: Vec<String>,
     /// Estimates whose interval is no ± about them.
@@ -61,6 +76,28 @@ pub struct Details {
     pub decrement: f64,
     /// Covariance of the estimates, in the order of the correlations' names.
     pub covariance: Vec<Vec<f64>>,
+}
+
+/// Unknowns that change together without a change of any output.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Inseparable {
+    /// The change of each, in its unit; the largest relative to its steepness is positive.
+    pub direction: BTreeMap<String, f64>,
+}
+
+impl Inseparable {
+    fn words(&self) -> String {
+        let names: Vec<&str> = self.direction.keys().map(String::as_str).collect();
+        let changes: Vec<String> =
+            self.direction.iter().map(|(name, by)| format!("{name} {by:+.3e}")).collect();
+        format!(
+            "{} cannot be told apart: no output changes when they change together ({}). Give one of them a value with --set in \
+             place of --free, or state what is known of it with --prior; else an output that depends on them differently is \
+             needed, or another motion.",
+            names.join(", "),
+            changes.join(", ")
+        )
+    }
 }
 
 /// One output of one recording.
@@ -149,30 +186,109 @@ pub fn identify(
     Ok(found)
 }
 
-/// The covariance of all unknowns; rows of those at a bound are 0.
-pub(crate) fn covariance(jacobian: &DMatrix<f64>, which: &[usize], n: usize) -> DMatrix<f64> {
-    let inverse = Curvature::of(jacobian, which).inverse();
-    let mut all = DMatrix::zeros(n, n);
+/// What is known of the unknowns at a point, and what is not.
+pub(crate) struct Knowledge {
+    /// The covariance of all unknowns; rows of those at a bound are 0, and what is not resolved has an infinite variance.
+    pub covariance: DMatrix<f64>,
+    /// Directions that no output shows.
+    pub inseparable: Vec<Inseparable>,
+    /// Unknowns whose derivatives are lost in the solver's errors, or which these move by more than [`DECIDES`] of the standard
+    /// deviation.
+    pub decided_by_solver: Vec<bool>,
+}
+
+pub(crate) fn knowledge(
+    problem: &Problem,
+    jacobian: &DMatrix<f64>,
+    which: &[usize],
+    solver: &SolverError,
+) -> Knowledge {
+    let n = problem.unknowns.len();
+    let curvature = Curvature::of(jacobian, which);
+    let inverse = curvature.inverse();
+    let mut covariance = DMatrix::zeros(n, n);
     for (a, &i) in which.iter().enumerate() {
         for (b, &j) in which.iter().enumerate() {
-            all[(i, j)] = inverse[(a, b)];
+            covariance[(i, j)] = inverse[(a, b)];
         }
     }
-    all
+    let (noise, both): (Vec<f64>, Vec<f64>) = which.iter().map(|&j| solver.derivative[j]).unzip();
+    // what curvature alone leaves unresolved is a property of the model; what noise adds is one of the solver
+    let curved: Vec<f64> =
+        both.iter().zip(&noise).map(|(b, n)| (b * b - n * n).max(0.0).sqrt()).collect();
+    let of_model = curvature.unresolved(&curved);
+    let of_both = curvature.unresolved(&both);
+    let mut decided_by_solver = vec![false; n];
+    if of_both.len() > of_model.len() {
+        for direction in &of_both {
+            let of = which.iter().zip(direction.iter()).filter(|(_, part)| part.abs() > PART);
+            of.for_each(|(&j, _)| decided_by_solver[j] = true);
+        }
+    }
+    let inseparable = of_model.iter().map(|direction| {
+        let own = curvature.unscaled(direction);
+        let sign = direction[direction.iamax()].signum();
+        let of = which.iter().zip(direction.iter().zip(own.iter()));
+        let of = of.filter(|(_, (part, _))| part.abs() > PART);
+        for (&j, _) in of.clone() {
+            covariance[(j, j)] = f64::INFINITY;
+        }
+        let of = of.map(|(&j, (_, by))| (problem.unknowns[j].name.clone(), sign * by));
+        Inseparable { direction: of.collect() }
+    });
+    let inseparable = inseparable.collect();
+    for &j in which {
+        let std = covariance[(j, j)].sqrt();
+        decided_by_solver[j] |= std.is_finite() && solver.shift[j] > DECIDES * std;
+    }
+    Knowledge { covariance, inseparable, decided_by_solver }
+}
+
+/// What makes the solver's errors smaller.
+fn remedy(problem: &Problem, solver: &SolverError) -> String {
+    let finer = "a smaller --solver-tolerance makes them smaller";
+    match problem.model {
+        Model::Host { .. } => "a smaller tolerance after --exchange makes them smaller".into(),
+        Model::Own(_) if problem.model.offers_exchange() => {
+            let also = if solver.heeds_tolerance { format!("; {finer} too") } else { String::new() };
+            format!("with --exchange the host integrates this FMU, with errors of 1e-8{also}")
+        }
+        Model::Own(_) if solver.heeds_tolerance => finer.into(),
+        Model::Own(_) => {
+            "the FMU ignores the tolerance that a host gives: export it with a finer solver, or for Model Exchange (FMI 2.0) and \
+             use --exchange"
+                .into()
+        }
+    }
 }
 
 fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identification {
     let n = minimum.x.len();
     let inner = minimum.inner(&problem.unknowns);
-    let covariance = covariance(&minimum.jacobian, &inner, n);
+    let solver = solver_error::measure(
+        problem,
+        &minimum.x,
+        &minimum.answer.motion,
+        &minimum.jacobian,
+        &minimum.steps,
+        &inner,
+    );
+    let Knowledge { covariance, inseparable, decided_by_solver } =
+        knowledge(problem, &minimum.jacobian, &inner, &solver);
     let curvature_alone = |j: usize| 1.0 / minimum.jacobian.column(j).norm();
     // where differences end before the minimum, how far it may be off is part of how sure it is
     let widened = (1.0 + minimum.decrement.powi(2)).sqrt();
     // at a bound: as far as it would go with the others held
     let std: Vec<f64> = (0..n)
-        .map(|j| match inner.contains(&j) {
-            true => widened * covariance[(j, j)].sqrt(),
-            false => curvature_alone(j),
+        .map(|j| {
+            if decided_by_solver[j] {
+                return f64::NAN;
+            }
+            let std = match inner.contains(&j) {
+                true => widened * covariance[(j, j)].sqrt(),
+                false => curvature_alone(j),
+            };
+            if solver.shift[j] > ADDED * std { std.hypot(solver.shift[j]) } else { std }
         })
         .collect();
     let intervals = profile::intervals(problem, minimum, &std);
@@ -180,6 +296,9 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
     let mut found = Identified::new(Details {
         outputs,
         not_determined: Vec::new(),
+        cannot_tell_apart: inseparable,
+        decided_by_solver: Vec::new(),
+        solver_shift: BTreeMap::new(),
         at_bound: Vec::new(),
         not_quadratic: Vec::new(),
         deviance: problem.deviance(&minimum.answer),
@@ -198,8 +317,41 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
         (0..n).map(|i| (0..n).map(|j| correlation(i, j)).collect()).collect();
     found.converged = minimum.converged();
     let fits = found.details.outputs.iter().all(Output::passed);
-    found.fits = Some(fits);
-    let mut words = vec![fit_in_words(&found.details.outputs)];
+    let decided: Vec<usize> = (0..n).filter(|&j| decided_by_solver[j]).collect();
+    found.details.decided_by_solver = decided.iter().map(|&j| names[j].clone()).collect();
+    let shifts = names.iter().cloned().zip(solver.shift.iter().copied().map(finite));
+    found.details.solver_shift = shifts.collect();
+    found.fits = (!fits || decided.is_empty()).then_some(fits);
+    let mut words = match found.fits {
+        None => vec![format!(
+            "{NOT_JUDGED}: the residual of every output is noise, but the errors of the solver decide estimates."
+        )],
+        Some(_) => vec![fit_in_words(&found.details.outputs)],
+    };
+    if !decided.is_empty() {
+        words.push(format!(
+            "No interval is given for {}: the errors of the {} solver decide them ({}).",
+            found.details.decided_by_solver.join(", "),
+            if matches!(problem.model, Model::Own(_)) { "FMU's own" } else { "host's" },
+            remedy(problem, &solver)
+        ));
+    }
+    let is_parameter = |unknown: &Unknown| matches!(unknown.what, What::Parameter { .. });
+    if decided.is_empty() && !solver.is_seen && problem.unknowns.iter().any(is_parameter) {
+        words.push(
+            "The size of the solver's errors is not known: the outputs are the same with a finer tolerance and with shorter \
+             communication steps. The intervals hold if these errors are small against the noise."
+                .into(),
+        );
+    }
+    words.extend(
+        found
+            .details
+            .cannot_tell_apart
+            .iter()
+            .filter(|set| set.direction.len() > 1)
+            .map(Inseparable::words),
+    );
     if !found.converged {
         words.push(format!(
             "{NO_MINIMUM}: it ended {:.1} standard deviations from it",
@@ -208,15 +360,21 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
     }
     for (j, unknown) in problem.unknowns.iter().enumerate() {
         let interval = &intervals[j];
-        let e = Estimated {
+        let mut e = Estimated {
             value: minimum.x[j],
             std: finite(std[j]),
             std_noise: finite(std[j]),
             interval: interval.ends.map(finite),
-            determined: interval.ends.iter().all(|end| end.is_finite()),
+            determined: false,
             unit: unknown.unit.clone(),
         };
-        say(unknown, &e, interval, inner.contains(&j), std[j], &mut found.details, &mut words);
+        if decided_by_solver[j] {
+            e.interval = [f64::NAN; 2];
+        } else {
+            say(unknown, &e, interval, inner.contains(&j), std[j], &mut found.details, &mut words);
+            e.determined = interval.ends.iter().all(|end| end.is_finite())
+                && !found.details.not_determined.contains(&unknown.name);
+        }
         match unknown.what {
             What::Parameter { .. } => found.parameters.insert(unknown.name.clone(), e),
             What::Bias { .. } | What::Gain { .. } => {
@@ -279,13 +437,16 @@ fn say(
     let unit = if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") };
     if !std.is_finite() || interval.ended == [false, false] && is_inner {
         details.not_determined.push(name.clone());
-        words.push(match std.is_finite() {
-            false => format!("{name} is not determined: no output depends on it by itself"),
-            true => format!(
+        let is_of_a_set =
+            |set: &Inseparable| set.direction.len() > 1 && set.direction.contains_key(name);
+        if std.is_finite() {
+            words.push(format!(
                 "{name} is not determined: any value from {:.4e} to {:.4e}{unit} fits as well",
                 interval.ends[0], interval.ends[1]
-            ),
-        });
+            ));
+        } else if !details.cannot_tell_apart.iter().any(is_of_a_set) {
+            words.push(format!("{name} is not determined: no output depends on it by itself"));
+        }
         return;
     }
     if let Some((mean, beforehand)) = unknown.prior

@@ -3,7 +3,7 @@
 use maud::{DOCTYPE, PreEscaped, html};
 use report::svg::{Chart, Style};
 
-use super::{Identification, Output};
+use super::{Identification, NOT_JUDGED, Output};
 use crate::estimate::{Estimated, prose};
 use crate::methods::Residual;
 use crate::methods::page::{STYLE, axis_chart, digits, series, table};
@@ -45,7 +45,7 @@ pub fn of(found: &Identification) -> String {
             body {
                 h1 { "Identification" }
                 @for line in &found.verdict {
-                    @let doubt = [DOES_NOT_FIT, NO_MINIMUM].iter().any(|words| line.starts_with(words));
+                    @let doubt = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED].iter().any(|words| line.starts_with(words));
                     p class=[doubt.then_some("doubt")] { (line) }
                 }
                 h2 { "Parameters" }

@@ -30,6 +30,10 @@ const MOVE: f64 = 0.5;
 const STEPS: (f64, f64) = (1e-7, 2e-2);
 /// The first step, in the same units.
 const FIRST_STEP: f64 = 1e-3;
+/// Second over first difference from which on the solver's noise may decide a derivative: noise alone makes √3 of it.
+const BEND: f64 = 0.3;
+/// Factor between the steps that are tried where noise may decide, and the largest one in units of an unknown's reach.
+const WIDER: (f64, f64) = (8.0, 0.2);
 /// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
 const JUMP: (f64, f64) = (8.0, 20.0);
 
@@ -62,6 +66,24 @@ pub struct Problem<'a> {
     pub unknowns: Vec<Unknown>,
     /// Outputs with their noise.
     pub channels: Vec<Channel>,
+}
+
+/// Step of the differences by one unknown, in its unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Its size.
+    pub size: f64,
+    /// Smaller steps were seen to measure the noise of the FMU's solver; 0: none was.
+    pub least: f64,
+}
+
+/// A difference of the residuals by one unknown.
+struct Difference {
+    /// Residuals per unit of the unknown, for each channel.
+    slope: Vec<Vec<f64>>,
+    /// Norm of the second difference over that of the first: near √3 where noise decides, small where neither noise nor
+    /// curvature does.
+    bend: f64,
 }
 
 /// Answers of the FMU to one set of values.
@@ -99,8 +121,9 @@ impl<'a> Problem<'a> {
     }
 
     /// Steps of the first differences.
-    pub fn first_steps(&self) -> Vec<f64> {
-        self.unknowns.iter().map(|unknown| FIRST_STEP * unknown.reach).collect()
+    pub fn first_steps(&self) -> Vec<Step> {
+        let first = |unknown: &Unknown| Step { size: FIRST_STEP * unknown.reach, least: 0.0 };
+        self.unknowns.iter().map(first).collect()
     }
 
     fn values(&self, x: &[f64], number: usize) -> Vec<Value> {
@@ -180,66 +203,118 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// If the FMU refuses every step of an unknown.
-    pub fn jacobian(&self, x: &[f64], base: &Motion, steps: &mut [f64]) -> Result<DMatrix<f64>> {
+    pub fn jacobian(&self, x: &[f64], base: &Motion, steps: &mut [Step]) -> Result<DMatrix<f64>> {
         let filters = self.filters();
-        let column = |j: usize| -> Result<DVector<f64>> {
+        let column = |j: usize| -> Result<(DVector<f64>, f64)> {
             let unknown = &self.unknowns[j];
-            let mut pieces = match unknown.what {
-                What::Parameter { recording, .. } => {
-                    self.difference(x, j, recording, base, steps[j])?
-                }
-                _ => self
-                    .channels
-                    .iter()
-                    .map(|channel| {
+            let (mut pieces, least) = match unknown.what {
+                What::Parameter { .. } => self.resolved_difference(x, j, base, steps[j])?,
+                _ => {
+                    let one = |channel: &Channel| {
                         let rows = channel.sampled.len();
                         match sensor(unknown, channel, &base[channel.recording]) {
                             None => vec![0.0; rows],
                             Some(shape) => (0..rows).map(|k| -shape(k)).collect(),
                         }
-                    })
-                    .collect(),
+                    };
+                    (self.channels.iter().map(one).collect(), 0.0)
+                }
             };
-            for ((piece, channel), filter) in pieces.iter_mut().zip(&self.channels).zip(&filters) {
-                piece.iter_mut().zip(&channel.sampled).for_each(|(v, s)| *v *= f64::from(*s));
-                filter.apply(piece);
-            }
+            self.whiten(&mut pieces, &filters);
             let mut all = pieces.concat();
             for (i, unknown) in self.unknowns.iter().enumerate() {
                 if let Some((_, std)) = unknown.prior {
                     all.push(if i == j { 1.0 / std } else { 0.0 });
                 }
             }
-            Ok(DVector::from_vec(all))
+            Ok((DVector::from_vec(all), least))
         };
-        let columns =
-            (0..x.len()).into_par_iter().map(column).collect::<Result<Vec<DVector<f64>>>>()?;
+        let (columns, least): (Vec<DVector<f64>>, Vec<f64>) = (0..x.len())
+            .into_par_iter()
+            .map(column)
+            .collect::<Result<Vec<(DVector<f64>, f64)>>>()?
+            .into_iter()
+            .unzip();
         let found = DMatrix::from_columns(&columns);
         for (j, step) in steps.iter_mut().enumerate() {
             let reach = self.unknowns[j].reach;
-            *step = (MOVE / found.column(j).norm()).clamp(STEPS.0 * reach, STEPS.1 * reach);
+            let size = (MOVE / found.column(j).norm()).clamp(STEPS.0 * reach, STEPS.1 * reach);
+            *step = Step { size: size.max(least[j]), least: least[j] };
         }
         Ok(found)
     }
 
-    /// Central difference of the residuals by one unknown; at a bound, or where the FMU refuses one side, the other side alone.
-    fn difference(
+    /// Masks and whitens residuals, or differences of them.
+    fn whiten(&self, pieces: &mut [Vec<f64>], filters: &[Whitening]) {
+        for ((piece, channel), filter) in pieces.iter_mut().zip(&self.channels).zip(filters) {
+            piece.iter_mut().zip(&channel.sampled).for_each(|(v, s)| *v *= f64::from(*s));
+            filter.apply(piece);
+        }
+    }
+
+    /// A linear combination of motions at points that differ in one unknown, as whitened residuals; the weights add up to 0,
+    /// so that the measurement cancels.
+    pub fn combined(&self, x: &[f64], motions: &[(f64, &Motion)]) -> DVector<f64> {
+        let mut sum: Vec<Vec<f64>> =
+            self.channels.iter().map(|c| vec![0.0; c.sampled.len()]).collect();
+        for (weight, motion) in motions {
+            for (sum, residual) in sum.iter_mut().zip(self.residuals(motion, x)) {
+                sum.iter_mut().zip(residual).for_each(|(sum, r)| *sum += weight * r);
+            }
+        }
+        self.whiten(&mut sum, &self.filters());
+        let mut all = sum.concat();
+        let priors = self.unknowns.iter().filter(|unknown| unknown.prior.is_some()).count();
+        all.resize(all.len() + priors, 0.0);
+        DVector::from_vec(all)
+    }
+
+    /// The FMU's outputs with one unknown moved; `only`: the one recording that it is of.
+    pub fn moved(&self, x: &[f64], j: usize, to: f64, base: &Motion) -> Result<Motion> {
+        let mut moved = x.to_vec();
+        moved[j] = to;
+        let only = match self.unknowns[j].what {
+            What::Parameter { recording, .. } => recording,
+            _ => None,
+        };
+        let runs = (0..self.records.len()).into_par_iter().map(|number| match only {
+            Some(of) if of != number => Ok(base[number].clone()),
+            _ => self.run(&moved, number),
+        });
+        runs.collect()
+    }
+
+    /// A difference whose step is as small as noise lets it be: where the second difference is not small against the first,
+    /// wider steps are tried. A wider one makes the part of noise smaller, and that of curvature larger. Also returns the step
+    /// below which noise decides.
+    fn resolved_difference(
         &self,
         x: &[f64],
         j: usize,
-        only: Option<usize>,
         base: &Motion,
-        step: f64,
-    ) -> Result<Vec<Vec<f64>>> {
+        step: Step,
+    ) -> Result<(Vec<Vec<f64>>, f64)> {
+        let mut best = self.difference(x, j, base, step.size)?;
+        let (mut size, mut least) = (step.size, step.least);
+        let widest = WIDER.1 * self.unknowns[j].reach;
+        while best.bend > BEND && size * WIDER.0 <= widest {
+            size *= WIDER.0;
+            match self.difference(x, j, base, size) {
+                // curvature would have made it larger
+                Ok(wider) if wider.bend < 0.7 * best.bend => (best, least) = (wider, size),
+                Ok(_) => {}
+                Err(_) => break,
+            }
+        }
+        Ok((best.slope, least))
+    }
+
+    /// Central difference of the residuals by one unknown; at a bound, or where the FMU refuses one side, the other side alone.
+    fn difference(&self, x: &[f64], j: usize, base: &Motion, step: f64) -> Result<Difference> {
         let (low, high) = self.unknowns[j].bounds;
         let side = |by: f64| -> Result<(f64, Motion)> {
-            let mut moved = x.to_vec();
-            moved[j] = (x[j] + by).clamp(low, high);
-            let runs = (0..self.records.len()).into_par_iter().map(|number| match only {
-                Some(of) if of != number => Ok(base[number].clone()),
-                _ => self.run(&moved, number),
-            });
-            Ok((moved[j], runs.collect::<Result<Motion>>()?))
+            let to = (x[j] + by).clamp(low, high);
+            Ok((to, self.moved(x, j, to, base)?))
         };
         let (ahead, behind) = rayon::join(|| side(step), || side(-step));
         let here = || (x[j], base.clone());
@@ -256,7 +331,24 @@ impl<'a> Problem<'a> {
         let slope = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
             a.iter().zip(b).map(|(a, b)| (a - b) / width).collect()
         };
-        Ok(to.iter().zip(&from).map(slope).collect())
+        let slope = to.iter().zip(&from).map(slope).collect();
+        // a point between both: x itself, or halfway where one side is x
+        let is_one_sided = ahead.0 <= x[j] || behind.0 >= x[j];
+        let middle = 0.5 * (ahead.0 + behind.0);
+        let between = match is_one_sided {
+            true => self.moved(x, j, middle, base).ok().map(|motion| (middle, motion)),
+            false => Some(here()),
+        };
+        let bend = between.map_or(0.0, |(at, motion)| {
+            let part = (at - behind.0) / width;
+            let bent = self.combined(
+                x,
+                &[(2.0, &motion), (-2.0 * part, &ahead.1), (2.0 * (part - 1.0), &behind.1)],
+            );
+            let first = self.combined(x, &[(1.0, &ahead.1), (-1.0, &behind.1)]).norm();
+            if first > 0.0 { bent.norm() / first } else { 0.0 }
+        });
+        Ok(Difference { slope, bend })
     }
 
     /// Leaves out the rows beside which the model's outputs jump: an event that the estimate has on the wrong side of a row would be

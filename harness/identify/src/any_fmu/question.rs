@@ -190,6 +190,8 @@ pub struct Question {
     pub drift: bool,
     /// Whose solver steps the FMU.
     pub solver: Solver,
+    /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.
+    pub tolerance: Option<f64>,
     /// Starts that are drawn within the bounds where the search from the first one ends at no good fit.
     pub starts: usize,
 }

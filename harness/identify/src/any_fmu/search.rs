@@ -10,7 +10,7 @@
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::problem::{Answer, Problem};
+use super::problem::{Answer, Problem, Step};
 use super::record::Record;
 use super::unknown::Unknown;
 use crate::news::News;
@@ -20,6 +20,9 @@ use analysis::random::Random;
 pub const DECREMENT: f64 = 0.02;
 /// Directions along which the scaled cost is flatter than this part of the steepest are not known.
 const FLAT: f64 = 1e-12;
+/// Directions along which the scaled cost is not steeper than this many times what the errors of the derivatives make are not
+/// resolved: they would be steep by chance.
+const RESOLVED: f64 = 4.0;
 /// Windows of a search from afar, as parts of the recordings.
 const WINDOWS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
 /// Least noise of a window, in parts of an output's spread: what the model can't follow yet.
@@ -37,7 +40,7 @@ pub struct Minimum {
     /// Derivatives there.
     pub jacobian: DMatrix<f64>,
     /// Steps of the differences.
-    pub steps: Vec<f64>,
+    pub steps: Vec<Step>,
     /// Distance to the minimum in standard deviations.
     pub decrement: f64,
 }
@@ -68,9 +71,10 @@ fn inner(unknowns: &[Unknown], x: &[f64], gradient: &DVector<f64>) -> Vec<usize>
     (0..x.len()).filter(is_inner).collect()
 }
 
-/// A symmetric matrix in its own scales, D A D with a unit diagonal, by eigenvectors.
+/// A symmetric matrix in its own scales, D A D with a unit diagonal, by eigenvectors. It may have no rows.
 pub struct Curvature {
-    eigen: SymmetricEigen<f64, nalgebra::Dyn>,
+    values: DVector<f64>,
+    vectors: DMatrix<f64>,
     scale: DVector<f64>,
 }
 
@@ -80,36 +84,57 @@ impl Curvature {
         let picked = jacobian.select_columns(which);
         let a = picked.tr_mul(&picked);
         let scale = a.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+        if which.is_empty() {
+            return Curvature { values: DVector::zeros(0), vectors: a, scale };
+        }
         let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
-        Curvature { eigen: scaled.symmetric_eigen(), scale }
+        let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
+        Curvature { values: eigenvalues, vectors: eigenvectors, scale }
+    }
+
+    /// The eigenvalue below which a direction is flat.
+    fn flat(&self) -> f64 {
+        FLAT * self.values.iter().copied().fold(0.0, f64::max)
     }
 
     /// A⁻¹ b, damped by λ in the matrix's own scales; nothing along directions that are flat.
     pub fn solve(&self, b: &DVector<f64>, damping: f64) -> DVector<f64> {
-        let flat = FLAT * self.eigen.eigenvalues.max();
-        let mut c = self.eigen.eigenvectors.tr_mul(&b.component_mul(&self.scale));
-        for (c, value) in c.iter_mut().zip(&self.eigen.eigenvalues) {
+        let flat = self.flat();
+        let mut c = self.vectors.tr_mul(&b.component_mul(&self.scale));
+        for (c, value) in c.iter_mut().zip(&self.values) {
             *c = if *value > flat { *c / (value + damping) } else { 0.0 };
         }
-        (&self.eigen.eigenvectors * c).component_mul(&self.scale)
+        (&self.vectors * c).component_mul(&self.scale)
     }
 
-    /// A⁻¹; infinite on the diagonal of what a flat direction contains.
+    /// Directions that the matrix does not resolve. `errors` are the relative errors of the Jacobian's columns, all of them
+    /// independent: along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i². Each direction is a unit vector
+    /// in the matrix's own scales.
+    pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
+        let flat = self.flat();
+        let is_flat = |value: f64, v: &DVector<f64>| {
+            let made: f64 = v.iter().zip(errors).map(|(v, error)| (v * error).powi(2)).sum();
+            value <= flat.max(RESOLVED * made)
+        };
+        let all = self.values.iter().zip(self.vectors.column_iter());
+        let all = all.map(|(value, v)| (*value, v.into_owned()));
+        all.filter(|(value, v)| is_flat(*value, v)).map(|(_, v)| v).collect()
+    }
+
+    /// A direction in the unknowns' own units.
+    pub fn unscaled(&self, direction: &DVector<f64>) -> DVector<f64> {
+        direction.component_mul(&self.scale)
+    }
+
+    /// A⁻¹ over the directions that are not flat.
     pub fn inverse(&self) -> DMatrix<f64> {
-        let flat = FLAT * self.eigen.eigenvalues.max();
+        let flat = self.flat();
         let n = self.scale.len();
         let mut inverse = DMatrix::zeros(n, n);
-        for (value, v) in self.eigen.eigenvalues.iter().zip(self.eigen.eigenvectors.column_iter()) {
-            let v = v.component_mul(&self.scale);
+        for (value, v) in self.values.iter().zip(self.vectors.column_iter()) {
             if *value > flat {
+                let v = v.component_mul(&self.scale);
                 inverse += &v * v.transpose() / *value;
-            } else {
-                for i in 0..n {
-                    let part = v[i] / self.scale[i];
-                    if part.abs() > 1e-3 {
-                        inverse[(i, i)] = f64::INFINITY;
-                    }
-                }
             }
         }
         inverse
@@ -123,7 +148,7 @@ impl Curvature {
 pub fn search(
     problem: &Problem,
     x: &[f64],
-    steps: Vec<f64>,
+    steps: Vec<Step>,
     tolerance: f64,
     most: usize,
     news: &mut dyn FnMut(&News),
@@ -145,7 +170,7 @@ pub fn search(
             "iteration {}: sum of squares {cost:.6e}, {decrement:.3} standard deviations from the minimum",
             iteration + 1
         )));
-        let here = |x: Vec<f64>, answer: Answer, steps: Vec<f64>| Minimum {
+        let here = |x: Vec<f64>, answer: Answer, steps: Vec<Step>| Minimum {
             x,
             answer,
             jacobian: jacobian.clone(),

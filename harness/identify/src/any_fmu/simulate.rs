@@ -73,6 +73,12 @@ impl Model {
         }
     }
 
+    /// Whether it steps itself, but the host's solver could.
+    pub fn offers_exchange(&self) -> bool {
+        let Model::Own(fmu) = self else { return false };
+        fmu.description().model_exchange.is_some() && !fmu.description().is_fmi3()
+    }
+
     /// What loading its binary has changed for this whole process.
     pub fn changed(&self) -> &[&'static str] {
         match self {
@@ -80,6 +86,10 @@ impl Model {
             Model::Host { fmu, .. } => fmu.changed(),
         }
     }
+}
+
+fn interpolates(description: &ModelDescription) -> bool {
+    description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs)
 }
 
 /// How an FMU is set up and driven.
@@ -92,9 +102,33 @@ pub struct Setup {
     outputs: Vec<Output>,
     /// What is read of the FMU for all outputs.
     reads: Vec<u32>,
-    /// Relative tolerance of the host's solver.
-    tolerance: f64,
+    /// Relative tolerance of the solver, the host's or the FMU's; `None`: the FMU's own.
+    tolerance: Option<f64>,
+    /// Communication steps from one row to the next, of an FMU that steps itself.
+    substeps: usize,
+    /// Steps of the host's solver from one row to the next.
+    most_steps: usize,
 }
+
+/// Runs with smaller errors of the solver.
+pub struct Finer {
+    /// How the FMU is driven.
+    pub setup: Setup,
+    /// The FMU for another solver than before; `None`: the same.
+    pub model: Option<Model>,
+}
+
+/// Steps of the host's solver from one row to the next where it is only compared with.
+const FEW_STEPS: usize = 1000;
+/// Tolerance of a solver that the FMU's own is compared with, where the FMU suggests none.
+const FINE: f64 = 1e-8;
+/// Factor by which that is finer than the one that the FMU suggests.
+const FINER: f64 = 1e-2;
+/// Parts of the way from row to row over which an input that follows a line is held, where the FMU takes no slopes. Held at
+/// the middle of each part, it differs from its line by a sawtooth of an eighth of its change from row to row, without a delay.
+const HELD_STEPS: usize = 4;
+/// The finest tolerance of the host's solver.
+const FINEST: f64 = 1e-13;
 
 /// How an output follows from what is read.
 #[derive(Clone, Debug)]
@@ -170,10 +204,36 @@ impl Setup {
             outputs,
             reads,
             tolerance: match question.solver {
-                Solver::Own => 0.0,
-                Solver::Host(tolerance) => tolerance,
+                Solver::Own => question.tolerance,
+                Solver::Host(tolerance) => Some(tolerance),
             },
+            substeps: 1,
+            most_steps: exchange::MOST_STEPS,
         })
+    }
+
+    /// The same runs with smaller errors of the solver: with a finer tolerance, with shorter communication steps, and by the host's
+    /// solver, as far as the FMU offers Model Exchange. An FMU may refuse or ignore the first two; where the host's solver would
+    /// take long, it refuses.
+    pub fn finer(&self, model: &Model) -> Vec<Finer> {
+        let setup = |setup: Setup| Finer { setup, model: None };
+        let Model::Own(fmu) = model else {
+            let tolerance = (FINER * self.tolerance.unwrap_or(FINE)).max(FINEST);
+            return vec![setup(Setup { tolerance: Some(tolerance), ..self.clone() })];
+        };
+        let suggested = fmu.description().default_experiment.tolerance.filter(|t| *t > 0.0);
+        let tolerance = self.tolerance.or(suggested).map_or(FINE, |tolerance| FINER * tolerance);
+        let mut all = vec![
+            setup(Setup { tolerance: Some(tolerance), ..self.clone() }),
+            setup(Setup { substeps: 2 * self.substeps, ..self.clone() }),
+        ];
+        if model.offers_exchange()
+            && let Ok(model) = Model::open(fmu.path(), Solver::Host(FINE))
+        {
+            let setup = Setup { tolerance: Some(FINE), most_steps: FEW_STEPS, ..self.clone() };
+            all.push(Finer { setup, model: Some(model) });
+        }
+        all
     }
 
     /// The outputs at the rows of the recording of this number.
@@ -202,7 +262,7 @@ impl Setup {
                 for (reference, value) in values {
                     instance.set_real(&[*reference], &[*value])?;
                 }
-                instance.enter_initialization_mode(None, start, None)?;
+                instance.enter_initialization_mode(self.tolerance, start, None)?;
                 if !first.is_empty() {
                     instance.set_real(&self.inputs, &first)?;
                 }
@@ -228,7 +288,13 @@ impl Setup {
                     instance.set_real(&self.inputs, &first)?;
                 }
                 instance.exit_initialization_mode()?;
-                let run = exchange::Run::new(instance, *sizes, self.tolerance, start)?;
+                let run = exchange::Run::new(
+                    instance,
+                    *sizes,
+                    self.tolerance.unwrap_or(FINE),
+                    start,
+                    self.most_steps,
+                )?;
                 self.integrate(run, record)
             }
         }
@@ -251,17 +317,22 @@ impl Setup {
         self.late(record, read)
     }
 
+    /// Whether inputs follow lines that the FMU cannot be told of. They are held over shorter communication steps then.
+    pub fn holds_lines(&self, model: &Model) -> bool {
+        let Model::Own(fmu) = model else { return false };
+        self.held.iter().any(|held| !held) && !interpolates(fmu.description())
+    }
+
     /// By the FMU's own solver: inputs are set at a row, with their slopes where the FMU takes them, the outputs are read and the
-    /// step to the next row is made.
+    /// step to the next row is made. Where the FMU takes no slopes, inputs that follow lines are held over [`HELD_STEPS`] parts of
+    /// the way, each at its value in the middle of the part.
     fn step(
         &self,
         instance: &mut Instance,
         description: &ModelDescription,
         record: &Record,
     ) -> Result<Vec<Vec<f64>>> {
-        let interface = description.co_simulation.as_ref();
-        let sloped = interface.is_some_and(|cs| cs.can_interpolate_inputs)
-            && self.held.iter().any(|held| !held);
+        let is_sloped = interpolates(description) && self.held.iter().any(|held| !held);
         let orders = vec![1; self.inputs.len()];
         let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
         for row in 0..record.time.len() {
@@ -270,19 +341,36 @@ impl Setup {
                 instance.set_real(&self.inputs, &values)?;
             }
             // an output may follow an input's slope, which changes here: what is read is that of the row onwards
-            if let (true, Instance::V2(instance, _)) = (sloped, &mut *instance) {
+            if let (true, Instance::V2(instance, _)) = (is_sloped, &mut *instance) {
                 instance.set_real_input_derivatives(&self.inputs, &orders, &slopes)?;
             }
             let mut at = vec![0.0; self.reads.len()];
             instance.get_real(&self.reads, &mut at)?;
             self.keep(&at, &mut read)?;
-            if let Some(next) = record.time.get(row + 1) {
-                let (t, h) = (record.time[row], next - record.time[row]);
-                match sloped {
-                    true => instance.do_step_along(t, h, &self.inputs, &values, &slopes),
-                    false => instance.do_step(t, h),
-                }
-                .with_context(|| format!("the run stopped at t = {t} s"))?;
+            let Some(next) = record.time.get(row + 1) else { continue };
+            let holds_lines = !is_sloped && slopes.iter().any(|slope| *slope != 0.0);
+            let parts = self.substeps * if holds_lines { HELD_STEPS } else { 1 };
+            let along = |by: f64| -> Vec<f64> {
+                values.iter().zip(&slopes).map(|(value, slope)| value + slope * by).collect()
+            };
+            let part = (next - record.time[row]) / parts as f64;
+            for k in 0..parts {
+                let by = part * k as f64;
+                let t = record.time[row] + by;
+                let h = if k + 1 == parts { next - t } else { part };
+                let done = if is_sloped {
+                    let values = along(by);
+                    if k > 0 {
+                        instance.set_real(&self.inputs, &values)?;
+                    }
+                    instance.do_step_along(t, h, &self.inputs, &values, &slopes)
+                } else {
+                    if holds_lines {
+                        instance.set_real(&self.inputs, &along(by + 0.5 * h))?;
+                    }
+                    instance.do_step(t, h)
+                };
+                done.with_context(|| format!("the run stopped at t = {t} s"))?;
             }
         }
         self.late(record, read)

@@ -54,6 +54,7 @@ fn question(free: &[&str]) -> Question {
         biases: vec!["omega=0.01".parse().unwrap()],
         triads: Vec::new(),
         drift: false,
+        tolerance: None,
         solver: Solver::Own,
         starts: 2,
     }

@@ -10,5 +10,6 @@ mod draw;
 mod methods;
 mod other_bench;
 mod sensors;
+mod solver_noise;
 mod twin;
 mod twins;

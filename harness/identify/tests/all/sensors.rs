@@ -68,6 +68,7 @@ fn comes_back(sensor: &str, column: &str, noise: f64) {
         biases: vec![format!("{column}={}", 10.0 * noise).parse().unwrap()],
         triads: Vec::new(),
         drift: false,
+        tolerance: None,
         solver: Solver::Own,
         starts: 2,
     };
