@@ -1,6 +1,6 @@
 /* A C host that traps floating-point exceptions and gives an FMU what its description allows: every
- * parameter and input at its smallest, its start and its largest value, one alone and random pairs, in
- * both interfaces. Each run initialises, reads everything, steps and differentiates, in a process of its
+ * parameter and input at its smallest, its start and its largest value, one alone, and random pairs of any allowed values,
+ * in both interfaces. Each run initialises, reads everything, steps and differentiates, in a process of its
  * own. A value that the FMU refuses is no fault; a trap is, and so is a number that is none. What no
  * description allows, NaN and infinity, has to be refused.
  *
@@ -243,6 +243,24 @@ static int below(int n)
     return (int)((state * 0x2545F4914F6CDD1DULL >> 33) % (uint64_t)n);
 }
 
+/* An allowed value of a variable: an end or the start of its range, what is nearest to 0, or any, of reals of any magnitude
+ * from 1e-12 on. */
+static double any_value(const struct variable *v)
+{
+    const double low = v->value[0], high = v->value[2];
+    const int which = below(5);
+    double x = 0;
+    if (which < 3)
+        return v->value[which];
+    if (which == 4 && v->type == 'R') {
+        const double most = fmax(fabs(low), fabs(high));
+        x = exp(log(1e-12) + (log(most) - log(1e-12)) * below(1 << 20) / (1 << 20));
+        x = below(2) ? x : -x;
+    } else if (which == 4)
+        x = low + below((int)fmin(high - low + 1, 1e6));
+    return fmin(fmax(x, low), high);
+}
+
 static void read_file(const char *path)
 {
     char line[300];
@@ -317,7 +335,7 @@ int main(int argc, char **argv)
         struct trial trials[2];
         for (int i = 0; i < 2; i++) {
             trials[i].variable = settable[below(n)];
-            trials[i].value = trials[i].variable->value[below(3)];
+            trials[i].value = any_value(trials[i].variable);
         }
         run(allowed, below(scenes), trials, 2);
     }

@@ -149,8 +149,8 @@ pub struct CraftMotion {
 
 impl CraftMotion {
     pub fn new(p: &Parameters, state: State) -> CraftMotion {
-        let tanks = p.tank.map(|tank| tank.resolve());
-        let tanks = &tanks[..p.tanks];
+        // Only these: the numbers of unused tanks can be anything within their ranges.
+        let tanks: Vec<Tank> = p.tank[..p.tanks].iter().map(Tank::resolve).collect();
         let liquids: Vec<Rigid> = tanks.iter().map(Tank::rigid).collect();
         let rigid = liquids.iter().fold(p.craft.rigid(), |sum, tank| sum.and(tank));
         let bobs: Vec<Bob> = tanks
@@ -201,7 +201,7 @@ impl CraftMotion {
             bobs,
             lumps: match p.mount {
                 Mount::Free => {
-                    (0..).zip(tanks).filter_map(|(i, tank)| Lump::new(tank, i)).collect()
+                    (0..).zip(&tanks).filter_map(|(i, tank)| Lump::new(tank, i)).collect()
                 }
                 Mount::Pivot => Vec::new(),
             },

@@ -167,8 +167,10 @@ impl<T: Number> MassProperties<T> {
     /// From O; O for nothing at all.
     pub fn center(&self) -> Vec3<T> {
         let is_something = self.mass.value() > 0.0;
-        let share = if is_something { self.mass.recip() } else { T::constant(0.0) };
-        scale(share, self.moment)
+        // The compiler would divide before it looks whether there is a mass, and hosts can trap divisions by 0.
+        let divisor = core::hint::black_box(if is_something { self.mass.value() } else { 1.0 });
+        let share = T::of(divisor, self.mass.result()).recip();
+        if is_something { scale(share, self.moment) } else { constant([0.0; 3]) }
     }
 
     /// About the centre of mass.

@@ -258,7 +258,9 @@ impl Tank {
         for n in 0..modes {
             if self.frequency[n] > 0.0 {
                 let w = core::f64::consts::TAU * self.frequency[n];
-                tank.length[n] = self.g_ref / (w * w - self.k[n] / tank.mass[n]);
+                // Bounds below what is allowed: other values give lengths that are refused, without a division by 0.
+                let squared = w * w - self.k[n] / tank.mass[n].max(LIGHTEST);
+                tank.length[n] = self.g_ref / squared.max(1e-30);
             }
         }
         tank
@@ -536,9 +538,9 @@ const HEAVIEST: f64 = 1e12;
 /// No length, speed or acceleration is larger.
 const FARTHEST: f64 = 1e9;
 /// Shorter pendulums are too stiff, m.
-const SHORTEST: f64 = 1e-6;
+pub(crate) const SHORTEST: f64 = 1e-6;
 /// Lighter bobs have no effect, kg.
-const LIGHTEST: f64 = 1e-9;
+pub(crate) const LIGHTEST: f64 = 1e-9;
 
 /// What a principal moment may exceed the sum of the others by: a plate's, rounded to four digits.
 const PLATE: f64 = 1.0 + 1e-3;
@@ -689,6 +691,7 @@ impl Tank {
     }
 
     fn find_resolved_problems(&self, name: &str, problems: &mut Problems) {
+        let before_all = problems.0.len();
         problems.vector(&format!("{name}.position"), &self.position, "m");
         problems.direction(&format!("{name}.q"), &self.q);
         // Across their planes the bobs of planar modes are rigid liquid, too: what they have may be more than all.
@@ -750,6 +753,9 @@ impl Tank {
             }
             problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
         }
+        if problems.0.len() == before_all {
+            self.find_ball_surface_problems(name, problems);
+        }
     }
 
     /// What is alike all around the axis does not go with what is not.
@@ -791,6 +797,23 @@ impl Tank {
             "m/s",
         );
         problems.number(&format!("{name}.ball.drag"), ball.drag, 0.0, 1e3, "1/s");
+    }
+
+    /// What is wrong with the surface that the lump's centre reaches, of a tank in which nothing else is.
+    fn find_ball_surface_problems(&self, name: &str, problems: &mut Problems) {
+        let ball = &self.ball;
+        if ball.travel <= 0.0 {
+            return;
+        }
+        let mass = self.whole_mass();
+        if mass <= 0.0 {
+            problems.0.push(format!(
+                "{name}.ball.travel with {name}.m_0 = {:?} kg, which leaves {mass:?} kg of liquid with the bobs of all modes \
+                 (allowed: more than 0)",
+                self.m_0
+            ));
+            return;
+        }
         let Some(surface) = self.ball_surface() else {
             let modes = self.modes;
             problems.0.push(format!(

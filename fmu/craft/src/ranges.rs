@@ -34,7 +34,7 @@ impl Bounds {
         Bounds {
             modes: tank.modes,
             radius: tank.wave[0] * (XI[0] * XI[0] - 1.0) / 2.0,
-            lowest: core::array::from_fn(|n| tank.lowest(n)),
+            lowest: core::array::from_fn(|n| if n < tank.modes { tank.lowest(n) } else { 0.0 }),
         }
     }
 

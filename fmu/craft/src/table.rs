@@ -14,6 +14,7 @@
 use formulas::interpolation::{derivatives, quintic};
 use taylor::number::Number;
 
+use crate::parameters::{LIGHTEST, SHORTEST};
 use crate::sizes::{MODES, POINTS};
 
 /// Modes and rigid liquid at some masses of the liquid.
@@ -54,14 +55,15 @@ impl FillTable {
         let curve = |y: [f64; POINTS]| Curve::new(self.masses(), y);
         let of_mode = |n: usize| {
             let (mass, l, h) = (&self.mass[n], &self.length[n], &self.hinge[n]);
-            // of the points and modes in use alone: the others' numbers may be anything
+            // Only of the points and modes in use: the others' numbers can be anything within their ranges. The compiler may
+            // divide for all points before it selects, so divisors have a bound that no used number is below.
             let used = |f: &dyn Fn(usize) -> f64| {
                 core::array::from_fn(|i| if i < self.points && n < modes { f(i) } else { 0.0 })
             };
             ModeCurves {
-                stiffness: curve(used(&|i| 1.0 / l[i])),
+                stiffness: curve(used(&|i| 1.0 / l[i].max(SHORTEST))),
                 bob: curve(used(&|i| h[i] - l[i])),
-                share: curve(used(&|i| mass[i] / self.liquid[i])),
+                share: curve(used(&|i| mass[i] / self.liquid[i].max(LIGHTEST))),
             }
         };
         FillCurves {

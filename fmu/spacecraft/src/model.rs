@@ -123,7 +123,7 @@ impl Parameters {
             p.mount = *mount;
         }
         p.tanks = usize::try_from(self.tanks).unwrap_or(0);
-        for (i, tank) in p.tank.iter_mut().enumerate() {
+        for (i, tank) in p.tank.iter_mut().enumerate().take(p.tanks) {
             let (law, kind) = (tank.damping_law, self.damping_law_kind[i]);
             let given = usize::try_from(kind - 1).ok().and_then(|i| DampingLaw::ALL.get(i));
             if let Some(given) = given {

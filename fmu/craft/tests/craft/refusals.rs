@@ -1,6 +1,6 @@
 //! Every number has its range: at its ends it is taken, beyond it is refused by name.
 
-use craft::{Inertia, Mount, Parameters, Tank, TankParameters};
+use craft::{Inertia, Inputs, MODES, Mount, POINTS, Parameters, Spacecraft, Tank, TankParameters};
 
 /// A parameter: its name in messages, its place, its range.
 type Number = (&'static str, fn(&mut Parameters) -> &mut f64, f64, f64);
@@ -255,4 +255,32 @@ fn a_host_without_inertia_about_an_axis_is_refused() {
     assert_eq!(p.problems(), ["host.J is singular: the inertia about every axis must be above 0"]);
     p.max_steps = 0;
     assert_eq!(p.problems().len(), 2);
+}
+
+/// Numbers that would be refused, or divided by, in a tank in use.
+#[test]
+fn unused_tanks_points_and_modes_are_never_evaluated() {
+    let step = |p: &Parameters| {
+        let mut craft = Spacecraft::new(p, &Inputs::default(), 0.0, 1e-8).unwrap();
+        craft.step(&Inputs::default(), 0.5).unwrap();
+        craft.state().to_words()
+    };
+    let mut p = Parameters::default();
+    p.init.omega = [0.1, 0.0, 0.2];
+    let as_it_was = step(&p);
+    let unused = &mut p.tank[1];
+    unused.fill.points = 6;
+    unused.fill.length[0] = [0.0; POINTS];
+    unused.fill.liquid[2] = 0.0;
+    (unused.modes, unused.diameter, unused.mass) = (9, 1.0, [0.0; MODES]);
+    assert_eq!(step(&p), as_it_was);
+    p.tank[1].fill.points = 1;
+    assert_eq!(step(&p), as_it_was);
+
+    (p.tank[0].fill.points, p.tank[0].liquid_0) = (5, 200.0);
+    let as_it_was = step(&p);
+    let table = &mut p.tank[0].fill;
+    (table.liquid[5], table.length[0][5], table.mass[0][6]) = (0.0, 0.0, -1.0);
+    (table.length[1], table.mass[1]) = ([0.0; POINTS], [0.0; POINTS]);
+    assert_eq!(step(&p), as_it_was);
 }
