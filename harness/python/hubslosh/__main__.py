@@ -31,6 +31,8 @@ def main() -> None:
     args = parser.parse_args()
     try:
         ending_of(args.out)
+        if args.out.exists() and args.input.exists() and args.out.samefile(args.input):
+            raise FmuError(f"{args.out} is not written: it is the input {args.input}")
         torque = read_table(args.input, ["time", TORQUE])
         answer = drive(
             args.fmu, torque["time"], torque[TORQUE], dict(args.settings),

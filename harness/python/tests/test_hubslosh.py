@@ -96,6 +96,19 @@ def test_a_file_of_parameters_is_as_good_as_a_mapping(fmu: Path, tmp_path: Path)
         read_parameters(toml)
 
 
+def test_the_program_never_replaces_its_input(fmu: Path, tmp_path: Path) -> None:
+    """Under another name of the file either."""
+    torque, link = tmp_path / "torque.csv", tmp_path / "link.csv"
+    torque.write_text("time,tau_cmd\n0,0\n1,0\n")
+    link.symlink_to(torque)
+    command = [sys.executable, "-m", "hubslosh", "--fmu", str(fmu), "--input", str(torque)]
+    done = subprocess.run(
+        [*command, "--out", str(link)], capture_output=True, text=True, check=False, cwd=PACKAGE
+    )
+    assert done.returncode == 1 and "it is the input" in done.stderr
+    assert torque.read_text() == "time,tau_cmd\n0,0\n1,0\n"
+
+
 def test_times_of_a_table_are_in_seconds(tmp_path: Path) -> None:
     """Dates and durations by their type; integers of a Parquet file have no unit."""
     path = tmp_path / "a.parquet"
