@@ -261,10 +261,12 @@ const ROUNDS: usize = 20;
 /// Part of the limit that [`within_angle`] is content with.
 const NEAR: f64 = 0.97;
 
-/// Geometric mean of the relative standard deviations: what one plan tells against another.
+/// Geometric mean of the relative standard deviations: what one plan tells against another. An unknown that is expected to be 0,
+/// a delay or a bias, has no relative deviation and does not count.
 pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
-    let sum: f64 = bounds.iter().map(|(_, value, std)| (std / value.abs().max(1e-12)).ln()).sum();
-    (sum / bounds.len() as f64).exp()
+    let relative = bounds.iter().filter(|(_, value, _)| *value != 0.0);
+    let logarithms: Vec<f64> = relative.map(|(_, value, std)| (std / value.abs()).ln()).collect();
+    analysis::statistics::mean(&logarithms).exp()
 }
 
 /// Standard deviation that no unbiased estimate can beat, for each unknown at its start, from a torque
@@ -322,6 +324,15 @@ mod tests {
             .sum();
         // 13 % of the lines; the antiresonance and the resonance are there
         assert!(near > 0.3, "{near}");
+    }
+
+    #[test]
+    fn an_unknown_that_is_expected_to_be_zero_does_not_count_in_the_mean_deviation() {
+        let bound = |value: f64, std: f64| ("name".to_string(), value, std);
+        let known = [bound(2.0, 0.02), bound(-1.0, 0.04)];
+        let with_zero = [&known[..], &[bound(0.0, 1e-4)]].concat();
+        // the geometric mean of 1 % and 4 %
+        assert!((merit(&known) - 0.02).abs() < 1e-15 && merit(&with_zero) == merit(&known));
     }
 
     #[test]

@@ -67,6 +67,17 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
     Ok(instance)
 }
 
+/// Settings in which a damping ratio counts: `slosh.zeta` turns `slosh.zeta_from_correlation` off, unless the settings say what
+/// that is.
+pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)> {
+    const CORRELATION: &str = "slosh.zeta_from_correlation";
+    let has = |name: &str| settings.iter().any(|(n, _)| n == name);
+    if has("slosh.zeta") && !has(CORRELATION) {
+        settings.push((CORRELATION.into(), "false".into()));
+    }
+    settings
+}
+
 impl Bench {
     /// Mass of the liquid in an upright cylinder, kg.
     pub fn liquid(self, d: f64, h: f64) -> f64 {

@@ -103,7 +103,10 @@ const COLUMNS: usize = 20;
 
 impl DesignArgs {
     /// Runs the command.
-    pub fn run(self) -> Result<()> {
+    pub fn run(mut self) -> Result<()> {
+        if !self.any.is_asked() {
+            self.settings = nominal::with_damping(self.settings);
+        }
         if self.any.is_asked() {
             let told = Told {
                 data: &self.data,
@@ -357,7 +360,11 @@ impl Plan {
         let head = if self.sweep.is_some() { "sweep %" } else { "" };
         println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std", "std %");
         for (k, (name, value, deviation)) in self.bounds.iter().enumerate() {
-            let percent = |std: f64| format!("{:.4}", 100.0 * std / value.abs());
+            // nothing is a part of what is expected to be 0
+            let percent = |std: f64| match *value {
+                0.0 => "-".to_string(),
+                value => format!("{:.4}", 100.0 * std / value.abs()),
+            };
             let other = self.sweep.as_ref().map_or(String::new(), |s| percent(s.bounds[k].2));
             println!(
                 "{name:20} {value:>12.6} {deviation:>12.2e} {:>9} {other:>9}",

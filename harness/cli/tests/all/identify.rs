@@ -158,6 +158,27 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
     assert!(said.contains("Even nonlinear distortion is not seen"), "{said}");
 }
 
+#[test]
+fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = ["design", "--profile", "lin-sweep:duration=40,f0=2,f1=2.8", "--sensor-errors"];
+    let with = |more: &[&str]| hubslosh(folder.path(), &[&asked[..], more].concat()).unwrap();
+    let json = with(&["--set", "slosh.zeta=0.01", "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(found["parameters"]["slosh.zeta"]["value"], 0.01, "{json}");
+    // a correlation that is asked for is kept
+    let both = ["--set", "slosh.zeta=0.01", "--set", "slosh.zeta_from_correlation=true", "--json"];
+    let json = with(&both);
+    let found: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_ne!(found["parameters"]["slosh.zeta"]["value"], 0.01, "{json}");
+    let said = with(&[]);
+    for name in ["friction.asymmetry", "delay", "gyro_bias[1]"] {
+        let line = said.lines().find(|line| line.starts_with(name)).unwrap();
+        assert!(line.trim_end().ends_with('-'), "{line}");
+    }
+    assert!(!said.contains("inf"), "{said}");
+}
+
 /// Each torque is given to the FMU, and its gyro's samples are taken apart into rate and noise.
 #[test]
 fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
