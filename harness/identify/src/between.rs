@@ -272,7 +272,22 @@ pub fn evidence(
     )
 }
 
-/// A delay (s, with its standard deviation) that looks like another behaviour of a torque with rows every `step` seconds, in words.
+/// Whether it is found if the torque is half a row late: no other behaviour explains the recordings as well with a delay
+/// (`delay` is the fitted one, s) that differs by more than a quarter of a row.
+pub fn is_found(
+    (cost, delay): (f64, f64),
+    step: f64,
+    acausal: bool,
+    others: &[Alternative],
+) -> bool {
+    let differs = |other: &Alternative| {
+        other.delay.is_none_or(|(other, _)| (other - delay).abs() > 0.25 * step)
+    };
+    !near(cost, step, acausal, others).any(differs) && others.len() + 1 == Intersample::ALL.len()
+}
+
+/// A delay (s, with its standard deviation) that looks like another behaviour of a torque with rows every `step` seconds, in
+/// words. It is a finding only where the behaviour was not found ([`is_found`]).
 pub fn half_a_row(delay: (f64, f64), step: f64) -> Option<String> {
     let rows = delay.0.abs() / step;
     let known = delay.1 < NEAR_HALF * step;

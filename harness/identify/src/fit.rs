@@ -239,6 +239,9 @@ impl<'a> Problem<'a> {
                 channels.push(Channel { recording: index, signal: Signal::Angle, noise });
             }
         }
+        let description = fmu.description();
+        let unknowns =
+            unknowns.into_iter().map(|unknown| unknown.within_range_of(description)).collect();
         let differences = Differences::Forward;
         let bench = Nominal::of(fmu, &setup.settings, &[]).ok().map(|nominal| nominal.bench);
         let driven = Arc::default();
@@ -253,12 +256,18 @@ impl<'a> Problem<'a> {
 
     /// Values of the unknowns for variables x.
     pub fn values(&self, x: &[f64]) -> Vec<f64> {
-        self.unknowns.iter().zip(x).map(|(unknown, &x)| unknown.scale.value(x)).collect()
+        self.unknowns.iter().zip(x).map(|(unknown, &x)| unknown.value(x)).collect()
+    }
+
+    /// Variables within the ranges that the FMU allows.
+    pub fn inside(&self, x: &[f64]) -> Vec<f64> {
+        self.unknowns.iter().zip(x).map(|(unknown, &x)| unknown.inside(x)).collect()
     }
 
     /// Variables of the starts.
     pub fn start(&self) -> Vec<f64> {
-        self.unknowns.iter().map(|unknown| unknown.scale.variable(unknown.start)).collect()
+        let variable = |unknown: &Unknown| unknown.inside(unknown.scale.variable(unknown.start));
+        self.unknowns.iter().map(variable).collect()
     }
 
     /// Index of a parameter of the FMU among the unknowns.
@@ -284,9 +293,9 @@ impl<'a> Problem<'a> {
             .iter()
             .zip(x)
             .filter_map(|(unknown, &x)| match &unknown.quantity {
-                Quantity::Parameter(name) => Some((name.as_str(), unknown.scale.value(x))),
+                Quantity::Parameter(name) => Some((name.as_str(), unknown.value(x))),
                 Quantity::Initial(of, name) if *of == recording => {
-                    Some((name.as_str(), unknown.scale.value(x)))
+                    Some((name.as_str(), unknown.value(x)))
                 }
                 _ => None,
             })
@@ -775,7 +784,7 @@ impl<'a> Problem<'a> {
                         all
                     };
                     let mut way = vec![(x.clone(), at_free(part * &step))];
-                    let mut trial = self.moved(&x, &way[0].1, fastest);
+                    let mut trial = self.inside(&self.moved(&x, &way[0].1, fastest));
                     // the step and, where it makes it worse, the same along the bent valley
                     for is_straight in [true, false] {
                         let Ok(there) = self.answer(&trial) else { break };
@@ -796,7 +805,7 @@ impl<'a> Problem<'a> {
                         let bend = &new - &e - part * (&jacobian * &step);
                         let back = -(&covariance.x * jacobian.tr_mul(&bend));
                         way.push((trial, at_free(back)));
-                        trial = self.moved(&way[1].0, &way[1].1, fastest);
+                        trial = self.inside(&self.moved(&way[1].0, &way[1].1, fastest));
                     }
                     if !taken {
                         part *= 0.3;
@@ -817,7 +826,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Where a search has ended off the minimum: the minimum with those unknowns held that have it at a kink, which no Newton step finds. These are a
-    /// friction that the step would lead below zero, and an initial rate of the hub that is zero within two standard deviations: dry friction
+    /// friction that the step would lead below zero, an unknown that it would lead out of the range that the FMU allows, and an initial rate of the hub that is zero within two standard deviations: dry friction
     /// stops a slow hub within a row, whatever the sign of its rate. Sensitivities and covariance are those of all unknowns.
     pub fn polish_at_kink(&self, found: Polished, rounds: usize) -> Result<Polished> {
         if found.decrement < MINIMUM {
@@ -828,6 +837,10 @@ impl<'a> Problem<'a> {
         let is_held = |&j: &usize| {
             let Unknown { quantity, scale, .. } = &self.unknowns[j];
             let (x, deviation) = (found.x[j], found.covariance.x[(j, j)].sqrt());
+            let [low, high] = self.unknowns[j].ends();
+            if x <= low && step[j] < 0.0 || x >= high && step[j] > 0.0 {
+                return true;
+            }
             match quantity {
                 Quantity::Initial(_, name) => name == "init.omega" && x.abs() < 2.0 * deviation,
                 _ => {
@@ -880,6 +893,7 @@ impl<'a> Problem<'a> {
         let steps = RefCell::new(vec![1e-5; x.len()]);
         let last = RefCell::new(None);
         let residuals = |x: &[f64]| {
+            let x = &self.inside(x)[..];
             let answer = first.take().map_or_else(|| self.answer(x), Ok);
             let answer = answer.unwrap_or_else(|_| {
                 // a parameter the FMU refuses: worse than anything, so that the step is taken back
@@ -892,16 +906,20 @@ impl<'a> Problem<'a> {
         };
         let all: Vec<usize> = (0..x.len()).collect();
         let derivatives = |x: &[f64]| {
-            let motion = motion.borrow();
-            let found = self.jacobian(x, &all, motion.as_ref()?, &steps.borrow()).ok()?;
+            let (motion, inside) = (motion.borrow(), self.inside(x));
+            let mut found = self.jacobian(&inside, &all, motion.as_ref()?, &steps.borrow()).ok()?;
             *steps.borrow_mut() = Problem::steps(&found);
             *last.borrow_mut() = Some(found.clone());
+            // beyond the range that the FMU allows an unknown has no influence
+            for j in all.iter().copied().filter(|&j| inside[j] != x[j]) {
+                found.column_mut(j).fill(0.0);
+            }
             Some(found)
         };
         let method = least_squares::tolerances(tolerance, 1e-8).with_gtol(0.0).with_patience(4);
         let found = least_squares::minimise_by(&method, &residuals, &derivatives, x);
         let jacobian = last.borrow_mut().take();
-        Ok(Estimate { x: found.x, reason: found.reason, jacobian })
+        Ok(Estimate { x: self.inside(&found.x), reason: found.reason, jacobian })
     }
 
     /// The same over windows of the recordings that grow, each from the estimate of the one before.

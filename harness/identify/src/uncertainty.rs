@@ -6,9 +6,12 @@
 //! J_kᵀ e_k over windows of [`WINDOW`], then shows at least how much the estimate would move from
 //! one part of the recording to the next.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use crate::estimate::{Estimated, prose};
 use crate::unknown::Unknown;
 
 /// Length of the windows of the sandwich, s; two times the slosh's decay.
@@ -123,6 +126,19 @@ pub struct Sources<'a> {
 }
 
 impl Sources<'_> {
+    /// The covariance that noise makes, with no variance less than in the sandwich.
+    pub fn least(noise: &DMatrix<f64>, sandwich: &DMatrix<f64>) -> DMatrix<f64> {
+        Sources {
+            noise,
+            friction_curves: None,
+            models: None,
+            between_rows: None,
+            tolerances: None,
+            residual: Some(sandwich),
+        }
+        .total()
+    }
+
     /// All of them together.
     pub fn total(&self) -> DMatrix<f64> {
         let mut all = self.noise.clone();
@@ -150,14 +166,14 @@ impl Sources<'_> {
     }
 }
 
-/// Two unknowns of which only the sum is known.
+/// Two unknowns of which only a sum or a product is known.
 #[derive(Clone, Debug, Serialize)]
 pub struct Combination {
-    /// `a + b`.
+    /// `a + b`, or `a (1 + b)`.
     pub name: String,
     /// The two.
     pub of: [String; 2],
-    /// Their sum.
+    /// Value of the combination.
     pub value: f64,
     /// Its standard deviation.
     pub std: f64,
@@ -165,6 +181,51 @@ pub struct Combination {
     pub unit: String,
     /// Their correlation.
     pub correlation: f64,
+}
+
+impl Combination {
+    /// In words.
+    pub fn words(&self) -> String {
+        format!(
+            "{} and {} cannot be told apart (correlation {:.4}); known is {} = {:.6} ± {:.6} {}.",
+            self.of[0],
+            self.of[1],
+            self.correlation,
+            self.name,
+            self.value,
+            self.std,
+            prose(&self.unit)
+        )
+    }
+}
+
+/// What is known of dry friction from a hub that turned one `way` alone (1: counter-clockwise, −1: clockwise), estimated with
+/// an asymmetry of 0: the friction of that direction, c (1 ± asymmetry) and d (1 ± asymmetry). The asymmetry is anywhere
+/// within its `bounds`, and c and d are anything from half of that friction upwards.
+pub fn one_way(
+    parameters: &mut BTreeMap<String, Estimated>,
+    way: f64,
+    bounds: [f64; 2],
+) -> Vec<Combination> {
+    const ASYMMETRY: &str = "friction.asymmetry";
+    let mut combinations = Vec::new();
+    for name in ["friction.c", "friction.d"] {
+        let Some(p) = parameters.get_mut(name) else { continue };
+        combinations.push(Combination {
+            name: format!("{name} (1 {} {ASYMMETRY})", if way > 0.0 { "+" } else { "-" }),
+            of: [name, ASYMMETRY].map(String::from),
+            value: p.value,
+            std: p.std,
+            unit: p.unit.clone(),
+            correlation: -way,
+        });
+        p.interval = [0.5 * p.interval[0], f64::INFINITY];
+        p.determined = false;
+    }
+    let unknown = Estimated::normal(0.0, (bounds[1] - bounds[0]) / 12f64.sqrt(), "1");
+    let asymmetry = Estimated { interval: bounds, determined: false, ..unknown };
+    parameters.insert(ASYMMETRY.into(), asymmetry);
+    combinations
 }
 
 /// Sums of unknowns that stand in for unknowns which are not known by themselves. `covariance` is

@@ -1,5 +1,6 @@
 //! What is estimated: parameters of the FMU, and what is between it and the recording.
 
+use host::description::{ModelDescription, Variable};
 use serde::Serialize;
 
 /// One unknown number.
@@ -17,7 +18,21 @@ pub struct Unknown {
     pub vague: bool,
     /// How it is made a variable without bounds.
     pub scale: Scale,
+    /// Least and largest value that the FMU allows.
+    pub range: [f64; 2],
 }
+
+/// Least and largest value that the FMU's description declares for a variable; infinite where it declares none.
+pub fn range(variable: &Variable) -> [f64; 2] {
+    let attributes = variable.attributes();
+    let number = |text: &Option<String>, otherwise: f64| {
+        text.as_ref().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+    };
+    [number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY)]
+}
+
+/// Distance (in x) that a search keeps from the ends of the range, so that differences of x stay within the range.
+const MARGIN: f64 = 0.06;
 
 /// Kinds of unknowns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -108,12 +123,50 @@ impl Scale {
 impl Unknown {
     /// An unknown of which nothing is known beforehand.
     fn new(quantity: Quantity, unit: &str, start: f64, scale: Scale) -> Self {
-        Unknown { quantity, unit: unit.into(), start, prior: None, vague: false, scale }
+        let range = [f64::NEG_INFINITY, f64::INFINITY];
+        Unknown { quantity, unit: unit.into(), start, prior: None, vague: false, scale, range }
     }
 
     /// A positive parameter of the FMU.
     pub fn positive(name: &str, unit: &str, start: f64) -> Self {
         Unknown::new(Quantity::Parameter(name.into()), unit, start, Scale::Log)
+    }
+
+    /// The same with the range that the FMU declares for it.
+    pub fn within_range_of(self, description: &ModelDescription) -> Self {
+        let name = match &self.quantity {
+            Quantity::Parameter(name) | Quantity::Initial(_, name) => name,
+            _ => return self,
+        };
+        match description.variable(name) {
+            Ok(variable) => Unknown { range: range(variable), ..self },
+            Err(_) => self,
+        }
+    }
+
+    /// Value for x, within the range.
+    pub fn value(&self, x: f64) -> f64 {
+        // NaN where the scale itself does not reach an end
+        self.scale.value(x).max(self.range[0]).min(self.range[1])
+    }
+
+    /// The ends of x for a search: the range's, less a margin.
+    pub fn ends(&self) -> [f64; 2] {
+        let [low, high] = self.range.map(|end| self.scale.variable(end));
+        let or = |end: f64, open: f64| if end.is_nan() { open } else { end };
+        [or(low, f64::NEG_INFINITY) + MARGIN, or(high, f64::INFINITY) - MARGIN]
+    }
+
+    /// x within [`Unknown::ends`].
+    pub fn inside(&self, x: f64) -> f64 {
+        let [low, high] = self.ends();
+        x.max(low).min(high)
+    }
+
+    /// Whether x is at one of these ends: only the FMU's range keeps it from going on.
+    pub fn is_at_end(&self, x: f64) -> bool {
+        let [low, high] = self.ends();
+        x <= low || x >= high
     }
 
     /// Whether its value must be positive.
@@ -181,6 +234,22 @@ impl Unknown {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_search_stays_within_the_range_that_the_fmu_declares() {
+        let zeta = Unknown { range: [0.0, 0.999], ..Unknown::positive("slosh.zeta", "1", 0.003) };
+        assert_eq!((zeta.value(1.0), zeta.is_at_end(zeta.inside(3.0))), (0.999, true));
+        let x = zeta.scale.variable(0.003);
+        assert!(zeta.inside(x) == x && !zeta.is_at_end(x));
+        // a step of a difference from the end is still within
+        assert!(zeta.scale.value(zeta.inside(3.0) + 0.05) < 0.999);
+        // ends that the scale does not reach
+        let angle = Unknown::initial(0, "init.slosh_angle", "rad", 0.1);
+        let angle = Unknown { range: [-1.5, 1.5], ..angle };
+        assert!(angle.inside(9.0) == 9.0 && angle.inside(-9.0) == -9.0);
+        let bias = Unknown::gyro_bias(0);
+        assert!(bias.inside(1e9) == 1e9 && !bias.is_at_end(-1e9));
+    }
 
     #[test]
     fn variables_and_values_go_there_and_back() {

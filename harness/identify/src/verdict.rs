@@ -92,18 +92,7 @@ pub fn words(
                 .into(),
         );
     }
-    for c in combinations {
-        lines.push(format!(
-            "{} and {} cannot be told apart (correlation {:.4}); known is {} = {:.6} ± {:.6} {}.",
-            c.of[0],
-            c.of[1],
-            c.correlation,
-            c.name,
-            c.value,
-            c.std,
-            prose(&c.unit)
-        ));
-    }
+    lines.extend(combinations.iter().map(Combination::words));
     for (name, p) in parameters {
         if !p.determined {
             let [low, high] = p.interval;

@@ -271,8 +271,16 @@ fn finish(
         polished = problem.polish_on(&polished, ROUNDS)?;
     }
     polished = problem.polish_at_kink(polished, ROUNDS)?;
+    let way = one_way(&mut problem, &mut polished)?;
+    let of_models = match &way {
+        Some(OneWay { place, .. }) => {
+            of_models.map(|gained| gained.remove_row(*place).remove_column(*place))
+        }
+        None => of_models,
+    };
     say("the last steps", &problem);
-    let between_rows = torque_between_rows(&mut problem, &mut polished, others.as_ref(), options)?;
+    let others = others.as_ref().filter(|_| way.is_none());
+    let between_rows = torque_between_rows(&mut problem, &mut polished, others, options)?;
     say("other torques between rows", &problem);
     fit.fit_pct = fit_pct(&problem, &polished.answer);
     fit.tests = tests(&problem, &polished.answer);
@@ -282,7 +290,7 @@ fn finish(
     fit.newton_decrement = polished.decrement;
     x.clone_from(&polished.x);
     let e = problem.stacked(&polished.answer, &x);
-    let changes = budget::slopes(&problem, (&x, &polished.answer), &options.tolerances)?;
+    let changes = budget::slopes(&problem, &polished, &options.tolerances)?;
     say("tolerances", &problem);
     let findings = Findings {
         torque: between_rows.words,
@@ -292,6 +300,7 @@ fn finish(
             .iter()
             .cloned()
             .chain(acausal(&problem, &polished, options))
+            .chain(at_end(&problem, &polished.x))
             .collect(),
     };
     say("torques that may be missing", &problem);
@@ -378,6 +387,10 @@ fn finish(
         if let Some((_, ends)) = of_deep {
             interval = *ends;
         }
+        interval[0] = interval[0].max(unknown.range[0]);
+        if interval[1].is_finite() {
+            interval[1] = interval[1].min(unknown.range[1]);
+        }
         // of a skew interval that of the longer side
         let reach = interval.map(|end| (end - values[i]).abs() / 1.96);
         let reach = reach.into_iter().filter(|reach| reach.is_finite()).fold(0.0, f64::max);
@@ -397,7 +410,10 @@ fn finish(
             _ => measurement.insert(name, estimated),
         };
     }
-    let combinations = uncertainty::combinations(&problem.unknowns, &values, &of_values);
+    let mut combinations = uncertainty::combinations(&problem.unknowns, &values, &of_values);
+    if let Some(OneWay { way, range: bounds, .. }) = way {
+        combinations.extend(uncertainty::one_way(&mut parameters, way, bounds));
+    }
     let shares = shares(&problem, &tolerances, &full, &error_budget);
     let names = problem.unknowns.iter().map(|u| u.quantity.name()).collect();
     let mut verdict =
@@ -419,6 +435,63 @@ fn finish(
         residuals: residuals(&problem, &answer),
         ..Identified::new(details)
     })
+}
+
+/// Standard deviation of the friction's asymmetry beyond which the recordings do not show it.
+const ONE_WAY: f64 = 0.3;
+
+/// A hub that turned one way alone.
+struct OneWay {
+    /// 1 forwards, −1 backwards.
+    way: f64,
+    /// What the asymmetry may be.
+    range: [f64; 2],
+    /// Where it stood among the unknowns.
+    place: usize,
+}
+
+/// If the hub turns one way alone, its friction is c (1 ± asymmetry) and d (1 ± asymmetry), and nothing tells the asymmetry from c
+/// and d but what is vaguely known of these. The asymmetry is then no unknown: the minimum is sought with an asymmetry of 0.
+fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>> {
+    const NAME: &str = "friction.asymmetry";
+    let Some(place) = problem.index(NAME) else { return Ok(None) };
+    let dry = ["friction.c", "friction.d"].map(|name| problem.index(name));
+    if dry.iter().flatten().next().is_none() {
+        return Ok(None);
+    }
+    // what is vaguely known is no knowledge
+    let rows: usize = found.answer.residual.iter().map(Vec::len).sum();
+    let priors = problem.unknowns.iter().filter(|unknown| unknown.prior.is_some());
+    let mut jacobian = found.jacobian.clone();
+    for (k, _) in priors.enumerate().filter(|(_, unknown)| unknown.vague) {
+        jacobian.row_mut(rows + k).fill(0.0);
+    }
+    let unknown = &problem.unknowns[place];
+    let slope = unknown.scale.slope(found.x[place]).abs();
+    let std = Covariance::of(&jacobian).map(|c| c.x[(place, place)].sqrt() * slope);
+    if std.is_some_and(|std| std < ONE_WAY) || unknown.prior.is_some() {
+        return Ok(None);
+    }
+    let turned: f64 = found.answer.motion.iter().flat_map(|motion| &motion.rate).sum();
+    let way = if turned < 0.0 { -1.0 } else { 1.0 };
+    let range = unknown.range;
+    let factor = 1.0 + way * unknown.value(found.x[place]);
+    let mut x = found.x.clone();
+    for j in dry.into_iter().flatten() {
+        let Unknown { scale, .. } = problem.unknowns[j];
+        x[j] = scale.variable(scale.value(x[j]) * factor);
+        if let Some((mean, deviation)) =
+            problem.unknowns[j].prior.filter(|_| problem.unknowns[j].vague)
+        {
+            problem.unknowns[j].prior = Some((mean * factor, deviation * factor));
+        }
+    }
+    x.remove(place);
+    problem.unknowns.remove(place);
+    let known = found.jacobian.clone().remove_column(place);
+    let polished = problem.polish(&x, Some(&known), ROUNDS)?;
+    *found = problem.polish_at_kink(polished, ROUNDS)?;
+    Ok(Some(OneWay { way, range, place }))
 }
 
 /// That the fit leaves linear slosh, in words: the wave at the wall, 2 α R/(ξ² − 1), over the radius R of an upright cylinder.
@@ -515,7 +588,9 @@ fn torque_between_rows(
     }
     let evidence = between::evidence(problem, found, step, acausal, &others);
     let delay = between::delay(problem, &found.x, &found.covariance);
-    let half = delay.and_then(|delay| between::half_a_row(delay, step));
+    let half =
+        delay.filter(|(late, _)| !between::is_found((found.cost, *late), step, acausal, &others));
+    let half = half.and_then(|delay| between::half_a_row(delay, step));
     Ok(BetweenRows {
         words: std::iter::once(evidence).chain(half).collect(),
         gained: between::gained(found, step, acausal, &others),
@@ -534,6 +609,20 @@ fn acausal(problem: &Problem, found: &Polished, options: &Options) -> Option<Str
             1e3 * std
         )
     })
+}
+
+/// Unknowns that only the FMU's range keeps from going on, in words.
+fn at_end(problem: &Problem, x: &[f64]) -> Vec<String> {
+    let unknowns = problem.unknowns.iter().zip(x).filter(|(unknown, x)| unknown.is_at_end(**x));
+    let words = |(unknown, x): (&Unknown, &f64)| {
+        let [low, high] = unknown.range;
+        format!(
+            "{} = {:.4e} is at the end of the range that the FMU allows, {low} to {high}",
+            unknown.quantity.name(),
+            unknown.value(*x)
+        )
+    };
+    unknowns.map(words).collect()
 }
 
 fn residuals(problem: &Problem, answer: &Answer) -> Vec<Residual> {
