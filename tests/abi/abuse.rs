@@ -612,7 +612,35 @@ fn lives_traps_and_allowed_values_all_in_both_versions() {
     });
 }
 
-/// Steps of `rounding.c`, 20 ms each.
+/// A handle of HubSlosh given to all others' functions, and the rest of `handles.c`.
+#[cfg(target_os = "linux")]
+#[test]
+fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() {
+    if under_valgrind() {
+        return; // which reports that the mark of a freed instance is read
+    }
+    for fmi in VERSIONS {
+        let all: Vec<Unpacked> =
+            pack::MODELS.iter().map(|model| Unpacked::new(model, fmi)).collect();
+        for (i, fmu) in all.iter().enumerate() {
+            let copy = fmu.directory.path().join("copy.so");
+            std::fs::copy(&fmu.library, &copy).unwrap();
+            let others = all.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, o)| &o.library);
+            let output = fmu.description.variables.iter().find(|v| v.kind() == Type::Real).unwrap();
+            let said = run(
+                fmu.host("handles", &["tests/abi/handles.c"], &[])
+                    .arg(&fmu.library)
+                    .args([fmu.guid(), &output.reference.to_string()])
+                    .args(others)
+                    .arg(&copy),
+                "a handle that is not the function's own was not refused",
+            );
+            assert!(said.contains("is an error"), "{said}");
+        }
+    }
+}
+
+/// Of `rounding.c`, 20 ms each.
 const STEPS: usize = 250;
 
 /// Further settings of a host, by name, before a motion.

@@ -190,6 +190,20 @@ pub fn null(call: &Call, name: &str) -> Fault {
 /// Marks a live component, so that a wrong handle is an error and no crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
+/// The first word of a live component or saved state of this model, this version of FMI and this loaded copy of the
+/// library, at this address. Handles of other FMUs, of the same FMU by the other version's functions, and of a second copy
+/// of the library have other marks: the variable table stands at another address, the version has another digit. No
+/// address has the upper 16 bits of a mark.
+fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
+    let table = ptr::from_ref(M::table()).addr() as u64;
+    // Below the table's alignment, so that the two do not mix.
+    let version = V::PREFIX.bytes().last().unwrap_or_default() & 7;
+    kind ^ table ^ u64::from(version) ^ handle.addr() as u64
+}
+
+/// No object stands at a lower address on any platform that FMUs are built for.
+const LOWEST_ADDRESS: usize = 1024;
+
 /// What a component handle points to.
 #[repr(C)]
 pub struct Component<M: Model, V: Version> {
@@ -208,14 +222,17 @@ pub fn new_component<M: Model, V: Version>(
     log: Log,
     host: V::Host<M>,
 ) -> *mut c_void {
-    Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log, host })).cast()
+    let mut component = Box::new(Component { mark: 0, instance, log, host });
+    component.mark = mark::<M, V>(COMPONENT, ptr::from_ref(&*component).cast());
+    Box::into_raw(component).cast()
 }
 
-/// Whether a handle is of a live `T`, whose first field is a mark.
-unsafe fn is_live<T>(handle: *mut c_void, mark: u64) -> bool {
-    !handle.is_null()
+/// Whether a handle is of a live `T` of this kind, whose first field is a mark. Of a handle that cannot be an address
+/// nothing is read; of others, one word is.
+unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bool {
+    handle.addr() >= LOWEST_ADDRESS
         && handle.cast::<T>().is_aligned()
-        && unsafe { ptr::read(handle.cast::<u64>()) } == mark
+        && unsafe { ptr::read(handle.cast::<u64>()) } == mark::<M, V>(kind, handle)
 }
 
 /// Frees what a live handle points to.
@@ -231,7 +248,7 @@ unsafe fn free<T>(handle: *mut c_void) {
 /// Frees a component; what is none is left alone.
 pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
     unsafe {
-        if is_live::<Component<M, V>>(handle, COMPONENT) {
+        if is_live::<Component<M, V>, M, V>(handle, COMPONENT) {
             let _ = catch_unwind(|| free::<Component<M, V>>(handle));
         }
     }
@@ -245,7 +262,7 @@ pub unsafe fn on<M: Model, V: Version>(
     call: &'static Call,
     body: impl FnOnce(&mut Component<M, V>) -> Result<(), Fault>,
 ) -> Status {
-    if !unsafe { is_live::<Component<M, V>>(handle, COMPONENT) } {
+    if !unsafe { is_live::<Component<M, V>, M, V>(handle, COMPONENT) } {
         return ERROR;
     }
     let component = unsafe { &mut *handle.cast::<Component<M, V>>() };
@@ -314,7 +331,9 @@ struct SavedState<M: Model, V: Version> {
 
 /// A handle of a new saved state.
 pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void {
-    Box::into_raw(Box::new(SavedState { mark: STATE, instance })).cast()
+    let mut state = Box::new(SavedState { mark: 0, instance });
+    state.mark = mark::<M, V>(STATE, ptr::from_ref(&*state).cast());
+    Box::into_raw(state).cast()
 }
 
 /// The instance that is saved behind a handle, which the version's function calls by a name.
@@ -326,7 +345,7 @@ pub unsafe fn saved_state<'a, M: Model, V: Version>(
     if handle.is_null() {
         return Err(null(call, name));
     }
-    if !unsafe { is_live::<SavedState<M, V>>(handle, STATE) } {
+    if !unsafe { is_live::<SavedState<M, V>, M, V>(handle, STATE) } {
         return Err(call.error(format_args!("argument {name} is not a saved state of this FMU")));
     }
     Ok(unsafe { &mut (*handle.cast::<SavedState<M, V>>()).instance })
@@ -343,7 +362,7 @@ pub unsafe fn free_state<M: Model, V: Version>(
         if handle.is_null() || (*handle).is_null() {
             return Ok(());
         }
-        let is_itself = ptr::read(handle.cast::<u64>()) == STATE;
+        let is_itself = is_live::<SavedState<M, V>, M, V>(handle.cast(), STATE);
         let state = if is_itself { handle.cast() } else { *handle };
         saved_state::<M, V>(call, name, state)?;
         free::<SavedState<M, V>>(state);
