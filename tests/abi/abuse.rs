@@ -85,7 +85,7 @@ impl Unpacked {
                     .arg(headers())
                     .args(sources)
                     .args(link)
-                    .args(["-ldl", "-lm", "-o"])
+                    .args(["-ldl", "-lm", "-pthread", "-o"])
                     .arg(&program),
                 "the host did not compile",
             );
@@ -636,6 +636,57 @@ fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() 
                 "a handle that is not the function's own was not refused",
             );
             assert!(said.contains("is an error"), "{said}");
+        }
+    }
+}
+
+/// Stack that an FMU needs, kB: to instantiate and initialise, and for steps. The book's page on real time has these
+/// numbers. The compiler decides on them, so that they have a margin of a quarter above what was measured.
+#[cfg(target_os = "linux")]
+const STACK: [(&str, [u32; 2]); 3] =
+    [("HubSlosh", [52, 16]), ("Spacecraft", [101, 62]), ("SloshTank", [65, 34])];
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_stack_that_an_fmu_needs_is_no_more_than_the_book_says() {
+    if under_valgrind() {
+        return; // which has a stack of its own
+    }
+    let page = std::fs::read_to_string(root().join("book/real_time.md")).unwrap();
+    for (name, limits) in STACK {
+        let row = format!("| {name} | {} | {} |", limits[0], limits[1]);
+        assert!(page.contains(&row), "book/real_time.md has no row {row}");
+        for fmi in VERSIONS {
+            let fmu = Unpacked::new(pack::model(name).unwrap(), fmi);
+            for scene in scenes(name) {
+                let settings = scene.iter().map(|(name, value)| {
+                    let v = fmu.variable(name);
+                    let value = if *value == "true" { "1" } else { value };
+                    format!("{}:{}={value}", letter(v), v.reference)
+                });
+                let settings: Vec<String> = settings.collect();
+                let reals = fmu.description.variables.iter().filter(|v| v.kind() == Type::Real);
+                let reals: Vec<String> = reals.map(|v| v.reference.to_string()).collect();
+                for interface in ["co-simulation", "model-exchange"] {
+                    let said = run(
+                        fmu.host("stack", &["tests/abi/stack.c"], &[])
+                            .arg(&fmu.library)
+                            .args([fmu.guid(), interface, &fmu.states.to_string()])
+                            .args(&settings)
+                            .arg("--")
+                            .args(&reals),
+                        "the stack could not be measured",
+                    );
+                    println!("{name}, {fmi:?}, {interface}, {scene:?}: {said}");
+                    for (what, limit) in [" bytes to start", " bytes to step"].iter().zip(limits) {
+                        let bytes = number(&said, what);
+                        assert!(
+                            bytes <= 1000.0 * f64::from(limit),
+                            "{name}: {bytes}{what}, more than {limit} kB"
+                        );
+                    }
+                }
+            }
         }
     }
 }
