@@ -15,7 +15,7 @@ use taylor::vector::{
 use crate::pivot::Pivot;
 use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod, smallest_pivot};
 use crate::sizes::{MODES, POINTS, TANKS, modes_of};
-use crate::table::FillTable;
+use crate::table::{FillTable, LIGHTEST, SHORTEST};
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -537,10 +537,6 @@ impl Default for Parameters {
 const HEAVIEST: f64 = 1e12;
 /// No length, speed or acceleration is larger.
 const FARTHEST: f64 = 1e9;
-/// Shorter pendulums are too stiff, m.
-pub(crate) const SHORTEST: f64 = 1e-6;
-/// Lighter bobs have no effect, kg.
-pub(crate) const LIGHTEST: f64 = 1e-9;
 
 /// What a principal moment may exceed the sum of the others by: a plate's, rounded to four digits.
 const PLATE: f64 = 1.0 + 1e-3;

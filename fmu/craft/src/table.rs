@@ -14,8 +14,12 @@
 use formulas::interpolation::{derivatives, quintic};
 use taylor::number::Number;
 
-use crate::parameters::{LIGHTEST, SHORTEST};
 use crate::sizes::{MODES, POINTS};
+
+/// Shorter pendulums are too stiff, m.
+pub(crate) const SHORTEST: f64 = 1e-6;
+/// Lighter bobs have no effect, kg.
+pub(crate) const LIGHTEST: f64 = 1e-9;
 
 /// Modes and rigid liquid at some masses of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
