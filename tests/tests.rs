@@ -12,6 +12,7 @@ mod common;
 mod fmi3;
 mod life {
     mod allocation;
+    mod effect;
     mod instance;
 }
 mod physics {

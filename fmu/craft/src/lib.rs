@@ -36,6 +36,7 @@ mod bob;
 mod contents;
 mod damping;
 mod draining;
+mod effect;
 mod handover;
 mod lump;
 mod motion;

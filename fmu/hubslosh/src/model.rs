@@ -179,6 +179,11 @@ impl Model for HubSlosh {
         parameters.resolved().map_or(Vec::new(), |p| Plant::warnings(&p, inputs))
     }
 
+    fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
+        let index = indices.first().copied().unwrap_or(0);
+        parameters.resolved().ok()?.without_effect(name, index)
+    }
+
     fn save(&self, words: &mut Vec<u64>) {
         words.extend(self.plant.state().to_words());
         let stopped = self.plant.stopped().map(StoppedStep::to_words);

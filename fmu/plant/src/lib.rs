@@ -20,6 +20,7 @@ mod amplitude;
 mod baffle;
 mod contact;
 mod damping;
+mod effect;
 mod equations;
 mod friction;
 mod hub;

@@ -193,36 +193,6 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
                 .to_string(),
         );
     }
-    let radial = [
-        ("init.slosh_angle_radial", p.init.slosh_angle_radial),
-        ("init.slosh_rate_radial", p.init.slosh_rate_radial),
-    ];
-    let along_tangent = matches!(slosh.model, SloshModel::Linear | SloshModel::Planar)
-        && (geometry || slosh.table.direction[0] == 0.0);
-    for (name, value) in radial.into_iter().filter(|(_, value)| along_tangent && *value != 0.0) {
-        warnings.push(format!(
-            "{name} = {value:?} is without effect: with slosh.model = linear and planar, mode 1 moves along the tangent alone \
-             (slosh.model = spherical, paraboloid and liquid move radially, too)"
-        ));
-    }
-    let start = Parameters::default();
-    let unused: Vec<&str> = [
-        ("tank.h", p.tank.h != start.tank.h),
-        ("slosh.zeta", slosh.zeta != start.slosh.zeta),
-        (
-            "slosh.zeta_from_correlation",
-            slosh.zeta_from_correlation != start.slosh.zeta_from_correlation,
-        ),
-    ]
-    .into_iter()
-    .filter_map(|(name, set)| (set && !geometry).then_some(name))
-    .collect();
-    if !unused.is_empty() {
-        warnings.push(format!(
-            "slosh.source = table: {} without effect; slosh.table says what the liquid is",
-            unused.join(", ")
-        ));
-    }
     if slosh.model == SloshModel::Liquid && geometry {
         warnings.extend(third_order_warning(p.tank.h / radius));
     }

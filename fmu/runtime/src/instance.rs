@@ -229,10 +229,39 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// What there is to be warned of, see [`Model::warnings`].
+    /// Warnings about the motion that begins: those of [`Model::warnings`], and one for each reason for which parameters that
+    /// differ from their start values have no effect ([`Model::without_effect`]).
     pub fn warnings(&self) -> Vec<String> {
-        let of = |model: &M| model.warnings(&self.given_parameters(), &self.inputs);
-        self.model.as_ref().map_or(Vec::new(), of)
+        let Some(model) = &self.model else { return Vec::new() };
+        let parameters = self.given_parameters();
+        let mut warnings = model.warnings(&parameters, &self.inputs);
+        let mut reasons: Vec<(String, Vec<String>)> = Vec::new();
+        let (table, starts) = (M::table(), M::table().starts());
+        for ((scalar, value), start) in table.parameters().iter().zip(&self.parameters).zip(&starts)
+        {
+            let Scalar { variable, element, .. } = scalar;
+            if value == start {
+                continue;
+            }
+            let why = M::without_effect(&parameters, variable.name, &variable.indices(*element));
+            let Some(why) = why else { continue };
+            match reasons.iter_mut().find(|(reason, _)| *reason == why) {
+                Some((_, names)) => names.push(scalar.name()),
+                None => reasons.push((why, vec![scalar.name()])),
+            }
+        }
+        /// More names would hide the reason.
+        const NAMED: usize = 6;
+        warnings.extend(reasons.into_iter().map(|(why, names)| {
+            let verb = if names.len() == 1 { "has" } else { "have" };
+            let named = names[..names.len().min(NAMED)].join(", ");
+            let more = match names.len().saturating_sub(NAMED) {
+                0 => String::new(),
+                more => format!(" and {more} more parameters"),
+            };
+            format!("{named}{more} {verb} no effect: {why}")
+        }));
+        warnings
     }
 
     /// The host goes on from initialization: parameters are what they are now.

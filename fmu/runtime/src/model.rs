@@ -70,6 +70,18 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Vec::new()
     }
 
+    /// Returns why a parameter has no effect on the motion or on any output, as "name = value" of the parameter that decides
+    /// it; `None` if it has an effect. `name` is the table's, `indices` are the element's, from 0, none for a scalar. Hosts
+    /// get a warning of such parameters that differ from their start values.
+    fn without_effect(
+        parameters: &Self::Parameters,
+        name: &str,
+        indices: &[usize],
+    ) -> Option<String> {
+        let _ = (parameters, name, indices);
+        None
+    }
+
     /// What else there is to save besides parameters and inputs, as plain words: always
     /// [`About::saved_words`](crate::table::About::saved_words) of them.
     fn save(&self, words: &mut Vec<u64>);

@@ -495,15 +495,21 @@ impl<M: Model> Variable<M> {
         false
     }
 
-    /// The name of an element, 0 for the first.
-    pub fn element_name(&self, element: usize) -> String {
+    /// The indices of an element, 0 for the first, each from 0.
+    pub fn indices(&self, element: usize) -> Vec<usize> {
         let mut indices = Vec::with_capacity(self.shape.len());
         let mut rest = element;
         for length in self.lengths().rev() {
-            indices.push((rest % length + 1).to_string());
+            indices.push(rest % length);
             rest /= length;
         }
         indices.reverse();
+        indices
+    }
+
+    /// The name of an element, 0 for the first.
+    pub fn element_name(&self, element: usize) -> String {
+        let indices: Vec<_> = self.indices(element).iter().map(|i| (i + 1).to_string()).collect();
         self.indexed(&indices)
     }
 

@@ -186,6 +186,14 @@ impl runtime::Model for Model {
         warnings
     }
 
+    fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
+        let p = parameters.resolved().ok()?;
+        if let Some(field) = name.strip_prefix("tank.") {
+            return Some(format!("tank.{}", p.tank.without_effect(field, indices)?));
+        }
+        (name.starts_with("host.") && p.host.is_none()).then(|| "host.mass = 0".into())
+    }
+
     fn save(&self, words: &mut Vec<u64>) {
         words.extend(self.tank.state().to_words());
         words.push(self.coupling_ratio.to_bits());

@@ -172,6 +172,10 @@ impl runtime::Model for Model {
         })
     }
 
+    fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
+        parameters.resolved().ok()?.without_effect(name, indices)
+    }
+
     fn save(&self, words: &mut Vec<u64>) {
         words.extend(self.craft.state().to_words());
     }

@@ -344,18 +344,25 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
 }
 
 #[test]
-fn dimensions_that_a_table_does_not_use_are_warned_of() {
+fn parameters_without_effect_say_which_parameter_decides_it() {
+    let why = |p: &Parameters, name: &str| p.without_effect(name, 0).unwrap_or_default();
     let mut p = Parameters::default();
-    p.tank.h = 0.06;
-    p.slosh.zeta = 0.01;
-    assert!(Plant::warnings(&p, &at(9.81)).is_empty());
+    assert!(why(&p, "slosh.zeta").contains("slosh.zeta_from_correlation is true"));
+    assert_eq!(why(&p, "tank.h"), "");
+    assert_eq!(why(&p, "slosh.table.mass"), "slosh.source = geometry");
+    assert_eq!(why(&p, "friction.eps"), "friction.model = stribeck");
+    assert_eq!(why(&p, "imu.arw"), "imu.enabled is false");
+    assert_eq!(why(&p, "baffle.depth"), "baffle.width = 0");
+    p.slosh.zeta_from_correlation = false;
+    assert_eq!(why(&p, "slosh.zeta"), "");
+    assert_eq!(why(&p, "fluid.nu"), "slosh.zeta_from_correlation is false");
     p.slosh.source = SloshSource::Table;
-    p.slosh.table.m_liq = 2.0;
-    p.slosh.table.mass[0] = 0.7;
-    p.slosh.table.length[0] = 0.05;
-    assert!(Plant::warnings(&p, &at(9.81))[0].contains("tank.h, slosh.zeta without effect"));
-    (p.tank.h, p.slosh.zeta) = (Parameters::default().tank.h, Parameters::default().slosh.zeta);
-    assert!(Plant::warnings(&p, &at(9.81)).is_empty());
+    assert!(why(&p, "tank.h").contains("slosh.source = table"));
+    assert!(why(&p, "slosh.zeta").contains("slosh.source = table"));
+    assert_eq!(p.without_effect("slosh.table.mass", 0), None);
+    assert_eq!(p.without_effect("slosh.table.mass", 1).unwrap(), "slosh.modes = 1");
+    p.slosh.model = SloshModel::Frozen;
+    assert_eq!(why(&p, "slosh.table.mass"), "slosh.model = frozen");
 }
 
 #[test]

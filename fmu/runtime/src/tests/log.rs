@@ -86,6 +86,30 @@ fn warnings_are_of_the_model_that_begins_to_move() {
 }
 
 #[test]
+fn parameters_without_effect_that_differ_from_their_start_values_are_named_with_the_reason() {
+    let with = |values: &[(&str, f64)]| {
+        let mut instance = fresh(CS);
+        instance.set(&SET_BOOLEAN, &[reference("has_lid")], |_| Value::Boolean(true)).unwrap();
+        for (name, x) in values {
+            match *name {
+                "number" | "gauges" => {
+                    let value = Value::Integer(*x as i32);
+                    instance.set(&SET_INTEGER, &[reference(name)], |_| value).unwrap();
+                }
+                _ => set(&mut instance, name, *x).unwrap(),
+            }
+        }
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
+        instance.warnings()
+    };
+    assert!(with(&[]).is_empty());
+    assert_eq!(with(&[("number", 4.0)]), ["number has no effect: has_lid is true"]);
+    let both = ["start.level[1], gauges have no effect: has_lid is true"];
+    assert_eq!(with(&[("gauges", 7.0), ("start.level[1]", 4.5), ("start.level[2]", 4.5)]), both);
+}
+
+#[test]
 fn the_host_is_warned_once_of_how_it_drives_the_model() {
     let (mut log, lines) = log();
     let mut instance = continuous(&[]);

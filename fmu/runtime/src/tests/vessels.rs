@@ -190,6 +190,12 @@ impl Model for Vessels {
         if p.k > 5.0 { vec![all] } else { Vec::new() }
     }
 
+    fn without_effect(p: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
+        let is_first = indices.first().is_none_or(|i| *i == 0);
+        let is_of_lid = ["number", "gauges", "start.level"].contains(&name) && is_first;
+        (is_of_lid && p.has_lid).then(|| "has_lid is true".into())
+    }
+
     fn save(&self, words: &mut Vec<u64>) {
         words.extend([self.time, self.x[0], self.x[1], self.longest].map(f64::to_bits));
         words.extend([u64::from(self.open), self.events as u64]);

@@ -1,0 +1,160 @@
+//! Parameters without effect: a warning names exactly those that change no output.
+
+use runtime::Model;
+use runtime::call::{CType, Interface};
+use runtime::instance::Instance;
+use runtime::table::Scalar;
+use runtime::v2::{Fmi2, GET_BOOLEAN, GET_INTEGER, GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
+use runtime::variable::{Access, Causality, Kind, Quantity, Value};
+
+type Values<'a> = &'a [(&'a str, f64)];
+
+fn value_of<M: Model>(scalar: &Scalar<M>, x: f64) -> Value {
+    match scalar.c_type {
+        CType::Real => Value::Real(x),
+        CType::Boolean => Value::Boolean(x != 0.0),
+        _ => Value::Integer(x as i32),
+    }
+}
+
+/// Outputs at the start and after each of four steps, as bits, and the warnings; `None` if the FMU refuses the values.
+fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Vec<String>)> {
+    let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
+    for (scalar, value) in values {
+        let call = match value {
+            Value::Real(_) => &SET_REAL,
+            Value::Integer(_) => &SET_INTEGER,
+            Value::Boolean(_) => &SET_BOOLEAN,
+        };
+        instance.set(call, &[scalar.index], |_| *value).ok()?;
+    }
+    instance.enter_initialization_mode().ok()?;
+    instance.exit_initialization_mode().ok()?;
+    let warnings = instance.warnings();
+    let is_set =
+        |s: &Scalar<M>| matches!(s.variable.causality, Causality::Input | Causality::Parameter);
+    let mut bits = Vec::new();
+    let mut time = 0.0;
+    for h in [0.1, 0.3, 0.7, 1.1] {
+        for scalar in M::table().scalars.iter().filter(|s| !is_set(s)) {
+            let call = match scalar.c_type {
+                CType::Real => &GET_REAL,
+                CType::Boolean => &GET_BOOLEAN,
+                _ => &GET_INTEGER,
+            };
+            bits.push(match instance.get(call, scalar.index).ok()? {
+                Value::Real(x) => x.to_bits(),
+                Value::Integer(n) => n as u64,
+                Value::Boolean(b) => b.into(),
+            });
+        }
+        instance.do_step(time, h).ok()?;
+        time += h;
+    }
+    Some((bits, warnings))
+}
+
+/// Other values of a parameter, of which the first that the FMU accepts is tried.
+fn others<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
+    match (value, scalar.variable.kind) {
+        (Value::Boolean(b), _) => vec![Value::Boolean(!b)],
+        (Value::Integer(n), Kind::Enumeration(of)) => {
+            (1..=of.items.len() as i32).filter(|m| *m != n).map(Value::Integer).collect()
+        }
+        (Value::Integer(n), _) => [n + 1, n - 1, n + 2].map(Value::Integer).to_vec(),
+        (Value::Real(x), Kind::Real(Quantity { max, .. })) => {
+            let by_range = max.map_or(1.0, |max| 1e-3 * max.min(1e3));
+            let all = [1.03 * x, 0.97 * x, x + by_range, x - by_range, x + 1e-3, x + 1e-6, 1.0];
+            all.into_iter().filter(|y| *y != x).map(Value::Real).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Changes each parameter alone. `silent` are names that may change nothing without a warning; so are bounds on work and
+/// numbers of enumerations, which may be of the item that is there already.
+fn check<M: Model>(base: Values, silent: &[&str]) {
+    let scalar = |name: &str| {
+        let n = M::table().find(name).unwrap_or_else(|| panic!("no variable {name}"));
+        &M::table().scalars[n as usize]
+    };
+    let base: Vec<_> =
+        base.iter().map(|(name, x)| (scalar(name), value_of(scalar(name), *x))).collect();
+    let (before, warnings) = run::<M>(&base).expect("the scene is accepted");
+    let warned = |warnings: &[String]| warnings.iter().any(|text| text.contains("no effect"));
+    assert!(!warned(&warnings), "{warnings:?}");
+    let mut faults = Vec::new();
+    for scalar in M::table().parameters() {
+        if matches!(scalar.access, Access::Input(_)) {
+            continue;
+        }
+        let set = base.iter().find(|(s, _)| s.index == scalar.index).map(|(_, value)| *value);
+        let Some(value) = set.or_else(|| scalar.start()) else { continue };
+        for other in others(scalar, value) {
+            let mut values = base.clone();
+            values.retain(|(s, _)| s.index != scalar.index);
+            values.push((scalar, other));
+            let Some((after, warnings)) = run::<M>(&values) else { continue };
+            let name = scalar.name();
+            let is_named = warnings
+                .iter()
+                .any(|text| text.contains("no effect") && text.starts_with(&format!("{name} ")));
+            let is_silent = silent.contains(&name.as_str())
+                || name.ends_with("kind")
+                || name == "solver.max_steps";
+            match (before == after, is_named) {
+                (false, true) => {
+                    faults.push(format!("{name} = {other:?} has an effect: {warnings:?}"))
+                }
+                (true, false) if !is_silent => {
+                    faults.push(format!("{name} = {other:?} has no effect and no warning says so"));
+                }
+                _ => {}
+            }
+            break;
+        }
+    }
+    let base: Vec<_> = base.iter().map(|(s, value)| (s.name(), value)).collect();
+    assert!(faults.is_empty(), "{base:?}:\n{}", faults.join("\n"));
+}
+
+/// Heights of hinges are in no equation of a hub on one axis, as their description says. The law of damping acts where
+/// g_axial changes, the width of the smoothed sign where the hub turns back, the limits of the
+/// wheel's speed at these speeds.
+const HUB_SILENT: [&str; 5] = [
+    "slosh.table.hinge",
+    "slosh.damping_law",
+    "friction.eps",
+    "wheel.speed_min",
+    "wheel.speed_max",
+];
+/// Attitudes and directions are normalised, and rates made tangential.
+const CRAFT_SILENT: [&str; 4] =
+    ["tank[1].q[1]", "tank[1].p_0[1,3]", "tank[1].p_dot_0[1,3]", "init.q[1]"];
+const TANK_SILENT: [&str; 3] = ["tank.q[1]", "tank.p_0[1,3]", "tank.p_dot_0[1,3]"];
+
+#[test]
+fn a_warning_names_each_parameter_of_hubslosh_that_changes_no_output() {
+    let check = check::<HubSlosh::HubSlosh>;
+    let moving = [("init.omega", 0.3), ("tau_cmd", 0.3), ("tau_ext", -0.5)];
+    let with =
+        |more: &[(&'static str, f64)]| -> Vec<(&'static str, f64)> { [&moving[..], more].concat() };
+    for friction in 1..=5 {
+        check(&with(&[("friction.model", friction.into())]), &HUB_SILENT);
+    }
+    for slosh in 2..=6 {
+        check(&with(&[("slosh.model", slosh.into()), ("slosh.modes", 1.0)]), &HUB_SILENT);
+    }
+    check(&with(&[("slosh.zeta_from_correlation", 0.0), ("bench.tilt", 0.02)]), &HUB_SILENT);
+    check(&with(&[("wheel.enabled", 1.0), ("imu.enabled", 1.0)]), &HUB_SILENT);
+}
+
+#[test]
+fn a_warning_names_each_parameter_of_spacecraft_that_changes_no_output() {
+    check::<Spacecraft::Model>(&[("force[1]", 10.0)], &CRAFT_SILENT);
+}
+
+#[test]
+fn a_warning_names_each_parameter_of_sloshtank_that_changes_no_output() {
+    check::<SloshTank::Model>(&[], &TANK_SILENT);
+}
