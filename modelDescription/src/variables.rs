@@ -45,7 +45,19 @@ pub fn page<M: Model>() -> String {
         "<!-- Written by `cargo run --release -p model-description`; do not edit. -->\n\
          # All variables\n\n\
          Values cross the interface in the unit given first; the one in brackets is what tools \
-         are asked to display. A name with [1..10] stands for ten variables. Ranges are those the FMU holds the host to.\n",
+         are asked to display. Ranges are those the FMU holds the host to.",
+    );
+    if let Some(array) = M::table().variables.iter().find(|v| !v.shape.is_empty()) {
+        let _ = write!(
+            page,
+            " A name with ranges of indices is an array: `{}` stands for {} variables.",
+            name(array),
+            array.len()
+        );
+    }
+    page.push_str(
+        " A list of start values has a value for each element, rows of the last index separated by semicolons. If the list \
+         is shorter than the array, it is the same for each value of the first index.\n",
     );
     for (causality, title, introduction) in CHAPTERS {
         let _ = write!(page, "\n## {title}\n\n{introduction}\n\n");
@@ -83,7 +95,8 @@ fn name<M: Model>(variable: &Variable<M>) -> String {
 fn unit<M: Model>(variable: &Variable<M>) -> String {
     match variable.kind {
         Kind::Real(quantity) => match (quantity.unit, quantity.display_unit) {
-            ("", _) => "depends on `slosh.model`".into(),
+            ("", _) if has_slosh_model::<M>() => "depends on `slosh.model`".into(),
+            ("", _) => "see meaning".into(),
             (unit, None) => unit.into(),
             (unit, Some(displayed)) => format!("{unit} ({displayed})"),
         },
@@ -93,8 +106,28 @@ fn unit<M: Model>(variable: &Variable<M>) -> String {
     }
 }
 
+fn has_slosh_model<M: Model>() -> bool {
+    M::table().variables.iter().any(|v| v.name == "slosh.model")
+}
+
+/// Start values of all elements: one if they are equal, and of equal blocks along the first index the first block.
 fn start<M: Model>(variable: &Variable<M>) -> String {
-    let start = variable.start(&mut M::Parameters::default(), &mut M::Inputs::default(), 0);
+    let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
+    let starts: Vec<_> = (0..variable.len())
+        .map(|element| start_text(variable, variable.start(&mut parameters, &mut inputs, element)))
+        .collect();
+    if starts.iter().all(|start| *start == starts[0]) {
+        return starts[0].clone();
+    }
+    let lengths: Vec<usize> = variable.lengths().collect();
+    let block = starts.len() / lengths[0];
+    let repeats = lengths.len() > 1 && starts.chunks(block).all(|other| *other == starts[..block]);
+    let shown = if repeats { &starts[..block] } else { &starts[..] };
+    let rows = shown.chunks(lengths[lengths.len() - 1]).map(|row| row.join(", "));
+    rows.collect::<Vec<_>>().join("; ")
+}
+
+fn start_text<M: Model>(variable: &Variable<M>, start: Option<Value>) -> String {
     match (start, variable.kind) {
         (Some(Value::Integer(n)), Kind::Enumeration(of)) => {
             let item = usize::try_from(n - 1).ok().and_then(|n| of.items.get(n));

@@ -33,6 +33,67 @@ fn up_to_date<M: Model>() {
     }
 }
 
+/// The start of every component, as the XML has it, in the row of its array.
+#[test]
+fn pages_of_variables_have_the_start_values_of_all_components() {
+    let row = |page: &str, name: &str| {
+        let row = page.lines().find(|line| line.starts_with(&format!("| `{name}` |")));
+        row.unwrap_or_else(|| panic!("no row of {name}")).split(" | ").nth(2).unwrap().to_string()
+    };
+    let page = variables::page::<Spacecraft::Model>();
+    assert_eq!(row(&page, "craft.r[1..3]"), "0, 0, 0.21");
+    assert_eq!(row(&page, "gravity[1..3]"), "0, 0, -9.81");
+    assert_eq!(row(&page, "tank[1..4].position[1..3]"), "0, 0, -0.45");
+    assert_eq!(row(&page, "tank[1..4].mass[1..3]"), "128.211, 3.91595, 0.93327");
+    assert_eq!(row(&page, "tank[1..4].p_0[1..3,1..3]"), "0, 0, -1; 0, 0, -1; 0, 0, -1");
+    assert_eq!(row(&page, "init.omega[1..3]"), "0.02, 0, 0.1");
+    assert!(row(&page, "tank[1..4].fill.liquid[1..12]").ends_with(", 763.407"));
+    let page = variables::page::<SloshTank::Model>();
+    assert!(!page.contains("slosh.model"), "SloshTank has no variable slosh.model");
+    assert_eq!(row(&page, "tank.p_0[1..3,1..3]"), "0, 0, -1");
+    assert_eq!(row(&page, "a[1..3]"), "0.1, 0, 9.80665");
+}
+
+/// Scalar parameters, and those of them that have an effect with one tank of one mode.
+fn parameters<M: Model>() -> [usize; 2] {
+    let (all, start) = (M::table().parameters(), M::Parameters::default());
+    let is_missing = |why: Option<String>| {
+        why.is_some_and(|why| why == "tanks = 1" || why.ends_with("modes = 1"))
+    };
+    let unused = all.iter().filter(|s| {
+        is_missing(M::without_effect(&start, s.variable.name, &s.variable.indices(s.element)))
+    });
+    [all.len(), all.len() - unused.count()]
+}
+
+#[test]
+fn numbers_of_variables_in_the_documentation_are_those_of_the_tables() {
+    let [spacecraft, small] = parameters::<Spacecraft::Model>();
+    let [hub, _] = parameters::<HubSlosh::HubSlosh>();
+    let [tank, _] = parameters::<SloshTank::Model>();
+    let extra = 1 + Spacecraft::table::TABLE.about.event_indicators;
+    let scalars = Spacecraft::table::TABLE.scalars.len() + extra;
+    let arrays = Spacecraft::table::TABLE.variables.len() + 2;
+    for (page, text) in [
+        (
+            "modelDescription/Spacecraft/documentation/index.md",
+            format!(
+                "Of its {spacecraft} parameters a craft with one tank of one mode needs {small}."
+            ),
+        ),
+        (
+            "book/hosts.md",
+            format!("HubSlosh has {hub} parameters, SloshTank {tank}, Spacecraft {spacecraft}:"),
+        ),
+        ("book/hosts.md", format!("description has {arrays} variables in place of {scalars},")),
+        ("book/hosts.md", format!("| `Spacecraft_1x1` | {small} |")),
+        ("README.md", format!("with {small} parameters in place of {spacecraft} |")),
+    ] {
+        let there = String::from_utf8(committed(pack::root().join(page))).unwrap();
+        assert!(there.contains(&text), "{page} does not contain: {text}");
+    }
+}
+
 #[test]
 fn icon_is_a_png_of_the_drawing() {
     let png = committed(format!("{}/icon.png", icon::FOLDER));
