@@ -52,6 +52,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (slosh, table) = (&p.slosh, &p.slosh.table);
     let mut problems = baffle::problems(p);
     problems.extend(leaning::problems(p));
+    problems.extend(inertia_problem(p));
     if slosh.source != SloshSource::Table {
         return problems;
     }
@@ -219,6 +220,21 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// Refuses the model `liquid` where its inertia falls with the amplitude: the kinetic energy of hub and liquid is then
+/// indefinite at amplitudes that depend on the hub.
+fn inertia_problem(p: &Parameters) -> Option<String> {
+    let fill = 2.0 * p.tank.h / p.tank.d;
+    let (s, _) = coefficients(fill);
+    let used = p.slosh.model == SloshModel::Liquid && p.slosh.source == SloshSource::Geometry;
+    (used && s <= 0.0).then(|| {
+        format!(
+            "slosh.model = liquid at tank.h / (tank.d/2) = {fill:.4}: the third order's inertia coefficient s = {s:.3} is not \
+             above 0, and the kinetic energy would be indefinite (allowed: a fill with s above 0, such as 0.35 to 0.82 and \
+             above 1.02; or slosh.model = spherical or paraboloid)"
+        )
+    })
 }
 
 /// Below this h/R waves are shallow: s turns negative and both coefficients grow without bound.

@@ -271,11 +271,11 @@ impl SloshMode for Paraboloid {
 
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
         let q2 = q[0] * q[0] + q[1] * q[1];
-        let Pendulum { l, hardening, l2_s, .. } = self.p;
+        let Pendulum { l, hardening, .. } = self.p;
         if q2 >= l * l {
             Some("its mass has moved by its length l, where the surface stands at 45 degrees")
-        } else if (l2_s < 0.0 && l2_s + q2 > 0.1 * l2_s) || hardening * q2 < -0.9 {
-            Some("its wave is too high for an inertia or a spring that falls with the amplitude")
+        } else if hardening * q2 < -0.9 {
+            Some("its wave is too high for a spring that falls with the amplitude")
         } else {
             None
         }
@@ -286,20 +286,17 @@ impl SloshMode for Paraboloid {
 mod tests {
     use super::*;
 
-    /// Displacement 1 is the length; an inertia that falls with the amplitude ends at 0.9 of where it is 0, a spring at
-    /// a tenth of its stiffness.
+    /// Displacement 1 is the length; a spring that falls with the amplitude ends at a tenth of its stiffness.
     #[test]
-    fn a_mass_leaves_its_range_at_its_length_or_where_inertia_or_spring_are_nearly_gone() {
-        let outside = |l2_s: f64, hardening: f64, q: [f64; 2]| {
-            let mode = Paraboloid::new(&Pendulum { l2_s, hardening, ..Pendulum::default() });
+    fn a_mass_leaves_its_range_at_its_length_or_where_the_spring_is_nearly_gone() {
+        let outside = |hardening: f64, q: [f64; 2]| {
+            let mode = Paraboloid::new(&Pendulum { hardening, ..Pendulum::default() });
             mode.out_of_range(&[q[0], q[1], 0.0, 0.0]).is_some()
         };
-        for (l2_s, hardening, ends) in
-            [(1.0, 0.0, 1.0), (-0.5, 0.0, 0.45), (1.0, -2.0, 0.45), (1.0, 2.0, 1.0)]
-        {
+        for (hardening, ends) in [(0.0, 1.0), (-2.0, 0.45), (2.0, 1.0)] {
             let at = |share: f64| [0.6, 0.8].map(|x| x * libm::sqrt(share * ends));
-            assert!(!outside(l2_s, hardening, at(0.999)), "{l2_s} {hardening}");
-            assert!(outside(l2_s, hardening, at(1.001)), "{l2_s} {hardening}");
+            assert!(!outside(hardening, at(0.999)), "{hardening}");
+            assert!(outside(hardening, at(1.001)), "{hardening}");
         }
     }
 }

@@ -133,3 +133,23 @@ fn a_spherical_bob_starts_below_the_horizontal() {
     assert!(!refused(1.55, 0.0) && refused(1.57, 0.0) && !refused(0.0, 1.55) && refused(0.0, 1.57));
     assert!(refused(0.9, 0.9), "beyond");
 }
+
+/// h/R = 0.2 has s = -38.7: hub and liquid together would have no positive inertia at amplitudes that depend on the hub. A
+/// secondary resonance makes s negative in narrow ranges of deeper liquid, too.
+#[test]
+fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
+    let said = |fill: f64, model: SloshModel| {
+        let mut p = bench(model, FrictionModel::None);
+        p.tank.h = fill * p.tank.d / 2.0;
+        Plant::problems(&p).join("\n")
+    };
+    for fill in [0.16, 0.2, 0.34, 0.829, 1.012] {
+        let text = said(fill, SloshModel::Liquid);
+        assert!(text.contains("tank.h / (tank.d/2)") && text.contains("not above 0"), "{text}");
+        assert_eq!(said(fill, SloshModel::Paraboloid), "");
+    }
+    for fill in [0.35, 0.6, 0.82, 0.84, 1.0, 1.02, 5.0] {
+        assert_eq!(said(fill, SloshModel::Liquid), "");
+        assert!(formulas::third_order::coefficients(fill).0 > 0.0);
+    }
+}
