@@ -87,7 +87,7 @@ fn numbers_of_variables_in_the_documentation_are_those_of_the_tables() {
         ),
         ("book/hosts.md", format!("description has {arrays} variables in place of {scalars},")),
         ("book/hosts.md", format!("| `Spacecraft_1x1` | {small} |")),
-        ("README.md", format!("with {small} parameters in place of {spacecraft} |")),
+        ("book/commands.md", format!("with {small} parameters in place of {spacecraft} |")),
     ] {
         let there = String::from_utf8(committed(pack::root().join(page))).unwrap();
         assert!(there.contains(&text), "{page} does not contain: {text}");
