@@ -88,7 +88,7 @@ pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
 /// Protects a file and, of a plan or a tank, the files that it names: recordings, torques, drawings.
 fn protect(path: &Path) {
     input::protect(path);
-    if !path.extension().is_some_and(|ending| ending == "toml") || !path.is_file() {
+    if path.extension().is_none_or(|ending| ending != "toml") || !path.is_file() {
         return;
     }
     // what is wrong with the file is for the command to say
