@@ -47,6 +47,10 @@ pub fn foresee(
     records: &[Record],
     noise: &[f64],
 ) -> Result<Vec<Bound>> {
+    ensure!(!records.is_empty(), "there is no table of planned inputs");
+    for record in records {
+        ensure!(!record.time.is_empty(), "{}: it has no row (allowed: at least one)", record.name);
+    }
     ensure!(
         noise.iter().all(|sigma| *sigma > 0.0 && sigma.is_finite()),
         "the noise of an output must be above 0"

@@ -21,7 +21,7 @@ pub mod unknown;
 
 use std::collections::BTreeMap;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -143,6 +143,9 @@ pub fn identify(
     news: &mut dyn FnMut(&News),
 ) -> Result<Identification> {
     ensure!(!records.is_empty(), "there is no recording");
+    for record in records {
+        record.check(question).with_context(|| format!("{} cannot be used", record.name))?;
+    }
     let setup = Setup::new(question, model.description())?;
     let unknowns = question.unknowns(model.description(), records)?;
     let mut done = Vec::new();

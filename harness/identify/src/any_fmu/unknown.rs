@@ -86,6 +86,22 @@ impl Question {
             if unknowns[..k].iter().any(|other| other.name == unknown.name) {
                 problems.push(format!("{} is free twice", unknown.name));
             }
+            let is_alias = |other: &&Unknown| match (unknown.what, other.what) {
+                (
+                    What::Parameter { reference: a, recording: of_a },
+                    What::Parameter { reference: b, recording: of_b },
+                ) => {
+                    let together = of_a.is_none() || of_b.is_none() || of_a == of_b;
+                    a == b && together && unknown.name != other.name
+                }
+                _ => false,
+            };
+            if let Some(other) = unknowns[..k].iter().find(is_alias) {
+                problems.push(format!(
+                    "{} and {} are the same variable of the FMU (allowed: one of them is free)",
+                    other.name, unknown.name
+                ));
+            }
         }
         for setting in &self.settings {
             if let Some(n) = setting.recording.filter(|n| *n >= records.len()) {

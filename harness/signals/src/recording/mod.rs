@@ -186,7 +186,8 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     let file = File::open(path)?;
     let header = file.header();
     // time first, then the signals that are there
-    let rows_signal = wanted.signals[0];
+    // a table of times alone has no signal
+    let rows_signal = wanted.signals.first().map_or("time", |signal| signal.name);
     let time = Signal { name: "time", required: true, between: Between::Line, unit: None };
     let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());
     let mut stated = None; // seconds in the unit of the time, if one is stated
@@ -273,7 +274,7 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
         done(format!("its times are dates: time counts from {origin}"));
     }
     let names = signals.iter().map(|signal| signal.name.to_string()).collect();
-    let columns = complete(&signals, columns, rows_signal.name, done)?;
+    let columns = complete(&signals, columns, rows_signal, done)?;
     Ok(Table::new(names, columns))
 }
 
