@@ -350,8 +350,7 @@ fn texts_in(folder: &Path) -> Result<Vec<Vec<u8>>> {
     Ok(found)
 }
 
-/// The software bill of materials (SBOM), CycloneDX 1.6. Neither a time nor a random number is in
-/// it, so the same binaries have the same SBOM.
+/// The software bill of materials (SBOM) of an FMU, CycloneDX 1.6.
 pub fn sbom(
     model: &Model,
     fmi: Fmi,
@@ -359,63 +358,106 @@ pub fn sbom(
     binaries: &[Packed],
     components: &[Component],
 ) -> String {
-    let (name, version) = (&description.model_name, &description.version);
-    let this = format!("{name}@{version}");
-    let licences = |expression: &str| json!([{ "expression": expression }]);
-    let mut list = Vec::new();
-    for component in components {
-        let platforms = component.platforms.iter();
-        let mut entry = json!({
-            "type": "library",
-            "bom-ref": component.purl,
-            "name": component.name,
-            "description": component.origin,
-            "licenses": licences(&component.licence),
-            "purl": component.purl,
-            "properties": platforms
-                .map(|folder| json!({ "name": "hubslosh:platform", "value": folder }))
-                .collect::<Vec<_>>(),
-        });
-        if let Some(version) = &component.version {
-            entry["version"] = json!(version);
-        }
-        if let Some(hash) = &component.sha256 {
-            entry["hashes"] = json!([{ "alg": "SHA-256", "content": hash }]);
-        }
-        list.push(entry);
-    }
-    let parts = components.iter().map(|c| c.purl.clone());
-    let mut dependencies =
-        vec![json!({ "ref": this, "dependsOn": parts.clone().collect::<Vec<_>>() })];
-    dependencies.extend(parts.map(|purl| json!({ "ref": purl })));
     let identifier = model.identifier();
     let files = binaries.iter().flat_map(|binary| {
         let hash = sha256(&binary.bytes);
-        binary.names(&identifier, fmi).map(move |name| {
-            json!({
-                "type": "file",
+        binary.names(&identifier, fmi).map(move |name| (name, hash.clone()))
+    });
+    let product = Product {
+        kind: "library",
+        name: &description.model_name,
+        version: &description.version,
+        description: &description.description,
+        files: files.collect(),
+    };
+    product.sbom(components)
+}
+
+/// The SBOM of a wheel: what is linked into its command for one platform; `files` are the names and SHA-256 of its binaries
+/// and FMUs.
+///
+/// # Errors
+/// If something is linked whose licence is not known.
+pub fn sbom_of_wheel(
+    command: &[u8],
+    folder: &'static str,
+    files: Vec<(String, String)>,
+) -> Result<String> {
+    let binary = Packed { folder, ending: "", bytes: command.to_vec() };
+    let product = Product {
+        kind: "application",
+        name: crate::metadata::PACKAGE,
+        version: crate::metadata::VERSION,
+        description: "Python package and command hubslosh",
+        files,
+    };
+    Ok(product.sbom(&linked("hubslosh", &[binary])?))
+}
+
+/// What an SBOM is of.
+struct Product<'a> {
+    /// Type of CycloneDX.
+    kind: &'static str,
+    name: &'a str,
+    version: &'a str,
+    description: &'a str,
+    /// Names of its binaries, and their SHA-256.
+    files: Vec<(String, String)>,
+}
+
+impl Product<'_> {
+    /// Neither a time nor a random number is in it, so the same binaries have the same SBOM.
+    fn sbom(&self, components: &[Component]) -> String {
+        let Product { kind, name, version, description, files } = self;
+        let this = format!("{name}@{version}");
+        let licences = |expression: &str| json!([{ "expression": expression }]);
+        let mut list = Vec::new();
+        for component in components {
+            let platforms = component.platforms.iter();
+            let mut entry = json!({
+                "type": "library",
+                "bom-ref": component.purl,
+                "name": component.name,
+                "description": component.origin,
+                "licenses": licences(&component.licence),
+                "purl": component.purl,
+                "properties": platforms
+                    .map(|folder| json!({ "name": "hubslosh:platform", "value": folder }))
+                    .collect::<Vec<_>>(),
+            });
+            if let Some(version) = &component.version {
+                entry["version"] = json!(version);
+            }
+            if let Some(hash) = &component.sha256 {
+                entry["hashes"] = json!([{ "alg": "SHA-256", "content": hash }]);
+            }
+            list.push(entry);
+        }
+        let parts = components.iter().map(|c| c.purl.clone());
+        let mut dependencies =
+            vec![json!({ "ref": this, "dependsOn": parts.clone().collect::<Vec<_>>() })];
+        dependencies.extend(parts.map(|purl| json!({ "ref": purl })));
+        let files = files.iter().map(|(name, hash)| {
+        json!({ "type": "file", "name": name, "hashes": [{ "alg": "SHA-256", "content": hash }] })
+    });
+        let sbom = json!({
+            "bomFormat": "CycloneDX",
+            "specVersion": "1.6",
+            "version": 1,
+            "metadata": { "component": {
+                "type": kind,
+                "bom-ref": this,
                 "name": name,
-                "hashes": [{ "alg": "SHA-256", "content": hash }],
-            })
-        })
-    });
-    let sbom = json!({
-        "bomFormat": "CycloneDX",
-        "specVersion": "1.6",
-        "version": 1,
-        "metadata": { "component": {
-            "type": "library",
-            "bom-ref": this,
-            "name": name,
-            "version": version,
-            "description": description.description,
-            "licenses": licences(OWN),
-            "components": files.collect::<Vec<_>>(),
-        }},
-        "components": list,
-        "dependencies": dependencies,
-    });
-    format!("{sbom:#}\n")
+                "version": version,
+                "description": description,
+                "licenses": licences(OWN),
+                "components": files.collect::<Vec<_>>(),
+            }},
+            "components": list,
+            "dependencies": dependencies,
+        });
+        format!("{sbom:#}\n")
+    }
 }
 
 #[cfg(test)]
@@ -444,6 +486,25 @@ mod tests {
             "/rust/deps/a b/",
         ] {
             assert!(standard_crates(words.as_bytes()).unwrap().is_empty(), "{words}");
+        }
+    }
+
+    #[test]
+    fn the_sbom_of_a_wheel_lists_its_files_and_what_its_command_links() {
+        let files = vec![("hubslosh.data/scripts/hubslosh".to_string(), "ab".to_string())];
+        let sbom = sbom_of_wheel(b"/rust/deps/gimli-0.32.3/src", "linux64", files).unwrap();
+        let sbom: serde_json::Value = serde_json::from_str(&sbom).unwrap();
+        assert_eq!(
+            (&sbom["bomFormat"], &sbom["specVersion"]),
+            (&"CycloneDX".into(), &"1.6".into())
+        );
+        let product = &sbom["metadata"]["component"];
+        assert_eq!(product["name"], crate::metadata::PACKAGE);
+        assert_eq!(product["components"][0]["hashes"][0]["content"], "ab");
+        let components = sbom["components"].as_array().unwrap();
+        for name in ["hubslosh", "host", "clap", "std", "gimli"] {
+            let found = components.iter().find(|component| component["name"] == name);
+            assert!(found.is_some_and(|c| !c["licenses"][0]["expression"].is_null()), "{name}");
         }
     }
 

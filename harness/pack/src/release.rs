@@ -1,5 +1,5 @@
-//! A release to take away: the FMU for all platforms in both versions of FMI, its hash, its SBOM and the
-//! report of its check; the wheels' hashes, and that for Linux itself.
+//! A release to take away: the FMU for all platforms in both versions of FMI, its SBOM and the report of its check; the
+//! wheels' SBOM, and the wheel for Linux. [`MANIFEST`] lists the SHA-256 of all of them.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -10,6 +10,10 @@ use host::output::{self, sha256};
 use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};
 use crate::{Fmi, Model, pack_built, platforms, wheel};
+
+/// Name of the list of all files of all releases, with their SHA-256, as `sha256sum --check` reads it. The folder keeps the
+/// files of one version; of the others it keeps the lines of the list.
+pub const MANIFEST: &str = "SHA256SUMS";
 
 /// Bytes up to which the wheel for Linux is in the release, for it lies in the project's history forever. Of 13 MB the command has 8,
 /// the FMUs of both versions of FMI 5.
@@ -31,9 +35,9 @@ pub fn path(model: &Model, fmi: Fmi, folder: &Path) -> PathBuf {
     fmi.path(folder, &format!("{}-{}", model.name, env!("CARGO_PKG_VERSION")))
 }
 
-/// Builds for all platforms, checks, and writes the release's files to `folder`, for each version of FMI: the FMU,
-/// `.sha256`, as `sha256sum --check` reads it, `.cdx.json`, and the report of the check, which
-/// `check` returns. Returns what was written. If `check` refuses the FMU of one version, neither is released.
+/// Builds for all platforms, checks, and writes the release's files to `folder`, for each version of FMI: the FMU, its SBOM
+/// (`.cdx.json`), and the report of the check (`.check.txt`), which `check` returns; lists them in [`MANIFEST`] and removes
+/// those of older versions. Returns what was written. If `check` refuses the FMU of one version, neither is released.
 pub fn write(
     model: &Model,
     folder: &Path,
@@ -47,14 +51,68 @@ pub fn write(
     for fmi in Fmi::RELEASED {
         let fmu = path(model, fmi, folder);
         for (ending, bytes) in of_version(model, fmi, &all, &check)? {
-            files.push((fmu.with_extension(ending), bytes));
+            files.push((file_name(&fmu.with_extension(ending)), bytes));
         }
     }
+    record(folder, model.name, &files, &[])
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Whether a file's name is `NAME-VERSION`, followed by `-` or `.`.
+fn is_of(file: &str, name: &str, version: &str) -> bool {
+    let rest = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-'));
+    rest.and_then(|rest| rest.strip_prefix(version))
+        .is_some_and(|rest| rest.starts_with(['-', '.']))
+}
+
+/// Writes files of the present version of `name` to `folder`, lists them and `elsewhere`, names and SHA-256 of files that
+/// the folder does not keep, in [`MANIFEST`] in place of what it has of this version, and removes the files of `name` that
+/// are listed there and are no longer kept. Returns what was written.
+///
+/// # Errors
+/// If a file cannot be read or written. Files are removed last.
+fn record(
+    folder: &Path,
+    name: &str,
+    files: &[(String, Vec<u8>)],
+    elsewhere: &[(String, String)],
+) -> Result<Vec<PathBuf>> {
     output::directory(folder)?;
-    for (path, bytes) in &files {
-        output::atomically(path, |file| Ok(file.write_all(bytes)?))?;
+    let manifest = folder.join(MANIFEST);
+    let cannot = || format!("{} cannot be read", manifest.display());
+    let old = match manifest.exists() {
+        true => std::fs::read_to_string(&manifest).with_context(cannot)?,
+        false => String::new(),
+    };
+    let listed = |line: &str| line.split_once("  ").map(|(_, file)| file.to_string());
+    let is_own = |file: &String| file.strip_prefix(name).is_some_and(|rest| rest.starts_with('-'));
+    let mut lines: Vec<String> = old.lines().map(String::from).collect();
+    lines.retain(|line| !listed(line).is_some_and(|file| is_of(&file, name, VERSION)));
+    let mut new: Vec<String> =
+        files.iter().map(|(file, bytes)| format!("{}  {file}", sha256(bytes))).collect();
+    new.extend(elsewhere.iter().map(|(file, hash)| format!("{hash}  {file}")));
+    let own = lines.iter().rposition(|line| listed(line).is_some_and(|file| is_own(&file)));
+    let place = own.map_or(lines.len(), |last| last + 1);
+    lines.splice(place..place, new);
+    let mut written = Vec::new();
+    for (file, bytes) in files {
+        let path = folder.join(file);
+        output::atomically(&path, |to| Ok(to.write_all(bytes)?))?;
+        written.push(path);
     }
-    Ok(files.into_iter().map(|(path, _)| path).collect())
+    output::atomically(&manifest, |to| Ok(to.write_all((lines.join("\n") + "\n").as_bytes())?))?;
+    for file in old.lines().filter_map(listed).filter(is_own) {
+        let path = folder.join(&file);
+        if !files.iter().any(|(kept, _)| *kept == file) && path.is_file() {
+            let cannot = || format!("{} cannot be removed", path.display());
+            std::fs::remove_file(&path).with_context(cannot)?;
+        }
+    }
+    written.push(manifest);
+    Ok(written)
 }
 
 /// The release's files of one version of FMI: endings of their names, and bytes.
@@ -63,58 +121,34 @@ fn of_version(
     fmi: Fmi,
     all: &[Built],
     check: impl Fn(&Path) -> Result<String>,
-) -> Result<[(&'static str, Vec<u8>); 4]> {
+) -> Result<[(&'static str, Vec<u8>); 3]> {
     let made = tempfile::tempdir().context("there is no place for temporary files")?;
     let fmu = path(model, fmi, made.path());
     pack_built(model, fmi, all, &fmu)?;
     let bytes = std::fs::read(&fmu).with_context(|| format!("{} cannot be read", fmu.display()))?;
-    let name = fmu.file_name().unwrap_or_default().to_string_lossy();
-    let hash = format!("{}  {name}\n", sha256(&bytes));
     let report = check(&fmu)?;
     let sbom = read(&fmu, &model.sbom())?;
-    Ok([
-        ("fmu", bytes),
-        ("fmu.sha256", hash.into_bytes()),
-        ("cdx.json", sbom),
-        ("check.txt", report.into_bytes()),
-    ])
+    Ok([("fmu", bytes), ("cdx.json", sbom), ("check.txt", report.into_bytes())])
 }
 
-/// Where the hashes of the present version's wheels are, in `folder`, as `sha256sum --check` reads them.
-pub fn wheel_hashes(folder: &Path) -> PathBuf {
-    folder.join(format!("{PACKAGE}-{VERSION}.sha256"))
-}
-
-/// Builds the wheels of all platforms to `made`, and writes their hashes to `folder`, with the wheel
-/// for Linux on x86-64 if it is not larger than [`LARGEST_WHEEL`]; an older version's wheel is removed. Returns
+/// Builds the wheels of all platforms to `made`, and lists them in [`MANIFEST`] of `folder`, to which it writes their SBOM and
+/// the wheel for Linux on x86-64 if it is not larger than [`LARGEST_WHEEL`]; an older version's wheel is removed. Returns
 /// what was written there.
 pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut wheels = wheel::write_for(&PLATFORMS.each_ref(), made)?;
     wheels.sort();
-    let mut hashes = String::new();
-    let mut linux = None;
+    let (mut kept, mut elsewhere, mut sboms) = (Vec::new(), Vec::new(), Vec::new());
     for path in &wheels {
         let bytes =
             std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        hashes += &format!("{}  {name}\n", sha256(&bytes));
-        if name.contains("manylinux") && name.contains("x86_64") {
-            linux = Some((folder.join(&*name), bytes));
+        let name = file_name(path);
+        sboms.push(read(path, &wheel::sbom_name())?);
+        let is_kept = name.contains("manylinux") && name.contains("x86_64");
+        if is_kept && bytes.len() as u64 <= LARGEST_WHEEL {
+            kept.push((name, bytes));
+            continue;
         }
-    }
-    output::directory(folder)?;
-    for entry in folder.read_dir()?.flatten() {
-        if entry.path().extension().is_some_and(|ending| ending == "whl") {
-            std::fs::remove_file(entry.path())?;
-        }
-    }
-    let mut written = vec![wheel_hashes(folder)];
-    output::atomically(&written[0], |file| Ok(file.write_all(hashes.as_bytes())?))?;
-    if let Some((path, bytes)) = linux {
-        if bytes.len() as u64 <= LARGEST_WHEEL {
-            output::atomically(&path, |file| Ok(file.write_all(&bytes)?))?;
-            written.push(path);
-        } else {
+        if is_kept {
             eprintln!(
                 "{} has {} bytes and is not kept in {} (allowed: {LARGEST_WHEEL})",
                 path.display(),
@@ -122,6 +156,42 @@ pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
                 folder.display()
             );
         }
+        elsewhere.push((name, sha256(&bytes)));
     }
-    Ok(written)
+    for (path, sbom) in wheels.iter().zip(sboms) {
+        kept.push((format!("{}.cdx.json", file_name(path)), sbom));
+    }
+    record(folder, PACKAGE, &kept, &elsewhere)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_release_takes_the_place_of_the_one_before_and_keeps_its_hashes() {
+        let folder = tempfile::tempdir().unwrap();
+        let there = |name: &str| folder.path().join(name).exists();
+        let old =
+            "1  A-0.0.1.fmu\n2  A-0.0.1.check.txt\n3  AB-0.0.1.fmu\n4  hubslosh-0.0.1-a.whl\n";
+        std::fs::write(folder.path().join(MANIFEST), old).unwrap();
+        for name in ["A-0.0.1.fmu", "A-0.0.1.check.txt", "AB-0.0.1.fmu", "A-notes.txt"] {
+            std::fs::write(folder.path().join(name), "old").unwrap();
+        }
+        let fmu = |ending: &str, text: &str| (format!("A-{VERSION}{ending}"), text.into());
+        let elsewhere = [(format!("A-{VERSION}-b.whl"), "5".to_string())];
+        record(folder.path(), "A", &[fmu(".fmu", "1"), fmu("-fmi3.fmu", "1")], &elsewhere).unwrap();
+        // the same version once more, without one of the files
+        record(folder.path(), "A", &[fmu(".fmu", "2")], &elsewhere).unwrap();
+        assert!(!there("A-0.0.1.fmu") && !there("A-0.0.1.check.txt"));
+        assert!(there("AB-0.0.1.fmu") && there("A-notes.txt"));
+        assert!(there(&format!("A-{VERSION}.fmu")) && !there(&format!("A-{VERSION}-fmi3.fmu")));
+        let list = std::fs::read_to_string(folder.path().join(MANIFEST)).unwrap();
+        let hash = sha256(b"2");
+        let wanted = format!(
+            "1  A-0.0.1.fmu\n2  A-0.0.1.check.txt\n{hash}  A-{VERSION}.fmu\n5  A-{VERSION}-b.whl\n3  AB-0.0.1.fmu\n4  \
+             hubslosh-0.0.1-a.whl\n"
+        );
+        assert_eq!(list, wanted);
+    }
 }

@@ -10,6 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use base64ct::{Base64UrlUnpadded, Encoding};
 use host::binary::{Binary, GLIBC, Kind, MACOS, Version};
 use host::fmi2::PLATFORM;
+use host::output::sha256;
 use sha2::{Digest, Sha256};
 
 use crate::archive::{self, Files, Packed, below, read};
@@ -19,6 +20,9 @@ use crate::{Fmi, MODELS, build, components, files as files_of_fmu, pack, root};
 
 /// Cargo package of the library that makes a whole run in one call, and its file's name.
 const BATCH: (&str, &str) = ("hubslosh-batch", "hubslosh_batch");
+
+/// Where the software bill of materials is in `.dist-info` (PEP 770).
+const SBOM: &str = "sboms/hubslosh.cdx.json";
 
 /// The binaries of a wheel.
 struct Binaries {
@@ -215,9 +219,18 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
         files.push((format!("{info}/licenses/{license}"), read(&root().join(license))?));
     }
     if let Some((name, bytes)) = binaries.command {
+        let command = format!("{PACKAGE}-{VERSION}.data/scripts/{name}");
+        let is_binary =
+            |name: &str| name.starts_with(&format!("{PACKAGE}/lib/")) || name.ends_with(".fmu");
+        let binaries_in = files.iter().filter(|(name, _)| is_binary(name));
+        let mut hashes: Vec<_> =
+            binaries_in.map(|(name, bytes)| (name.clone(), sha256(bytes))).collect();
+        hashes.insert(0, (command.clone(), sha256(&bytes)));
+        let sbom = components::sbom_of_wheel(&bytes, binaries.folder, hashes)?;
+        files.push((sbom_name(), sbom.into_bytes()));
         let notices = components::notices(&bytes, binaries.folder)?;
         files.push((format!("{info}/licenses/{}", metadata::NOTICES), notices.into_bytes()));
-        files.insert(0, (format!("{PACKAGE}-{VERSION}.data/scripts/{name}"), bytes));
+        files.insert(0, (command, bytes));
     }
     files.push((format!("{info}/METADATA"), metadata::text()?.into_bytes()));
     let mut wheel =
@@ -230,6 +243,11 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     let list = files.iter().map(|(name, bytes)| record_line(name, bytes)).collect::<String>();
     files.push((record.clone(), format!("{list}{record},,\n").into_bytes()));
     Ok(files)
+}
+
+/// Returns the name of the SBOM in a wheel.
+pub fn sbom_name() -> String {
+    format!("{PACKAGE}-{VERSION}.dist-info/{SBOM}")
 }
 
 fn file_name(path: &Path) -> String {

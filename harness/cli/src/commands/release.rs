@@ -12,8 +12,9 @@ use crate::progress;
 /// Where the release goes.
 const DEFAULT_RELEASE: &str = "dist/release";
 
-/// Builds and checks the release for all platforms: each FMU in both versions of FMI, its hash, its software bill of
-/// materials (SBOM); the Python package's wheels, of which the hashes and that for Linux are kept.
+/// Builds and checks the release for all platforms: each FMU in both versions of FMI with its software bill of materials
+/// (SBOM) and the report of its check; the Python package's wheels with their SBOMs, of which the one for Linux is kept.
+/// SHA256SUMS lists them all; files of older versions are removed, their hashes stay.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]

@@ -1,7 +1,9 @@
 //! The FMUs released in dist/release are whole, and of this source as long as they bear this
 //! version.
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use host::binary::Binary;
 use host::output::sha256;
@@ -45,11 +47,8 @@ fn release_of_this_version_has_this_interface() {
 }
 
 #[test]
-fn hash_and_sbom_beside_the_release_are_its_own() {
+fn sbom_beside_the_release_is_its_own() {
     for (model, _, fmu) in released() {
-        let name = fmu.file_name().unwrap().to_string_lossy();
-        let written = std::fs::read_to_string(fmu.with_extension("fmu.sha256")).unwrap();
-        assert_eq!(written, format!("{}  {name}\n", sha256(&std::fs::read(&fmu).unwrap())));
         let beside = std::fs::read(fmu.with_extension("cdx.json")).unwrap();
         assert!(beside == release::read(&fmu, &model.sbom()).unwrap());
         let sbom: serde_json::Value = serde_json::from_slice(&beside).unwrap();
@@ -64,36 +63,125 @@ fn hash_and_sbom_beside_the_release_are_its_own() {
 #[test]
 fn release_folder_holds_one_version_and_the_hashes_of_all() {
     let folder = pack::root().join("dist").join("release");
-    let sums = std::fs::read_to_string(folder.join("SHA256SUMS")).unwrap();
-    let mut versions = std::collections::BTreeSet::new();
+    let sums = std::fs::read_to_string(folder.join(release::MANIFEST)).unwrap();
+    let mut versions = BTreeSet::new();
+    let mut wheels = 0;
     for entry in folder.read_dir().unwrap().flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
+        if name == release::MANIFEST {
+            continue;
+        }
+        let bytes = std::fs::read(entry.path()).unwrap();
+        let line = format!("{}  {name}\n", sha256(&bytes));
+        assert!(sums.contains(&line), "{} has no line {line}", release::MANIFEST);
         if name.ends_with(".fmu") || name.ends_with(".whl") {
             versions.extend(name.trim_end_matches(".fmu").split('-').nth(1).map(String::from));
-            let line = format!("{}  {name}\n", sha256(&std::fs::read(entry.path()).unwrap()));
-            assert!(sums.contains(&line), "SHA256SUMS has no line {line}");
+        }
+        if name.ends_with(".whl") {
+            wheels += 1;
+            let size = bytes.len() as u64;
+            assert!(size <= release::LARGEST_WHEEL, "{name}: {size} bytes");
         }
     }
     assert_eq!(versions.len(), 1, "{versions:?}");
+    assert!(wheels <= 1, "{wheels} wheels");
+    let version = versions.first().unwrap();
+    let listed =
+        |line: &&str| line.contains(&format!("  hubslosh-{version}-")) && line.ends_with(".whl");
+    assert_eq!(sums.lines().filter(listed).count(), 5, "Linux, macOS twice each, Windows");
     assert!(sums.contains("  HubSlosh-0.1.0.fmu\n"));
 }
 
-#[test]
-fn wheel_beside_the_release_is_the_only_one_and_has_its_hash() {
-    let folder = pack::root().join("dist").join("release");
-    let entries = folder.read_dir().unwrap().flatten().map(|entry| entry.path());
-    let wheels: Vec<_> = entries.filter(|p| p.extension().is_some_and(|e| e == "whl")).collect();
-    let Ok(hashes) = std::fs::read_to_string(release::wheel_hashes(&folder)) else {
-        assert!(wheels.is_empty() || released().is_empty(), "a wheel without its hash: {wheels:?}");
-        return;
+/// A source tree of version 1.2.3 with a release of small files, and the wheels that CI has made.
+#[cfg(unix)]
+fn tree_with_a_release(folder: &Path) {
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
     };
-    assert_eq!(hashes.lines().count(), 5, "Linux, macOS twice each, Windows: {hashes}");
-    assert!(wheels.len() <= 1, "{wheels:?}");
-    for wheel in wheels {
-        let bytes = std::fs::read(&wheel).unwrap();
-        let name = wheel.file_name().unwrap().to_string_lossy();
-        assert!(hashes.contains(&format!("{}  {name}\n", sha256(&bytes))), "{name}");
-        assert!(bytes.len() as u64 <= release::LARGEST_WHEEL, "{name}: {} bytes", bytes.len());
+    let script = std::fs::read_to_string(pack::root().join(".github/release-files")).unwrap();
+    write(".github/release-files", &script);
+    write("Cargo.toml", "[workspace.package]\nversion = \"1.2.3\"\n\n");
+    write("CITATION.cff", "version: 1.2.3\n");
+    write("CHANGELOG.md", "## 1.2.3\n\nAll.\n\n## 1.2.2\n\nLess.\n");
+    let mut sums = "0  HubSlosh-1.2.2.fmu\n0  HubSlosh-1.2.30.fmu\n".to_string();
+    let mut listed = |file: &str, name: &str| {
+        write(file, name);
+        sums += &format!("{}  {name}\n", sha256(name.as_bytes()));
+    };
+    for model in ["HubSlosh", "Spacecraft", "SloshTank"] {
+        for name in ["", "-fmi3"].map(|fmi| format!("{model}-1.2.3{fmi}.fmu")) {
+            listed(&format!("dist/release/{name}"), &name);
+        }
+    }
+    listed("dist/release/HubSlosh-1.2.3-fmi3.cdx.json", "HubSlosh-1.2.3-fmi3.cdx.json");
+    listed("wheels/hubslosh-1.2.3-py3-none-win_amd64.whl", "hubslosh-1.2.3-py3-none-win_amd64.whl");
+    write("wheels/hubslosh-1.2.3.tar.gz", "sdist");
+    write("dist/release/notes.txt", "not listed");
+    write("dist/release/SHA256SUMS", &sums);
+}
+
+/// Names of the gathered files, or what the script says.
+#[cfg(unix)]
+fn gathered(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String> {
+    let mut command = Command::new("bash");
+    let command = command.current_dir(tree).arg(".github/release-files").args(arguments);
+    let done = command.output().unwrap();
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let names = std::fs::read_dir(tree.join(arguments[1])).into_iter().flatten().flatten();
+    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    if done.status.success() { Ok(names) } else { Err(said) }
+}
+
+#[cfg(unix)]
+#[test]
+fn release_files_are_those_of_the_manifest_and_a_missing_or_changed_one_fails() {
+    let whole = tempfile::tempdir().unwrap();
+    tree_with_a_release(whole.path());
+    let found = gathered(whole.path(), &["v1.2.3", "files"]).unwrap();
+    let mut wanted: BTreeSet<String> =
+        ["SHA256SUMS", "notes.md", "HubSlosh-1.2.3-fmi3.cdx.json"].map(String::from).into();
+    for model in ["HubSlosh", "Spacecraft", "SloshTank"] {
+        wanted.extend(["", "-fmi3"].map(|fmi| format!("{model}-1.2.3{fmi}.fmu")));
+    }
+    assert_eq!(found, wanted);
+    let found = gathered(whole.path(), &["v1.2.3", "all", "wheels"]).unwrap();
+    wanted.extend(
+        ["hubslosh-1.2.3-py3-none-win_amd64.whl", "hubslosh-1.2.3.tar.gz"].map(String::from),
+    );
+    assert_eq!(found, wanted);
+    let check = Command::new("sha256sum")
+        .current_dir(whole.path().join("all"))
+        .args(["--check", "--quiet", "SHA256SUMS"])
+        .status()
+        .unwrap();
+    assert!(check.success());
+    let fmu = "dist/release/Spacecraft-1.2.3-fmi3.fmu";
+    let wheel = "wheels/hubslosh-1.2.3-py3-none-win_amd64.whl";
+    let other = "wheels/hubslosh-1.2.3-py3-none-any.whl";
+    for (name, content, why) in [
+        (fmu, None, "is missing"),
+        (fmu, Some("other"), "has the SHA-256"),
+        ("dist/release/HubSlosh-1.2.3-fmi3.cdx.json", None, "is missing"),
+        (wheel, None, "is missing"),
+        (wheel, Some("other"), "has the SHA-256"),
+        (other, Some("other"), "lists no hubslosh-1.2.3-py3-none-any.whl"),
+        (
+            "dist/release/SHA256SUMS",
+            Some("0  HubSlosh-1.2.3.fmu\n"),
+            "lists no HubSlosh-1.2.3-fmi3.fmu",
+        ),
+        ("CITATION.cff", Some("version: 1.2.2\n"), "CITATION.cff has another version"),
+    ] {
+        let tree = tempfile::tempdir().unwrap();
+        tree_with_a_release(tree.path());
+        match content {
+            Some(content) => std::fs::write(tree.path().join(name), content).unwrap(),
+            None => std::fs::remove_file(tree.path().join(name)).unwrap(),
+        }
+        let said = gathered(tree.path(), &["v1.2.3", "files", "wheels"]).unwrap_err();
+        assert!(said.contains(why), "{name}: {said}");
     }
 }
 
