@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use formulas::cylinder;
 use taylor::integrator::Steps;
 use taylor::vector::{
-    Mat3, Quaternion, Vec3, add, dot, largest, on_sphere, rotation, scale, sub, times,
+    Mat3, Quaternion, Vec3, add, cross, dot, largest, on_sphere, rotation, scale, sub, times,
     unit_quaternion,
 };
 
@@ -339,16 +339,31 @@ impl Tank {
         }
     }
 
-    /// Adds what the bobs of planar modes are carried along with where they hang: across their planes and along their rods.
-    fn add_planar_bobs(&self, matrix: &mut Mat6) {
+    /// Adds what the bobs of planar modes are carried along with, across their planes and along their rods, at `angles` (rad)
+    /// from where they hang.
+    fn add_planar_bobs(&self, matrix: &mut Mat6, angles: &[f64; MODES]) {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         for n in 0..self.modes {
             let (hinge, Some(b)) = self.hinge_and_across(n) else { continue };
-            let rho = sub(hinge, scale(self.length[n], e));
-            for u in [along_rod(e, hinge), along_rod(b, rho)] {
+            let (sin, cos) = libm::sincos(angles[n]);
+            let up = add(scale(cos, e), scale(sin, cross(b, e)));
+            let rho = sub(hinge, scale(self.length[n], up));
+            for u in [along_rod(up, hinge), along_rod(b, rho)] {
                 add_rank_one(matrix, self.mass[n], &u);
             }
         }
+    }
+
+    /// The least that the rigid liquid contributes: of liquid in flight the inertia that turns with the tank, of a tank that
+    /// drains that at its emptiest.
+    fn least_rigid(&self) -> Rigid {
+        if self.ball.travel > 0.0 {
+            return Rigid { mass: 0.0, moment: [0.0; 3], inertia: self.own_inertia() };
+        }
+        if self.fill.points > 0 {
+            return Tank { liquid_0: self.fill.liquid[0], ..*self }.resolve().rigid();
+        }
+        self.rigid()
     }
 
     /// Direction and rate of the bob of mode n (from 0) at the start, tank axes.
@@ -911,14 +926,93 @@ impl Craft {
     }
 }
 
-/// Whether a body with rigid liquid and what is carried along of planar modes has no inertia about some axis.
-pub(crate) fn has_no_inertia(body: Rigid, tanks: impl Iterator<Item = Tank> + Clone) -> bool {
-    let rigid = tanks.clone().fold(body, |sum, tank| sum.and(&tank.rigid()));
-    let mut matrix = rigid.mass_matrix();
-    for tank in tanks {
-        tank.add_planar_bobs(&mut matrix);
+/// Below this smallest pivot a mass matrix counts as singular.
+const SINGULAR: f64 = 1e-12;
+
+/// Where a body with the liquid of `tanks` lacks mass along or inertia about some axis, as words that follow "is singular"; `None`
+/// where it has both in every state of the liquid.
+pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
+    let matrix = |rigid: fn(&Tank) -> Rigid| {
+        tanks.iter().fold(body, |sum, tank| sum.and(&rigid(tank))).mass_matrix()
+    };
+    let rigid = matrix(Tank::rigid);
+    let at = |angles: &[[f64; MODES]; TANKS]| {
+        let mut matrix = rigid;
+        tanks
+            .iter()
+            .zip(angles)
+            .for_each(|(tank, angles)| tank.add_planar_bobs(&mut matrix, angles));
+        smallest_pivot(&matrix)
+    };
+    let mut angles = [[0.0; MODES]; TANKS];
+    if at(&angles) < SINGULAR {
+        return Some(String::new());
     }
-    smallest_pivot(&matrix) < 1e-12
+    if smallest_pivot(&matrix(Tank::least_rigid)) < SINGULAR && !tanks.iter().any(Tank::is_planar) {
+        return Some(
+            " in flight of detached liquid or with tanks at the start of their tables".into(),
+        );
+    }
+    // Bobs only add to the rigid part: where that is enough, no direction is singular.
+    if smallest_pivot(&rigid) >= SINGULAR {
+        return None;
+    }
+    (least_pivot(&at, tanks, &mut angles) < SINGULAR).then(|| {
+        let mut found = String::new();
+        for (i, tank) in tanks.iter().enumerate() {
+            for n in (0..tank.modes).filter(|n| tank.across(*n).is_some()) {
+                let degrees = libm::round(angles[i][n].to_degrees());
+                let comma = if found.is_empty() { "" } else { ", " };
+                found += &format!("{comma}mode {} of tank {} at {degrees}", n + 1, i + 1);
+            }
+        }
+        format!(" where planar modes swing as far as this, in degrees from rest: {found}")
+    })
+}
+
+/// The least of `pivot` over all angles of the planar modes that a search finds, and where: one angle after the other, from
+/// several starts, with steps that are halved.
+fn least_pivot(
+    pivot: &impl Fn(&[[f64; MODES]; TANKS]) -> f64,
+    tanks: &[Tank],
+    angles: &mut [[f64; MODES]; TANKS],
+) -> f64 {
+    let modes = |i: usize| (0..tanks[i].modes).filter(move |n| tanks[i].across(*n).is_some());
+    let mut least = f64::INFINITY;
+    for start in [0.0, 0.5, 1.0, -0.5] {
+        let mut now = [[start * core::f64::consts::PI; MODES]; TANKS];
+        let mut best = pivot(&now);
+        let mut step = core::f64::consts::PI / 4.0;
+        while step > 1e-3 && best >= SINGULAR {
+            let mut moved = false;
+            for i in 0..tanks.len() {
+                for n in modes(i) {
+                    let before = now[i][n];
+                    for angle in (-3..=4).map(|k| before + k as f64 * step) {
+                        let kept = now[i][n];
+                        now[i][n] = angle;
+                        let found = pivot(&now);
+                        // What rounding makes of a difference moves nothing.
+                        if found < best * (1.0 - 1e-9) {
+                            (best, moved) = (found, true);
+                        } else {
+                            now[i][n] = kept;
+                        }
+                    }
+                }
+            }
+            if !moved {
+                step /= 2.0;
+            }
+        }
+        if best < least {
+            (least, *angles) = (best, now);
+        }
+        if least < SINGULAR {
+            break;
+        }
+    }
+    least
 }
 
 impl Parameters {
@@ -988,13 +1082,13 @@ impl Parameters {
             ));
         }
         if problems.0.is_empty() {
-            let tanks = self.tank[..self.tanks].iter().map(Tank::resolve);
-            if has_no_inertia(self.craft.rigid(), tanks) {
-                problems.0.push(
-                    "craft.J with the tanks' m_0, I_0 and I_z is singular: the inertia of craft \
-                     and rigid liquid about every axis through their centre of mass must be above 0"
-                        .into(),
-                );
+            let tanks: Vec<Tank> = self.tank[..self.tanks].iter().map(Tank::resolve).collect();
+            if let Some(place) = singular_where(self.craft.rigid(), &tanks) {
+                problems.0.push(format!(
+                    "craft.J with the tanks' m_0, I_0 and I_z is singular{place}: the inertia of craft and rigid liquid about every \
+                     axis through their centre of mass, and their mass, must be above 0 (allowed: more of craft.mass or craft.J, or \
+                     of the tanks' m_0, I_0 and I_z)"
+                ));
             }
         }
         problems.0

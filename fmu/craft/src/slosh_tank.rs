@@ -90,7 +90,7 @@ use crate::lump::{Directions, Due, Lump};
 use crate::motion::{SCALE_TIME, twice_crossed};
 use crate::outputs::{MassProperties, TankOutputs};
 use crate::parameters::{
-    Craft, Limits, MAX_STEPS, Tank, has_no_inertia, steps_problem, tolerance_problem,
+    Craft, Limits, MAX_STEPS, Tank, singular_where, steps_problem, tolerance_problem,
 };
 use crate::ranges;
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
@@ -202,10 +202,12 @@ impl TankParameters {
             ));
         }
         let host = self.host?;
-        has_no_inertia(host.rigid(), core::iter::once(tank)).then(|| {
-            "host.J with the tank's m_0, I_0, dI_y, I_z and products is singular: the inertia of host and rigid liquid \
-             about every axis through their centre of mass must be above 0"
-                .into()
+        singular_where(host.rigid(), &[tank]).map(|place| {
+            format!(
+                "host.J with the tank's m_0, I_0, dI_y, I_z and products is singular{place}: the inertia of host and rigid liquid \
+                 about every axis through their centre of mass, and their mass, must be above 0 (allowed: more of host.mass or \
+                 host.J, or of the tank's m_0, I_0 and I_z)"
+            )
         })
     }
 }

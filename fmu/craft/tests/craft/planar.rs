@@ -185,6 +185,46 @@ fn rigid_liquid_below_0_is_allowed_with_planar_modes_as_long_as_the_whole_is_not
     assert!(p.problems()[0].starts_with("tank[1].direction[2] = "), "{:?}", p.problems());
 }
 
+/// 10 kg of craft carry a box whose m_0 is -120 kg: at rest both modes carry the craft along the axis, at 90 degrees none does.
+/// Earlier versions found the craft regular and its inputs wrong once it moved. A craft in which the rigid part is enough is accepted.
+#[test]
+fn a_craft_that_is_singular_at_some_direction_of_planar_bobs_is_refused() {
+    let light = |mass: f64| {
+        let mut p = craft(a_box());
+        p.craft.mass = mass;
+        p
+    };
+    let said = light(10.0).problems();
+    let means = ["craft.J", "singular where planar modes swing", "mode 2 of tank 1", "craft.mass"];
+    assert!(said.len() == 1 && means.iter().all(|word| said[0].contains(word)), "{said:?}");
+    // Craft and rigid liquid alone have 880 kg and inertia about every axis, to which bobs only add.
+    assert_eq!(light(1000.0).problems(), [""; 0]);
+    let host = TankParameters {
+        tank: a_box(),
+        host: Some(light(10.0).craft),
+        ..TankParameters::default()
+    };
+    let said = host.problems();
+    assert!(said.len() == 1 && said[0].starts_with("host.J with the tank's m_0"), "{said:?}");
+    let host = TankParameters { host: Some(light(1000.0).craft), ..host };
+    assert_eq!(host.problems(), [""; 0]);
+}
+
+/// A craft without inertia about its own axis has that of the liquid in a tank off the axis, but not while the liquid flies.
+#[test]
+fn a_craft_that_is_singular_without_its_liquid_is_refused_where_the_liquid_may_leave() {
+    let mut p = Parameters::default();
+    p.craft.r = [0.0; 3];
+    p.craft.j = Inertia { xx: 900.0, yy: 900.0, zz: 0.0, xy: 0.0, xz: 0.0, yz: 0.0 };
+    p.tank[0].position = [2.0, 0.0, 0.0];
+    assert_eq!(p.problems(), [""; 0]);
+    p.tank[0].ball.travel = 0.6;
+    let said = p.problems();
+    assert!(said.len() == 1 && said[0].contains("in flight of detached liquid"), "{said:?}");
+    p.tank[0].i_z = 1.0;
+    assert_eq!(p.problems(), [""; 0]);
+}
+
 type V = Vector3<f64>;
 
 /// Momentum and angular momentum about the origin of space, and energy, of a body with its tanks, from positions and velocities of
