@@ -157,6 +157,36 @@ pub struct Damping {
     pub warnings: Vec<String>,
 }
 
+/// Natural frequencies with surface tension.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Capillarity {
+    /// Surface tension, N/m.
+    pub sigma: f64,
+    /// Contact angle between surface and wall, degrees; 90 is a flat surface.
+    pub contact_angle: f64,
+    /// Specific force along the axis at which it holds, m/s².
+    pub gravity: f64,
+    /// Bond number rho g R^2/sigma of the free surface's outer radius; none for a box or without surface tension.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bond: Option<f64>,
+    /// The modes, in the order of [`ModalData::modes`]. Of a box, those along its first length.
+    pub modes: Vec<CapillaryMode>,
+    /// Of a box, those along its second length.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modes_y: Vec<CapillaryMode>,
+    /// What leaves the range of a formula, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// One mode with surface tension.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CapillaryMode {
+    /// Natural frequency, rad/s; none where no formula holds.
+    pub omega: Option<f64>,
+    /// Centring stiffness at the bob, N/m; below 0 for a meniscus that softens the surface; none where no formula holds.
+    pub k: Option<f64>,
+}
+
 /// The damping of one mode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModeDamping {
@@ -231,6 +261,9 @@ pub struct ModalData {
     pub error_i_0: f64,
     /// Estimated relative error of beta.
     pub error_beta: f64,
+    /// Natural frequencies with surface tension, where that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub capillarity: Option<Capillarity>,
     /// Damping, where the liquid's viscosity is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damping: Option<Damping>,
@@ -352,6 +385,7 @@ impl ModalData {
             error: 0.0,
             error_i_0: 0.0,
             error_beta: 0.0,
+            capillarity: None,
             damping: None,
             wall: None,
         }
@@ -373,7 +407,24 @@ impl ModalData {
         self.error_i_0 = error * (1.0 + lever).powi(2);
     }
 
-    /// Origin of heights, in words.
+    /// Natural frequencies, Hz, under the specific force `gravity`, m/s²; of a box along one of its lengths, the first or
+    /// (`along_y`) the second. With surface tension those of [`Capillarity`], none where no formula holds.
+    pub fn frequencies(&self, gravity: f64, along_y: bool) -> Vec<Option<f64>> {
+        let omegas: Vec<Option<f64>> = match (&self.capillarity, &self.axes) {
+            (Some(found), _) => {
+                let modes = if along_y { &found.modes_y } else { &found.modes };
+                modes.iter().map(|mode| mode.omega).collect()
+            }
+            (None, axes) => {
+                let of_y = axes.as_ref().filter(|_| along_y).map(|axes| &axes.y.modes);
+                let modes = of_y.unwrap_or(&self.modes).iter();
+                modes.map(|mode| Some((gravity * mode.lambda).sqrt())).collect()
+            }
+        };
+        omegas.iter().map(|omega| omega.map(|omega| omega / core::f64::consts::TAU)).collect()
+    }
+
+    /// Where heights count from, in words.
     pub fn origin(&self) -> String {
         if self.z_lowest.abs() < 1e-9 {
             return "z = 0 is the tank's lowest point, z up".to_string();

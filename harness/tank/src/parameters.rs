@@ -66,8 +66,53 @@ pub struct ParameterSet {
     pub values: Vec<(String, Value)>,
 }
 
-/// Centring stiffnesses of the modes, N/m: of a flat surface, and of the first mode of an upright cylinder
-/// of the meniscus that the contact angle makes. The FMUs take none below 0.
+/// The modes with surface tension: of a flat surface, and of the first mode of an upright cylinder of the meniscus that the
+/// contact angle makes.
+fn with_capillarity(
+    tank: &Tank,
+    data: &ModalData,
+    modes: &[modal::Mode],
+    (fluid, angle): (Fluid, f64),
+    notes: &mut Vec<String>,
+    warnings: &mut Vec<String>,
+    unknown: &mut Vec<String>,
+) -> Vec<Capillary> {
+    let mut all: Vec<Capillary> = modes.iter().map(|mode| low_gravity::flat(mode, fluid)).collect();
+    if angle != 90.0 {
+        if let Geometry::Revolution { shape: Some(Shape::Cylinder { radius, .. }), .. } =
+            &tank.geometry
+        {
+            all[0] = low_gravity::cylinder(&modes[0], *radius, data.fill, angle, fluid);
+            let bond = fluid.bond(*radius);
+            notes.push(format!(
+                "k of mode 1: meniscus of a deep cylinder at a contact angle of {angle} degrees and the Bond \
+                 number {bond:.4}, free contact line (table); it holds at {} m/s²",
+                fluid.g
+            ));
+            warnings.push(
+                "capillarity: under a curved meniscus masses and heights, and the stiffnesses of the modes \
+                 after the first, are not known; they are those of a flat surface"
+                    .to_string(),
+            );
+        } else {
+            warnings.push(format!(
+                "capillarity: the meniscus of a contact angle of {angle} degrees is known for an upright \
+                 cylinder (shape = {{ cylinder = … }}) alone; k is that of a flat surface, 90 degrees"
+            ));
+        }
+    }
+    for (n, capillary) in all.iter().enumerate() {
+        let outside = capillary.outside.iter().map(|why| format!("capillarity: {why}"));
+        warnings.extend(outside);
+        if capillary.unknown {
+            let why = capillary.outside.join("; ");
+            unknown.push(format!("k of mode {} is not known: {why}", n + 1));
+        }
+    }
+    all
+}
+
+/// Centring stiffnesses of the modes, N/m. The FMUs take none below 0.
 fn springs(
     tank: &Tank,
     data: &ModalData,
@@ -84,38 +129,10 @@ fn springs(
         }
         return vec![0.0; modes.len()];
     };
-    let (fluid, angle) = (Fluid { rho: data.rho, sigma, g: liquid.gravity }, liquid.contact_angle);
-    let mut all: Vec<Capillary> = modes.iter().map(|mode| low_gravity::flat(mode, fluid)).collect();
-    if angle != 90.0 {
-        if let Geometry::Revolution { shape: Some(Shape::Cylinder { radius, .. }), .. } =
-            &tank.geometry
-        {
-            all[0] = low_gravity::cylinder(&modes[0], *radius, data.fill, angle, fluid);
-            let bond = fluid.bond(*radius);
-            notes.push(format!(
-                "k of mode 1: meniscus of a deep cylinder at a contact angle of {angle} degrees and the Bond \
-                 number {bond:.4}, free contact line (table); it holds at {} m/s²",
-                liquid.gravity
-            ));
-            warnings.push(
-                "capillarity: under a curved meniscus masses and heights, and the stiffnesses of the modes \
-                 after the first, are not known; they are those of a flat surface"
-                    .to_string(),
-            );
-        } else {
-            warnings.push(format!(
-                "capillarity: the meniscus of a contact angle of {angle} degrees is known for an upright \
-                 cylinder (shape = {{ cylinder = … }}) alone; k is that of a flat surface, 90 degrees"
-            ));
-        }
-    }
+    let fluid = Fluid { rho: data.rho, sigma, g: liquid.gravity };
+    let curved = (fluid, liquid.contact_angle);
+    let mut all = with_capillarity(tank, data, modes, curved, notes, warnings, unknown);
     for (n, (mode, capillary)) in modes.iter().zip(&mut all).enumerate() {
-        let outside = capillary.outside.iter().map(|why| format!("capillarity: {why}"));
-        warnings.extend(outside);
-        if capillary.unknown {
-            let why = capillary.outside.join("; ");
-            unknown.push(format!("k of mode {} is not known: {why}", n + 1));
-        }
         let (k, gravity) = (capillary.spring, liquid.gravity * mode.lambda);
         if k < 0.0 {
             warnings.push(format!(
@@ -139,6 +156,42 @@ fn along_both(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
         chosen.push((usize::from(mass(1) > mass(0)), 1));
     }
     chosen
+}
+
+/// Natural frequencies of a tank's modes with the surface tension and the contact angle of the liquid, at its gravity; none
+/// without surface tension.
+pub fn capillarity_of(tank: &Tank, data: &ModalData, liquid: Liquid) -> Option<modal::Capillarity> {
+    let sigma = liquid.sigma?;
+    let fluid = Fluid { rho: data.rho, sigma, g: liquid.gravity };
+    let curved = (fluid, liquid.contact_angle);
+    let mut warnings = Vec::new();
+    let mut of_modes = |modes: &[modal::Mode]| -> Vec<modal::CapillaryMode> {
+        let (mut notes, mut unknown) = (Vec::new(), Vec::new());
+        let all =
+            with_capillarity(tank, data, modes, curved, &mut notes, &mut warnings, &mut unknown);
+        warnings.extend(unknown.iter().map(|why| why.replacen("k of mode", "f of mode", 1)));
+        all.iter()
+            .map(|mode| {
+                let known = !mode.unknown;
+                modal::CapillaryMode {
+                    omega: known.then(|| mode.omega2.max(0.0).sqrt()),
+                    k: known.then_some(mode.spring),
+                }
+            })
+            .collect()
+    };
+    let modes = if data.modes.is_empty() { Vec::new() } else { of_modes(&data.modes) };
+    let modes_y = data.axes.as_ref().map_or(Vec::new(), |axes| of_modes(&axes.y.modes));
+    warnings.dedup();
+    Some(modal::Capillarity {
+        sigma,
+        contact_angle: liquid.contact_angle,
+        gravity: liquid.gravity,
+        bond: data.r_surface.filter(|_| sigma > 0.0).map(|radius| fluid.bond(radius)),
+        modes,
+        modes_y,
+        warnings,
+    })
 }
 
 /// The damping of a tank's modes with the capillarity of the liquid: see [`damping::of_tank`].

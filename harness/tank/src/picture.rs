@@ -235,7 +235,7 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
 
 /// The tank in section with its liquid, the free surface in each mode (largest elevations drawn alike)
 /// and, for modes with more than 1 % of the mass, the pendulum's hinge and bob if they lie in the
-/// drawing. `gravity`, m/s², gives frequencies.
+/// drawing. `gravity`, m/s², gives the frequencies where the result has none with surface tension.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);
     let margin = 0.16 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
@@ -275,22 +275,28 @@ pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     for line in [
         format!("liquid {} kg", digits(data.m_liq)),
         format!("centre of mass at {} m", digits(data.z_cg)),
-        format!("at g = {} m/s²:", significant(gravity)),
+        match &data.capillarity {
+            Some(found) => {
+                let [g, sigma] = [gravity, found.sigma].map(significant);
+                format!("at g = {g} m/s², surface tension {sigma} N/m:")
+            }
+            None => format!("at g = {} m/s²:", significant(gravity)),
+        },
     ] {
         text(&mut svg, x, y, "start", &line);
         y += 20.0;
     }
-    for (mode, colour) in data.modes.iter().take(DRAWN).zip(COLOURS) {
-        let frequency = (gravity * mode.lambda).sqrt() / core::f64::consts::TAU;
+    let frequencies = data.frequencies(gravity, false);
+    for ((mode, colour), f) in data.modes.iter().take(DRAWN).zip(COLOURS).zip(frequencies) {
         let _ = writeln!(
             svg,
             "<path d=\"M{x} {}h24\" stroke=\"{colour}\" stroke-width=\"2\"/>",
             y - 4.0
         );
         let words = format!(
-            "{}: {} Hz, {} % of the mass",
+            "{}: {}, {} % of the mass",
             mode.n,
-            digits(frequency),
+            f.map_or("frequency not known".to_string(), |f| format!("{} Hz", digits(f))),
             digits(100.0 * mode.m_ratio)
         );
         text(&mut svg, x + 32.0, y, "start", &words);

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use crate::modal::{Axis, Damping, ModalData, Mode, Rest};
+use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest};
 
 /// A length in m to 1e-9 m, without zeros at its end: fills found from a volume have 17 digits.
 pub(crate) fn short(length: f64) -> String {
@@ -16,7 +16,7 @@ pub(crate) fn significant(value: f64) -> String {
 }
 
 /// The result as text: liquid, modes, what stays with the tank, and the error. `gravity`, m/s², gives the
-/// frequencies.
+/// frequencies where the result has none with surface tension.
 pub fn table(data: &ModalData, gravity: f64) -> String {
     let mut text = String::new();
     let name = data.name.as_deref().unwrap_or("tank");
@@ -44,18 +44,23 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
         let _ = writeln!(text, "  inertia about the axis, effective      {inertia} kg·m²");
     }
     if let Some(axes) = &data.axes {
-        for (name, axis) in [("x", &axes.x), ("y", &axes.y)] {
+        for (name, axis, along_y) in [("x", &axes.x, false), ("y", &axes.y, true)] {
             let Axis { i_frozen_cg, i_eff_cg, modes, rest } = axis;
             let _ = writeln!(text, "\nmotion along {name}");
-            section(&mut text, *i_frozen_cg, *i_eff_cg, modes, rest, gravity);
+            let f = data.frequencies(gravity, along_y);
+            section(&mut text, [*i_frozen_cg, *i_eff_cg], modes, rest, gravity, &f);
         }
     } else {
-        section(&mut text, data.i_frozen_cg, data.i_eff_cg, &data.modes, &data.rest, gravity);
+        let inertias = [data.i_frozen_cg, data.i_eff_cg];
+        let f = data.frequencies(gravity, false);
+        section(&mut text, inertias, &data.modes, &data.rest, gravity, &f);
     }
-    if gravity == 0.0 && !data.modes.is_empty() {
+    if let Some(capillarity) = data.capillarity.as_ref().filter(|_| !data.modes.is_empty()) {
+        capillarity_section(&mut text, capillarity);
+    } else if gravity == 0.0 && !data.modes.is_empty() {
         let _ = writeln!(
             text,
-            "\nat 0 m/s² only capillarity brings the liquid back, which is not in this table: f is 0"
+            "\nat 0 m/s² only capillarity brings the liquid back, which is not in this table without --sigma: f is 0"
         );
     }
     if let Some(damping) = &data.damping {
@@ -67,6 +72,19 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
         data.error, data.error_i_0, data.error_beta
     );
     text
+}
+
+fn capillarity_section(text: &mut String, capillarity: &Capillarity) {
+    let Capillarity { sigma, contact_angle, bond, warnings, .. } = capillarity;
+    let bond = bond.map_or(String::new(), |bond| format!(", Bond number {}", significant(bond)));
+    let _ = writeln!(
+        text,
+        "\nf is with surface tension {} N/m, contact angle {contact_angle} degrees{bond}",
+        significant(*sigma)
+    );
+    for warning in warnings {
+        let _ = writeln!(text, "  warning: {warning}");
+    }
 }
 
 fn damping_section(text: &mut String, damping: &Damping) {
@@ -105,11 +123,11 @@ fn damping_section(text: &mut String, damping: &Damping) {
 
 fn section(
     text: &mut String,
-    rigid: f64,
-    effective: f64,
+    [rigid, effective]: [f64; 2],
     modes: &[Mode],
     rest: &[Rest],
     gravity: f64,
+    frequencies: &[Option<f64>],
 ) {
     let (rigid, effective) = (significant(rigid), significant(effective));
     let _ = writeln!(text, "  inertia about the centre, rigid        {rigid} kg·m²");
@@ -125,13 +143,13 @@ fn section(
         text,
         "         Hz           1/m           kg                   m            z, m        z, m        m/rad       1/m"
     );
-    for m in modes {
+    for (m, f) in modes.iter().zip(frequencies) {
         let height = |z: Option<f64>| z.map_or("-".to_string(), |z| format!("{z:.6}"));
         let _ = writeln!(
             text,
-            " {:2}  {:12.6} {:12.6} {:12.6} {:10.6} {:11.6} {:>11} {:>11} {:11.6} {:11.5}",
+            " {:2}  {:>12} {:12.6} {:12.6} {:10.6} {:11.6} {:>11} {:>11} {:11.6} {:11.5}",
             m.n,
-            (gravity * m.lambda).sqrt() / core::f64::consts::TAU,
+            f.map_or("-".to_string(), |f| format!("{f:.6}")),
             m.lambda,
             m.m,
             m.m_ratio,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use host::output::atomically;
-use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, damping_of};
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, capillarity_of, damping_of};
 use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
 
 use crate::terminal;
@@ -44,8 +44,8 @@ pub struct TankArgs {
     /// How many lateral modes, 1 to 20.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     modes: usize,
-    /// Acceleration along the tank's axis for the frequencies in table and picture, m/s². At 0 they are 0: only
-    /// capillarity (--sigma) brings the liquid back.
+    /// Acceleration along the tank's axis for the frequencies in table and picture, m/s². At 0 they are 0 without
+    /// surface tension (--sigma).
     #[arg(long, value_name = "NUMBER", default_value_t = 9.80665)]
     gravity: f64,
     /// Print the result as JSON, that of --sweep too.
@@ -72,12 +72,12 @@ pub struct TankArgs {
     /// at the largest fill [default: none, the ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
-    /// Surface tension, N/m, for the centring stiffness of --parameters and the frequencies that damping follows
-    /// [default: none]; with --sweep in --parameters alone, at the largest fill.
-    #[arg(long, value_name = "NUMBER")]
+    /// Surface tension, N/m, for the frequencies (in table, picture and --out at --gravity), for the centring stiffness of
+    /// --parameters and for the damping [default: none].
+    #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     sigma: Option<f64>,
-    /// Contact angle between surface and wall, degrees: the centring stiffness of an upright cylinder's first mode is
-    /// then that of the meniscus that --gravity and --sigma make. 90 is a flat surface.
+    /// Contact angle between surface and wall, degrees: frequency and centring stiffness of an upright cylinder's first
+    /// mode are then those of the meniscus that --gravity and --sigma make. 90 is a flat surface.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
     /// Write --parameters although a centring stiffness is far outside of what its formula holds for.
@@ -132,6 +132,11 @@ impl TankArgs {
             Some(fill) => {
                 let fill = tank.height_of(fill).with_context(read)?;
                 let mut data = tank.solve(fill, self.modes).with_context(read)?;
+                data.capillarity = capillarity_of(&tank, &data, self.liquid());
+                let found = data.capillarity.iter().flat_map(|found| &found.warnings);
+                // The table has them, and --parameters warns of its own.
+                let is_read = self.parameters.is_some() || !(self.json || self.out.is_some());
+                found.filter(|_| !is_read).for_each(|warning| terminal::warn(warning));
                 if let Some(nu) = self.nu.filter(|_| !data.modes.is_empty()) {
                     let liquid = self.liquid();
                     data.damping = Some(damping_of(&tank, &data, nu, liquid).with_context(read)?);

@@ -305,3 +305,51 @@ fn set_files_that_are_none_are_refused_in_a_sentence() {
         assert!(!folder.path().join("out.csv").exists());
     }
 }
+
+/// Omega_1^2 rho R^3/sigma at Bo = 3.6 and 30 degrees is between 9.1 and 21.4, the rows of the meniscus table at Bo 3 and 10, in
+/// table, picture and JSON; gravity alone makes 6.6. A sphere has no such formula: no frequency, in words and as null.
+#[test]
+fn frequencies_are_those_with_surface_tension_where_it_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let shape = |shape: &str| {
+        let text = format!("density = 1000\nshape = {{ {shape} }}\n");
+        std::fs::write(path("tank.toml"), text).unwrap();
+    };
+    let run = |more: &[&str]| {
+        let file = path("tank.toml");
+        let args = ["--modes=2", "--gravity=0.02592", "--sigma=0.072", "--contact-angle=30"];
+        let (ok, out, said) = tank(&[&[&file[..]], &args[..], more].concat());
+        assert!(ok, "{said}");
+        (out, said)
+    };
+    shape("cylinder = { radius = 0.1, height = 3 }");
+    let (table, _) = run(&["--fill=2", "--picture", &path("tank.svg")]);
+    let (json, said) = run(&["--fill=2", "--json"]);
+    let data: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let found = &data["capillarity"];
+    let omega = found["modes"][0]["omega"].as_f64().unwrap();
+    let omega2 = omega * omega / 0.072;
+    let gravity = 0.02592 * data["modes"][0]["lambda"].as_f64().unwrap() / 0.072;
+    assert!((10.0..10.4).contains(&omega2) && gravity < 6.7, "{omega2} {gravity}");
+    assert!((found["bond"].as_f64().unwrap() - 3.6).abs() < 1e-12);
+    let row = |table: &str| -> Vec<String> {
+        let row = table.lines().find(|line| line.trim_start().starts_with("1  ")).unwrap();
+        row.split_whitespace().map(String::from).collect()
+    };
+    assert_eq!(row(&table)[1], format!("{:.6}", omega / core::f64::consts::TAU));
+    assert!(table.contains("contact angle 30 degrees, Bond number 3.6"), "{table}");
+    assert!(table.contains("warning: capillarity: under a curved meniscus"), "{table}");
+    assert!(said.contains("warning: capillarity: under a curved meniscus"), "{said}");
+    let picture = std::fs::read_to_string(path("tank.svg")).unwrap();
+    assert!(picture.contains("surface tension 0.072 N/m"));
+    assert!(picture.contains(&format!("1: {:.3} Hz", omega / core::f64::consts::TAU)), "{picture}");
+
+    shape("sphere = { radius = 0.1 }");
+    let (table, _) = run(&["--fill=0.1"]);
+    assert!(table.contains("f of mode 1 is not known"), "{table}");
+    assert_eq!(row(&table)[1], "-");
+    let (json, _) = run(&["--fill=0.1", "--json"]);
+    let data: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(data["capillarity"]["modes"][0]["omega"].is_null(), "{json}");
+}
