@@ -1,6 +1,6 @@
-//! What the C interfaces of all versions of FMI have in common: the status of a call, the way to
-//! the host's logger, the host's texts and arrays, handles of instances and of saved states. Panics
-//! end here: one poisons the instance and is told to the logger.
+//! Common parts of the C interfaces of all versions of FMI: the status of a call, the
+//! host's logger, the host's texts and arrays, handles of instances and of saved states. Panics
+//! end here: one poisons the instance.
 //!
 //! Pointers may be NULL wherever the standard does not forbid it, and mostly where it does.
 
@@ -22,7 +22,7 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// What a call returns.
+/// Return value of a call.
 pub type Status = c_int;
 /// All is well.
 pub const OK: Status = 0;
@@ -49,14 +49,14 @@ pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 /// The way to the host's logger.
 pub struct Log {
     logger: Option<Logger>,
-    /// What is logged.
+    /// Filter of the log.
     pub filter: Filter,
-    /// Whether the host was warned of how it drives the model: once is enough.
+    /// True once the host was warned of how it drives the model.
     step_warned: bool,
 }
 
 impl Log {
-    /// As an instance starts.
+    /// Log of a new instance.
     pub fn new(logger: Option<Logger>) -> Log {
         Log { logger, filter: Filter::FAILURES, step_warned: false }
     }
@@ -159,7 +159,7 @@ pub unsafe fn array<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// As [`array`], to write to.
+/// [`array`] for writing.
 pub unsafe fn array_mut<'a, T>(
     call: &Call,
     name: &str,
@@ -204,7 +204,7 @@ fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
 /// No object stands at a lower address on any platform that FMUs are built for.
 const LOWEST_ADDRESS: usize = 1024;
 
-/// What a component handle points to.
+/// Target of a component handle.
 #[repr(C)]
 pub struct Component<M: Model, V: Version> {
     mark: u64,
@@ -212,7 +212,7 @@ pub struct Component<M: Model, V: Version> {
     pub instance: Instance<M, V>,
     /// Its way to the host's logger.
     pub log: Log,
-    /// What else its version keeps of the host.
+    /// Further data about the host that its version keeps.
     pub host: V::Host<M>,
 }
 
@@ -227,8 +227,7 @@ pub fn new_component<M: Model, V: Version>(
     Box::into_raw(component).cast()
 }
 
-/// Whether a handle is of a live `T` of this kind, whose first field is a mark. Of a handle that cannot be an address
-/// nothing is read; of others, one word is.
+/// Returns true if a handle is that of a live `T`, whose first field is a mark.
 unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bool {
     handle.addr() >= LOWEST_ADDRESS
         && handle.cast::<T>().is_aligned()
@@ -283,8 +282,8 @@ pub unsafe fn on<M: Model, V: Version>(
     status(fault.severity)
 }
 
-/// As [`on`], for the calls with which the motion can begin: then warnings are logged, of the parameters and
-/// inputs that it begins with.
+/// [`on`] for the calls with which the motion can begin: they log warnings about the initial parameters and
+/// inputs.
 pub unsafe fn on_start<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -322,7 +321,7 @@ pub fn silence_panics() {
 /// Marks a live saved state.
 const STATE: u64 = 0x5374_6174_6548_7562;
 
-/// What a state handle points to.
+/// Target of a state handle.
 #[repr(C)]
 struct SavedState<M: Model, V: Version> {
     mark: u64,

@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-/// What an instance is made for.
+/// Interface type of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Interface {
@@ -16,7 +16,7 @@ pub enum Interface {
 }
 
 impl Interface {
-    /// As messages name it.
+    /// Name in messages.
     pub const fn name(self) -> &'static str {
         match self {
             Interface::ModelExchange => "Model Exchange",
@@ -25,7 +25,7 @@ impl Interface {
     }
 }
 
-/// Who handles events.
+/// Handler of events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Events {
@@ -87,7 +87,7 @@ impl InstanceState {
         InstanceState::Intermediate,
     ];
 
-    /// As messages name it.
+    /// Name in messages.
     pub const fn name(self) -> &'static str {
         match self {
             InstanceState::Instantiated => "instantiated",
@@ -103,7 +103,7 @@ impl InstanceState {
         }
     }
 
-    /// Whether an instance for this interface and with this policy can get there and stay.
+    /// Returns true if an instance for this interface and with this policy can reach the state and stay in it.
     pub fn is_reachable(self, interface: Interface, events: Events) -> bool {
         match self {
             InstanceState::Stepping => interface == Interface::CoSimulation,
@@ -126,9 +126,9 @@ impl InstanceState {
 pub enum CType {
     Real,
     Integer,
-    /// Where a version passes enumerations in a type of their own.
+    /// Enumeration, in versions with a type for it.
     Enumeration,
-    /// Where a version passes structural parameters in a type of their own.
+    /// Structural parameter, in versions with a type for it.
     Size,
     Boolean,
     String,
@@ -184,7 +184,7 @@ impl Call {
         Call { only_in: Some(interface), ..self }
     }
 
-    /// Whether an instance may be called like this in this state; if not, the message says where.
+    /// Refuses a call that is not allowed in this state; the message names the states in which it is.
     #[inline]
     pub fn check(
         &self,
@@ -250,7 +250,7 @@ impl Call {
     }
 }
 
-/// How bad a failure is.
+/// Severity of a failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The call has no answer.
@@ -261,12 +261,12 @@ pub enum Severity {
     Fatal,
 }
 
-/// Why a call failed.
+/// Failure of a call.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// What the call returns.
+    /// Status to return.
     pub severity: Severity,
-    /// What the log says: the call, the variable, what is allowed.
+    /// Message for the log: the call, the variable, the allowed values.
     pub text: String,
 }
 

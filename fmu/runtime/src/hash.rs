@@ -20,7 +20,7 @@ impl Hash {
         self
     }
 
-    /// As [`Hash::bytes`], and the text's end counts: "ab", "c" is not "a", "bc".
+    /// Adds a text and its end: "ab", "c" differs from "a", "bc".
     pub fn text(self, text: &str) -> Hash {
         self.bytes(text.as_bytes()).bytes(&[0xff])
     }

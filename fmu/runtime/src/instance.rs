@@ -22,8 +22,8 @@ pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 /// The size that a continuous state may not reach.
 pub const MAX_STATE: f64 = 1e100;
-/// What two times may differ by, relative to the larger of time and step: hosts
-/// add up steps in their own way and are off by a few ulps.
+/// Relative tolerance for comparing times, by the larger of time and step: hosts
+/// accumulate steps in their own way and are off by a few units in the last place.
 const TIME_SLACK: f64 = 1e-9;
 
 /// An instance of an FMU, for hosts that speak a version of FMI.
@@ -33,9 +33,9 @@ const TIME_SLACK: f64 = 1e-9;
 pub struct Instance<M: Model, V: Version> {
     version: PhantomData<V>,
     pub(crate) interface: Interface,
-    /// Who handles events.
+    /// Handler of events.
     pub(crate) events: Events,
-    /// What the host has as variables.
+    /// Form in which the host sees the variables.
     pub(crate) layout: Layout,
     pub(crate) state: InstanceState,
     pub(crate) start: f64,
@@ -46,9 +46,9 @@ pub struct Instance<M: Model, V: Version> {
     /// The parameters' values in the table's order, right or wrong.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
-    /// Whether an input has a slope for the next step.
+    /// True if an input has a slope for the next step.
     pub(crate) sloped: bool,
-    /// Whether the inputs still have the slopes of the step that has just ended: until an input is
+    /// True while the inputs have the slopes of the step that has just ended: until an input is
     /// set, outputs are limits from the left.
     pub(crate) past_slopes: bool,
     /// There from the first look at it in initialization mode; gone when a parameter or an
@@ -65,7 +65,7 @@ pub struct Instance<M: Model, V: Version> {
     scratch: [Vec<f64>; 2],
 }
 
-/// What is to be known of a step that may stop at events.
+/// Result of a step that may stop at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepInfo {
     /// There is an event to be handled.
@@ -74,12 +74,12 @@ pub struct StepInfo {
     pub early: bool,
 }
 
-/// What is to be known of an event that has been handled.
+/// Result of handling an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventInfo {
     /// The FMU has changed continuous states.
     pub states_changed: bool,
-    /// When the next event is due at the latest, s.
+    /// Latest time of the next event, s.
     pub next_time: Option<f64>,
 }
 
@@ -139,12 +139,12 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// What it is made for.
+    /// Interface type of the instance.
     pub fn interface(&self) -> Interface {
         self.interface
     }
 
-    /// Whether a call is allowed now.
+    /// Refuses a call that is not allowed in the present state.
     #[inline]
     pub fn check(&self, call: &'static Call) -> Result<&'static Call, Fault> {
         call.check(self.interface, self.events, self.state)?;
@@ -166,7 +166,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.state = InstanceState::Fatal;
     }
 
-    /// What a failed call does to it.
+    /// Changes the instance state after a failed call.
     pub(crate) fn after_error(&mut self) {
         if let Some(state) = V::AFTER_ERROR.filter(|_| self.state != InstanceState::Fatal) {
             self.state = state;
@@ -281,7 +281,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// As new.
+    /// Resets the instance to its state after instantiation.
     pub fn reset(&mut self) -> Result<(), Fault> {
         self.check(V::RESET)?;
         let layout = self.layout;
@@ -427,7 +427,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Whether something discrete is not as the host is shown it.
+    /// Returns true if a discrete value differs from the one that the host sees.
     fn hides_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
         let outputs = *self.outputs(call)?;
         let mut all = M::table().discrete().zip(&self.shown);
@@ -510,7 +510,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Whether a host that integrates itself may set single states now.
+    /// Returns true if a Model Exchange host may set single states now.
     fn takes_states(&self) -> bool {
         self.interface == Interface::ModelExchange
             && matches!(self.state, InstanceState::Event | InstanceState::Continuous)
@@ -709,7 +709,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if scalar.state.is_some() || !has_derivative {
             return Ok(declared.into_iter().map(V::reference).collect());
         }
-        /// How far the points are, in orders of magnitude.
+        /// Distance of the points, in orders of magnitude.
         const NEAR: f64 = 1e-3;
         const POINTS: u64 = 4;
         let mut depends = vec![false; declared.len()];
@@ -824,7 +824,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// As [`Instance::do_step`], for a host that is told of events, and where it allows so stops at the first.
+    /// [`Instance::do_step`] for a host that is notified of events; it stops at the first event if the host allows that.
     #[inline(always)]
     pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
         let call = self.check(V::DO_STEP)?;
@@ -854,7 +854,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
     }
 
-    /// What is wrong with a step from `at` on by `h`, whatever it finds on its way.
+    /// Refuses a step from `at` by `h` that is invalid whatever happens during it.
     #[inline(always)]
     pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
         if !(is_finite(h) && h > 0.0) {
@@ -1222,7 +1222,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Whether a saved state is of an instance whose host has the same variables.
+    /// Refuses a saved state of an instance whose host sees other variables.
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
         if saved.layout == self.layout {
             return Ok(());
@@ -1297,12 +1297,12 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(answer(*events, model, inputs, question))
     }
 
-    /// What there is to be warned of in how the host drives the model, see [`Model::step_warning`].
+    /// Warning about how the host drives the model, see [`Model::step_warning`].
     pub fn step_warning(&self) -> Option<&'static str> {
         self.model.as_ref().and_then(M::step_warning)
     }
 
-    /// How many events have happened since the start.
+    /// Number of events since the start.
     #[inline]
     pub fn event_count(&self) -> i32 {
         self.model.as_ref().map_or(0, M::event_count)
@@ -1314,8 +1314,8 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 }
 
-/// What the model answers to a question: as the present inputs leave it, where it handles events
-/// itself; where the host does, as it is.
+/// Queries the model: with the present inputs applied if it handles events
+/// itself, unchanged if the host does.
 #[inline(always)]
 fn answer<M: Model, T>(
     events: Events,
@@ -1381,7 +1381,7 @@ fn hold<M: Model>(inputs: &mut M::Inputs) {
     }
 }
 
-/// Where an input is after `h`. A ramp down to the smallest value may miss it by a rounding error.
+/// Value of an input after `h`. A ramp down to the smallest value may miss it by a rounding error.
 #[inline]
 fn end_of_ramp<M: Model>(scalar: &Scalar<M>, (value, slope): (f64, f64), h: f64) -> f64 {
     let end = value + slope * h;
@@ -1396,7 +1396,7 @@ fn no_value<M: Model>(call: &Call, scalar: &Scalar<M>) -> Fault {
     call.error(format_args!("{} has no value", scalar.name()))
 }
 
-/// Whether an input can have this derivative.
+/// Refuses a derivative that the input cannot have.
 #[inline(always)]
 fn check_slope<M: Model>(
     call: &Call,

@@ -1,4 +1,4 @@
-//! What every FMU of the project shares. It knows FMI and no physics; a model knows its physics
+//! Common base of the project's FMUs. It knows FMI and no physics; a model knows its physics
 //! and no FMI. They meet in one trait, [`Model`].
 //!
 //! [`variable`] and [`table`] say what a model's variables are, [`call`] when a call is allowed,

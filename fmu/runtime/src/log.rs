@@ -1,4 +1,4 @@
-//! Which messages go to the host's logger.
+//! Selection of messages for the host's logger.
 //!
 //! Calls that fail, what to be warned of when the motion begins or a size changes, and, for those
 //! who ask, the model's events. A host that asks for
@@ -12,7 +12,7 @@ use crate::model::Model;
 use crate::table::Table;
 use crate::version::Version;
 
-/// What a message is about.
+/// Topic of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topic {
     /// An event of the model.
@@ -26,11 +26,11 @@ pub enum Topic {
 /// A log category of the model description.
 #[derive(Clone, Debug)]
 pub struct Category {
-    /// As hosts name it.
+    /// Name for hosts.
     pub name: &'static str,
-    /// What it holds.
+    /// Description of its messages.
     pub description: String,
-    /// What it is for; `None` stands for everything.
+    /// Topic; `None` includes all.
     pub topic: Option<Topic>,
 }
 
@@ -70,7 +70,7 @@ pub fn category(topic: Topic) -> &'static str {
     NAMES.iter().find(|(_, of)| *of == Some(topic)).map_or("logAll", |(name, _)| name)
 }
 
-/// What one instance logs.
+/// Filter of one instance's messages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
     events: bool,
@@ -90,7 +90,7 @@ impl Filter {
     pub const NONE: Filter =
         Filter { events: false, warning: false, discard: false, error: false, fatal: false };
 
-    /// Why calls fail, and nothing else.
+    /// Reasons of failed calls only.
     pub const ERRORS: Filter = Filter { warning: false, ..Filter::FAILURES };
 
     /// The same, with why calls fail.
@@ -121,7 +121,7 @@ impl Filter {
         Err(format!("unknown log category {}; known: {}", unknown.join(", "), known.join(", ")))
     }
 
-    /// Whether messages on this topic are wanted.
+    /// Returns true if messages on this topic are logged.
     pub fn wants(mut self, topic: Topic) -> bool {
         *self.switch(topic)
     }

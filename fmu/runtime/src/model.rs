@@ -1,26 +1,26 @@
-//! What a model must offer to become an FMU.
+//! Interface that a model implements to become an FMU.
 
 use std::fmt::Debug;
 
 use crate::table::Table;
 
-/// Why a step failed.
+/// Failure of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepFailure {
     /// In words.
     pub text: String,
-    /// Whether a shorter step may succeed.
+    /// True if a shorter step may succeed.
     pub shorter_may_succeed: bool,
 }
 
-/// Of a text alone: a shorter step may succeed, as where a step takes too much work.
+/// Makes a failure from a text: a shorter step may succeed, as when a step takes too much work.
 impl From<&str> for StepFailure {
     fn from(text: &str) -> StepFailure {
         StepFailure { text: text.into(), shorter_may_succeed: true }
     }
 }
 
-/// How a step has ended that stops at events.
+/// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepEnd {
     /// At its end.
@@ -44,10 +44,10 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// All that follows from states and inputs at one instant. The same type holds the outputs'
     /// derivatives along a direction.
     type Outputs: Copy + Debug;
-    /// What inputs can change at once of what is discrete; `()` for a model without events.
+    /// Discrete values that inputs can change at once; `()` for a model without events.
     type Discrete: Default;
 
-    /// Whether outputs depend on how the inputs move, not only on where they are.
+    /// True if outputs depend on the inputs' slopes, not only on their values.
     const OUTPUTS_USE_SLOPES: bool = false;
 
     /// The variables and what else the model description says.
@@ -63,7 +63,7 @@ pub trait Model: Clone + Debug + Sized + 'static {
         tolerance: f64,
     ) -> Result<Self, Vec<String>>;
 
-    /// What its parameters and the inputs at the start leave of the range in which the model is known,
+    /// Lists where parameters and initial inputs leave the known range of the model,
     /// one sentence each.
     fn warnings(&self, parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
         let _ = (parameters, inputs);
@@ -82,7 +82,7 @@ pub trait Model: Clone + Debug + Sized + 'static {
         None
     }
 
-    /// What else there is to save besides parameters and inputs, as plain words: always
+    /// Appends the saved state other than parameters and inputs as words: always
     /// [`About::saved_words`](crate::table::About::saved_words) of them.
     fn save(&self, words: &mut Vec<u64>);
 
@@ -93,8 +93,8 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// model is as before. Does not allocate unless it fails.
     fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), StepFailure>;
 
-    /// As [`Model::step`], but stops at the first event. A step from there to the same end, with the same inputs, ends
-    /// as the whole step does, bit for bit.
+    /// [`Model::step`] that stops at the first event. A step from there to the same end with the same inputs ends
+    /// bit-identical to the whole step.
     fn step_to_event(&mut self, inputs: &Self::Inputs, h: f64) -> Result<StepEnd, StepFailure> {
         self.step(inputs, h).map(|()| StepEnd::End)
     }
@@ -105,7 +105,7 @@ pub trait Model: Clone + Debug + Sized + 'static {
         let _ = inputs;
     }
 
-    /// What there is to see now.
+    /// Returns the current outputs.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
 
     /// Sets the slopes, over a step of length `h`, of inputs that follow from others during it, such
@@ -174,7 +174,7 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Ok(false)
     }
 
-    /// When the next event is due that depends on time alone.
+    /// Time of the next event that depends on time alone.
     fn next_time_event(&self) -> Option<f64> {
         None
     }
@@ -186,13 +186,13 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Ok(false)
     }
 
-    /// What there is to be warned of in the motion so far, or in how a host that integrates itself has driven it; looked
-    /// at after each step, until there is something.
+    /// Warning about the motion so far, or about how a Model Exchange host has driven it; queried
+    /// after each step until there is one.
     fn step_warning(&self) -> Option<&'static str> {
         None
     }
 
-    /// How many events have happened since the start.
+    /// Number of events since the start.
     fn event_count(&self) -> i32 {
         0
     }

@@ -11,16 +11,16 @@ use crate::model::Model;
 use crate::unit::{self, Unit};
 use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Value, Variable};
 
-/// What a model description says of the FMU as a whole.
+/// Properties of the FMU as a whole.
 #[derive(Clone, Copy, Debug)]
 pub struct About {
     /// The FMU's name in every sense: modelName, modelIdentifier, file name.
     pub model: &'static str,
     /// The version of model and table.
     pub version: &'static str,
-    /// What the FMU is.
+    /// Description of the FMU.
     pub description: &'static str,
-    /// What an event is, for the log; "" where there are none.
+    /// Description of events for the log; "" without events.
     pub events: &'static str,
     /// Number of event indicators.
     pub event_indicators: usize,
@@ -32,7 +32,7 @@ pub struct About {
 /// load and unload the FMU as often as it likes.
 #[derive(Debug)]
 pub struct Table<M: Model> {
-    /// Of the FMU as a whole.
+    /// Properties of the FMU as a whole.
     pub about: About,
     /// The variables.
     pub variables: &'static [Variable<M>],
@@ -45,7 +45,7 @@ pub struct Table<M: Model> {
     tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
 }
 
-/// What a table's entries are as variables.
+/// Form of a table's entries as FMI variables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Layout {
@@ -67,7 +67,7 @@ pub const GUID_LENGTH: usize = 38;
 /// Scalars that follow each other: the first, and the one after the last.
 type Span = (usize, usize);
 
-/// Where a table has the scalars of one kind.
+/// Range of the scalars of one kind in a table.
 const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
     let (mut begin, mut end, mut n) = (0, 0, 0);
     while n < scalars.len() {
@@ -96,7 +96,7 @@ const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
 pub struct Scalar<M: Model> {
     /// Its entry.
     pub variable: &'static Variable<M>,
-    /// Where it lives: the entry's, kept here because every call needs it.
+    /// Access of the entry, copied here because every call needs it.
     pub access: Access<M>,
     /// The C type that it is got and set with, likewise.
     pub c_type: CType,
@@ -107,7 +107,7 @@ pub struct Scalar<M: Model> {
     pub index: u32,
     /// Its place in the array, 0 for the first.
     pub element: usize,
-    /// How many scalar parameters come before it; of an output that is discrete, how many of these.
+    /// Number of scalar parameters before it; for a discrete output, number of discrete outputs before it.
     pub slot: usize,
 }
 
@@ -171,7 +171,7 @@ pub const fn scalars<M: Model, const N: usize>(
     scalars
 }
 
-/// Whether a variable is an output that is discrete.
+/// Returns true for a discrete output.
 const fn is_discrete<M: Model>(variable: &Variable<M>) -> bool {
     matches!(variable.access, Access::OutputInteger(_) | Access::OutputBoolean(_))
 }
@@ -188,7 +188,7 @@ impl<M: Model> Scalar<M> {
         self.state.map(|place| place(self.element))
     }
 
-    /// What is wrong with a value of it, in words.
+    /// Error in a value of it, in words.
     #[inline]
     pub fn problem(&self, value: Value) -> Option<String> {
         self.variable.problem(self.element, value)
@@ -221,7 +221,7 @@ impl<M: Model> Scalar<M> {
         })
     }
 
-    /// Whether `other` is among the names of a list of dependencies.
+    /// Returns true if `other` is among the names of a list of dependencies.
     fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
         let v = other.variable;
         names.iter().any(|name| match name.strip_suffix("[]") {
@@ -292,7 +292,7 @@ impl<M: Model> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// Whether arrays are sized by a parameter: it is structural where they are variables.
+    /// Returns true if a parameter sizes arrays: it is structural if arrays are variables.
     pub fn is_structural(&self, variable: &Variable<M>) -> bool {
         let sizes =
             |d: &Dimension| matches!(d, Dimension::Sized(name, _) if *name == variable.name);

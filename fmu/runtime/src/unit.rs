@@ -3,7 +3,7 @@
 /// A unit as a product of powers of SI base units, and what people read instead.
 #[derive(Debug)]
 pub struct Unit {
-    /// As variables name it.
+    /// Name in variables.
     pub name: &'static str,
     /// Exponents of kg, m, s, rad; `None` when they are not integers.
     pub base: Option<[i32; 4]>,

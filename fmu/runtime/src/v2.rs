@@ -51,7 +51,7 @@ pub type fmi2String = *const fmi2Char;
 /// A byte of a saved state.
 pub type fmi2Byte = c_char;
 
-/// What a call returns.
+/// Return value of a call.
 pub type fmi2Status = c_abi::Status;
 /// All is well.
 pub const fmi2OK: fmi2Status = c_abi::OK;
@@ -66,22 +66,22 @@ pub const fmi2Fatal: fmi2Status = c_abi::FATAL;
 /// Never returned.
 pub const fmi2Pending: fmi2Status = 5;
 
-/// What kind of FMU the host wants.
+/// Interface type that the host requests.
 pub type fmi2Type = c_int;
 /// Model Exchange.
 pub const fmi2ModelExchange: fmi2Type = 0;
 /// Co-Simulation.
 pub const fmi2CoSimulation: fmi2Type = 1;
 
-/// What the host asks of fmi2GetStatus and its kin.
+/// Kind of status queried by fmi2GetStatus and related functions.
 pub type fmi2StatusKind = c_int;
 /// The result of an asynchronous step.
 pub const fmi2DoStepStatus: fmi2StatusKind = 0;
-/// What an asynchronous step is busy with.
+/// Status of an asynchronous step.
 pub const fmi2PendingStatus: fmi2StatusKind = 1;
-/// How far the last step came.
+/// Time that the last step reached.
 pub const fmi2LastSuccessfulTime: fmi2StatusKind = 2;
-/// Whether the FMU wants to end the simulation.
+/// True if the FMU wants to end the simulation.
 pub const fmi2Terminated: fmi2StatusKind = 3;
 
 /// The host's logger: printf with a few words before.
@@ -118,12 +118,12 @@ const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
     Call::new(name, allowed).of(c_type)
 }
 
-/// Of Co-Simulation.
+/// Restricts a call to Co-Simulation.
 const fn cs(call: Call) -> Call {
     call.only_in(Interface::CoSimulation)
 }
 
-/// Of Model Exchange.
+/// Restricts a call to Model Exchange.
 const fn me(call: Call) -> Call {
     call.only_in(Interface::ModelExchange)
 }
@@ -317,7 +317,7 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
     }))
 }
 
-/// What the instance is for, or why there can be none like this.
+/// Interface of the requested instance, or the reason why it cannot be created.
 fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,
@@ -388,7 +388,7 @@ pub unsafe fn fmi2Terminate<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe { on_start::<M, Fmi2>(c, Fmi2::TERMINATE, |component| component.instance.terminate()) }
 }
 
-/// As new.
+/// Resets the instance to its state after instantiation.
 pub unsafe fn fmi2Reset<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe { on::<M, Fmi2>(c, Fmi2::RESET, |component| component.instance.reset()) }
 }
@@ -570,7 +570,7 @@ pub unsafe fn fmi2FreeFMUstate<M: Model>(
     unsafe { on::<M, Fmi2>(c, call, |_| free_state::<M, Fmi2>(call, "FMUstate", FMUstate)) }
 }
 
-/// How many bytes a saved state takes.
+/// Returns the size of a saved state in bytes.
 pub unsafe fn fmi2SerializedFMUstateSize<M: Model>(
     c: fmi2Component,
     FMUstate: fmi2FMUstate,
@@ -636,7 +636,7 @@ pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
     }
 }
 
-/// What the unknowns do when the knowns go in a direction.
+/// Derivative of the unknowns along a direction of the knowns.
 pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
     c: fmi2Component,
     vUnknown_ref: *const fmi2ValueReference,
@@ -661,7 +661,7 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
 
 // ---- Model Exchange ----
 
-/// What fmi2NewDiscreteStates tells.
+/// Result of fmi2NewDiscreteStates.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
@@ -903,7 +903,7 @@ unsafe fn answer<M: Model, T>(
     }
 }
 
-/// How the last step ended.
+/// Status of the last step.
 pub unsafe fn fmi2GetStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
@@ -916,7 +916,7 @@ pub unsafe fn fmi2GetStatus<M: Model>(
     unsafe { answer::<M, _>(c, &GET_STATUS, s, value, known) }
 }
 
-/// How far the last step came.
+/// Time that the last step reached.
 pub unsafe fn fmi2GetRealStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,

@@ -70,10 +70,10 @@ pub type fmi3String = *const c_char;
 pub type fmi3Byte = u8;
 /// The bytes of a binary variable.
 pub type fmi3Binary = *const fmi3Byte;
-/// Whether a clock ticks.
+/// True if a clock ticks.
 pub type fmi3Clock = bool;
 
-/// What a call returns.
+/// Return value of a call.
 pub type fmi3Status = c_abi::Status;
 /// All is well.
 pub const fmi3OK: fmi3Status = c_abi::OK;
@@ -86,12 +86,12 @@ pub const fmi3Error: fmi3Status = c_abi::ERROR;
 /// The instance is unusable.
 pub const fmi3Fatal: fmi3Status = c_abi::FATAL;
 
-/// How an unknown depends on a known.
+/// Kind of the dependency of an unknown on a known.
 pub type fmi3DependencyKind = c_int;
 /// Nothing particular.
 pub const fmi3Dependent: fmi3DependencyKind = 1;
 
-/// What is asked for of a clock's interval.
+/// Qualifier of a clock's interval.
 pub type fmi3IntervalQualifier = c_int;
 
 /// The host's logger.
@@ -104,7 +104,7 @@ pub type fmi3LogMessageCallback = Option<
     ),
 >;
 
-/// What the host does within a step.
+/// Callback of the host within a step.
 pub type fmi3IntermediateUpdateCallback = Option<
     unsafe extern "C" fn(
         environment: fmi3InstanceEnvironment,
@@ -118,12 +118,12 @@ pub type fmi3IntermediateUpdateCallback = Option<
     ),
 >;
 
-/// Of Scheduled Execution.
+/// Callback of Scheduled Execution.
 pub type fmi3ClockUpdateCallback =
     Option<unsafe extern "C" fn(environment: fmi3InstanceEnvironment)>;
-/// Of Scheduled Execution.
+/// Callback of Scheduled Execution.
 pub type fmi3LockPreemptionCallback = Option<unsafe extern "C" fn()>;
-/// Of Scheduled Execution.
+/// Callback of Scheduled Execution.
 pub type fmi3UnlockPreemptionCallback = Option<unsafe extern "C" fn()>;
 
 // ---- Which functions there are, and when each may be called ----
@@ -136,12 +136,12 @@ const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
     Call::new(name, allowed).of(c_type)
 }
 
-/// Of Co-Simulation.
+/// Restricts a call to Co-Simulation.
 const fn cs(call: Call) -> Call {
     call.only_in(Interface::CoSimulation)
 }
 
-/// Of Model Exchange.
+/// Restricts a call to Model Exchange.
 const fn me(call: Call) -> Call {
     call.only_in(Interface::ModelExchange)
 }
@@ -267,7 +267,7 @@ pub(crate) fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
     }
 }
 
-/// What FMI 3.0 calls a type.
+/// Name of a type in FMI 3.0.
 fn type_name(c_type: CType) -> &'static str {
     match c_type {
         CType::Real => "Float64",
@@ -346,18 +346,18 @@ fn extra_name<M: Model>(reference: u32) -> Option<String> {
 
 // ---- The host ----
 
-/// What an instance of FMI 3.0 keeps of its host.
+/// Data that an instance of FMI 3.0 keeps about its host.
 pub struct Host<M: Model> {
     environment: fmi3InstanceEnvironment,
     intermediate_update: fmi3IntermediateUpdateCallback,
     early_return_allowed: bool,
     /// The variables that the host wants within steps.
     required: Vec<fmi3ValueReference>,
-    /// What it may do with them at present.
+    /// Present phase of an intermediate update.
     phase: Phase,
     /// The inputs at the end of the piece that comes, as far as they are set.
     ends: M::Inputs,
-    /// Which of them are set.
+    /// Inputs that are set.
     set: Vec<fmi3ValueReference>,
     /// Room for event indicators.
     indicators: Vec<f64>,
@@ -367,7 +367,7 @@ pub struct Host<M: Model> {
     required_variables: Vec<fmi3ValueReference>,
 }
 
-/// What a host may do in an intermediate update.
+/// Phases of an intermediate update, by the calls that a host may make.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Set,
@@ -391,7 +391,7 @@ impl<M: Model> Host<M> {
     }
 }
 
-/// Whether hosts may get or set a variable within a step: an input that follows others has no end of its own.
+/// Returns true if hosts may get or set a variable within a step; an input that follows others has no end value of its own.
 pub fn has_intermediate_update<M: Model>(variable: &Variable<M>) -> bool {
     matches!(variable.causality, Causality::Input | Causality::Output)
         && variable.c_type() == CType::Real
@@ -643,7 +643,7 @@ pub unsafe fn fmi3Terminate<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe { on::<M, Fmi3>(instance, Fmi3::TERMINATE, |component| component.instance.terminate()) }
 }
 
-/// As new.
+/// Resets the instance to its state after instantiation.
 pub unsafe fn fmi3Reset<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, Fmi3::RESET, |component| {
@@ -711,7 +711,7 @@ fn check_elements<M: Model>(
     if values == expected {
         return Ok(());
     }
-    /// So many variables are named.
+    /// Largest number of variables that a message names.
     const NAMED: usize = 4;
     let mut shapes: Vec<_> = references
         .iter()
@@ -727,7 +727,7 @@ fn check_elements<M: Model>(
     )))
 }
 
-/// What the host knows follows the structural parameters.
+/// Resizes the host's arrays after a change of structural parameters.
 fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     let Component { instance, host, .. } = component;
     if let Some(arrays) = &mut host.arrays {
@@ -1283,14 +1283,14 @@ pub unsafe fn fmi3ActivateModelPartition<M: Model>(
 
 // ---- Dependencies ----
 
-/// That an element of a variable depends on an element of another.
+/// Dependency of one element of a variable on an element of another.
 struct Dependency {
     element: usize,
     independent: fmi3ValueReference,
     independent_element: usize,
 }
 
-/// What a variable depends on.
+/// Dependencies of a variable.
 fn dependencies<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,
@@ -1330,7 +1330,7 @@ fn dependencies<M: Model>(
     Ok(all)
 }
 
-/// How much a variable depends on.
+/// Number of dependencies of a variable.
 pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
     instance: fmi3Instance,
     valueReference: fmi3ValueReference,
@@ -1347,7 +1347,7 @@ pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
     }
 }
 
-/// What a variable depends on: at the start before the end of initialization mode, then at present.
+/// Dependencies of a variable: initial ones before the end of initialization mode, then the present ones.
 pub unsafe fn fmi3GetVariableDependencies<M: Model>(
     instance: fmi3Instance,
     dependent: fmi3ValueReference,
@@ -1432,7 +1432,7 @@ pub unsafe fn fmi3FreeFMUState<M: Model>(
     unsafe { on::<M, Fmi3>(instance, call, |_| free_state::<M, Fmi3>(call, "FMUState", FMUState)) }
 }
 
-/// How many bytes a saved state takes.
+/// Returns the size of a saved state in bytes.
 pub unsafe fn fmi3SerializedFMUStateSize<M: Model>(
     instance: fmi3Instance,
     FMUState: fmi3FMUState,
@@ -1499,7 +1499,7 @@ pub unsafe fn fmi3DeserializeFMUState<M: Model>(
 
 // ---- Derivatives ----
 
-/// As many numbers are given as a derivative has scalars.
+/// Refuses a derivative with a wrong number of scalars.
 fn check_numbers(call: &Call, name: &str, given: usize, expected: usize) -> Result<(), Fault> {
     if given == expected {
         return Ok(());
@@ -1507,7 +1507,7 @@ fn check_numbers(call: &Call, name: &str, given: usize, expected: usize) -> Resu
     Err(call.error(format_args!("{name} = {given} (allowed: {expected})")))
 }
 
-/// What the unknowns do when the knowns go in a direction.
+/// Derivative of the unknowns along a direction of the knowns.
 pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
     instance: fmi3Instance,
     unknowns: *const fmi3ValueReference,
@@ -1545,7 +1545,7 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
     }
 }
 
-/// What a weighted sum of the unknowns does with each known: column by column, each a directional derivative.
+/// Derivative of a weighted sum of the unknowns by each known: column by column, each a directional derivative.
 pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
     instance: fmi3Instance,
     unknowns: *const fmi3ValueReference,
@@ -1819,7 +1819,7 @@ unsafe fn tell<M: Model>(
     }
 }
 
-/// How many event indicators there are.
+/// Returns the number of event indicators.
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Model>(
     instance: fmi3Instance,
     nEventIndicators: *mut usize,
@@ -1829,7 +1829,7 @@ pub unsafe fn fmi3GetNumberOfEventIndicators<M: Model>(
     unsafe { tell::<M>(instance, &NUMBER_OF_INDICATORS, into, count) }
 }
 
-/// How many continuous states there are.
+/// Returns the number of continuous states.
 pub unsafe fn fmi3GetNumberOfContinuousStates<M: Model>(
     instance: fmi3Instance,
     nContinuousStates: *mut usize,
@@ -1892,7 +1892,7 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
     }
 }
 
-/// What the host answers in an intermediate update.
+/// Answer of the host to an intermediate update.
 #[derive(Clone, Copy)]
 struct Wish {
     /// To return early, at this time.
@@ -1947,7 +1947,7 @@ unsafe fn intermediate_update<M: Model>(
     Ok(Wish { early_return: Some(at).filter(|_| requested != 0 && can_return) })
 }
 
-/// Where a step's answers go.
+/// Targets of a step's results.
 #[derive(Clone, Copy)]
 struct Answers {
     event: *mut fmi3Boolean,
@@ -2023,7 +2023,7 @@ pub unsafe fn fmi3DoStep<M: Model>(
     unsafe { step_looked_into::<M>(instance, at, h, answers) }
 }
 
-/// What is answered and told after a step, before which so many events had happened.
+/// Writes results and messages after a step; `before` is the number of events before it.
 #[inline(always)]
 unsafe fn stepped<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -2225,7 +2225,7 @@ mod tests {
         Spring::table().find(name).unwrap() + 1
     }
 
-    /// What a test's host keeps, behind its environment.
+    /// Data of a test's host, behind its environment.
     #[derive(Default)]
     struct TestHost {
         instance: Option<usize>,
@@ -2234,7 +2234,7 @@ mod tests {
         updates: Vec<(f64, bool)>,
         /// The force that it sets at a piece's end.
         force: Option<f64>,
-        /// When it wants to return.
+        /// Time at which the host requests an early return.
         wish: Option<f64>,
         statuses: Vec<fmi3Status>,
         x: f64,
@@ -2856,7 +2856,7 @@ mod tests {
     }
 }
 
-/// What a host that knows arrays sees.
+/// Tests with a host that knows arrays.
 #[cfg(test)]
 mod tests_of_arrays {
     use super::*;
@@ -2918,7 +2918,7 @@ mod tests_of_arrays {
         assert_eq!(*lines.lock().unwrap(), [""; 0]);
     }
 
-    /// What was wrong, and how long the arrays are; of five and more the first four.
+    /// Messages name the error and the lengths of the arrays; of five and more the first four.
     #[test]
     fn wrong_counts_types_and_references_of_arrays_are_described() {
         let all = [6, 7, 8, 6, 8];

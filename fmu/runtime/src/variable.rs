@@ -1,4 +1,4 @@
-//! What a variable of an FMU is: the words that a model's table is written in.
+//! Variables of an FMU: the vocabulary of a model's table.
 
 use crate::call::CType;
 use crate::model::Model;
@@ -35,7 +35,7 @@ pub enum Causality {
 pub struct Quantity {
     /// SI; "" where it is not the same for all parameters.
     pub unit: &'static str,
-    /// What people read instead.
+    /// Unit for display.
     pub display_unit: Option<&'static str>,
     /// Smallest value allowed.
     pub min: Option<f64>,
@@ -50,7 +50,7 @@ pub struct Quantity {
 pub struct Item {
     /// Its name.
     pub name: &'static str,
-    /// What it means.
+    /// Meaning of the item.
     pub description: &'static str,
 }
 
@@ -66,7 +66,7 @@ impl Item {
 pub struct Enumeration {
     /// The type's name.
     pub name: &'static str,
-    /// What it chooses.
+    /// Purpose of the enumeration.
     pub description: &'static str,
     /// Its items.
     pub items: &'static [Item],
@@ -90,11 +90,11 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
 }
 
-/// Where an array's elements are among the model's continuous states: from the element's number,
-/// 0 for the first, to the state's.
+/// Maps an array element's number,
+/// 0 for the first, to the index of a continuous state.
 pub type Place = fn(usize) -> usize;
 
-/// How long an array is along one of its dimensions.
+/// Length of an array along one dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
     /// Always so long.
@@ -114,7 +114,7 @@ impl Dimension {
     }
 }
 
-/// Where a variable lives in the model. The last argument is the element's number in an array,
+/// Access to a variable in the model. The last argument is the element's number in an array,
 /// 0 for the first and for a scalar.
 #[derive(Debug)]
 #[allow(missing_docs)]
@@ -124,7 +124,7 @@ pub enum Access<M: Model> {
     Output(fn(&M::Outputs, usize) -> f64),
     OutputInteger(fn(&M::Outputs, usize) -> i32),
     OutputBoolean(fn(&M::Outputs, usize) -> bool),
-    /// Of parameters and present inputs alone: its value, and its rate along the inputs' slopes.
+    /// Function of parameters and present inputs: value, and rate along the inputs' slopes.
     OfInputs(fn(&M, &M::Inputs, usize) -> [f64; 2]),
     Real(fn(&mut M::Parameters, usize) -> &mut f64),
     Boolean(fn(&mut M::Parameters) -> &mut bool),
@@ -134,7 +134,7 @@ pub enum Access<M: Model> {
         get: fn(&M::Parameters, usize) -> i32,
         set: fn(&mut M::Parameters, usize, i32),
     },
-    /// Of the model itself: it does not change with time.
+    /// Function of the model, constant in time.
     Calculated(fn(&M, usize) -> f64),
     /// A continuous state that is not among the outputs.
     State,
@@ -149,24 +149,24 @@ pub struct Variable<M: Model> {
     /// those that find none follow in brackets of their own: `tank[].p` of the shape 4, 3, 3 is
     /// `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
     pub name: &'static str,
-    /// What it is, with sign and frame.
+    /// Description with sign and frame.
     pub description: &'static str,
     /// Its role.
     pub causality: Causality,
     /// Its type.
     pub kind: Kind,
-    /// Where it lives.
+    /// Access in the model.
     pub access: Access<M>,
     /// An array's dimensions, none for a scalar.
     pub shape: &'static [Dimension],
     /// Its place, if it is a continuous state.
     pub state: Option<Place>,
-    /// Whether an event can make this state jump.
+    /// True if an event can make this state jump.
     pub reinit: bool,
-    /// Whether this input's slope over a step follows from other inputs
-    /// ([`Model::set_dependent_slopes`]), whatever the host gives.
+    /// True if this input's slope over a step follows from other inputs
+    /// ([`Model::set_dependent_slopes`]), whatever slope the host sets.
     pub follows_inputs: bool,
-    /// Whether this parameter can be set while the simulation runs.
+    /// True if this parameter can be set during the simulation.
     pub tunable: bool,
     /// The inputs and continuous states it depends on without delay: a name as it is, the
     /// name of an array for all elements, or with "[]" after it for the same element.
@@ -378,7 +378,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
     }
 
-    /// What follows from the parameters.
+    /// A calculated parameter.
     pub const fn calculated(
         name: &'static str,
         get: fn(&M, usize) -> f64,
@@ -470,7 +470,7 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// How many scalars it is.
+    /// Number of scalars.
     pub const fn len(&self) -> usize {
         let (mut len, mut n) = (1, 0);
         while n < self.shape.len() {
@@ -592,7 +592,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// Whether an input may change at this rate: finite, and no more than [`Variable::fastest`].
+    /// Returns true if an input may change at this rate: finite, and at most [`Variable::fastest`].
     #[inline]
     pub fn allows_rate(&self, rate: f64) -> bool {
         let Kind::Real(Quantity { min, max, .. }) = &self.kind else { return is_finite(rate) };
@@ -628,7 +628,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// What is wrong with `value` of an element, in words: `name = value unit (allowed: …)`.
+    /// Error in `value` of an element, in words: `name = value unit (allowed: …)`.
     #[inline]
     pub fn problem(&self, element: usize, value: Value) -> Option<String> {
         if self.allows(value) { None } else { Some(self.refusal(element, value)) }

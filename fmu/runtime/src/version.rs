@@ -1,5 +1,5 @@
-//! What a version of FMI says of an instance: its functions' names, when they may be called, who
-//! handles events, and how value references number the variables.
+//! Properties of a version of FMI: its functions' names, when they may be called, the handler of
+//! events, and the numbering of value references.
 
 use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
 use crate::model::Model;
@@ -10,19 +10,19 @@ use crate::table::{Layout, Scalar};
 /// functions, name theirs themselves.
 #[allow(missing_docs)]
 pub trait Version: std::fmt::Debug + 'static {
-    /// What the names of its functions and types begin with.
+    /// Prefix of its functions and types.
     const PREFIX: &'static str;
 
-    /// What an instance keeps of its host besides the logger.
+    /// Data that an instance keeps about its host in addition to the logger.
     type Host<M: Model>;
 
     /// The state after a call that failed, if it is another than before.
     const AFTER_ERROR: Option<InstanceState>;
-    /// How bad a value outside its range is, where it is refused at once.
+    /// Severity of a value outside its range, if it is refused at once.
     const OUT_OF_RANGE: Severity;
     /// The state in which a host that handles events is after initialization mode.
     const FIRST_EVENT: InstanceState;
-    /// Whether Model Exchange hosts may set single continuous states, and not go back behind an event.
+    /// True if Model Exchange hosts may set single continuous states, and may not go back behind an event.
     const SETS_STATES: bool;
 
     const SETUP_EXPERIMENT: &'static Call;
@@ -48,13 +48,13 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_CONTINUOUS_STATES: &'static Call;
     const GET_NOMINALS: &'static Call;
 
-    /// By which a model description and this binary know that they belong together.
+    /// GUID (FMI 2.0) or instantiationToken (FMI 3.0).
     fn token<M: Model>(layout: Layout) -> &'static str;
 
-    /// Who handles the events of an instance for this interface, unless the host says more.
+    /// Default handler of events for this interface.
     fn events(interface: Interface) -> Events;
 
-    /// Whether a host may have events handled like this for this interface.
+    /// Returns true if a host may choose this handler of events for this interface.
     fn allows(interface: Interface, events: Events) -> bool {
         events == Self::events(interface)
     }

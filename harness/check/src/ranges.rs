@@ -74,9 +74,9 @@ fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(
 
 /// `values.limits_exact`
 pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// How far outside a bound is just outside, relative to it.
+    /// Relative distance just outside a bound.
     const JUST: f64 = 1e-6;
-    /// How far outside is an Integer that no range has that ends near the bound.
+    /// Distance of an Integer far outside any range that ends near the bound.
     const FAR: f64 = 1000.0;
     let mut any = false;
     let settable = fmu.variables().iter().filter(|v| v.is_set_by_hosts());

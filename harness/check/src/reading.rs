@@ -1,4 +1,4 @@
-//! What makes modelDescription.xml dangerous to read: a host parses it before it knows anything of
+//! Dangerous content of modelDescription.xml: a host parses it before it knows anything about
 //! the FMU.
 
 use host::xml::{Element, Fault};
@@ -11,7 +11,7 @@ const NAME: &str = "modelDescription.xml";
 pub struct Doctype {
     /// Line of the file in which it begins.
     pub line: usize,
-    /// As it is written.
+    /// Text in the file.
     pub text: String,
 }
 
@@ -44,7 +44,7 @@ impl Doctype {
         Some(Doctype { line, text: rest[..end.unwrap_or(rest.len())].to_string() })
     }
 
-    /// What it could make a parser do.
+    /// Effect on a parser.
     pub fn danger(&self) -> &'static str {
         if self.text.contains("SYSTEM") || self.text.contains("PUBLIC") {
             "it makes a parser open another file or address"

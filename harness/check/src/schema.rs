@@ -5,7 +5,7 @@
 use super::{Description, Findings};
 use host::xml::{Element, double};
 
-/// How the value of an attribute is written.
+/// Format of an attribute's value.
 #[derive(Clone, Copy)]
 pub enum Written {
     /// Any text.
@@ -44,7 +44,7 @@ pub struct Kind {
     children: Children,
 }
 
-/// What stands inside an element.
+/// Children of an element.
 pub enum Children {
     /// Anything.
     Any,
@@ -165,7 +165,7 @@ fn find(kinds: &'static [Kind], parent: &str, name: &str) -> Option<&'static Kin
 }
 
 impl Written {
-    /// What is allowed, if this is not.
+    /// Allowed values, if this one is not allowed.
     fn allowed(self, value: &str) -> Option<String> {
         let value = value.trim();
         let (fits, allowed) = match self {
@@ -207,7 +207,7 @@ impl Written {
     }
 }
 
-/// Whether it is an `xs:dateTime`; fractions of seconds and time zones are allowed.
+/// Returns true for an `xs:dateTime`; fractions of seconds and time zones are allowed.
 fn is_time(text: &str) -> bool {
     let Some((date, time)) = text.split_once('T') else { return false };
     let date: Vec<Option<u32>> = date.split('-').map(|part| part.parse().ok()).collect();

@@ -30,7 +30,7 @@ fn able<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Ses
     stepping(fmu, findings)
 }
 
-/// Whether steps may have any size.
+/// Returns true if steps may have any size.
 fn variable_steps(fmu: &FmuUnderTest, findings: &mut Findings) -> bool {
     let can = fmu.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize");
     if !can {
@@ -305,9 +305,9 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `steps.input_derivatives`
 pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// How far the input is moved in a step, of its size.
+    /// Change of the input in a step, relative to its size.
     const SHARE: f64 = 0.3;
-    /// What a held input changes and a slope does not, of the former, if the slope is ignored.
+    /// Effect of a held input that a slope lacks, relative to the former, if the FMU ignores the slope.
     const IGNORED: f64 = 0.05;
     if able(fmu, findings)?.is_none() {
         return Ok(());

@@ -9,27 +9,27 @@ use serde::{Deserialize, Serialize};
 
 use super::Findings;
 
-/// What it is if the process ends, or does not end, during what comes next.
+/// Meaning of a crash or hang during the next call.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Crash {
     /// An error, whatever the rule.
     Error,
-    /// As bad as the rule: the standard does not say what such a call does.
+    /// Same severity as the rule: the standard leaves the call open.
     Open,
-    /// What this rule tells.
+    /// Reported by this rule.
     ToldBy(String),
 }
 
 /// One line of the file.
 #[derive(Serialize, Deserialize)]
 pub(super) enum Line {
-    /// What comes next.
+    /// Announcement of the next call.
     Doing(String, Crash),
     /// All that was found; the last line.
     Done(Findings),
 }
 
-/// Where the process writes what it does.
+/// File to which the process writes its progress.
 pub struct Trace(pub(super) File);
 
 impl Trace {

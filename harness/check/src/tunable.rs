@@ -29,7 +29,7 @@ fn set_between_steps(session: &mut Session, v: &Variable, value: &Reading) -> Re
     Ok(answer)
 }
 
-/// Whether a value is accepted before initialisation.
+/// Returns true if a value is accepted before initialisation.
 fn is_allowed(
     fmu: &FmuUnderTest,
     interface: Interface,
@@ -80,7 +80,7 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// What a short run shows.
+/// Result of a short run.
 struct Run {
     /// All values after initialisation.
     at_first: Vec<Reading>,

@@ -49,7 +49,7 @@ pub enum Interface {
 pub struct Unusable {
     /// The rule that tells; empty if it is no fault.
     pub rule: &'static str,
-    /// Why.
+    /// Reason.
     pub why: String,
 }
 
@@ -67,7 +67,7 @@ pub struct FmuUnderTest {
     binaries: Vec<Fmu>,
     /// The interfaces that can be called, Co-Simulation first, and the binary of each.
     interfaces: Vec<(Interface, usize)>,
-    /// Why a binary that is there cannot be loaded.
+    /// Reason why an existing binary cannot be loaded.
     broken: Option<String>,
     deadline: Instant,
     description: Description,
@@ -77,25 +77,25 @@ pub struct FmuUnderTest {
     sessions: Cell<usize>,
     directory: PathBuf,
     path: PathBuf,
-    /// What the process was like before the binary was loaded.
+    /// State of the process before the binary was loaded.
     pub before: Vec<(&'static str, String)>,
 }
 
 /// A value as it was read.
 #[derive(Clone, Debug)]
 pub enum Reading {
-    /// Of a Real.
+    /// Value of a Real.
     Real(f64),
-    /// Of an Integer or an Enumeration.
+    /// Value of an Integer or an Enumeration.
     Integer(i32),
-    /// Of a Boolean, as C has it.
+    /// Value of a Boolean in C.
     Boolean(i32),
-    /// Of a String.
+    /// Value of a String.
     Text(String),
 }
 
 impl Reading {
-    /// Whether it is the same to the last bit.
+    /// Returns true for a bit-identical value.
     pub fn is(&self, other: &Reading) -> bool {
         match (self, other) {
             (Reading::Real(a), Reading::Real(b)) => a.to_bits() == b.to_bits(),
@@ -256,7 +256,7 @@ impl FmuUnderTest {
         answer
     }
 
-    /// What it was told last.
+    /// Last announced call.
     pub fn now(&self) -> String {
         let doing = self.doing.borrow();
         if doing.is_empty() { "a first call".into() } else { doing.clone() }
@@ -273,12 +273,12 @@ impl FmuUnderTest {
         &self.binaries
     }
 
-    /// Why the binary of one interface cannot be loaded although it is there.
+    /// Reason why the existing binary of one interface cannot be loaded.
     pub fn broken(&self) -> Option<&str> {
         self.broken.as_deref()
     }
 
-    /// What the FMU says of itself.
+    /// Model description of the FMU.
     pub fn description(&self) -> &Description {
         &self.description
     }
@@ -303,7 +303,7 @@ impl FmuUnderTest {
         self.interfaces.iter().map(|(interface, _)| *interface).collect()
     }
 
-    /// Whether an interface declares a capability.
+    /// Returns true if an interface declares a capability.
     pub fn can(&self, interface: Interface, flag: &str) -> bool {
         let element = match interface {
             Interface::CoSimulation => &self.description.co_simulation,
@@ -312,7 +312,7 @@ impl FmuUnderTest {
         element.as_ref().is_some_and(|element| element.flag(flag))
     }
 
-    /// What the FMU suggests.
+    /// Default experiment of the FMU.
     pub fn experiment(&self) -> Experiment {
         let element = self.description.root.child("DefaultExperiment");
         let number = |name: &str| element.and_then(|e| e.number(name)).filter(|x| x.is_finite());
@@ -423,7 +423,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// As findings name it.
+    /// Name in findings.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Instantiated => "instantiated",
@@ -443,7 +443,7 @@ impl Interface {
         }
     }
 
-    /// As findings name it.
+    /// Name in findings.
     pub fn name(self) -> &'static str {
         match self {
             Interface::CoSimulation => "Co-Simulation",
@@ -456,7 +456,7 @@ impl Interface {
 pub struct Session<'f> {
     /// The FMU.
     pub fmu: &'f FmuUnderTest,
-    /// What it was made for.
+    /// Interface type of the instance.
     pub interface: Interface,
     /// The instance.
     pub instance: Instance<'f>,
@@ -469,13 +469,13 @@ pub struct Session<'f> {
     next_event: Option<f64>,
     /// Orders of magnitude of the states.
     nominals: Vec<f64>,
-    /// When and by which call the FMU asked for the end of the simulation.
+    /// Time and call by which the FMU requested the end of the simulation.
     ended: Option<(f64, &'static str)>,
     /// The first time at which the FMU gave a nextEventTime that had passed, and that.
     past_event: Option<(f64, f64)>,
     /// Events in succession after which the next one was to be at once.
     immediate_events: usize,
-    /// What the last event iteration told of states and of their nominals.
+    /// Result of the last event iteration: changes of states and of their nominals.
     values_changed: bool,
     nominals_changed: bool,
     /// The first state that an event has changed although the FMU told of no change: when, which,
@@ -487,7 +487,7 @@ pub struct Session<'f> {
     step_event: Option<(f64, String, String)>,
 }
 
-/// How far a host is.
+/// Position of a host in the simulation.
 #[derive(Clone, Copy, Debug)]
 pub struct Mark {
     time: f64,
@@ -582,12 +582,12 @@ impl<'f> Session<'f> {
         self.ended.get_or_insert((self.time, call));
     }
 
-    /// Whether the FMU has asked for the end of the simulation; a host makes no more steps then.
+    /// Returns true if the FMU has requested the end of the simulation; a host makes no more steps then.
     pub fn is_ended(&self) -> bool {
         self.ended.is_some()
     }
 
-    /// When and by which call it did.
+    /// Time and call of that request.
     pub fn ended(&self) -> Option<(f64, &'static str)> {
         self.ended
     }
@@ -602,7 +602,7 @@ impl<'f> Session<'f> {
         self.next_event
     }
 
-    /// How many continuous states there are.
+    /// Number of continuous states.
     pub(super) fn states(&self) -> usize {
         self.fmu.description.states().len()
     }
@@ -669,7 +669,7 @@ impl<'f> Session<'f> {
         self.hidden_jump
     }
 
-    /// Whether the last event changed the nominals of states.
+    /// Returns true if the last event changed the nominals of states.
     pub(super) fn nominals_changed(&self) -> bool {
         self.nominals_changed
     }
@@ -693,7 +693,7 @@ impl<'f> Session<'f> {
         self.steps(steps, Session::stimulate)
     }
 
-    /// As [`Session::advance`], with the inputs as they are.
+    /// [`Session::advance`] with unchanged inputs.
     ///
     /// # Errors
     /// The same.
@@ -719,7 +719,7 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// What the host knows of how far it is; a saved state does not tell it.
+    /// Position of the host, which a saved state does not contain.
     pub fn mark(&self) -> Mark {
         Mark { time: self.time, count: self.count, next_event: self.next_event, ended: self.ended }
     }
@@ -730,7 +730,7 @@ impl<'f> Session<'f> {
         (self.next_event, self.ended) = (to.next_event, to.ended);
     }
 
-    /// Whether a step was discarded because the FMU wants to end the simulation.
+    /// Returns true if a step was discarded because the FMU wants to end the simulation.
     pub(super) fn has_terminated(&mut self, error: &CallError) -> bool {
         const TERMINATED: i32 = 3; // fmi2Terminated of fmi2StatusKind
         error.status == Status::Discard
@@ -757,7 +757,7 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// How many event indicators there are.
+    /// Number of event indicators.
     pub fn indicators(&self) -> usize {
         let root = &self.fmu.description.root;
         root.number("numberOfEventIndicators").unwrap_or(0.0) as usize

@@ -16,7 +16,7 @@ use host::xml::Element;
 const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 const RADIAN: usize = 7;
 
-/// What `value · factor + offset` turns into base units.
+/// Base unit of `value · factor + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Unit {
     exponents: [i32; 8],
@@ -36,17 +36,17 @@ impl Unit {
         Unit { exponents, factor: self.factor * other.factor.powi(power), offset: 0.0 }
     }
 
-    /// Whether it measures the same, radians aside.
+    /// Returns true for the same quantity, radians aside.
     fn measures_like(&self, other: &Unit) -> bool {
         (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
     }
 
-    /// Whether the radians are those of another unit, or left out.
+    /// Returns true if the radians are those of the other unit, or omitted.
     fn has_radians_of(&self, other: &Unit) -> bool {
         [0, other.exponents[RADIAN]].contains(&self.exponents[RADIAN])
     }
 
-    /// As UnitDefinitions writes it.
+    /// Returns the unit in the form of UnitDefinitions.
     fn text(&self) -> String {
         let mut text: Vec<String> = BASE
             .iter()
@@ -219,7 +219,7 @@ fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     (!base.is_empty()).then(|| base.iter().map(|u| Unit::ONE.times(*u, power)).collect())
 }
 
-/// What an element BaseUnit says; none if a number in it is not one.
+/// Unit of an element BaseUnit; `None` if one of its numbers is invalid.
 fn declared(unit: &Element) -> Option<Unit> {
     let base = unit.child("BaseUnit")?;
     let mut exponents = [0; 8];
@@ -243,7 +243,7 @@ fn number(element: &Element, attribute: &str, default: f64) -> Option<f64> {
     }
 }
 
-/// Whether two factors are the same but for the digits that authors write.
+/// Returns true if two factors agree in the digits that authors write.
 fn agree(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-3 * a.abs().max(b.abs())
 }

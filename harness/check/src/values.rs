@@ -397,7 +397,7 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Whether a text contains a name as a whole word.
+/// Returns true if a text contains a name as a whole word.
 pub fn mentions(text: &str, name: &str) -> bool {
     let part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '[');
     text.match_indices(name).any(|(at, _)| {

@@ -130,7 +130,7 @@ fn indexed(name: &str) -> Option<(&str, Vec<u32>)> {
     Some((array, indices?))
 }
 
-/// Whether these are all indices of an array, each once.
+/// Returns true if these are all indices of an array, each once.
 fn is_whole(indices: &[Vec<u32>]) -> bool {
     let dimensions = indices[0].len();
     if indices.iter().any(|index| index.len() != dimensions || index.contains(&0)) {

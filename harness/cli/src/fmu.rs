@@ -1,11 +1,11 @@
-//! Which file `--fmu` means: one that is named, or the FMU of this project with that name.
+//! Resolves `--fmu`: a file, or one of the project's FMUs by name.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use pack::{Fmi, Model};
 
-/// Where the project's FMUs lie below the folder of the command's own: beside it, in its data folder,
+/// Folders of the project's FMUs relative to the command's own: next to it, in its data folder,
 /// in the Python package that it came with.
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
@@ -54,7 +54,7 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     Ok(packed)
 }
 
-/// What `--fmu` calls one of this project's FMUs: `HubSlosh`, and of FMI 3.0 `HubSlosh-fmi3` and
+/// Name of one of the project's FMUs for `--fmu`: `HubSlosh`, and of FMI 3.0 `HubSlosh-fmi3` and
 /// `HubSlosh-fmi3-arrays`.
 fn named(fmi: Fmi, model: &Model) -> String {
     format!("{}{}", model.name, fmi.suffix())

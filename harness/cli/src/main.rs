@@ -58,7 +58,7 @@ struct Cli {
     /// Understands the command line, and does nothing: for the tests of examples.
     #[arg(long, hide = true)]
     parse_only: bool,
-    /// How a process that runs FMUs is started.
+    /// Data with which a process that runs FMUs is started.
     #[arg(long, hide = true)]
     guarded: Option<String>,
     #[command(flatten)]
@@ -85,7 +85,7 @@ impl Cli {
         }
     }
 
-    /// Whether memory and files of the command are limited.
+    /// Returns true if memory and files of the command are limited.
     fn has_memory_limit(&self) -> bool {
         matches!(
             self.command,
@@ -93,7 +93,7 @@ impl Cli {
         )
     }
 
-    /// What the process that does it may take.
+    /// Limits of the process that runs the command.
     fn limits(&self) -> Result<Limits> {
         let call = Duration::try_from_secs_f64(self.call_limit).ok().filter(|time| !time.is_zero());
         let call =
@@ -107,7 +107,7 @@ impl Cli {
     }
 }
 
-/// What the program's exit code says.
+/// Meaning of the exit codes.
 const EXIT_CODES: &str = "Exit codes:\n  \
     0  done, or the reader of its output has closed the pipe\n  \
     1  it failed; stderr says what was wrong, where, and what is allowed (of check: errors were \
@@ -267,7 +267,7 @@ fn carry_out(cli: Cli) -> u8 {
     }
 }
 
-/// What `cargo run --release` does with the FMU that it has packed.
+/// Runs the default job of `cargo run --release` with the FMU that it has packed.
 fn everything() -> Result<()> {
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();

@@ -1,4 +1,4 @@
-//! What the command says: results on stdout, all else on stderr.
+//! Output of the command: results on stdout, all else on stderr.
 
 use std::io::{ErrorKind, Write};
 use std::sync::OnceLock;
@@ -10,7 +10,7 @@ use clap::ColorChoice;
 use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
 use host::guard;
 
-/// How the command says it.
+/// Options for output.
 #[derive(Clone, Copy, Default, clap::Args)]
 #[group(skip)]
 pub struct Terminal {
@@ -20,7 +20,7 @@ pub struct Terminal {
     /// Exit with 1 if there was a warning.
     #[arg(long, global = true)]
     strict: bool,
-    /// Whether messages are coloured; `auto`: on a terminal, unless NO_COLOR is set.
+    /// Colours of messages; `auto`: on a terminal, unless NO_COLOR is set.
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     color: ColorChoice,
 }
@@ -39,7 +39,7 @@ fn terminal() -> Terminal {
     TERMINAL.get().copied().unwrap_or_default()
 }
 
-/// Whether only results, warnings and errors are wanted.
+/// Returns true if only results, warnings and errors are printed.
 pub fn is_quiet() -> bool {
     terminal().quiet
 }
@@ -56,19 +56,19 @@ pub fn color_of_arguments() -> ColorChoice {
     value.and_then(|value| value.parse().ok()).unwrap_or_default()
 }
 
-/// What has gone wrong, as clap says it.
+/// Prints an error in clap's style.
 pub fn error(text: impl std::fmt::Display) {
     complain(format!("{} {text}\n", styled("error:", *Styles::styled().get_error())));
 }
 
-/// What the reader should know of a result; with `--strict` it is an error in the end.
+/// Prints a warning; with `--strict` the command fails in the end.
 pub fn warn(text: impl std::fmt::Display) {
     WARNINGS.fetch_add(1, Ordering::Relaxed);
     let style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
     complain(format!("{} {text}\n", styled("warning:", style)));
 }
 
-/// What was done or is going on; not with `--quiet`.
+/// Prints progress and results of work; not with `--quiet`.
 pub fn note(text: impl std::fmt::Display) {
     if !is_quiet() {
         complain(format!("{text}\n"));
@@ -98,7 +98,7 @@ fn styled(word: &str, style: Style) -> String {
     }
 }
 
-/// Whether messages are coloured on stderr, the one behind a guard's pipes.
+/// Choice of colours on stderr, including the one behind a guard's pipes.
 fn choice() -> anstream::ColorChoice {
     let auto = || match guard::streams() {
         Some((_, stderr)) => AutoStream::choice(stderr),

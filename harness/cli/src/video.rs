@@ -10,7 +10,7 @@ use host::temporary;
 
 use crate::progress;
 
-/// How a video is made.
+/// Settings of a video.
 pub struct Film {
     /// Run time per video time.
     pub speed: f64,

@@ -33,22 +33,22 @@ pub const DESCRIPTION: &str = "modelDescription.xml";
 pub struct Entry {
     /// Name as written, invalid characters replaced.
     pub name: String,
-    /// How it is compressed.
+    /// Compression method.
     pub method: CompressionMethod,
-    /// Whether it is encrypted.
+    /// True if the entry is encrypted.
     pub encrypted: bool,
-    /// Whether it is a symbolic link.
+    /// True for a symbolic link.
     pub link: bool,
     zip: OwnedZipFileEntry,
 }
 
 impl Entry {
-    /// Whether it is a folder's own entry.
+    /// Returns true for the entry of a folder.
     pub fn is_folder(&self) -> bool {
         self.name.ends_with('/')
     }
 
-    /// Why a host that unpacks it would write elsewhere, if it would.
+    /// Reason why a host that unpacks the entry would write outside its folder, if it would.
     fn way_out(&self) -> Option<&'static str> {
         let name = &self.name;
         if name.starts_with('/') || name.get(1..2) == Some(":") {
@@ -85,7 +85,7 @@ pub struct Archive {
     file: File,
     /// In the order of its directory, repeated names included; those up to the fault if there is one.
     pub entries: Vec<Entry>,
-    /// Why its directory cannot be read to the end, or goes beyond the budgets: nothing of it should
+    /// Error in its directory, or the exceeded budget: nothing of the archive should
     /// be unpacked then.
     pub fault: Option<String>,
 }
@@ -175,7 +175,7 @@ impl Archive {
         Ok(())
     }
 
-    /// What is in a file.
+    /// Content of a file.
     pub fn content(&self, entry: &Entry) -> Result<Vec<u8>> {
         let mut content = Vec::new();
         self.copy(entry, &mut content)?;
@@ -245,7 +245,7 @@ mod tests {
         file
     }
 
-    /// What unpacking says; the folder holds nothing from outside.
+    /// Result of unpacking; the folder holds nothing from outside.
     fn unpacked(files: &[(&str, &[u8])], lie: i64) -> Result<(), String> {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("inner");

@@ -1,5 +1,4 @@
-//! What a binary of an FMU asks of the machine that loads it, and what it
-//! offers: read from the file itself, whichever platform it is for.
+//! Requirements and exports of an FMU's binary for any platform, read from the file itself.
 //!
 //! An FMU is loaded by programs its maker never saw: a MATLAB on an old Linux
 //! cluster, a Windows without development tools. A library or a symbol version
@@ -47,7 +46,7 @@ const WINDOWS_LIBRARIES: [&str; 12] = [
     "userenv.dll",
     "ws2_32.dll",
 ];
-/// Where the libraries that are part of macOS are.
+/// Folders of the libraries that are part of macOS.
 const MACOS_LIBRARIES: [&str; 5] = [
     "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
     "/usr/lib/libSystem.B.dylib",
@@ -107,7 +106,7 @@ pub struct Binary {
     pub needs: Option<Version>,
     /// Names it exports, in alphabetical order.
     pub exports: Vec<String>,
-    /// What is wrong with its code signature; macOS kills a process that loads unsigned code for
+    /// Error in its code signature; macOS kills a process that loads unsigned code for
     /// arm64.
     pub signature: Option<String>,
 }
@@ -139,7 +138,7 @@ impl Binary {
         loading.into_iter().chain(lacking).chain(self.surplus()).collect()
     }
 
-    /// What would keep it from loading on a machine without development tools.
+    /// Lists what prevents loading on a machine without development tools.
     pub fn loading_faults(&self) -> Vec<String> {
         self.loading_faults_for(match self.kind {
             Kind::Linux | Kind::Windows => &["x86_64"],
@@ -148,7 +147,7 @@ impl Binary {
         })
     }
 
-    /// As [`Binary::loading_faults`], of machines with these processors.
+    /// [`Binary::loading_faults`] for machines with these processors.
     pub fn loading_faults_for(&self, architectures: &[&str]) -> Vec<String> {
         let mut faults = Vec::new();
         let (libraries, newest): (&[&str], _) = match self.kind {
@@ -186,7 +185,7 @@ impl Binary {
         (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
     }
 
-    /// What it exports beside functions of the FMI, in one sentence.
+    /// Describes exports other than functions of FMI, in one sentence.
     pub fn surplus(&self) -> Option<String> {
         // On macOS names are bound to the library they come from, so that others do no harm; and
         // the linker that links it elsewhere exports a few of Rust's.
@@ -347,8 +346,8 @@ fn universal(bytes: &[u8]) -> Result<Binary> {
     whole.context("no code in it")
 }
 
-/// Whether the hashes in the code directory of a signature are those of the code: a binary that
-/// was changed after it was signed (stripped, say) is killed.
+/// Error if the hashes in the code directory of a signature differ from those of the code: macOS kills a binary that
+/// was changed after signing (stripped, for example).
 fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
     const SIGNATURE: u32 = 0xfade_0cc0; // CSMAGIC_EMBEDDED_SIGNATURE
     const DIRECTORY: u32 = 0xfade_0c02; // CSMAGIC_CODEDIRECTORY

@@ -1,5 +1,5 @@
-//! What one command may take of a machine. Stated here alone, and checked before anything is
-//! allocated or started: a number that was mistyped is answered by a sentence.
+//! Budgets of one command, checked before anything is
+//! allocated or started: a mistyped number gets a message.
 
 use anyhow::{Result, ensure};
 

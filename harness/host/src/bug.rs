@@ -45,7 +45,7 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-/// What a user reads of a panic.
+/// Message of a panic for the user.
 pub fn report(panic: &str) -> String {
     let read = input::read_so_far();
     let files = match read.is_empty() {

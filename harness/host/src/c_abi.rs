@@ -168,7 +168,7 @@ pub(crate) extern "C" fn log_message(
 /// One message of the FMU's logger.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// How bad it is.
+    /// Status of the message.
     pub status: Status,
     /// Log category, as in modelDescription.xml.
     pub category: String,
@@ -190,14 +190,14 @@ unsafe extern "C" {
 pub struct CallError {
     /// The C function.
     pub call: &'static str,
-    /// What it returned (of a function that makes an instance and returns NULL: `Error`).
+    /// Returned status; `Error` for a function that returned NULL instead of an instance.
     pub status: Status,
-    /// What the FMU logged during the call.
+    /// Messages of the FMU during the call.
     pub messages: Vec<Message>,
 }
 
 impl CallError {
-    /// What the FMU logged, in one line.
+    /// Messages of the FMU in one line.
     pub fn text(&self) -> String {
         let prefix = format!("{}: ", self.call); // the FMU may name the call as well; once will do
         let text = |m: &Message| m.text.trim().trim_start_matches(&prefix).to_string();
@@ -245,7 +245,7 @@ macro_rules! functions {
 
 pub(crate) use functions;
 
-/// What of this process an FMU shares with its host and must leave as it is.
+/// State of the process that an FMU shares with its host and must not change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HostState {
     /// Rounding mode, exception masks and flushing of small numbers.
@@ -259,7 +259,7 @@ pub struct HostState {
 }
 
 impl HostState {
-    /// As it is now.
+    /// Present state.
     pub fn now() -> Self {
         // SAFETY: the three take nothing; the locale's name is a terminated string of the C
         // library.
@@ -273,7 +273,7 @@ impl HostState {
         }
     }
 
-    /// What is other now.
+    /// Lists the differences from the present state.
     pub(crate) fn changed(&self) -> Vec<&'static str> {
         let now = HostState::now();
         let parts = [
@@ -304,7 +304,7 @@ pub(crate) struct Loaded {
     pub library: Library,
     /// SHA-256 of its file, in hexadecimal digits.
     pub hash: String,
-    /// What loading it has changed for this whole process.
+    /// Changes of the whole process by loading it.
     pub changed: Vec<&'static str>,
     /// Its path within the FMU.
     pub binary: String,
@@ -349,7 +349,7 @@ pub(crate) fn load(
     Ok(Loaded { library, hash, changed: before.changed(), binary })
 }
 
-/// Of these functions those that a library lacks.
+/// Functions of this list that a library lacks.
 pub(crate) fn lacking(library: &Library, symbols: &[&'static str]) -> Vec<&'static str> {
     let is_there = |symbol: &&&str| {
         // SAFETY: only asked whether the symbol is there.

@@ -1,4 +1,4 @@
-//! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2; FMI 3.0, section 2.4), as far as
+//! Model description: `modelDescription.xml` (FMI 2.0, section 2.2; FMI 3.0, section 2.4), as far as
 //! a host needs it to drive the FMU.
 //!
 //! Both versions are read into the same: what FMI 3.0 calls Float64 is a Real here, its instantiationToken a
@@ -47,7 +47,7 @@ pub struct ModelDescription {
 /// An array of FMI 3.0.
 #[derive(Clone, Debug)]
 pub struct Array {
-    /// How many elements it has.
+    /// Number of elements.
     pub length: usize,
     /// Type of its elements.
     pub c_type: CType,
@@ -57,7 +57,7 @@ pub struct Array {
     pub(crate) is_resized: bool,
 }
 
-/// Where an element of an array is.
+/// Position of an element of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArrayElement {
     /// Value reference of the array.
@@ -107,7 +107,7 @@ pub struct BaseUnit {
     pub exponents: [i32; 8],
     /// What multiplies the number.
     pub factor: f64,
-    /// What is added then.
+    /// Offset, added after the factor.
     pub offset: f64,
 }
 
@@ -136,9 +136,9 @@ impl BaseUnit {
 pub struct DisplayUnit {
     /// Its name.
     pub name: String,
-    /// What multiplies the value.
+    /// Factor on the value.
     pub factor: f64,
-    /// What is added then.
+    /// Offset, added after the factor.
     pub offset: f64,
 }
 
@@ -174,7 +174,7 @@ pub struct Variable {
     pub causality: String,
     /// constant, fixed, tunable, discrete or continuous; empty if it is not given.
     pub variability: String,
-    /// What it means; empty if it is not said.
+    /// Description; empty if there is none.
     pub description: String,
     /// In FMI 3.0: it may be set or read within a step.
     pub intermediate: bool,
@@ -183,7 +183,7 @@ pub struct Variable {
     attributes: Attributes,
 }
 
-/// What the typed child of a `ScalarVariable` carries.
+/// Attributes of the typed child of a `ScalarVariable`.
 #[derive(Clone, Debug, Default)]
 pub struct Attributes {
     /// Start value, as written.
@@ -240,7 +240,7 @@ pub enum CType {
 }
 
 impl CType {
-    /// Of an element of FMI 3.0, with the type that it is to people.
+    /// C type and displayed type of an element of FMI 3.0.
     pub fn of_element(name: &str) -> Option<(CType, Type)> {
         Some(match name {
             "Float32" => (CType::Float32, Type::Real),
@@ -281,18 +281,18 @@ impl CType {
 /// A value of a variable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Of a Real.
+    /// Value of a Real.
     Real(f64),
-    /// Of an Integer or an Enumeration.
+    /// Value of an Integer or an Enumeration.
     Integer(i64),
-    /// Of a Boolean.
+    /// Value of a Boolean.
     Boolean(bool),
-    /// Of a String.
+    /// Value of a String.
     String(String),
 }
 
 impl Value {
-    /// As a description writes it.
+    /// Returns the value in the form of a description.
     fn text(&self) -> String {
         match self {
             Value::Real(x) => x.to_string(),
@@ -314,7 +314,7 @@ impl Variable {
         self.c_type
     }
 
-    /// Whether arrays may be sized by it: of FMI 3.0, set in configuration mode alone.
+    /// Returns true for a structural parameter of FMI 3.0, which is set in configuration mode alone.
     pub fn is_structural(&self) -> bool {
         self.causality == "structuralParameter"
     }
@@ -342,7 +342,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Of many problems the first are kept.
+    /// Adds a problem; only the first ones are kept.
     fn problem(&mut self, element: &Element, what: &str) {
         match self.problems.len() < NAMED {
             true => {
@@ -618,7 +618,7 @@ const LONGEST_NAME: usize = 1024;
 const MOST_TYPES: usize = 5000;
 /// Elements that all arrays of an FMU may have together.
 const MOST_ELEMENTS: usize = 100_000;
-/// What is missing is named so many times.
+/// Largest number of missing items that a message names.
 const NAMED: usize = 20;
 
 impl ModelDescription {
@@ -654,17 +654,17 @@ impl ModelDescription {
         Ok(())
     }
 
-    /// Whether it is of FMI 3.
+    /// Returns true for FMI 3.
     pub fn is_fmi3(&self) -> bool {
         self.fmi_version.starts_with("3.")
     }
 
-    /// Where an element of an array is, by its variable's reference; none for a variable that is no element.
+    /// Position of an array element by its variable's reference; `None` for a variable that is not an element.
     pub fn element(&self, reference: u32) -> Option<ArrayElement> {
         self.elements.get(&reference).copied()
     }
 
-    /// Whether there are arrays.
+    /// Returns true if there are arrays.
     pub fn has_arrays(&self) -> bool {
         !self.arrays.is_empty()
     }

@@ -14,7 +14,7 @@ pub struct Inputs {
     sloped: bool,
 }
 
-/// What the inputs do from one communication point to the next, in their order.
+/// Course of the inputs between two communication points, in their order.
 pub struct Course<'a> {
     /// Values at the communication point.
     pub values: &'a mut [f64],

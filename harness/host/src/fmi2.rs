@@ -203,7 +203,7 @@ impl Fmu {
         Fmu::load_binary(None, directory, path)
     }
 
-    /// As [`Fmu::load`], but the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`]:
+    /// [`Fmu::load`] with the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`]:
     /// the two may name different ones.
     pub fn load_for(kind: i32, directory: &Path, path: &Path) -> Result<Self> {
         Fmu::load_binary(Some(kind), directory, path)
@@ -260,7 +260,7 @@ impl Fmu {
         })
     }
 
-    /// What the FMU says of itself.
+    /// Model description of the FMU.
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }
@@ -275,12 +275,12 @@ impl Fmu {
         &self.binary_hash
     }
 
-    /// What loading its binary has changed for this whole process, such as how numbers are rounded.
+    /// Changes of the whole process by loading the binary, such as the rounding mode.
     pub fn changed(&self) -> &[&'static str] {
         &self.changed
     }
 
-    /// Whether its binary has all functions of model exchange.
+    /// Returns true if the binary has all functions of Model Exchange.
     pub fn has_exchange(&self) -> bool {
         self.exchange.is_some()
     }
@@ -305,13 +305,13 @@ impl Fmu {
         ExchangeFunctions::SYMBOLS
     }
 
-    /// What fmi2GetVersion says.
+    /// Result of fmi2GetVersion.
     pub fn version(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
         unsafe { CStr::from_ptr((self.functions.get_version)()) }.to_string_lossy().into_owned()
     }
 
-    /// What fmi2GetTypesPlatform says.
+    /// Result of fmi2GetTypesPlatform.
     pub fn types_platform(&self) -> String {
         // SAFETY: as above.
         unsafe { CStr::from_ptr((self.functions.get_types_platform)()) }
@@ -506,18 +506,18 @@ pub struct Instantiation<'a> {
     pub guid: Option<&'a str>,
     /// URI of the unpacked resources folder.
     pub resources: Option<&'a str>,
-    /// Which callbacks are handed over.
+    /// Callbacks for the FMU.
     pub callbacks: Callbacks,
-    /// Whether the FMU may log.
+    /// True if the FMU may log.
     pub logging: bool,
 }
 
-/// Which callback functions fmi2Instantiate is given.
+/// Callback functions for fmi2Instantiate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Callbacks {
     /// Logger and memory functions.
     Full,
-    /// As `Full`, and the struct is wiped once fmi2Instantiate has returned: it is valid during
+    /// Like `Full`, with the struct wiped after fmi2Instantiate has returned: it is valid during
     /// that call alone.
     Fleeting,
     /// The logger alone; the memory functions are NULL.
@@ -574,7 +574,7 @@ impl<'fmu> Instance<'fmu> {
         self.environment.take()
     }
 
-    /// What the FMU has warned of, of everything logged since the last time somebody asked.
+    /// Returns the FMU's warnings since the last call.
     pub fn take_warnings(&self) -> Vec<String> {
         let messages = self.take_messages().into_iter();
         let warnings = messages.filter(|message| message.status == Status::Warning);

@@ -453,7 +453,7 @@ impl Fmu {
         Ok(())
     }
 
-    /// What the FMU says of itself.
+    /// Model description of the FMU.
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }
@@ -468,7 +468,7 @@ impl Fmu {
         &self.binary_hash
     }
 
-    /// Whether these Reals can be exchanged in one call: all are Float64, none an element of an array.
+    /// Returns true if these Reals can be exchanged in one call: all are Float64, none an element of an array.
     pub(crate) fn is_plain(&self, references: &[u32]) -> bool {
         self.is_plain || {
             let plain = |r: &u32| self.plain.binary_search(r).is_ok();
@@ -476,7 +476,7 @@ impl Fmu {
         }
     }
 
-    /// What loading its binary has changed for this whole process, such as how numbers are rounded.
+    /// Changes of the whole process by loading the binary, such as the rounding mode.
     pub fn changed(&self) -> &[&'static str] {
         &self.changed
     }
@@ -493,7 +493,7 @@ impl Fmu {
         called.chain(UNCALLED).collect()
     }
 
-    /// What fmi3GetVersion says.
+    /// Result of fmi3GetVersion.
     pub fn version(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
         unsafe { CStr::from_ptr((self.functions.get_version)()) }.to_string_lossy().into_owned()
@@ -623,7 +623,7 @@ impl Fmu {
     }
 }
 
-/// Whether all Reals are Float64 and scalar, and the references of those that are, in order.
+/// True if all Reals are scalar Float64, and the references of those that are, in order.
 fn plain(description: &ModelDescription) -> (bool, Vec<u32>) {
     let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
     let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
@@ -641,23 +641,23 @@ type Nobody = fn(&Update) -> Option<f64>;
 pub struct Instantiation<'a> {
     /// Instance name.
     pub name: Option<&'a str>,
-    /// Which of the two.
+    /// Interface type.
     pub interface: Interface,
     /// instantiationToken that the host expects.
     pub token: Option<&'a str>,
     /// Path of the unpacked resources folder.
     pub resources: Option<&'a str>,
-    /// Whether the FMU may log.
+    /// True if the FMU may log.
     pub logging: bool,
     /// eventModeUsed.
     pub event_mode: bool,
     /// earlyReturnAllowed.
     pub early_return: bool,
-    /// Whether intermediateUpdate is handed over.
+    /// True if the FMU gets the callback intermediateUpdate.
     pub intermediate_update: bool,
     /// requiredIntermediateVariables.
     pub required: Vec<u32>,
-    /// Whether logMessage is handed over.
+    /// True if the FMU gets the callback logMessage.
     pub logger: bool,
 }
 
@@ -691,7 +691,7 @@ impl Drop for Instance<'_> {
 /// memory is lost.
 pub struct FmuState(State);
 
-/// What fmi3DoStep says beside its status. Bytes as the FMU wrote them, or [`UNWRITTEN`].
+/// Results of fmi3DoStep other than its status. Bytes as the FMU wrote them, or [`UNWRITTEN`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// eventHandlingNeeded.
@@ -704,10 +704,10 @@ pub struct Step {
     pub last_time: f64,
 }
 
-/// What a byte holds before the FMU writes into it: neither 0 nor 1.
+/// Value of a byte before the FMU writes to it: neither 0 nor 1.
 pub const UNWRITTEN: u8 = 0xa5;
 
-/// What fmi3UpdateDiscreteStates says. Bytes as the FMU wrote them, or [`UNWRITTEN`].
+/// Results of fmi3UpdateDiscreteStates. Bytes as the FMU wrote them, or [`UNWRITTEN`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct EventInfo {
@@ -748,19 +748,19 @@ impl<'fmu> Instance<'fmu> {
         self.environment.take()
     }
 
-    /// What the FMU has warned of, of everything logged since the last time somebody asked.
+    /// Returns the FMU's warnings since the last call.
     pub fn take_warnings(&self) -> Vec<String> {
         let messages = self.take_messages().into_iter();
         let warnings = messages.filter(|message| message.status == Status::Warning);
         warnings.map(|message| message.text.trim().to_string()).collect()
     }
 
-    /// How many messages had no category (NULL).
+    /// Number of messages without a category (NULL).
     pub fn uncategorised(&self) -> usize {
         self.environment.uncategorised()
     }
 
-    /// How often the FMU has called intermediateUpdate.
+    /// Number of calls of intermediateUpdate by the FMU.
     pub fn updates(&self) -> usize {
         self.stepping.updates.get()
     }

@@ -18,25 +18,25 @@ use crate::{fmi2, fmi3};
 
 /// An opened FMU: unpacked to a temporary directory, its binary loaded.
 pub enum Fmu {
-    /// Of FMI 2.0.
+    /// FMI 2.0.
     V2(fmi2::Fmu),
-    /// Of FMI 3.0.
+    /// FMI 3.0.
     V3(fmi3::Fmu),
 }
 
 /// One instance for co-simulation; freed when dropped. Belongs to the thread that made it.
 pub enum Instance<'fmu> {
-    /// Of an FMU 2.0.
+    /// FMI 2.0.
     V2(fmi2::Instance<'fmu>, &'fmu Fmu),
-    /// Of an FMU 3.0.
+    /// FMI 3.0.
     V3(fmi3::Instance<'fmu>, &'fmu Fmu),
 }
 
 /// A snapshot of an instance.
 pub enum State {
-    /// Of an FMU 2.0.
+    /// FMI 2.0.
     V2(fmi2::FmuState),
-    /// Of an FMU 3.0.
+    /// FMI 3.0.
     V3(fmi3::FmuState),
 }
 
@@ -86,7 +86,7 @@ impl Fmu {
         Ok(Fmu::V3(fmu))
     }
 
-    /// What the FMU says of itself.
+    /// Model description of the FMU.
     pub fn description(&self) -> &ModelDescription {
         match self {
             Fmu::V2(fmu) => fmu.description(),
@@ -110,7 +110,7 @@ impl Fmu {
         }
     }
 
-    /// What loading its binary has changed for this whole process, such as how numbers are rounded.
+    /// Changes of the whole process by loading the binary, such as the rounding mode.
     pub fn changed(&self) -> &[&'static str] {
         match self {
             Fmu::V2(fmu) => fmu.changed(),
@@ -166,7 +166,7 @@ impl<'fmu> Instance<'fmu> {
         }
     }
 
-    /// What the FMU has warned of, of everything logged since the last time somebody asked.
+    /// Returns the FMU's warnings since the last call.
     pub fn take_warnings(&self) -> Vec<String> {
         match self {
             Instance::V2(instance, _) => instance.take_warnings(),
@@ -383,7 +383,7 @@ impl<'fmu> Instance<'fmu> {
     }
 }
 
-/// What an FMU 3.0 is told within a step, in its own value references: of an array all elements.
+/// Inputs of an FMU 3.0 within a step, by its own value references: of an array all elements.
 #[derive(Default)]
 struct Line {
     references: Vec<u32>,
@@ -393,7 +393,7 @@ struct Line {
 }
 
 impl Line {
-    /// Of these inputs, at `values` now, those that the FMU takes within a step.
+    /// Those of these inputs, at `values` now, that the FMU takes within a step.
     fn of(instance: &mut fmi3::Instance, references: &[u32], values: &[f64]) -> Called<Line> {
         let description = instance.fmu().description();
         let mut line = Line::default();

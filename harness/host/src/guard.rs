@@ -43,7 +43,7 @@ pub const FLOOD: u64 = 16 << 20;
 /// See [`FLOOD`].
 pub const FLOOD_SHOWN: u64 = 4 << 30;
 
-/// What a process may take.
+/// Limits of a guarded process.
 #[derive(Clone, Debug)]
 pub struct Limits {
     /// Time that one call of an FMU may take.
@@ -56,7 +56,7 @@ pub struct Limits {
     pub file: u64,
 }
 
-/// How a process ended.
+/// End of a process.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cause {
     /// It called [`done`] with this code.
@@ -71,12 +71,12 @@ pub enum Cause {
     Flood,
 }
 
-/// What came of a process.
+/// Result of a process.
 #[derive(Debug)]
 pub struct Outcome {
-    /// How it ended.
+    /// End of the process.
     pub cause: Cause,
-    /// What it printed to stdout and stderr, up to [`PRINTED`] bytes; echoed, both are the first.
+    /// Output to stdout and stderr, up to [`PRINTED`] bytes; echoed, both are the first.
     pub printed: [Vec<u8>; 2],
 }
 
@@ -89,7 +89,7 @@ impl Outcome {
     }
 }
 
-/// What becomes of a process's output.
+/// Treatment of a process's output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output {
     /// It is kept for the parent.
@@ -257,7 +257,7 @@ fn kill_group(id: u32) {
 #[cfg(not(unix))]
 fn kill_group(_: u32) {}
 
-/// Whether a process has ended; it is not waited for, so that its number stays its own.
+/// Returns true if a process has ended. It is not reaped, so that its number is not reused.
 #[cfg(unix)]
 fn has_ended(child: &mut Child) -> Result<bool> {
     let id = rustix::process::Pid::from_raw(i32::try_from(child.id())?);
@@ -323,7 +323,7 @@ impl News {
     }
 }
 
-/// What was read of a pipe.
+/// Data read from a pipe.
 #[derive(Default)]
 struct Printed {
     kept: Vec<u8>,
@@ -355,7 +355,7 @@ fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
     Reader { printed, end }
 }
 
-/// What the parent hands to [`enter`].
+/// Data that the parent passes to [`enter`].
 struct Spec {
     told: PathBuf,
     limits: Limits,
@@ -381,7 +381,7 @@ impl Spec {
 
 // ---------------------------------------------------------------- the child
 
-/// What a guarded process knows.
+/// Data of a guarded process.
 struct Guarded {
     told: File,
     spec: Spec,

@@ -1,5 +1,4 @@
-//! What a program does not leave behind, however it ends: its temporary folders and half-written
-//! files go when they are dropped, on a signal ([`remove_all`]), and after a kill when the next
+//! Temporary folders and half-written files: they are removed when they are dropped, on a signal ([`remove_all`]), and after a kill when the next
 //! program needs a folder.
 
 use std::collections::BTreeSet;
@@ -10,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use anyhow::{Context, Result};
 use tempfile::TempDir;
 
-/// What a signal removes.
+/// Paths that a signal removes.
 static PATHS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn paths() -> MutexGuard<'static, BTreeSet<PathBuf>> {
@@ -52,11 +51,11 @@ pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// How the names of our temporary folders begin.
+/// Prefix of our temporary folders.
 const PREFIX: &str = "hubslosh-";
 /// The file in such a folder that is locked as long as its program lives.
 const ALIVE: &str = "alive";
-/// Where in such a folder the files are.
+/// Folder of the files within it.
 const FILES: &str = "files";
 
 /// A folder for temporary files.
@@ -93,7 +92,7 @@ impl Folder {
         })
     }
 
-    /// Where to put files.
+    /// Path for files.
     pub fn path(&self) -> &Path {
         &self.files
     }

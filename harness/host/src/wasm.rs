@@ -1,11 +1,11 @@
-//! What a module for WebAssembly asks of a page and what it offers: its imports and exports, read from the file.
+//! Imports and exports of a WebAssembly module, read from the file.
 //!
 //! Layout of a module: WebAssembly Core Specification 2.0, chapter 5.5.
 
 use anyhow::{Context, Result, ensure};
 
-/// What a host needs of an FMU's module beside the functions of FMI: the memory that arrays lie in, and the table of
-/// functions that callbacks are put into.
+/// Exports that a host needs in addition to FMI functions: the memory of arrays, and the table of
+/// functions for callbacks.
 const OTHERS: [&str; 2] = ["memory", "__indirect_function_table"];
 const IMPORTS: u8 = 2;
 const EXPORTS: u8 = 7;
@@ -13,7 +13,7 @@ const EXPORTS: u8 = 7;
 /// A module, seen from outside.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Module {
-    /// What a host would have to give it, as `module.name`.
+    /// Imports that a host has to provide, as `module.name`.
     pub imports: Vec<String>,
     /// Names of its functions, memories, tables and globals that a host can reach.
     pub exports: Vec<String>,
@@ -30,7 +30,7 @@ impl Module {
         read_sections(Cursor(&bytes[head.len()..])).context("a damaged module for WebAssembly")
     }
 
-    /// What would keep a host from using it as an FMU that has the functions `wanted`; one sentence each.
+    /// Lists what prevents use as an FMU with the functions `wanted`; one sentence each.
     pub fn faults(&self, wanted: &[&str]) -> Vec<String> {
         let mut faults = Vec::new();
         if !self.imports.is_empty() {
@@ -105,7 +105,7 @@ impl<'a> Cursor<'a> {
         Ok(String::from_utf8(self.take(length)?.to_vec())?)
     }
 
-    /// What is said of an import after its name.
+    /// Reads the type of an import after its name.
     fn import(&mut self) -> Result<()> {
         match self.byte()? {
             0 => _ = self.number()?, // function: its type

@@ -20,7 +20,7 @@ pub const LONGEST_VALUE: usize = 1 << 20;
 /// Namespaces that may be declared: looking one up takes longer the more there are.
 pub const MOST_NAMESPACES: usize = 100;
 
-/// Why a file is not read. The texts of all but `TooLarge` begin with line and column.
+/// Reasons for refusing a file. The texts of all but `TooLarge` begin with line and column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
     /// It is not well-formed, or not UTF-8.
@@ -58,7 +58,7 @@ impl Element {
         Element::read(bytes).map_err(|fault| fault.to_string())
     }
 
-    /// As [`Element::parse`], with the kind of the fault.
+    /// [`Element::parse`] with the kind of the fault.
     pub fn read(bytes: &[u8]) -> Result<Element, Fault> {
         if bytes.len() > LONGEST {
             let length = bytes.len();
@@ -110,7 +110,7 @@ impl Element {
         self.get(attribute).and_then(double)
     }
 
-    /// Whether an attribute says yes.
+    /// Returns true for an attribute with the value true or 1.
     pub fn flag(&self, attribute: &str) -> bool {
         matches!(self.get(attribute).map(str::trim), Some("true" | "1"))
     }

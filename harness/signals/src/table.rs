@@ -29,7 +29,7 @@ pub struct Table {
     gaps: BTreeSet<String>,
 }
 
-/// How a table is stored.
+/// File format of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Csv,
@@ -241,7 +241,7 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
     names().with_context(|| format!("{name} cannot be used"))
 }
 
-/// Where each wanted column stands, or which are missing.
+/// Position of each wanted column, or the missing ones.
 fn positions<'a>(there: impl Iterator<Item = &'a str>, wanted: &[&str]) -> Result<Vec<usize>> {
     let there: Vec<&str> = there.map(str::trim).collect();
     let missing: Vec<_> = wanted.iter().copied().filter(|w| !there.contains(w)).collect();
@@ -275,7 +275,7 @@ fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), columns))
 }
 
-/// How the unit of a table's time is stated where a file has integers.
+/// How to state the unit of a table's time if a file has integers.
 const IN_SECONDS: &str = "the table's time is in s, write it as floating-point numbers";
 
 fn read_parquet(path: &Path, wanted: &[&str]) -> Result<Table> {

@@ -1,4 +1,4 @@
-//! What is set up before the motion, and where each call is allowed.
+//! Setup before the motion, and the states in which each call is allowed.
 
 use super::*;
 use crate::call::{Call, Events, InstanceState};
@@ -148,7 +148,7 @@ const CALLS: [&Call; 40] = [
     Fmi2::GET_NOMINALS,
 ];
 
-/// What is allowed in every state but "fatal" of both interfaces.
+/// Calls allowed in every state but "fatal" of both interfaces.
 const ALWAYS: [&str; 12] = [
     "SetDebugLogging",
     "Reset",

@@ -1,4 +1,4 @@
-//! What the host's logger is told.
+//! Messages to the host's logger.
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -42,7 +42,7 @@ fn started(interface: Interface, values: &[(&str, f64)]) -> Subject {
     instance
 }
 
-/// As [`started`], in continuous-time mode.
+/// [`started`] in continuous-time mode.
 fn continuous(values: &[(&str, f64)]) -> Subject {
     let mut instance = started(ME, values);
     instance.enter_continuous_time_mode().unwrap();
@@ -100,7 +100,7 @@ fn discarded<T: std::fmt::Debug>(result: Result<T, Fault>) -> String {
     fault.text
 }
 
-/// What a call does to an instance that refuses it: nothing.
+/// A refused call leaves the instance unchanged.
 fn unchanged<T: std::fmt::Debug>(
     instance: &mut Subject,
     call: impl FnOnce(&mut Subject) -> Result<T, Fault>,

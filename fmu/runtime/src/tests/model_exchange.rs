@@ -1,4 +1,4 @@
-//! Where the host integrates and handles events.
+//! Tests with a host that integrates and handles events.
 
 use super::*;
 use crate::call::InstanceState;

@@ -31,7 +31,7 @@ fn stepping(events: Events, start: f64, values: &[(&str, f64)]) -> Host {
     host
 }
 
-/// Whether the valve is open, how often it has moved, where it is: as the host is shown it.
+/// State, number of movements and position of the valve, as the host sees them.
 fn shown(host: &mut Host) -> [Value; 3] {
     [
         host.get(&GET_BOOLEAN, number("open")).unwrap(),

@@ -1,4 +1,4 @@
-//! What follows from a table of variables.
+//! Consequences of a table of variables.
 
 use super::*;
 use crate::table::{About, Layout, Scalar, Table, scalar_count, scalars};
@@ -240,7 +240,7 @@ fn inputs_that_do_not_stand_together_are_refused() {
     Table::new(TABLE.about, apart, scalars::<Vessels, N>(apart).to_vec().leak());
 }
 
-/// What sizes an array is told in the description with arrays alone.
+/// Only the description with arrays names the parameters that size them.
 #[test]
 fn token_with_arrays_changes_with_what_sizes_them() {
     let tokens = |shape: &'static [Dimension]| {

@@ -10,7 +10,7 @@ use crate::variable::Variable;
 /// Most trays.
 pub const MOST: usize = 3;
 
-/// How many trays there are, and numbers of each without effect: by tray, and by side first; and of none.
+/// Number of trays, and arrays without effect: by tray, by side first, and of length zero.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     rows: u8,
@@ -26,7 +26,7 @@ impl Default for Parameters {
     }
 }
 
-/// What flows in, m/s, with slopes.
+/// Inflow, m/s, with slopes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     q: [[f64; 2]; MOST],

@@ -1,4 +1,4 @@
-//! Which values a variable takes, and what is said of those that it does not.
+//! Allowed values of a variable, and messages for others.
 
 use super::*;
 use crate::variable::Dimension::Fixed;

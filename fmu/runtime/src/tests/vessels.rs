@@ -44,7 +44,7 @@ impl Default for Parameters {
 /// Each with its slope.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
-    /// What flows in, m/s.
+    /// Inflow, m/s.
     q: [[f64; 2]; 2],
     /// Height of the platform, m: its slope is its rate.
     z: [f64; 2],
@@ -58,7 +58,7 @@ impl Default for Inputs {
     }
 }
 
-/// What there is to see.
+/// Outputs.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs {
     sum: f64,

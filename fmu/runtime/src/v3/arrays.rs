@@ -16,7 +16,7 @@ use crate::version::Version;
 pub struct Arrays {
     /// References of scalars, variable by variable.
     scalars: Vec<u32>,
-    /// Where each variable's end there.
+    /// End of each variable's elements.
     ends: Vec<usize>,
     /// The C type in which each variable passes.
     types: Vec<CType>,
@@ -77,12 +77,12 @@ impl Arrays {
         self.types.get(n).copied().unwrap_or(CType::Real)
     }
 
-    /// How many variables there are.
+    /// Number of variables.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Whether there is none.
+    /// Returns true without variables.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
@@ -104,7 +104,7 @@ fn first_derivative<M: Model>() -> usize {
     M::table().derivatives().first().map_or(0, |scalar| scalar.index as usize)
 }
 
-/// What a parameter that sizes arrays says.
+/// Value of a parameter that sizes arrays.
 fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     let is_it = |scalar: &&Scalar<M>| scalar.variable.name == name;
     let slot = M::table().parameters().iter().find(is_it).map(|scalar| scalar.slot);
@@ -114,7 +114,7 @@ fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     }
 }
 
-/// How long a variable is along each of its dimensions, where structural parameters have these values.
+/// Lengths of a variable along its dimensions for these values of the structural parameters.
 pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -> Vec<usize> {
     let length = |dimension: &Dimension| match dimension {
         Dimension::Fixed(length) => *length,
@@ -123,7 +123,7 @@ pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -
     variable.shape.iter().map(length).collect()
 }
 
-/// Whether an element, counted by rows in the largest array, is within these lengths.
+/// Returns true if an element, counted by rows in the largest array, is within these lengths.
 fn is_within<M: Model>(variable: &Variable<M>, element: usize, lengths: &[usize]) -> bool {
     let mut rest = element;
     variable.lengths().zip(lengths).rev().all(|(most, length)| {
@@ -172,7 +172,7 @@ pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     if lengths.is_empty() { name } else { format!("{name}[{}]", lengths.join(",")) }
 }
 
-/// What the host of this layout keeps: nothing where scalars are its variables.
+/// Array data for this layout; `None` if scalars are the variables.
 pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
     (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
 }

@@ -1,4 +1,4 @@
-//! What an event may change, seen before and after it.
+//! Quantities that an event may change, before and after it.
 
 use anyhow::Result;
 
@@ -10,7 +10,7 @@ const ROUNDING: f64 = 1e-9;
 /// A share of a derivative below which its change is what an iteration leaves in it.
 const ITERATED: f64 = 1e-2;
 
-/// What an event may change.
+/// Quantities that an event may change.
 pub struct Sight {
     states: Vec<f64>,
     derivatives: Vec<f64>,
@@ -23,7 +23,7 @@ fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
 }
 
 impl Sight {
-    /// What is to be seen now.
+    /// Present values.
     pub fn of(session: &mut Session) -> Result<Sight> {
         let n = session.states();
         let (mut states, mut derivatives) = (vec![0.0; n], vec![0.0; n]);

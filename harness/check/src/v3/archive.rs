@@ -1,4 +1,4 @@
-//! What is in the archive of an FMU 3.0 (FMI 3.0.2, sections 2.5 and 2.6), and its binaries.
+//! Content of the archive of an FMU 3.0 (FMI 3.0.2, sections 2.5 and 2.6), and its binaries.
 
 use super::Description;
 use crate::archive::folders_of;
@@ -8,7 +8,7 @@ use host::binary::{Binary, Kind};
 use host::fmi3::{Fmu, PLATFORM};
 use host::xml::Element;
 
-/// What stands at the top of an FMU (2.5.1).
+/// Files and folders at the top of an FMU (2.5.1).
 const AT_THE_TOP: [&str; 7] = [
     "modelDescription.xml",
     "binaries",
@@ -145,7 +145,7 @@ impl<'a> Binaries<'a> {
         Binaries { archive, identifiers }
     }
 
-    /// Whether there is one for the platform this program runs on.
+    /// Returns true if there is a binary for the platform of this program.
     pub fn is_callable(&self) -> bool {
         self.placed().iter().any(|(_, folder, ..)| *folder == PLATFORM)
     }

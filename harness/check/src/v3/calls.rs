@@ -97,7 +97,7 @@ pub fn free_null(subject: &Subject, _: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// What a run of every variable gives.
+/// Runs the FMU and returns every variable.
 fn run(subject: &Subject, using: Use) -> Result<Vec<(String, Vec<Value>)>> {
     let mut session = subject.running(using)?;
     session.advance(STEPS)?;

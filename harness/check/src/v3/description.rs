@@ -25,15 +25,15 @@ pub struct Variable {
     pub name: String,
     /// Its value reference; 0 if that cannot be read.
     pub reference: u32,
-    /// As written, or the default "local".
+    /// Value in the file, or the default "local".
     pub causality: String,
-    /// As written, or the default for causality and type.
+    /// Value in the file, or the default for causality and type.
     pub variability: String,
-    /// As written, or the default for causality and variability, if there is one.
+    /// Value in the file, or the default for causality and variability, if there is one.
     pub initial: Option<String>,
     /// In which type calls exchange it.
     pub c_type: CType,
-    /// What it is to people.
+    /// Type for display.
     pub kind: Type,
     /// Its start values, as written.
     pub starts: Vec<String>,
@@ -54,24 +54,24 @@ pub struct Unknown {
     pub line: u64,
     /// Value reference; none if it cannot be read.
     pub reference: Option<u32>,
-    /// What it depends on; none if that is not said: on everything.
+    /// Dependencies; `None` if they are not declared and all knowns count.
     pub dependencies: Option<Vec<u32>>,
-    /// How.
+    /// Kinds of the dependencies.
     pub kinds: Option<Vec<String>>,
 }
 
 impl Variable {
-    /// Where it is, for findings.
+    /// Position for findings.
     pub fn place(&self) -> String {
         format!("line {}, {}", self.line, self.name)
     }
 
-    /// Whether it is a floating-point number.
+    /// Returns true for a floating-point number.
     pub fn is_float(&self) -> bool {
         self.kind == Type::Real
     }
 
-    /// Whether it may change at any time.
+    /// Returns true for a continuous variable.
     pub fn is_continuous(&self) -> bool {
         self.is_float() && self.variability == "continuous"
     }
@@ -81,17 +81,17 @@ impl Variable {
         self.element.get("derivative")?.trim().parse().ok()
     }
 
-    /// How many values it has.
+    /// Number of values.
     pub fn length(&self) -> usize {
         self.dimensions.iter().product()
     }
 
-    /// Whether a host sets it before and while it runs.
+    /// Returns true for variables that a host sets before and during a simulation.
     pub fn is_set_by_hosts(&self) -> bool {
         matches!(self.causality.as_str(), "input" | "parameter")
     }
 
-    /// Whether values of it are exchanged by calls that the rules make.
+    /// Returns true if the rules' calls exchange values of the variable.
     pub fn is_exchanged(&self) -> bool {
         !matches!(self.kind, Type::Binary | Type::Clock) && self.element.get("clocks").is_none()
     }

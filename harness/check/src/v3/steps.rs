@@ -9,7 +9,7 @@ use crate::Findings;
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
 
-/// What is wrong with the answers of one fmi3DoStep from `from` by `h`.
+/// Errors in the results of one fmi3DoStep from `from` by `h`.
 fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
     let mut faults = Vec::new();
     for (name, byte) in [
@@ -581,7 +581,7 @@ fn deriving(subject: &Subject, flag: &str, findings: &mut Findings) -> Option<Us
 /// A central difference.
 struct Difference {
     quotient: f64,
-    /// What rounding of the two values may have taken of it.
+    /// Rounding error of the difference of the two values.
     rounding: f64,
 }
 
@@ -591,7 +591,7 @@ impl Difference {
         Difference { quotient: (above - below) / (2.0 * h), rounding }
     }
 
-    /// Whether a derivative is that of the difference, which loses what rounding takes of the values, and sees
+    /// Returns true if a derivative agrees with the difference quotient, within rounding and
     /// curvature.
     fn is_near(&self, derivative: f64, unsure: f64) -> bool {
         let size = self.quotient.abs().max(derivative.abs());

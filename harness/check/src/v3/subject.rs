@@ -26,17 +26,17 @@ pub type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
 /// The loaded FMU.
 pub struct Subject {
     binaries: Vec<(Interface, Fmu)>,
-    /// What the FMU says of itself.
+    /// Model description of the FMU.
     pub description: Description,
     tell: Box<dyn Fn(&str)>,
     doing: RefCell<String>,
     deadline: Instant,
 }
 
-/// How an instance is used.
+/// Use of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
-    /// Which interface.
+    /// Interface type.
     pub interface: Interface,
     /// eventModeUsed.
     pub event_mode: bool,
@@ -57,7 +57,7 @@ impl Use {
     /// Model Exchange.
     pub const EXCHANGE: Use = Use { interface: Interface::ModelExchange, ..Use::PLAIN };
 
-    /// As findings name it.
+    /// Name in findings.
     pub fn name(self) -> &'static str {
         match self {
             Use { interface: Interface::ModelExchange, .. } => "Model Exchange",
@@ -104,7 +104,7 @@ impl Subject {
         *self.doing.borrow_mut() = what;
     }
 
-    /// What it was told last.
+    /// Last announced call.
     pub fn now(&self) -> String {
         let doing = self.doing.borrow();
         if doing.is_empty() { "a first call".into() } else { doing.clone() }
@@ -120,7 +120,7 @@ impl Subject {
         self.binaries.iter().find(|(of, _)| *of == interface).map(|(_, fmu)| fmu)
     }
 
-    /// Whether an interface declares a capability.
+    /// Returns true if an interface declares a capability.
     pub fn can(&self, interface: Interface, flag: &str) -> bool {
         let name = match interface {
             Interface::CoSimulation => "CoSimulation",
@@ -239,7 +239,7 @@ impl Subject {
 pub struct Session<'s> {
     /// The FMU.
     pub subject: &'s Subject,
-    /// How it is used.
+    /// Use of the instance.
     pub using: Use,
     /// The instance.
     pub instance: Instance<'s>,

@@ -20,7 +20,7 @@ use std::io::Write;
 use super::estimates::print_estimates;
 use crate::{progress, terminal};
 
-/// What is asked of any FMU.
+/// Options for fitting any FMU.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Any FMU")]
 pub struct AnyFmuArgs {
@@ -76,7 +76,7 @@ pub struct PointsArgs {
     found: Option<PathBuf>,
 }
 
-/// What all commands are told.
+/// Options of all commands.
 pub struct Told<'a> {
     /// Recordings.
     pub data: &'a [PathBuf],
@@ -90,7 +90,7 @@ pub struct Told<'a> {
     pub json: bool,
 }
 
-/// Where results go.
+/// Files of the results.
 pub struct Out<'a> {
     /// JSON.
     pub result: &'a Path,
@@ -118,7 +118,7 @@ fn read<T: std::str::FromStr<Err = anyhow::Error>>(
 }
 
 impl AnyFmuArgs {
-    /// Whether it is about any FMU.
+    /// Returns true if any of these options is given.
     pub fn is_asked(&self) -> bool {
         !self.free.is_empty()
     }

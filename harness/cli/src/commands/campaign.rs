@@ -37,7 +37,7 @@ pub struct CampaignArgs {
     /// Torque amplitudes, N·m.
     #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = plan::AMPLITUDES)]
     amplitudes: Vec<f64>,
-    /// How the frequency grows from 1.25 to 3.5 Hz in 2700 s.
+    /// Growth of the frequency from 1.25 to 3.5 Hz in 2700 s.
     #[arg(long, value_enum, default_value = "exponential")]
     sweep: Sweep,
     /// Sets a parameter or an input by its FMU name: a number in SI or with a unit of the variable (50mm); enumerations by
@@ -71,7 +71,7 @@ pub struct CampaignArgs {
 /// Length of a directory's name, beyond which it has a hash of the flags.
 const LONGEST: usize = 100;
 
-/// How the frequency of `campaign`'s sweep grows.
+/// Growth of the frequency of `campaign`'s sweep.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Sweep {
     /// Exponentially.

@@ -53,7 +53,7 @@ impl std::fmt::Display for Unchecked {
 
 impl std::error::Error for Unchecked {}
 
-/// What `check` starts for the calls of one rule.
+/// Process that `check` starts for the calls of one rule.
 #[derive(clap::Args)]
 pub struct CheckCallsArgs {
     rule: String,

@@ -9,7 +9,7 @@ use clap::CommandFactory;
     hubslosh completions bash > ~/.local/share/bash-completion/completions/hubslosh\n  \
     hubslosh completions zsh > ~/.zfunc/_hubslosh")]
 pub struct CompletionsArgs {
-    /// Which shell.
+    /// Shell.
     #[arg(value_enum)]
     shell: clap_complete::Shell,
 }

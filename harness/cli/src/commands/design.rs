@@ -72,7 +72,7 @@ pub struct DesignArgs {
     /// Print what is found as JSON.
     #[arg(long)]
     json: bool,
-    /// Where to put the torque, .csv or .parquet.
+    /// File for the torque, .csv or .parquet.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Tables of the inputs that are planned, with --free.
@@ -198,7 +198,7 @@ impl DesignArgs {
         Ok((time, tau, factor))
     }
 
-    /// What a plain sweep of the peak `peak` tells, N·m, before its liquid is limited.
+    /// Information from a plain sweep of the peak `peak`, N·m, before its liquid is limited.
     fn sweep(&self, bench: &Bench, time: &[f64], peak: f64) -> Result<Sweep> {
         let (f0, f1) = (self.band[0], self.band[1]);
         let written = |peak: f64| {
@@ -214,7 +214,7 @@ impl DesignArgs {
     }
 }
 
-/// What a plan is tried on.
+/// Bench on which a plan is tried.
 struct Bench<'f> {
     fmu: &'f Fmu,
     /// With the damping as the FMU has it, whether by the correlation or not.
@@ -263,7 +263,7 @@ impl<'f> Bench<'f> {
         Ok((factor, torque.iter().map(|t| factor * t).collect()))
     }
 
-    /// What a torque tells at best: name, expected value and standard deviation of every unknown.
+    /// Cramér–Rao bounds for a torque: name, expected value and standard deviation of every unknown.
     fn bounds(&self, time: &[f64], torque: &[f64]) -> Result<Bounds> {
         let rows = (time.to_vec(), torque.to_vec());
         let unknowns = self.unknowns.clone();
@@ -282,9 +282,9 @@ struct Sweep {
     bounds: Bounds,
 }
 
-/// What a torque does and tells.
+/// A torque, its effect and its information.
 struct Plan {
-    /// By how much it has been made smaller.
+    /// Factor by which it has been reduced.
     factor: f64,
     /// N·m.
     peak: f64,

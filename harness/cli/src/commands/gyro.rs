@@ -15,7 +15,7 @@ use signals::table::Table;
 use super::{DEFAULT_FMU, open, setting};
 use crate::{progress, terminal};
 
-/// Where its files go.
+/// Folder for its files.
 const DEFAULT_GYRO: &str = "dist/gyro";
 
 /// Records the gyro for hours at rest, estimates its noise from the Allan deviation and compares it
@@ -62,7 +62,7 @@ pub struct GyroArgs {
 }
 
 impl GyroArgs {
-    /// Whether it records the FMU's gyro.
+    /// Returns true if it records the FMU's gyro.
     pub fn needs_fmu(&self) -> bool {
         self.recording.is_none()
     }
@@ -167,7 +167,7 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     ]
 }
 
-/// What a recording at rest shows, as lines of text.
+/// Statistics of a recording at rest, as lines of text.
 fn text(rest: &Rest) -> String {
     let hours = rest.count as f64 * rest.step / 3600.0;
     let mut text = format!(

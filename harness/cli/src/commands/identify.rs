@@ -149,10 +149,10 @@ pub struct IdentifyArgs {
     /// Print the result as JSON too, in place of tables and verdict.
     #[arg(long)]
     json: bool,
-    /// Where to put the result, .json.
+    /// File for the result, .json.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Where to put a report, .html.
+    /// File for a report, .html.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     #[command(flatten)]
@@ -222,7 +222,7 @@ fn known(text: &str) -> Result<(String, f64, f64)> {
 }
 
 impl IdentifyArgs {
-    /// Whether the method simulates the FMU.
+    /// Returns true if the method simulates the FMU.
     pub fn needs_fmu(&self) -> bool {
         match self.method {
             MethodName::OutputError => OutputError::NEEDS.fmu,
@@ -306,7 +306,7 @@ impl IdentifyArgs {
         }
     }
 
-    /// What is asked for, with the names of the FMU.
+    /// Options with the names of the FMU.
     fn options(&self) -> Options {
         Options {
             intersample: self.intersample(),
@@ -361,7 +361,7 @@ impl IdentifyArgs {
         self.find(method, fmu, &recordings, &validation, notes)
     }
 
-    /// How the recordings are read.
+    /// Options for reading the recordings.
     fn source(&self, trim: Option<(f64, f64)>) -> Result<Source> {
         let slow = match self.intersample() {
             Some(Intersample::FirstOrderHold | Intersample::BandLimited) => Between::Line,

@@ -32,7 +32,7 @@ pub mod view;
 
 /// The FMU that commands drive unless another is named.
 pub const DEFAULT_FMU: &str = "HubSlosh";
-/// Where a campaign goes.
+/// Default folder of a campaign.
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
 /// Opens the FMU that `--fmu` names, and says what that has changed.

@@ -15,10 +15,10 @@ use pack::{Fmi, Model, sdist, wheel};
                   hubslosh pack --python\n  hubslosh pack --python --all-platforms\n  hubslosh pack --sdist"
 )]
 pub struct PackArgs {
-    /// Which FMU.
+    /// The FMU to pack.
     #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
     model: &'static Model,
-    /// Of FMI 2.0 or of FMI 3.0; the binary is the same.
+    /// Version of FMI, 2 or 3; the binary is the same.
     #[arg(long, value_name = "2|3", default_value = "2", value_parser = fmi, conflicts_with_all = ["python", "sdist"])]
     fmi: Fmi,
     /// Of FMI 3.0: vectors and matrices are variables, and how many tanks or modes there are is a structural parameter
@@ -34,7 +34,7 @@ pub struct PackArgs {
     /// Pack the source as an sdist instead, from which pip builds the Python package.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
     sdist: bool,
-    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist/NAME-fmi3-arrays.fmu, dist].
+    /// File for the FMU, or folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist/NAME-fmi3-arrays.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
     /// Of Spacecraft: a variant for this many tanks, 1 to 4, which has no variables of more. It is called Spacecraft_1x1

@@ -9,7 +9,7 @@ use pack::{Model, release};
 
 use crate::progress;
 
-/// Where the release goes.
+/// Default folder of the release.
 const DEFAULT_RELEASE: &str = "dist/release";
 
 /// Builds and checks the release for all platforms: each FMU in both versions of FMI with its software bill of materials
@@ -19,7 +19,7 @@ const DEFAULT_RELEASE: &str = "dist/release";
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]
 pub struct ReleaseArgs {
-    /// Which FMU; without it, every one, and the wheels.
+    /// One FMU; by default all FMUs and the wheels.
     #[arg(long, value_name = "NAME", value_parser = pack::model)]
     model: Option<&'static Model>,
     /// Directory for all wheels.

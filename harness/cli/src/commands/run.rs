@@ -73,7 +73,7 @@ pub struct RunArgs {
     /// The FMU: a file, or the name of one of this project.
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
-    /// Where to put the signals, .csv or .parquet; - prints them as CSV.
+    /// File for the signals, .csv or .parquet; - prints them as CSV.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }

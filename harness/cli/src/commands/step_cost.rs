@@ -28,16 +28,16 @@ pub struct StepCostArgs {
     /// Time that a step may take: 1ms, 250us, 0.01s, or a number of s; chooses solver.max_steps.
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     deadline: Option<f64>,
-    /// How many times the measured cost must fit the deadline: other machines, other motions.
+    /// Safety factor between the measured cost and the deadline, for other machines and motions.
     #[arg(long, value_name = "NUMBER", default_value_t = 2.0)]
     margin: f64,
     /// Communication step, as --deadline [default: the deadline, or 1ms].
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     step: Option<f64>,
-    /// How many steps the manoeuvre has.
+    /// Number of steps of the manoeuvre.
     #[arg(long, value_name = "NUMBER", default_value_t = 20_000)]
     steps: usize,
-    /// What drives it, as for `hubslosh run`, in place of the sweep or the slew.
+    /// Profile that drives the FMU, as in `hubslosh run`, in place of the sweep or the slew.
     #[arg(long, value_name = "PROFILE")]
     profile: Option<String>,
     /// Input that is driven [default: tau_cmd, of SloshTank a[1], of Spacecraft torque[1]].
@@ -151,7 +151,7 @@ impl StepCostArgs {
     }
 }
 
-/// What was measured.
+/// Measurements.
 struct Found<'a> {
     args: &'a StepCostArgs,
     fmu: &'a Fmu,
@@ -225,7 +225,7 @@ impl Found<'_> {
         println!("{}", self.beyond());
     }
 
-    /// What becomes of a step that would need more.
+    /// Consequence for a step that would need more.
     fn beyond(&self) -> &'static str {
         match self.is_fmi3() {
             true => {

@@ -41,7 +41,7 @@ pub struct TankArgs {
     /// the ends, between which it places its points, otherwise the points themselves, at most 12.
     #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
     sweep: Vec<Fill>,
-    /// How many lateral modes, 1 to 20.
+    /// Number of lateral modes, 1 to 20.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     modes: usize,
     /// Acceleration along the tank's axis for the frequencies in table and picture, m/s². At 0 they are 0 without
@@ -51,13 +51,13 @@ pub struct TankArgs {
     /// Print the result as JSON, that of --sweep too.
     #[arg(long, conflicts_with = "out")]
     json: bool,
-    /// Where to put the result, JSON (of --sweep CSV).
+    /// File for the result, JSON (CSV with --sweep).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Where to put a drawing of tank, free surface and mode shapes, SVG.
+    /// File for a drawing of tank, free surface and mode shapes, SVG.
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Where to put the parameters under the names of an FMU's variables, .toml (for `hubslosh run
+    /// File for the parameters under the names of an FMU's variables, .toml (for `hubslosh run
     /// --set-file` and Python) or .ssv (SSP 1.0).
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,

@@ -30,7 +30,7 @@ pub struct ViewArgs {
     /// The run: .parquet or .csv, as `hubslosh run` and `campaign` write them.
     #[arg(value_name = "RUN")]
     run: PathBuf,
-    /// Where to put the page [default: beside the run, its name with .html].
+    /// File for the page [default: next to the run, its name with .html].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// First time, s.
@@ -212,7 +212,7 @@ const POINTS: usize = 24;
 /// Steps of the radius over which a mode's surface is given.
 const STEPS: usize = 80;
 
-/// What `--tank [N:]FILE` names.
+/// Parses `--tank [N:]FILE`.
 fn drawing(text: &str) -> Result<(usize, Drawing)> {
     let (number, path) = match text.split_once(':') {
         Some((number, path)) if number.parse::<usize>().is_ok() => (number.parse()?, path),

@@ -47,7 +47,7 @@ fn zipped(files: &Files, method: CompressionMethod) -> Vec<u8> {
     to.finish().unwrap().into_inner()
 }
 
-/// Where binaries are, and what they are called.
+/// Path and name of binaries.
 fn binary() -> String {
     format!("binaries/{PLATFORM}/HubSlosh{}", std::env::consts::DLL_SUFFIX)
 }
@@ -1184,7 +1184,7 @@ fn descriptions_that_do_not_fit_the_binary_are_told() {
 
 // ---------------------------------------------------------------- small FMUs of C
 
-/// What the FMU of model.c offers and how it is compiled.
+/// Capabilities and compilation of the FMU of model.c.
 struct Small<'a> {
     /// C definitions besides the rate.
     definitions: &'a [&'a str],

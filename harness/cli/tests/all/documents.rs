@@ -1,4 +1,4 @@
-//! What README and the scripts for other hosts promise.
+//! Promises of README and of the scripts for other hosts.
 
 use host::description::ModelDescription;
 

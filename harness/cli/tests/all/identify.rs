@@ -16,7 +16,7 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// What the program prints; stderr if it fails.
+/// Output of the program; stderr if it fails.
 fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     let done = run(folder, arguments);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

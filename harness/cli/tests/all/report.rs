@@ -126,7 +126,7 @@ fn one_linear_model_fits_ever_less_of_a_spherical_liquid() {
     assert!(coherence[0] > 0.5 && (0.15..0.35).contains(&coherence[4]), "{coherence:?}");
 }
 
-/// Whether the `column`-th model does what the thesis says, in the table's row that begins so.
+/// Returns true if the `column`-th model agrees with the thesis in the table's row that begins so.
 fn agrees(page: &str, says: &str, column: usize) -> bool {
     let row = page.split("<tr>").find(|row| row.starts_with(&format!("<td>{says}")));
     let row = row.unwrap_or_else(|| panic!("no row says {says}"));

@@ -20,7 +20,7 @@ fn said(output: &Output) -> String {
 const RUN: [&str; 5] =
     ["run", "--profile", "exp-sweep:amplitude=0.1,duration=20", "--set", "tank.d=200mm"];
 
-/// What the page draws.
+/// Data that the page draws.
 fn drawn(directory: &Path, file: &str) -> serde_json::Value {
     let page = std::fs::read_to_string(directory.join(file)).unwrap();
     for word in [" src=\"", "<link", "@import", "url(http"] {

@@ -5,14 +5,14 @@ use super::*;
 
 /// Bytes on either side of an array.
 const MARGIN: usize = 1024;
-/// What the margins are filled with; no number of an FMU looks like it by chance.
+/// Fill value of the margins; no number of an FMU looks like it by chance.
 const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 
 /// An array between its margins, aligned for every type of FMI.
 struct Guarded {
     words: Vec<u64>,
     bytes: usize,
-    /// What it held when it was handed over, if the FMU shall only read it.
+    /// Content at the call, if the FMU may only read it.
     input: Option<Vec<u8>>,
 }
 
@@ -45,7 +45,7 @@ impl Guarded {
         self.all_bytes()[MARGIN..MARGIN + self.bytes].to_vec()
     }
 
-    /// What was written where it must not be.
+    /// Describes writes outside the array or to a read-only array.
     fn fault(&self) -> Option<String> {
         let all = self.all_bytes();
         let fill = FILL.to_ne_bytes();
@@ -74,22 +74,22 @@ pub struct Beside {
     pub call: &'static str,
     /// The array, by the name of the standard's argument, and how many values it has.
     pub array: String,
-    /// What was written.
+    /// Description of the write.
     pub fault: String,
 }
 
-/// What the calls of [`Instance::writes_beside`] ask for.
+/// Arguments of the calls in [`Instance::writes_beside`].
 #[derive(Clone, Debug, Default)]
 pub struct Lists {
     /// Value references of Reals to read.
     pub reals: Vec<u32>,
-    /// Of Integers and Enumerations.
+    /// References of Integers and Enumerations.
     pub integers: Vec<u32>,
-    /// Of Booleans.
+    /// References of Booleans.
     pub booleans: Vec<u32>,
-    /// Of Strings.
+    /// References of Strings.
     pub strings: Vec<u32>,
-    /// Of Reals that may be set now, with values.
+    /// References of Reals that may be set now, with values.
     pub inputs: Vec<(u32, f64)>,
     /// Unknowns of directional derivatives; none if the FMU does not provide them.
     pub unknowns: Vec<u32>,
@@ -101,7 +101,7 @@ pub struct Lists {
     pub states: Option<usize>,
     /// Event indicators, if they may be asked for now.
     pub indicators: Option<usize>,
-    /// Whether states can be serialised.
+    /// True if states can be serialised.
     pub serializes: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What the values of a column are, by physical, logical and converted type.
+//! Meaning of a column's values, by physical, logical and converted type.
 
 use std::fmt;
 
@@ -72,7 +72,7 @@ impl Temporal {
     }
 }
 
-/// What the values of a column are.
+/// Meaning of a column's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// Floating-point numbers.

@@ -21,14 +21,14 @@ use self::kind::Kind;
 /// Rows that are decoded at once.
 const BATCH: usize = 1 << 16;
 
-/// How the column of the time is read.
+/// Reading of the time column.
 #[derive(Clone, Copy, Debug)]
 pub struct Time<'a> {
     /// Its place among the wanted columns.
     pub place: usize,
     /// Seconds in the unit that the user or the column's name states; `None`: no unit is stated.
     pub stated: Option<f64>,
-    /// How a user states the unit, the end of an error's sentence.
+    /// End of an error's sentence: how to state the unit.
     pub remedy: &'a str,
 }
 
@@ -38,7 +38,7 @@ pub struct Found {
     pub columns: Vec<Vec<f64>>,
     /// The first row's date in RFC 3339, if the times are dates: they count from that row.
     pub origin: Option<String>,
-    /// Whether the column of the time is in seconds by its type, whatever unit is stated.
+    /// True if the type of the time column gives seconds, whatever unit is stated.
     pub seconds: bool,
 }
 

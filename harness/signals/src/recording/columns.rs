@@ -36,7 +36,7 @@ pub const SIGNALS: [(&str, Quantity); 10] = [
     ("force", Quantity::Force),
 ];
 
-/// What a signal measures.
+/// Quantity of a signal.
 ///
 /// # Errors
 /// If there is no such signal.
@@ -129,7 +129,7 @@ impl Columns {
         self.0.get(signal).cloned().unwrap_or_else(own)
     }
 
-    /// Whether a signal's column was given.
+    /// Returns true if the user named the signal's column.
     pub fn names(&self, signal: &str) -> bool {
         self.0.contains_key(signal)
     }

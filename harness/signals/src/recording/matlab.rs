@@ -49,7 +49,7 @@ impl Shape {
     }
 }
 
-/// What is done with an array of numbers: its shape, and its values in the file's order.
+/// Visitor of an array of numbers: its shape, and its values in the file's order.
 type Visit<'a> = &'a mut dyn FnMut(&Shape, &mut Numbers) -> Result<()>;
 
 /// The names of the columns in a file.

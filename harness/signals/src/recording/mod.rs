@@ -24,7 +24,7 @@ use crate::table::Table;
 /// Names and units of a file's columns.
 struct Header {
     names: Vec<String>,
-    /// As they are written; `None` where none is.
+    /// Units in the file; `None` for a column without one.
     units: Vec<Option<String>>,
 }
 
@@ -50,7 +50,7 @@ impl Header {
         }
     }
 
-    /// Where a column stands.
+    /// Position of a column.
     fn place(&self, column: &str) -> Result<usize> {
         let number = column.strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
         if let Some(place) = number.filter(|n| (1..=self.names.len()).contains(n)) {
@@ -85,11 +85,11 @@ struct Found {
     columns: Vec<Vec<f64>>,
     /// The first row's date, if time is dates: time counts from there.
     origin: Option<String>,
-    /// Whether times are in s already, whatever unit is stated: those of dates, and of types with a unit.
+    /// True if times are in s whatever unit is stated: dates, and types with a unit.
     seconds: bool,
 }
 
-/// What becomes of a signal in rows that have no value of it.
+/// Treatment of a signal in rows without a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Between {
     /// The last value, as of a command that is held.
@@ -107,18 +107,18 @@ pub struct Signal<'a> {
     pub name: &'a str,
     /// It must be there.
     pub required: bool,
-    /// How it is completed.
+    /// Treatment of rows without a value.
     pub between: Between,
     /// The unit in which its values are wanted, and in which they are where the file names none; `None`: SI.
     pub unit: Option<&'a str>,
 }
 
-/// What is wanted of a recording beside its time.
+/// Signals to read in addition to time.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
     /// The first is the rows' signal, unless it may be missing ([`Between::Missing`]).
     pub signals: &'a [Signal<'a>],
-    /// Which columns they are.
+    /// Columns of the signals.
     pub columns: &'a Columns,
 }
 
@@ -278,7 +278,7 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     Ok(Table::new(names, columns))
 }
 
-/// What a value of a signal in a unit is multiplied by.
+/// Factor from a unit to SI for a signal.
 fn factor(signal: &Signal, unit: &str) -> Result<f64> {
     let Some(own) = signal.unit else {
         let quantity = quantity(signal.name)?;

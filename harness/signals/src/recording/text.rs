@@ -20,7 +20,7 @@ const NAMED: usize = 5;
 /// Beginnings of lines of comment.
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
 
-/// What stands between two fields.
+/// Separator between two fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Separator {
     Char(char),
@@ -69,7 +69,7 @@ impl Separator {
     }
 }
 
-/// What a field holds.
+/// Value of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Value {
     Number(f64),
@@ -105,7 +105,7 @@ fn date(field: &str) -> Option<i64> {
     zoned().or_else(|| plain("%Y-%m-%dT%H:%M:%S%.f")).or_else(|| plain("%Y-%m-%d %H:%M:%S%.f"))
 }
 
-/// What stands where a value is missing.
+/// Returns true for a field that marks a missing value.
 fn missing(field: &str) -> bool {
     let words = ["", "nan", "na", "n/a", "null", "none", "-"];
     field.len() < 5 && words.iter().any(|word| field.eq_ignore_ascii_case(word))
@@ -120,7 +120,7 @@ fn value((field, quoted): (&str, bool), separator: Separator) -> Value {
     }
 }
 
-/// Whether a line holds values alone, and at least one that is not missing.
+/// Returns true if a line holds only values, and at least one that is not missing.
 fn is_data(fields: &[(&str, bool)], separator: Separator) -> bool {
     let mut values = fields.iter().map(|field| value(*field, separator));
     let some = values.clone().any(|v| matches!(v, Value::Number(_) | Value::Date(_)));
@@ -131,7 +131,7 @@ fn is_data(fields: &[(&str, bool)], separator: Separator) -> bool {
 struct Lines {
     reader: BufReader<File>,
     bytes: Vec<u8>,
-    /// Of the line that was read last, counted from 1.
+    /// Number of the last line, from 1.
     number: usize,
     /// That line has an end.
     ended: bool,
@@ -195,19 +195,19 @@ impl Lines {
     }
 }
 
-/// How a file is written, seen from its first lines.
+/// Layout of a file, detected in its first lines.
 pub(super) struct Layout {
     separator: Separator,
     /// Names and units of its columns.
     pub header: Header,
     /// First line of data, counted from 1.
     first: usize,
-    /// What was taken for what.
+    /// Notes on the detected layout.
     pub notes: Vec<String>,
 }
 
 impl Layout {
-    /// Of a file.
+    /// Detects the layout of a file.
     pub fn of(path: &Path) -> Result<Self> {
         let mut lines = Lines::open(path)?;
         let (mut sample, mut text) = (Vec::new(), String::new());

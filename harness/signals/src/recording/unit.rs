@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What a signal measures.
+/// Quantity of a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// s.
@@ -72,7 +72,7 @@ fn plain(text: &str) -> String {
     text.chars().filter(|c| !matches!(c, '·' | '.' | '*' | '^' | ' ' | '⋅')).collect()
 }
 
-/// What a value in one unit is multiplied by to be in another; `None` if they are not known to be of one quantity.
+/// Factor from one unit to another; `None` unless both are known units of one quantity.
 pub fn conversion(from: &str, to: &str) -> Option<f64> {
     let (from, to) = (plain(from), plain(to));
     if from == to {
@@ -84,7 +84,7 @@ pub fn conversion(from: &str, to: &str) -> Option<f64> {
 }
 
 impl Quantity {
-    /// What a value in that unit is multiplied by to be in SI; `None` if there is no such unit.
+    /// Factor from that unit to SI; `None` for an unknown unit.
     pub fn factor(self, unit: &str) -> Option<f64> {
         let unit = plain(unit);
         let found = UNITS.iter().find(|(quantity, name, _)| *quantity == self && *name == unit);

@@ -20,7 +20,7 @@ fn columns(text: &str) -> Columns {
     text.parse().unwrap()
 }
 
-/// What is read, and what was said.
+/// Table and notes of reading a file.
 fn read_file(path: &Path, columns: &Columns) -> Result<(Table, String), String> {
     let mut said = String::new();
     let table = read(path, &Wanted { signals: &SIGNALS, columns }, &mut |line| {
