@@ -182,6 +182,20 @@ impl Boundary {
         self.panels_for(modes, f64::INFINITY, width, many).unwrap_or_default()
     }
 
+    /// The same panels, each cut in two.
+    #[cfg(test)]
+    pub(crate) fn halved(panels: &[Panel]) -> Vec<Panel> {
+        let halves = |panel: &Panel| {
+            let length = 0.5 * panel.length;
+            let inner = Panel { length, ..*panel };
+            // Only the half at the corner is graded.
+            let outer = Panel { s0: panel.s0 + length, gamma: 1.0, nu: 1.0, ..inner };
+            // In the order along the contour.
+            if panel.end { [outer, inner] } else { [inner, outer] }
+        };
+        panels.iter().flat_map(halves).collect()
+    }
+
     /// None if a panel at most `gap` times as long as its distance from another part takes more
     /// than `many` panels; those on the surface are at most `width` of its width.
     fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {

@@ -86,6 +86,12 @@ impl Discretisation {
         Discretisation::on_panels(self.boundary.clone(), self.panels.clone(), order)
     }
 
+    /// On panels of half the length.
+    #[cfg(test)]
+    pub(crate) fn halved(&self, order: usize) -> Discretisation {
+        Discretisation::on_panels(self.boundary.clone(), Boundary::halved(&self.panels), order)
+    }
+
     pub(crate) fn panel_count(&self) -> usize {
         self.panels.len()
     }
