@@ -350,7 +350,7 @@ fn a_start_is_along_the_direction_of_mode_1_or_refused() {
                 p.init.slosh_angle_radial = example("init.slosh_angle_radial");
                 start(&p).unwrap();
             }
-            p.init.slosh_rate = 1.0 + p.init.slosh_rate;
+            p.init.slosh_rate += 1.0;
             let said = start(&p).unwrap_err().join("\n");
             assert!(said.contains("init.slosh_rate ="), "{said}");
         }
