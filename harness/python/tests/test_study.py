@@ -52,7 +52,7 @@ def study(folder: Path | None, runs: int = 40, **more) -> pd.DataFrame:
 
 
 def not_called(values: dict) -> dict[str, float]:
-    """Say that a stored run was made again."""
+    """Say that a stored run was simulated again."""
     raise AssertionError(values)
 
 
@@ -168,7 +168,7 @@ def test_a_damaged_manifest_is_an_error_and_a_line_that_a_kill_cut_off_is_not(
             with pytest.raises(FmuError, match=said):
                 study(tmp_path, outcome=not_called)
         manifest.write_bytes(good)
-    # A cut line: the run before it is stored, its own is made again.
+    # A cut line: the run before it is stored, its own is simulated again.
     last = tmp_path / "runs" / "000039.json"
     last.unlink()
     manifest.write_bytes(
