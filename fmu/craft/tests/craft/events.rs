@@ -19,6 +19,28 @@ struct Case {
     end: f64,
 }
 
+impl Case {
+    /// Time in which the liquid moves a tenth of the wall's least radius of curvature, at most 20 ms.
+    fn step(&self) -> f64 {
+        let (_, semi, _) = wall(&self.p, 0);
+        let radius = (semi.x * semi.x / semi.z).min(semi.z * semi.z / semi.x);
+        let acceleration = v(&self.u.force.value).norm() / self.p.craft.mass;
+        (0.1 * radius / f64::sqrt(4.0 * acceleration * semi.z)).min(0.02)
+    }
+
+    /// Whether the liquid leaves its bottom at once and stays off, which is all that the simulator has equations of.
+    fn stays_loose(&self) -> bool {
+        let mut craft = Spacecraft::new(&self.p, &self.u, 0.0, 1e-9).unwrap();
+        (0..100).all(|k| {
+            craft.step(&self.u, if k == 0 { 1e-6 } else { self.end / 100.0 }).unwrap();
+            !matches!(
+                craft.outputs(&self.u).tank[0].ball_state,
+                BallState::Settled | BallState::Held
+            )
+        })
+    }
+}
+
 /// One tank of any size; a thrust between 0.02 and 0.5 m/s2 that takes the liquid from its bottom.
 fn case(seed: u64) -> Case {
     let mut random = Random::new(seed);
@@ -249,10 +271,11 @@ impl Simulator<'_> {
         2.0 * self.mass * self.case.p.tank[0].ball.drag * self.in_tank(y).rate.norm()
     }
 
-    /// Goes on to the time `end`, with steps of at most 20 ms.
+    /// Goes on to the time `end`, with steps of [`Case::step`].
     fn go(&mut self, end: f64) {
+        let step = self.case.step();
         while self.t < end {
-            let h = (end - self.t).min(0.02);
+            let h = (end - self.t).min(step);
             let mut past = self.moved(h);
             let (mut low, mut high) = (0.0, h);
             if self.mode == Mode::Flying {
@@ -274,7 +297,7 @@ impl Simulator<'_> {
                 }
             }
             if self.distance_to_event(&past) > 0.0 {
-                (self.y, self.t) = (past, if h < 0.02 { end } else { self.t + h });
+                (self.y, self.t) = (past, if h < step { end } else { self.t + h });
                 self.put_on_wall();
                 continue;
             }
@@ -593,12 +616,17 @@ fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     (shown(&mut own.craft, &case.u), own.impacts)
 }
 
-/// Tolerances and steps of hosts that locate events, as CVODE does with an output every 5 ms, and with a fixed step.
-const LOCATING: [Method; 3] = [
-    Method { tolerance: 1e-9, longest: 0.02, locates: true },
-    Method { tolerance: 1e-6, longest: 5e-3, locates: true },
-    Method { tolerance: 0.0, longest: 5e-3, locates: true },
-];
+/// Hosts that locate events, as CVODE does with an output every 5 ms, and with a fixed step; what they may be off by.
+fn locating(case: &Case) -> [(Method, f64); 3] {
+    let step = case.step();
+    let fixed = (step / 4.0).min(5e-3);
+    // Steps and events leave 1e-11, of the second method 1e-8. Each of up to 16 impacts multiplies errors some two to ten times.
+    [
+        (Method { tolerance: 1e-9, longest: step, locates: true }, 1e-6),
+        (Method { tolerance: 1e-6, longest: 5e-3, locates: true }, 1e-4),
+        (Method { tolerance: 0.0, longest: fixed, locates: true }, 1e-6),
+    ]
+}
 
 /// Bounces are often shorter than these steps. Before 0.6.0 the indicator was below zero before and after such a bounce, and the
 /// liquid left the tank through its wall.
@@ -607,11 +635,10 @@ fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps()
     for (seed, case) in (0..9).map(|seed| (seed, case(seed))).chain([(9, default_case())]) {
         let mut simulator = Simulator::new(&case);
         simulator.go(case.end);
-        for method in LOCATING {
+        for (method, allowed) in locating(&case) {
             let (shown, impacts) = by_model_exchange(&case, method);
             let error = distance(&shown, &simulator.shown());
-            // Steps of 5 ms and events leave some 1e-11. Each of up to 16 impacts multiplies errors some two to ten times.
-            assert!(error < 1e-6, "{seed} {method:?}: {error:e}");
+            assert!(error < allowed, "{seed} {method:?}: {error:e}");
             assert_eq!(impacts, simulator.impacts, "{seed} {method:?}");
         }
     }
@@ -620,7 +647,8 @@ fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps()
 /// A host that does not locate events handles an impact when the liquid is already outside. Returns what is missing in the energy
 /// balance, over 1 J or the energy.
 fn without_location(case: &Case, seed: u64) -> f64 {
-    let method = Method { tolerance: 0.0, longest: 2e-3, locates: false };
+    let longest = (case.step() / 10.0).min(2e-3);
+    let method = Method { tolerance: 0.0, longest, locates: false };
     let mut craft = Spacecraft::new(&case.p, &case.u, 0.0, 1e-12).unwrap();
     let begin = craft.outputs(&case.u);
     let start = craft.continuous_states();
@@ -630,14 +658,15 @@ fn without_location(case: &Case, seed: u64) -> f64 {
     let end = own.craft.outputs(&case.u);
     let balance = end.energy - end.work + end.dissipated - begin.energy;
     let balance = balance.abs() / (1.0 + end.energy);
-    // Rounding, and Dormand and Prince's method at 2 ms.
+    // Rounding, and what Dormand and Prince's method leaves.
     assert!(balance < 1e-9, "{seed}: {balance:e}");
     let (height, semi, _) = wall(&case.p, 0);
     let at = v(&end.tank[0].ball_position) - V::z() * height;
     let outside = at.component_div(&semi).norm() - 1.0;
     let speed = v(&end.tank[0].ball_velocity).norm();
     // At most some steps' way.
-    assert!(outside < 10.0 * speed * 2e-3 / semi.min() + 1e-6, "{seed}: {outside:e}");
+    let bound = 10.0 * speed * longest / semi.min() + 1e-6;
+    assert!(outside < bound, "{seed}: {outside:e} {:?} {speed}", own.ball());
     balance
 }
 
@@ -652,11 +681,14 @@ fn a_host_of_model_exchange_that_locates_no_events_keeps_the_liquid_in_the_tank(
 #[derive(Debug, Default)]
 struct Figures {
     craft: usize,
-    /// A relative change of the thrust by 1e-7 changes these by more than 1e-3, or their number of impacts.
+    /// How many craft are left out: their liquid settles, or a change of the thrust by a factor of 1 + 1e-7 changes the result by more
+    /// than 1e-3 or the number of impacts.
+    settled: usize,
     too_sensitive: usize,
     impacts: usize,
     /// Largest error in Co-Simulation, in Model Exchange, and of the energy balance of hosts that locate no events.
     errors: [f64; 3],
+    problems: Vec<String>,
 }
 
 /// Compares Co-Simulation at steps of 1 ms to 10 s, hosts of Model Exchange and the independent simulator for `count` craft from the
@@ -665,6 +697,10 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
     let mut figures = Figures::default();
     for seed in first..first + count {
         let case = case(seed);
+        if !case.stays_loose() {
+            figures.settled += 1;
+            continue;
+        }
         let mut simulator = Simulator::new(&case);
         simulator.go(case.end);
         let (want, impacts) = (simulator.shown(), simulator.impacts);
@@ -687,14 +723,18 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
         for h in [1e-3, 0.01, 0.07, 0.5, 1.0, 10.0] {
             let error = distance(&by_co_simulation(&case, h), &want);
             // Both sides leave 1e-12 of the motion at each impact.
-            assert!(error < 1e-8 + sensitivity, "{seed}, steps of {h} s: {error:e}");
+            if error > 1e-8 + sensitivity {
+                figures.problems.push(format!("{seed}, steps of {h} s: {error:e}"));
+            }
             figures.errors[0] = figures.errors[0].max(error);
         }
-        for method in LOCATING {
+        for (method, allowed) in locating(&case) {
             let (shown, met) = by_model_exchange(&case, method);
             let error = distance(&shown, &want);
-            assert!(error < 1e-6 + sensitivity, "{seed} {method:?}: {error:e}");
-            assert_eq!(met, impacts, "{seed} {method:?}");
+            if error > allowed + sensitivity || met != impacts {
+                let seen = format!("{seed} {method:?}: {error:e}, impacts {met} {impacts}");
+                figures.problems.push(seen);
+            }
             figures.errors[1] = figures.errors[1].max(error);
         }
         figures.errors[2] = figures.errors[2].max(without_location(&case, seed));
@@ -705,6 +745,7 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
 #[test]
 fn random_craft_have_the_same_impacts_in_every_host() {
     let figures = compare_hosts(100, 6);
+    assert!(figures.problems.is_empty(), "{figures:#?}");
     assert!(figures.craft > 3 && figures.impacts > 10, "{figures:?}");
 }
 
@@ -714,8 +755,9 @@ fn random_craft_have_the_same_impacts_in_every_host() {
 fn two_hundred_random_craft_have_the_same_impacts_in_every_host() {
     let seed = std::env::var("HUBSLOSH_EVENTS_SEED").map_or(1, |seed| seed.parse().unwrap());
     let figures = compare_hosts(1_000 * seed, 200);
-    println!("seed {seed}: {figures:?}");
-    assert!(figures.too_sensitive < 10, "{figures:?}");
+    println!("seed {seed}: {figures:#?}");
+    assert!(figures.problems.is_empty());
+    assert!(figures.craft > 180, "{figures:?}");
 }
 
 /// A SloshTank and its host, integrated together.
