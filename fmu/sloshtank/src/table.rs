@@ -246,7 +246,7 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("tank.wave", |p, n| &mut p.tank.wave[n], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
         .shape(PER_MODE).range(0.0, 1e9),
     V::parameter("tank.ball.travel", |p, _| &mut p.tank.ball.travel, "m",
-        "Above 0: where thrust pulls the liquid off the tank's bottom, or a bob passes 45 degrees, all of it goes on as one lump that flies, is thrown back by the wall and settles; how far its centre is moved along the axis from the bottom to the top. With coupling = split, host.mass and the host's inertia, in a tank with modes that does not drain, on a host that takes impulse")
+        "Above 0: where thrust pulls the liquid off the tank's bottom, or the bobs pass 45 degrees on average by modal mass, all of it goes on as one lump that flies, is thrown back by the wall and settles; how far its centre is moved along the axis from the bottom to the top. With coupling = split, host.mass and the host's inertia, in a tank with modes that does not drain, on a host that takes impulse")
         .display_unit("mm").range(0.0, 1e3),
     V::parameter("tank.ball.radius", |p, _| &mut p.tank.ball.radius, "m",
         "How far the lump's centre gets from the tank's axis; 0: as far as makes the surface that it reaches as curved at the bottom as the path of the pendulums' common centre")
