@@ -13,7 +13,7 @@ use identify::methods::multisine::Multisine;
 use identify::methods::output_error::OutputError;
 use identify::methods::{Identified, Method, Task};
 use identify::news::News;
-use identify::nominal::Nominal;
+use identify::nominal::{self, Nominal};
 use identify::options::Options;
 use identify::recording::{self, Recording, Source};
 use identify::simulate::Intersample;
@@ -89,7 +89,8 @@ pub struct IdentifyArgs {
     /// Sets what is known of the bench by its FMU name; it is then not estimated.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Starts from this value instead of one found in the data.
+    /// Starts from this value instead of one found in the data, of --method output-error and acceleration (there besides those
+    /// found in the data).
     #[arg(conflicts_with = "free", long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
     starts: Vec<(String, f64)>,
     /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
@@ -204,7 +205,7 @@ fn bound(text: &str) -> Result<(String, f64, f64)> {
 fn start_value(text: &str) -> Result<(String, f64)> {
     let (name, value) = setting(text)?;
     let value: f64 = value.parse()?;
-    ensure!(value.is_finite() && value > 0.0, "{name} must be a positive number");
+    ensure!(value.is_finite(), "{name} must be a finite number, not {value}");
     Ok((name, value))
 }
 
@@ -236,6 +237,9 @@ impl IdentifyArgs {
 
     /// Runs the command.
     pub fn run(mut self) -> Result<()> {
+        if !self.any.is_asked() {
+            self.settings = nominal::with_damping(self.settings);
+        }
         if self.empty {
             // the least that the FMU takes: 2e-9 kg in the bench's tank
             self.settings.push(("fluid.rho".into(), "1e-6".into()));
@@ -258,10 +262,17 @@ impl IdentifyArgs {
             self.bounds.is_empty() || self.method == MethodName::Acceleration,
             "--bound is for --method acceleration alone"
         );
+        let searches = matches!(self.method, MethodName::OutputError | MethodName::Acceleration);
         ensure!(
-            self.starts.is_empty() || self.method == MethodName::OutputError,
-            "--start is for --method output-error alone: the other methods need none"
+            self.starts.is_empty() || searches,
+            "--start is for --method output-error and acceleration alone: the other methods need none"
         );
+        for (name, value) in &self.starts {
+            ensure!(
+                *value > 0.0 || self.method == MethodName::Acceleration,
+                "--start {name}={value}: must be a positive number"
+            );
+        }
         let trim = match self.trim[..] {
             [] => None,
             [from, to] if from < to => Some((from, to)),
@@ -290,6 +301,7 @@ impl IdentifyArgs {
                 let options = acceleration::Options {
                     weights: self.weights.into(),
                     bounds: self.bounds.clone(),
+                    starts: self.starts.clone(),
                     harmonics: self.harmonics,
                     settings: self.settings.clone(),
                     held: self.intersample() == Some(Intersample::ZeroOrderHold),

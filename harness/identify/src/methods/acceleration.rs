@@ -6,7 +6,8 @@
 //! ```
 //!
 //! (5.1 and 5.3 to 5.6; the difference as printed, ω_{k+1} − ω_k over two steps, is half of the acceleration).
-//! It needs no simulation and no start, and no liquid that moves: its torque is not in the equation.
+//! It needs no simulation and no liquid that moves: its torque is not in the equation. Starts come from linear least squares on a
+//! grid of Stribeck speeds (`starts.rs`); the law says nothing of a hub that sticks, so such rows are left out.
 //! Rows closer than 10 ms are taken together first. The noise's share of the power of y goes with the cube of the sampling rate;
 //! I (ω̄_{k+1} − ω̄_{k−1}) = T̄_{k+1} − T̄_{k−1} holds for means over blocks of rows as it does for rows, T the integral of the torque.
 //! Three things make the estimate biased, and here each is dealt with:
@@ -19,9 +20,11 @@
 //!   power of y. The residual is r_k/I instead: y_k is then what is explained, and its noise biases nothing, however large.
 //! * Near ω = 0 the measured sign is not that of ω. Expected is the mean over the noise, erf(ω/σ√2) ≈ tanh(ω/1.25σ).
 
+mod starts;
+
 use std::collections::BTreeMap;
 
-use analysis::statistics::{noise_level, peak};
+use analysis::statistics::{about_mean, noise_level, peak};
 use anyhow::{Result, bail, ensure};
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
@@ -32,10 +35,10 @@ use crate::estimate::Estimated;
 use crate::news::News;
 use crate::nominal::{self, Nominal};
 use crate::recording::Recording;
-use crate::uncertainty::{self, Covariance};
-use crate::unknown::Scale;
+use crate::uncertainty::{self, Combination, Covariance, Sources, one_way};
+use crate::unknown::{self, Scale};
 use crate::verdict::DOES_NOT_FIT;
-use analysis::least_squares::{Minimum, minimise};
+use analysis::least_squares::{self, Minimum};
 
 /// How rows are weighted (thesis 5.2.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -67,6 +70,8 @@ pub struct Options {
     pub weights: Weights,
     /// Bounds in place of the usual ones, by FMU name (`hub.I` stands for the whole inertia).
     pub bounds: Vec<(String, f64, f64)>,
+    /// Starts besides those that are found in the data, by FMU name.
+    pub starts: Vec<(String, f64)>,
     /// Harmonics of the hub's angle in the friction, 0 to 2; more than 0 needs the column theta.
     pub harmonics: usize,
     /// What is known of the bench, by FMU name.
@@ -85,8 +90,10 @@ pub struct Details {
     pub fit: Fit,
     /// The same without any of the corrections above: 5.4 to 5.6 as they stand.
     pub uncorrected: BTreeMap<String, f64>,
-    /// Unknowns that ended at a bound; their standard deviation is as if there were none.
+    /// Unknowns that ended at a bound; their standard deviation is as if there were none. Such a result does not fit.
     pub at_bound: Vec<String>,
+    /// Sums and products that are known where their terms are not.
+    pub combinations: Vec<Combination>,
     /// Condition number of the sensitivities with columns of unit length.
     pub condition: f64,
     /// cond₂(J) in SI units, as the thesis states it.
@@ -169,8 +176,16 @@ const WINDOW: f64 = 2.0;
 const MISFIT: f64 = 1.1;
 /// Instants in an interval where the friction is taken.
 const PARTS: usize = 8;
-/// ω_s over the fastest speed, where searches begin.
-const SPEEDS: [f64; 3] = [0.1, 0.4, 1.2];
+/// Rounds in which the rows of a hub that sticks are found with the bias.
+const ROUNDS: usize = 4;
+/// Relative standard deviation of friction.d or omega_s beyond which the sum of squares is not quadratic in them.
+const VAGUE: f64 = 0.3;
+/// Standard deviations by which a friction below zero would explain more, beyond which it is not zero but something else acts.
+const DRIVING: f64 = 3.0;
+/// Fall of the likelihood's logarithm that ends a 95 % interval, times two.
+const LIMIT: f64 = 3.84;
+/// Standard deviation of the asymmetry beyond which it is not determined.
+const ONE_WAY: f64 = 0.3;
 /// Names of the first unknowns.
 const FIRST: [&str; 6] =
     ["hub.I", "friction.b", "friction.c", "friction.d", "friction.omega_s", "friction.asymmetry"];
@@ -179,8 +194,12 @@ const FIRST: [&str; 6] =
 const BLOCK: f64 = 0.01;
 /// Rows by which the starts are told apart; the best is followed over all.
 const ROUGH: usize = 20_000;
+/// Of the grid of Stribeck speeds, every so many are fitted for intervals.
+const EVERY: usize = 2;
 /// Place of the Stribeck speed among them.
 const STRIBECK: usize = 4;
+/// Place of the asymmetry among them.
+const ASYMMETRY: usize = 5;
 
 /// A recording as means over blocks of rows; differenced are its rows 1 to n − 2.
 #[derive(Clone)]
@@ -196,8 +215,10 @@ struct Rows {
     step: f64,
     /// Standard deviation of the gyro's noise, rad/s.
     noise: f64,
-    /// sqrt(w_k) of the rows 1 to n − 2.
+    /// sqrt(w_k) of the rows 1 to n − 2; 0 where the hub sticks.
     weight: Vec<f64>,
+    /// The same of all rows.
+    all: Vec<f64>,
     /// Only every so many of them counts.
     every: usize,
 }
@@ -226,6 +247,7 @@ impl Rows {
             step: block as f64 * recording.step(),
             noise: noise_level(&rate).max(analysis::gauss_markov::FLOOR),
             weight: Vec::new(),
+            all: Vec::new(),
             every: 1,
             rate,
         }
@@ -290,7 +312,7 @@ struct Problem {
 }
 
 impl Problem {
-    fn new(recordings: &[Recording], options: &Options, form: Form) -> Result<Self> {
+    fn new(fmu: &Fmu, recordings: &[Recording], options: &Options, form: Form) -> Result<Self> {
         let mut rows: Vec<Rows> =
             recordings.iter().map(|recording| Rows::new(recording, options.held)).collect();
         let count: usize = rows.iter().map(|r| r.inner().len()).sum();
@@ -304,11 +326,14 @@ impl Problem {
                 true => each * (rows.time[k + 1] - rows.time[k - 1]) / (2.0 * rows.step),
                 false => each,
             });
-            rows.weight = weight.map(f64::sqrt).collect();
+            rows.all = weight.map(f64::sqrt).collect();
+            rows.weight.clone_from(&rows.all);
         }
         let largest = |of: &dyn Fn(&Rows) -> f64| rows.iter().map(of).fold(0.0, f64::max);
         let torque = largest(&|r| peak(&r.torque));
-        let speed = largest(&|r| peak(&r.rate));
+        // whatever the gyro's bias
+        let reading = largest(&|r| peak(&r.rate));
+        let speed = largest(&|r| peak(&about_mean(&r.rate)));
         let size = |of: &dyn Fn(&Rows, usize) -> f64| {
             rows.iter().flat_map(|r| r.inner().map(|k| of(r, k).powi(2))).sum::<f64>().sqrt()
         };
@@ -332,7 +357,12 @@ impl Problem {
         }
         for i in 0..rows.len() {
             names.push(format!("gyro_bias[{}]", i + 1));
-            bounds.push((-0.2 * speed, 0.2 * speed));
+            bounds.push((-reading, reading));
+        }
+        for (place, name) in names.iter().enumerate().skip(1) {
+            let Ok(variable) = fmu.description().variable(name) else { continue };
+            let [low, high] = unknown::range(variable);
+            bounds[place] = (bounds[place].0.max(low), bounds[place].1.min(high));
         }
         for (name, low, high) in &options.bounds {
             let Some(place) = names.iter().position(|n| n == name) else {
@@ -365,16 +395,36 @@ impl Problem {
         }
     }
 
-    /// Starts at a Stribeck speed over the fastest speed; friction is some hundredths of the torque, as in a bearing.
-    fn start(&self, part: f64) -> Vec<f64> {
-        let middle = |place: usize, part: f64| match self.scales[place] {
-            Scale::Logit(a, b) => self.scales[place].variable(a + part * (b - a)),
-            _ => 0.0,
-        };
-        let mut x: Vec<f64> = (0..self.names.len()).map(|place| middle(place, 0.5)).collect();
-        (x[0], x[1]) = (middle(0, 1.0 / 30.0), middle(1, 0.01));
-        (x[2], x[3], x[4]) = (middle(2, 0.03), middle(3, 0.02), middle(4, part / 10.0));
-        x
+    /// A value a little within its bounds, where its variable is finite.
+    fn inside(&self, place: usize, value: f64) -> f64 {
+        match self.scales[place] {
+            Scale::Logit(a, b) => value.clamp(a + 1e-4 * (b - a), b - 1e-4 * (b - a)),
+            _ => value,
+        }
+    }
+
+    /// Leaves out the rows of a hub that sticks by these biases; whether that changes anything.
+    fn leave_out_stuck(&mut self, biases: &[f64]) -> bool {
+        let mut changed = false;
+        for (rows, bias) in self.rows.iter_mut().zip(biases) {
+            let stuck = rows.stuck(*bias);
+            let weight = |(k, weight): (usize, &f64)| if stuck[k + 1] { 0.0 } else { *weight };
+            let weights: Vec<f64> = rows.all.iter().enumerate().map(weight).collect();
+            changed |= weights != rows.weight;
+            rows.weight = weights;
+        }
+        changed
+    }
+
+    /// The biases among the values.
+    fn biases<'p>(&self, p: &'p [f64]) -> &'p [f64] {
+        &p[p.len() - self.rows.len()..]
+    }
+
+    /// Rows that count.
+    fn used(&self) -> usize {
+        let of = |rows: &Rows| rows.inner().filter(|k| rows.weight[k - 1] > 0.0).count();
+        self.rows.iter().map(of).sum()
     }
 
     /// −τ_f at a measured rate near row i; its derivatives with respect to the values p are added to `slope`.
@@ -425,6 +475,10 @@ impl Problem {
         for (index, rows) in self.rows.iter().enumerate() {
             let bias = n - self.rows.len() + index;
             for k in rows.inner() {
+                if rows.weight[k - 1] == 0.0 {
+                    residuals.push(0.0);
+                    continue;
+                }
                 let (instants, parts) = rows.instants(self.form, k);
                 slopes.fill(0.0);
                 let mut friction = 0.0;
@@ -463,24 +517,127 @@ impl Problem {
         jacobian
     }
 
-    /// The best of the minima from these starts.
-    fn solve(&self, starts: &[Vec<f64>]) -> Minimum {
+    /// The best of the minima from these starts, without moving the variables `held`.
+    fn solve(&self, starts: &[Vec<f64>], held: &[usize]) -> Minimum {
+        self.solve_to(starts, held, 1e-9)
+    }
+
+    /// The same to a relative tolerance of the sum of squares and of x.
+    fn solve_to(&self, starts: &[Vec<f64>], held: &[usize], tolerance: f64) -> Minimum {
+        let method = least_squares::tolerances(tolerance, tolerance);
         let residuals = |x: &[f64]| self.evaluate(&self.values(x), None);
         let derivatives = |x: &[f64]| {
             let mut jacobian = self.jacobian(&self.values(x));
             for (j, mut column) in jacobian.column_iter_mut().enumerate() {
-                column *= self.scales[j].slope(x[j]);
+                column *= if held.contains(&j) { 0.0 } else { self.scales[j].slope(x[j]) };
             }
             Some(jacobian)
         };
-        let minima = starts.iter().map(|start| minimise(&residuals, &derivatives, start));
+        let minima = starts
+            .iter()
+            .map(|start| least_squares::minimise_by(&method, &residuals, &derivatives, start));
         let best = minima.min_by(|a, b| a.cost.total_cmp(&b.cost));
         best.expect("there is a start")
+    }
+
+    /// What is known at a minimum of the variables that are not `held`; `None` if some combination has no influence.
+    fn known(&self, minimum: &Minimum, held: &[usize]) -> Option<Known> {
+        let p = self.values(&minimum.x);
+        // how sure the others are must not depend on a value that only a bound keeps from going on
+        let whole = self.jacobian(&p);
+        let free = |j: &usize| !held.contains(j);
+        let all = (0..p.len()).filter(free);
+        let acting = all.clone().filter(|&j| whole.column(j).norm() > 0.0).collect();
+        let inner = all.filter(|&j| !self.is_at_bound(j, p[j])).collect();
+        let e = self.evaluate(&p, None);
+        [acting, inner].into_iter().find_map(|shown: Vec<usize>| {
+            let jacobian = whole.select_columns(&shown);
+            let covariance = Covariance::of(&jacobian)?;
+            let noise = &covariance.x * self.noise_scores(&jacobian) * &covariance.x;
+            let sandwich = covariance.sandwich(&jacobian, &e, &windows(self));
+            let scatter = Sources::least(&noise, &sandwich);
+            let of_values = uncertainty::spread_out(&scatter, &shown, p.len());
+            Some(Known { covariance, jacobian, shown, scatter, of_values })
+        })
+    }
+
+    /// Covariance of the sum of scores Jᵀe that the gyro's white noise makes: the noise of one row is in the differences of the rows before
+    /// and after it, with opposite signs. The sandwich alone says too little of what shows in a few windows, as d does.
+    fn noise_scores(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = jacobian.ncols();
+        let (mut sum, mut first) = (DMatrix::zeros(n, n), 0);
+        for rows in &self.rows {
+            let count = rows.inner().len();
+            // row i of the recording is the difference i − 1 of the inner rows
+            let score = |k: usize| {
+                let part = rows.weight[k] / (rows.time[k + 2] - rows.time[k]);
+                jacobian.row(first + k) * (part * rows.noise)
+            };
+            for i in 1..count.saturating_sub(1) {
+                let of_row = score(i - 1) - score(i + 1);
+                sum += of_row.transpose() * of_row;
+            }
+            first += count;
+        }
+        sum
+    }
+
+    /// 1 if the hub turns forwards for most of the way, else −1.
+    fn way(&self, x: &[f64]) -> f64 {
+        let p = self.values(x);
+        let turned = self.rows.iter().zip(self.biases(&p)).map(|(rows, bias)| {
+            rows.inner().map(|k| rows.weight[k - 1] * (rows.rate[k] - bias)).sum::<f64>()
+        });
+        if turned.sum::<f64>() < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    /// Minima at the Stribeck speeds of the grid, and the 95 % intervals of b, c, d and ω_s over them.
+    fn profile(&self, minimum: &Minimum, held: &[usize]) -> Profile {
+        let held: Vec<usize> = held.iter().copied().chain([STRIBECK]).collect();
+        let p = self.values(&minimum.x);
+        let biases = self.biases(&p);
+        let [low, high] = [f64::NEG_INFINITY, f64::INFINITY].map(|end| self.bounded(STRIBECK, end));
+        let mut points = vec![minimum.clone()];
+        for (speed, (linear, _)) in self.grid(biases).into_iter().step_by(EVERY) {
+            let start = self.start(speed.clamp(low, high), &linear, biases);
+            let mut x = off_the_bounds(&minimum.x);
+            (1..=STRIBECK).for_each(|place| x[place] = start[place]);
+            points.push(self.solve_to(&[x], &held, 1e-6));
+        }
+        let speed = |point: &Minimum| self.values(&point.x)[STRIBECK];
+        points.sort_by(|a, b| speed(a).total_cmp(&speed(b)));
+        let least = points.iter().map(|point| point.cost).fold(f64::INFINITY, f64::min);
+        let variance = least / self.used().max(1) as f64;
+        let is_in: Vec<bool> =
+            points.iter().map(|point| point.cost - least < LIMIT * variance).collect();
+        let mut intervals = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+        for (point, _) in points.iter().zip(&is_in).filter(|(_, is_in)| **is_in) {
+            let (p, known) = (self.values(&point.x), self.known(point, &held));
+            for (k, interval) in intervals.iter_mut().enumerate() {
+                let std =
+                    known.as_ref().map_or(0.0, |known| known.of_values[(k + 1, k + 1)].sqrt());
+                let end = |side: f64| self.bounded(k + 1, p[k + 1] + side * 1.96 * std);
+                *interval = [interval[0].min(end(-1.0)), interval[1].max(end(1.0))];
+            }
+        }
+        // to the neighbours that are out, for the interval ends somewhere between
+        let first = is_in.iter().position(|is_in| *is_in).unwrap_or(0);
+        let last = is_in.iter().rposition(|is_in| *is_in).unwrap_or(0);
+        let end = |k: Option<usize>, bound: f64| k.and_then(|k| points.get(k)).map_or(bound, speed);
+        let speeds = [end(first.checked_sub(1), low), end(Some(last + 1), high)];
+        Profile { points, intervals, speeds }
     }
 
     /// What the gyro's noise makes of the sum of w_k y_k² on average.
     fn noise_power(&self) -> f64 {
         self.rows.iter().flat_map(|rows| rows.inner().map(|k| rows.noise_power(k))).sum()
+    }
+
+    /// Whether a value of b, c or d is zero, the least that there is.
+    fn is_zero(&self, place: usize, value: f64) -> bool {
+        let least = self.bounded(place, f64::NEG_INFINITY);
+        let half = 0.5 * self.bounded(place, f64::INFINITY);
+        (1..=3).contains(&place) && least == 0.0 && value < half && self.is_at_bound(place, value)
     }
 
     /// Whether a value is at one of its bounds.
@@ -490,6 +647,39 @@ impl Problem {
             _ => false,
         }
     }
+}
+
+/// What is known at a minimum.
+struct Known {
+    covariance: Covariance,
+    jacobian: DMatrix<f64>,
+    /// Places of its columns.
+    shown: Vec<usize>,
+    /// Covariance of the values of these.
+    scatter: DMatrix<f64>,
+    /// The same of all values, with zeros for the others.
+    of_values: DMatrix<f64>,
+}
+
+/// Minima along the Stribeck speed.
+struct Profile {
+    points: Vec<Minimum>,
+    /// 95 % intervals of b, c and d.
+    intervals: [[f64; 2]; 3],
+    /// 95 % interval of ω_s, rad/s.
+    speeds: [f64; 2],
+}
+
+/// Places and values of the user's starts.
+fn given(problem: &Problem, options: &Options, liquid: f64) -> Result<Vec<(usize, f64)>> {
+    let one = |(name, value): &(String, f64)| {
+        let Some(place) = problem.names.iter().position(|n| n == name) else {
+            bail!("there is no start to give for {name} (there are {})", problem.names.join(", "))
+        };
+        ensure!(value.is_finite(), "{name}: the start {value} is not a finite number");
+        Ok((place, if place == 0 { value + liquid } else { *value }))
+    };
+    options.starts.iter().map(one).collect()
 }
 
 /// Estimates friction and inertia from recordings whose liquid does not move.
@@ -508,40 +698,104 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let mut bench = nominal::initialised(fmu, &options.settings)?;
     // it turns with the hub, all of it
     let liquid = bench.real("tank.m_liq")? * bench.real("tank.r")?.powi(2);
-    let plain = Problem::new(recordings, options, Form::AtRow)?;
+    let mut plain = Problem::new(fmu, recordings, options, Form::AtRow)?;
+    let given = given(&plain, options, liquid)?;
+    let biases = plain.rough_biases();
+    plain.leave_out_stuck(&biases);
     let rough = plain.thinned(ROUGH);
-    let start = rough.solve(&SPEEDS.map(|part| rough.start(part)));
-    let near = plain.solve(&[off_the_bounds(&start.x)]);
+    let starts = rough.starts(&biases, &given);
+    ensure!(!starts.is_empty(), "inertia and friction have no influence on the recording");
+    let start = rough.solve_to(&starts, &[], 1e-4);
+    let near = plain.solve_to(&[off_the_bounds(&start.x)], &[], 1e-6);
     let uncorrected = plain.values(&near.x);
-    let problem = Problem::new(recordings, options, Form::Averaged)?;
-    let minimum = problem.solve(&[off_the_bounds(&near.x)]);
+    let mut problem = Problem::new(fmu, recordings, options, Form::Averaged)?;
+    problem.leave_out_stuck(problem.biases(&uncorrected).to_vec().as_slice());
+    let mut minimum = problem.solve_to(&[off_the_bounds(&near.x)], &[], 1e-6);
+    for _ in 0..ROUNDS {
+        let biases = problem.biases(&problem.values(&minimum.x)).to_vec();
+        if !problem.leave_out_stuck(&biases) {
+            break;
+        }
+        minimum = problem.solve_to(&[off_the_bounds(&minimum.x)], &[], 1e-6);
+    }
+    minimum = problem.solve(&[off_the_bounds(&minimum.x)], &[]);
+    let mut held = Vec::new();
+    let mut known = problem.known(&minimum, &held);
+    let way = problem.way(&minimum.x);
+    let is_vague = |known: &Option<Known>, place: usize, part: f64| {
+        known.as_ref().is_none_or(|known| {
+            !known.shown.contains(&place) || known.of_values[(place, place)].sqrt() > part
+        })
+    };
+    if is_vague(&known, ASYMMETRY, ONE_WAY) {
+        // the dry friction of one direction alone is seen: that of both is as large
+        let mut x = off_the_bounds(&minimum.x);
+        let factor = 1.0 + way * problem.values(&x)[ASYMMETRY];
+        for place in [2, 3] {
+            let value = problem.scales[place].value(x[place]) * factor;
+            x[place] = problem.scales[place].variable(problem.inside(place, value));
+        }
+        x[ASYMMETRY] = problem.scales[ASYMMETRY].variable(problem.inside(ASYMMETRY, 0.0));
+        held.push(ASYMMETRY);
+        minimum = problem.solve(&[x], &held);
+        known = problem.known(&minimum, &held);
+    }
+    let values = problem.values(&minimum.x);
+    let vague = |place: usize| is_vague(&known, place, VAGUE * values[place]);
+    let profile = (vague(3) || vague(STRIBECK)).then(|| problem.profile(&minimum, &held));
+    if let Some(profile) = &profile {
+        // where a bound alone keeps friction or speed from going on, a minimum within the bounds may explain the recording as well
+        let is_inside = |x: &[f64]| {
+            let p = problem.values(x);
+            [2, 3, STRIBECK]
+                .iter()
+                .all(|&j| problem.is_zero(j, p[j]) || !problem.is_at_bound(j, p[j]))
+        };
+        if !is_inside(&minimum.x) {
+            let inner = profile.points.iter().filter(|point| is_inside(&point.x));
+            if let Some(point) = inner.min_by(|a, b| a.cost.total_cmp(&b.cost)) {
+                minimum = point.clone();
+            }
+        }
+        if !held.contains(&STRIBECK) {
+            held.push(STRIBECK);
+        }
+        known = problem.known(&minimum, &held);
+    }
     let p = problem.values(&minimum.x);
     let n = p.len();
-    let at_bound: Vec<bool> = (0..n).map(|j| problem.is_at_bound(j, p[j])).collect();
-    // how sure the others are must not depend on a value that only a bound keeps from going on
-    let whole = problem.jacobian(&p);
-    let acting = (0..n).filter(|&j| whole.column(j).norm() > 0.0).collect();
-    let inner = (0..n).filter(|&j| !at_bound[j]).collect();
-    let known = [acting, inner].into_iter().find_map(|places: Vec<usize>| {
-        let jacobian = whole.select_columns(&places);
-        Some((Covariance::of(&jacobian)?, jacobian, places))
-    });
-    let Some((covariance, jacobian, shown)) = known else {
+    let Some(Known { covariance, jacobian, shown, scatter, mut of_values }) = known else {
         bail!("some combination of inertia and friction has no influence on the recording")
     };
     let e = problem.evaluate(&p, None);
-    let scatter = covariance.sandwich(&jacobian, &e, &windows(&problem));
+    // a bearing may have no such friction at all, but it has none that drives the hub
+    let newton = uncertainty::spread_out(&covariance.x, &shown, n)
+        * problem.jacobian(&p).tr_mul(&DVector::from_column_slice(&e));
+    let is_none = |j: usize| {
+        problem.is_zero(j, p[j]) && p[j] - newton[j] > -DRIVING * of_values[(j, j)].sqrt()
+    };
+    let at_bound: Vec<bool> =
+        (0..n).map(|j| problem.is_at_bound(j, p[j]) && !held.contains(&j) && !is_none(j)).collect();
     let correlations = Covariance::correlations(&scatter);
-    let of_values = uncertainty::spread_out(&scatter, &shown, n);
     let root_mean = |sum: f64| (sum / e.len() as f64).sqrt();
     let rms = root_mean(e.iter().map(|e| e * e).sum());
     let expected = root_mean(problem.noise_power());
-    let fits = rms < MISFIT * expected;
+    let fits = rms < MISFIT * expected && !at_bound.contains(&true);
+    let sum_of_dry = (of_values[(2, 2)] + of_values[(3, 3)] + 2.0 * of_values[(2, 3)]).max(0.0);
+    if let Some(profile) = &profile {
+        for (place, [low, high]) in (1..=3).zip(profile.intervals) {
+            let reach = (high - p[place]).max(p[place] - low) / 1.96;
+            of_values[(place, place)] = of_values[(place, place)].max(reach * reach);
+        }
+    }
     let estimated = |j: usize, less: f64| {
         let std = of_values[(j, j)].sqrt();
         let end = |side: f64| problem.bounded(j, p[j] + side * 1.96 * std) - less;
         let interval = [end(-1.0), end(1.0)];
-        Estimated { interval, ..Estimated::normal(p[j] - less, std, unit(&problem.names[j])) }
+        let estimated = Estimated::normal(p[j] - less, std, unit(&problem.names[j]));
+        // a friction is known if it is known to half its size
+        let determined = !(1..=STRIBECK).contains(&j) || std < 0.5 * p[j];
+        Estimated { interval, determined, ..estimated }
     };
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (j, name) in problem.names.iter().enumerate() {
@@ -552,12 +806,29 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         }
     }
     measurement.insert("inertia".into(), estimated(0, 0.0));
-    let excess = &parameters["friction.d"];
-    if let (true, Scale::Logit(low, high)) = (excess.interval[0] <= 0.0, problem.scales[STRIBECK]) {
-        // without an excess of the friction at rest there is no speed at which it vanishes
+    let mut combinations = Vec::new();
+    let may_have_none = parameters["friction.d"].interval[0] <= 0.0;
+    if let Some(profile) = &profile {
         let speed = parameters.get_mut("friction.omega_s").expect("one of the first");
-        (speed.interval, speed.determined) = ([low, high], false);
-        speed.std = (high - low) / 12.0_f64.sqrt();
+        // without an excess of the friction at rest there is no speed at which it vanishes
+        let bounds = [f64::NEG_INFINITY, f64::INFINITY].map(|end| problem.bounded(STRIBECK, end));
+        speed.interval = if may_have_none { bounds } else { profile.speeds };
+        speed.std = (speed.interval[1] - speed.interval[0]) / 12.0_f64.sqrt();
+        speed.determined = !may_have_none && speed.std < 0.5 * speed.value;
+        if !parameters["friction.c"].determined && !parameters["friction.d"].determined {
+            combinations.push(Combination {
+                name: "friction.c + friction.d".into(),
+                of: ["friction.c", "friction.d"].map(String::from),
+                value: p[2] + p[3],
+                std: sum_of_dry.sqrt(),
+                unit: "N.m".into(),
+                correlation: -1.0,
+            });
+        }
+    }
+    if held.contains(&ASYMMETRY) {
+        let bounds = [f64::NEG_INFINITY, f64::INFINITY].map(|end| problem.bounded(ASYMMETRY, end));
+        combinations.extend(one_way(&mut parameters, way, bounds));
     }
     let named = |keep: &dyn Fn(usize) -> bool| -> Vec<String> {
         (0..n).filter(|&j| keep(j)).map(|j| problem.names[j].clone()).collect()
@@ -569,11 +840,13 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let mut uncorrected: BTreeMap<String, f64> =
         problem.names.iter().cloned().zip(uncorrected).collect();
     uncorrected.entry("hub.I".into()).and_modify(|inertia| *inertia -= liquid);
-    let braking: Vec<Braking> =
-        [1.0, -1.0].into_iter().filter_map(|way| braking(recordings, way, 2)).collect();
+    let braking: Vec<Braking> = [1.0, -1.0]
+        .into_iter()
+        .filter_map(|way| braking(recordings, problem.biases(&p), way))
+        .collect();
     let details = Details {
         fit: Fit {
-            rows: e.len(),
+            rows: problem.used(),
             rmse: rms,
             expected,
             noise: problem.rows.iter().map(|r| r.noise).collect(),
@@ -581,6 +854,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         },
         uncorrected,
         at_bound: named(&|j| at_bound[j]),
+        combinations,
         condition: covariance.condition,
         condition_si: si.max() / si.min(),
         braking,
@@ -628,12 +902,14 @@ const MOVING: f64 = 0.05;
 
 /// The braking of free decay in one direction against the angle, ordinary least squares (thesis 5.4);
 /// `None` without angle or free decay.
-fn braking(recordings: &[Recording], way: f64, harmonics: usize) -> Option<Braking> {
+fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking> {
+    let harmonics = 2;
     let (mut rows, mut accelerations) = (Vec::new(), Vec::new());
-    for recording in recordings {
+    for (recording, bias) in recordings.iter().zip(biases) {
         let angle = recording.angle.as_ref()?;
-        let (torque, rate, t) = (&recording.torque, &recording.rate, &recording.time);
-        let (still, slow) = (FREE * peak(torque), MOVING * peak(rate));
+        let rate: Vec<f64> = recording.rate.iter().map(|w| w - bias).collect();
+        let (torque, t) = (&recording.torque, &recording.time);
+        let (still, slow) = (FREE * peak(torque), MOVING * peak(&rate));
         for k in 1..t.len() - 1 {
             let free = (k - 1..=k + 1).all(|i| torque[i].abs() <= still && way * rate[i] > slow);
             if free {
@@ -673,7 +949,13 @@ fn words(found: &Found) -> Vec<String> {
     let mut words = Vec::new();
     let Details { fit, at_bound, braking, .. } = &found.details;
     let (ratio, fits) = (fit.rmse / fit.expected, found.fits == Some(true));
-    if fits {
+    if ratio < MISFIT {
+        words.extend((!at_bound.is_empty()).then(|| {
+            format!(
+                "{DOES_NOT_FIT}: {} ended at a bound; no number here is to be trusted.",
+                at_bound.join(", ")
+            )
+        }));
         words.push(format!(
             "The residual is that of the gyro's noise: {:.2e} rad/s², {ratio:.3} times what is expected.",
             fit.rmse
@@ -687,14 +969,19 @@ fn words(found: &Found) -> Vec<String> {
         ));
     }
     for name in at_bound {
-        words.push(format!("{name} ended at a bound; its value is the bound's."));
+        words.push(format!(
+            "{name} ended at a bound; its value is the bound's. --bound {name}=LOW:HIGH moves the bound."
+        ));
     }
     if found.parameters.get("friction.omega_s").is_some_and(|speed| !speed.determined) {
         words.push(
-            "friction.omega_s is not determined: friction.d is zero within its interval, and the recording may have no Stribeck effect. Its \
-             interval is that of its bounds."
+            "friction.omega_s is not determined: other Stribeck speeds explain the recording as well, each with its own friction.c \
+             and friction.d. A sweep and a ramp through zero together tell them apart."
                 .into(),
         );
+    }
+    for combination in &found.details.combinations {
+        words.push(combination.words());
     }
     let (names, matrix) = &found.correlations;
     for i in 0..names.len() {
@@ -707,7 +994,7 @@ fn words(found: &Found) -> Vec<String> {
             }
         }
     }
-    if let Some(asymmetry) = found.parameters.get("friction.asymmetry") {
+    if let Some(asymmetry) = found.parameters.get("friction.asymmetry").filter(|a| a.determined) {
         let strong = asymmetry.value.abs() > 3.0 * asymmetry.std && fits;
         if strong {
             let (harder, easier) = if asymmetry.value > 0.0 {

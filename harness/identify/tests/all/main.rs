@@ -1,5 +1,6 @@
 //! Recordings of simulated benches, identified: what is found, with what uncertainty, and what is said of it.
 
+mod acceleration;
 mod any_fmu;
 #[path = "../../examples/twins/bench.rs"]
 #[allow(dead_code, reason = "the example looks at more of it")]

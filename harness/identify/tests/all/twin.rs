@@ -3,8 +3,9 @@
 use experiments::profile::{Profile, Torque};
 use host::fmu::Fmu;
 use identify::between;
+use identify::budget;
 use identify::estimate::Estimated;
-use identify::fit::{Differences, Problem};
+use identify::fit::{Differences, Problem, ROUNDS};
 use identify::methods::output_error::identify;
 use identify::nominal::COARSEST;
 use identify::options::Options;
@@ -12,7 +13,7 @@ use identify::recording::{Recording, prepare};
 use identify::simulate::{Intersample, Setup};
 use identify::tolerance::Tolerances;
 use identify::twin::{self, SensorErrors, Twin, Unmodelled};
-use identify::unknown::Unknown;
+use identify::unknown::{Scale, Unknown};
 use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
@@ -563,4 +564,136 @@ fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
         // friction where the hub turns round is the steepest: a thousandth of it is some 1e-5 rad/s
         assert!(off < 1e-3 * largest, "{intersample:?}, {delay} s late: off by {off} of {largest}");
     }
+}
+
+/// The unknowns of a bench with dry friction and its sensor's errors, at the truth; the tank's where the liquid moves.
+fn unknowns_of(model: &str) -> Vec<Unknown> {
+    let softplus = |name: &str, unit: &str, start: f64| Unknown {
+        scale: Scale::Softplus(0.1 * start),
+        ..Unknown::positive(name, unit, start)
+    };
+    let mut unknowns = vec![
+        Unknown::positive("hub.I", "kg.m2", 0.322414),
+        softplus("friction.b", "N.m.s", 0.03793),
+        softplus("friction.c", "N.m", 0.003498),
+        softplus("friction.d", "N.m", 0.002423),
+        Unknown { start: 0.1, ..Unknown::asymmetry() },
+        Unknown::delay(),
+        Unknown::gyro_bias(0),
+    ];
+    if model != "frozen" {
+        unknowns.extend([
+            Unknown::positive("tank.d", "m", 0.163),
+            Unknown::positive("tank.h", "m", 0.1),
+            Unknown::positive("slosh.zeta", "1", 0.003),
+        ]);
+    }
+    unknowns
+}
+
+/// Torque, inertias, masses and frictions in proportion make the same motion: nothing else depends on the torque's scale. The hub
+/// sticks in each half cycle, and the instants at which it does depend on the torque.
+#[test]
+fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_asymmetry_not_at_all()
+{
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    for model in ["frozen", "linear"] {
+        let settings = [
+            ("slosh.model", model),
+            ("slosh.zeta_from_correlation", "false"),
+            ("friction.asymmetry", "0.1"),
+        ];
+        let recording = sweep(&fmu, "lin-sweep:amplitude=0.02,f0=1.8,f1=3,duration=60", &settings);
+        let setup = Setup {
+            settings: settings[..2].iter().map(|(n, v)| (n.to_string(), v.to_string())).collect(),
+            intersample: Intersample::FirstOrderHold,
+        };
+        let recordings = [recording];
+        let problem = Problem::new(&fmu, setup.clone(), &recordings, unknowns_of(model));
+        let found = problem.polish(&problem.start(), None, ROUNDS).unwrap();
+        let tolerances = Tolerances { torque: 0.01, ..Tolerances::NONE };
+        let slopes = budget::slopes(&problem, &found, &tolerances).unwrap();
+        let there: Vec<f64> =
+            found.x.iter().zip(slopes[0].moved.iter()).map(|(x, by)| x + by).collect();
+        let (before, after) = (problem.values(&found.x), problem.values(&there));
+        let of = |name: &str| {
+            let place = problem.unknowns.iter().position(|u| u.quantity.name() == name).unwrap();
+            (before[place], after[place] - before[place])
+        };
+        for name in ["friction.b", "friction.c", "friction.d"] {
+            let (value, change) = of(name);
+            // the law is exact; the search ended a hundredth of a standard deviation from the minimum
+            assert!((change / value - 0.01).abs() < 1e-5, "{model}: {name} {change} of {value}");
+        }
+        assert!(of("delay").1.abs() < 1e-8, "{model}: {:?}", of("delay"));
+        assert!(of("friction.asymmetry").1.abs() < 1e-5, "{model}: {:?}", of("friction.asymmetry"));
+        // and it is what a fit of the recording with 1.01 times the torque finds
+        let mut scaled = recordings.clone();
+        scaled[0].torque.iter_mut().for_each(|torque| *torque *= 1.01);
+        let other = Problem { recordings: &scaled, ..problem.clone() };
+        let again = other.polish(&there, Some(&found.jacobian), ROUNDS).unwrap();
+        let off = nalgebra::DVector::from_iterator(
+            there.len(),
+            there.iter().zip(&again.x).map(|(a, b)| a - b),
+        );
+        // both searches end a hundredth of a standard deviation from the minimum
+        assert!((&found.jacobian * off).norm() < 0.05, "{model}");
+    }
+}
+
+#[test]
+fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let options = Options { models: vec!["frozen".into()], sensor_errors: true, ..options() };
+    let recordings = [crate::acceleration::push(1)];
+    let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    let details = &found.details;
+    crate::acceleration::is_one_way(&found.parameters, &details.combinations, &found.verdict);
+}
+
+/// The damping is the largest that the FMU allows, and a difference from there leaves the range.
+#[test]
+fn a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=60";
+    let recording = sweep(&fmu, torque, &[("slosh.model", "linear"), ("slosh.zeta", "0.999")]);
+    let set = ["tank.d=0.163", "tank.h=0.1", "friction.b=0.03793", "friction.c=0.003498"];
+    let set = set.iter().chain(&["friction.d=0.002423", "friction.omega_s=0.08581"]);
+    let pair = |text: &&str| {
+        let (name, value) = text.split_once('=').unwrap();
+        (name.to_string(), value.to_string())
+    };
+    let starts = vec![("slosh.zeta".to_string(), 0.9)];
+    let options = Options { settings: set.map(pair).collect(), starts, ..options() };
+    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+    let zeta = &found.parameters["slosh.zeta"];
+    // the search keeps 6 % from the end
+    assert!(zeta.value > 0.9 && zeta.value <= 0.999, "{zeta:?}");
+    assert!(zeta.interval[1] <= 0.999, "{zeta:?}");
+    assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
+    let said = found
+        .verdict
+        .iter()
+        .any(|line| line.contains("is at the end of the range that the FMU allows, 0 to 0.999"));
+    assert!(said, "{:?}", found.verdict);
+}
+
+/// Dry friction that turns round with the hub shows when the torque acts: the behaviour is found, and the delay is one.
+#[test]
+fn a_delay_of_half_a_row_is_no_finding_where_the_torque_between_rows_is_found() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let settings = vec![("slosh.model".to_string(), "frozen".to_string())];
+    let sensor_errors = SensorErrors { delay: 0.01, ..SensorErrors::default() };
+    let twin = Twin { settings, sensor_errors, ..Twin::default() };
+    let torque =
+        Torque::Profile("lin-sweep:amplitude=0.05,duration=60,f0=2,f1=3.5".parse().unwrap());
+    let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
+    let asked = Options { sensor_errors: true, models: vec!["frozen".into()], ..of_any_torque() };
+    let found = identify(&fmu, &[recording], &asked, &mut |_| {}).unwrap();
+    let delay = &found.measurement["delay"];
+    assert!((delay.value - 0.01).abs() < 4.0 * delay.std && delay.std < 1e-3, "{delay:?}");
+    let says = |words: &str| found.verdict.iter().any(|line| line.contains(words));
+    // held is refuted; smooth or linear is the same 10 ms
+    assert!(says("linear between rows") && !says("half a row"), "{:?}", found.verdict);
 }

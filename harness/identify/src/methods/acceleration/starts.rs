@@ -1,0 +1,179 @@
+//! Starts of the acceleration's least squares, and which rows show no friction law because the hub sticks.
+//!
+//! At a given Stribeck speed and gyro bias the residual is linear in inertia, b, c and d. So a grid of Stribeck speeds needs one
+//! linear least squares each, and the sum of squares along the grid shows every basin of the nonlinear problem. From one
+//! fixed start the search ends in a basin with a Stribeck speed far beyond all rates, where c and d cannot be told apart.
+
+use analysis::statistics::{deviation, mean, median};
+use nalgebra::{DMatrix, DVector};
+
+use super::{Problem, Rows};
+
+/// Stribeck speeds of the grid over the fastest speed: the first and the last, and how many.
+const GRID: (f64, f64, usize) = (2e-3, 3.0, 14);
+/// Basins of the grid that are followed.
+const FOLLOWED: usize = 3;
+/// A rate nearer to zero than this many standard deviations of its noise is that of a hub that sticks…
+const STILL: f64 = 4.0;
+/// …if so many rows in succession are.
+const RUN: usize = 5;
+/// Torque below which nothing drives the hub, over the largest torque.
+const FREE: f64 = 1e-3;
+/// Length of a part in which the hub rests without torque, s. A dry bearing that slips changes the rate within
+/// it by more than the noise.
+const REST: f64 = 0.5;
+
+/// Inertia, b, c, d and a constant torque, and the sum of squares.
+type Linear = ([f64; 5], f64);
+
+impl Rows {
+    /// Whether each row belongs to a run in which the hub sticks, or is next to one. The Stribeck law says nothing of
+    /// the torque of a bearing that sticks.
+    pub(super) fn stuck(&self, bias: f64) -> Vec<bool> {
+        let still = |rate: &f64| (rate - bias).abs() < STILL * self.noise;
+        let mut stuck = vec![false; self.rate.len()];
+        let mut from = 0;
+        for part in self.rate.chunk_by(|a, b| still(a) == still(b)) {
+            let to = from + part.len();
+            if still(&part[0]) && part.len() >= RUN {
+                stuck[from.saturating_sub(1)..(to + 1).min(self.rate.len())].fill(true);
+            }
+            from = to;
+        }
+        stuck
+    }
+
+    /// What the gyro reads where the hub rests and no torque acts, rad/s; `None` without such a part.
+    fn reading_at_rest(&self) -> Option<f64> {
+        let length = (REST / self.step).ceil().max(RUN as f64) as usize;
+        let largest = self.torque.iter().fold(0.0_f64, |most, t| most.max(t.abs()));
+        let parts = self.rate.chunks_exact(length).zip(self.torque.chunks_exact(length));
+        let rest = parts.filter_map(|(rate, torque)| {
+            let is_free = torque.iter().all(|t| t.abs() <= FREE * largest);
+            // a drift along the part shows in the difference of its halves
+            let (first, last) = rate.split_at(length / 2);
+            let drift = (mean(last) - mean(first)).abs();
+            let is_flat = deviation(rate) < 2.0 * self.noise
+                && drift < STILL * self.noise * (4.0 / length as f64).sqrt();
+            (is_free && is_flat).then(|| mean(rate))
+        });
+        median(&rest.collect::<Vec<f64>>())
+    }
+}
+
+impl Problem {
+    /// The gyro's bias in each recording, roughly: what is read at rest, else the mean where that explains the recording better
+    /// than no bias.
+    pub(super) fn rough_biases(&self) -> Vec<f64> {
+        (0..self.rows.len())
+            .map(|index| {
+                if let Some(rest) = self.rows[index].reading_at_rest() {
+                    return rest;
+                }
+                let one = Problem { rows: vec![self.rows[index].clone()], ..self.clone() };
+                let cost = |bias: f64| {
+                    let costs = one.grid(&[bias]).into_iter().map(|(_, (_, cost))| cost);
+                    costs.fold(f64::INFINITY, f64::min)
+                };
+                let mean = mean(&self.rows[index].rate);
+                if cost(mean) < cost(0.0) { mean } else { 0.0 }
+            })
+            .collect()
+    }
+
+    /// Starts in the lowest basins of the grid of Stribeck speeds; values `given` by the user replace those of the grid.
+    pub(super) fn starts(&self, biases: &[f64], given: &[(usize, f64)]) -> Vec<Vec<f64>> {
+        let grid = self.grid(biases);
+        let cost = |k: usize| grid[k].1.1;
+        let is_basin = |k: &usize| {
+            let neighbours = [k.checked_sub(1), Some(k + 1).filter(|k| *k < grid.len())];
+            neighbours.into_iter().flatten().all(|other| cost(*k) <= cost(other))
+        };
+        let mut basins: Vec<usize> = (0..grid.len()).filter(is_basin).collect();
+        basins.sort_by(|a, b| cost(*a).total_cmp(&cost(*b)));
+        let of_grid = |k: &usize| self.start(grid[*k].0, &grid[*k].1.0, biases);
+        let mut starts: Vec<Vec<f64>> = basins.iter().take(FOLLOWED).map(of_grid).collect();
+        if !given.is_empty() {
+            let mut own = starts[0].clone();
+            for (place, value) in given {
+                own[*place] = self.scales[*place].variable(self.inside(*place, *value));
+            }
+            starts.push(own);
+        }
+        starts
+    }
+
+    /// Variables of a start at a Stribeck speed.
+    pub(super) fn start(&self, speed: f64, linear: &[f64; 5], biases: &[f64]) -> Vec<f64> {
+        let [inertia, b, c, d, constant] = *linear;
+        let dry = (c + d).max(f64::MIN_POSITIVE);
+        let n = self.scales.len();
+        let mut values = vec![0.0; n];
+        values[..6].copy_from_slice(&[inertia, b, c, d, speed, (constant / dry).clamp(-0.5, 0.5)]);
+        values[n - biases.len()..].copy_from_slice(biases);
+        let variable =
+            |(place, value): (usize, f64)| self.scales[place].variable(self.inside(place, value));
+        values.into_iter().enumerate().map(variable).collect()
+    }
+
+    /// A Stribeck speed with the least squares there, for each speed of the grid that has one.
+    pub(super) fn grid(&self, biases: &[f64]) -> Vec<(f64, Linear)> {
+        let (first, last, count) = GRID;
+        let fastest = self
+            .rows
+            .iter()
+            .zip(biases)
+            .flat_map(|(rows, bias)| rows.inner().map(move |k| (rows.rate[k] - bias).abs()));
+        let fastest = fastest.fold(0.0, f64::max);
+        let ratio = (last / first).powf(1.0 / (count as f64 - 1.0));
+        let speeds = (0..count).map(|k| fastest * first * ratio.powi(k as i32));
+        speeds.filter_map(|speed| Some((speed, self.linear(speed, biases)?))).collect()
+    }
+
+    /// Linear least squares of I y + b ω + s (c + d exp(−(ω/ω_s)²)) + k = τ, with b, c, d ≥ 0.
+    fn linear(&self, speed: f64, biases: &[f64]) -> Option<Linear> {
+        const N: usize = 5;
+        let (mut normal, mut right, mut square) =
+            (DMatrix::<f64>::zeros(N, N), DVector::<f64>::zeros(N), 0.0);
+        for (rows, bias) in self.rows.iter().zip(biases) {
+            for k in rows.inner() {
+                let weight = rows.weight[k - 1];
+                if weight == 0.0 {
+                    continue;
+                }
+                let w = rows.rate[k] - bias;
+                let sign = (w / (1.25 * rows.noise)).tanh();
+                let shape = (-(w / speed).powi(2)).exp();
+                let row = [rows.acceleration(k), w, sign, sign * shape, 1.0];
+                let row = DVector::from_row_slice(&row) * weight;
+                let torque = weight * rows.torque[k];
+                normal += &row * row.transpose();
+                right += &row * torque;
+                square += torque * torque;
+            }
+        }
+        let mut free: Vec<usize> = (0..N).collect();
+        loop {
+            let part = normal.select_rows(&free).select_columns(&free);
+            // the columns differ by orders of magnitude
+            let size = part.diagonal().map(|d| d.sqrt().max(f64::MIN_POSITIVE));
+            let mut scaled = part.component_div(&(&size * size.transpose()));
+            for i in 0..free.len() {
+                scaled[(i, i)] += 1e-9;
+            }
+            let r = right.select_rows(&free).component_div(&size);
+            let x = scaled.cholesky()?.solve(&r).component_div(&size);
+            let worst = (0..free.len())
+                .filter(|i| (1..=3).contains(&free[*i]) && x[*i] < 0.0)
+                .min_by(|a, b| (x[*a] * size[*a]).total_cmp(&(x[*b] * size[*b])));
+            if let Some(worst) = worst {
+                free.remove(worst);
+                continue;
+            }
+            let mut values = [0.0; N];
+            free.iter().zip(x.iter()).for_each(|(place, value)| values[*place] = *value);
+            let cost = square - x.dot(&right.select_rows(&free));
+            return (values[0] > 0.0 && cost.is_finite()).then_some((values, cost));
+        }
+    }
+}
