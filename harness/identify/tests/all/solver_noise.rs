@@ -289,10 +289,10 @@ fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() 
 /// Sizes at which matrices are empty or singular: none panics, and each gives an answer or an error.
 #[test]
 fn one_unknown_none_inside_its_bounds_and_one_without_effect_are_answered() {
-    let fmu = Adaptive::new(&["-DTOLERANCE=1e-7", "-DMODEL_EXCHANGE"]);
+    let fmu = Adaptive::new(&["-DTOLERANCE=1e-5", "-DMODEL_EXCHANGE"]);
     let one_row =
         Record { time: vec![0.0], outputs: vec![vec![1.0], vec![0.0]], ..Record::default() };
-    for solver in [Solver::Own, Solver::Host(1e-8)] {
+    for solver in [Solver::Own, Solver::Host(1e-6)] {
         let model = Model::open(&fmu.path(), solver).unwrap();
         for free in [
             &["k=40:20:80"][..],
@@ -302,7 +302,7 @@ fn one_unknown_none_inside_its_bounds_and_one_without_effect_are_answered() {
             &["unused=1"],
             &["unused=1", "k=40:20:80"],
         ] {
-            let question = with_free(free, solver);
+            let question = Question { starts: 1, ..with_free(free, solver) };
             let result = found(&fmu, &question, 1, 1.0);
             for (name, e) in &result.parameters {
                 let is_lost = name == "unused";
