@@ -37,7 +37,7 @@ use identify::start::PARAMETERS;
 use identify::tolerance::Tolerances;
 use identify::twin::{self, SensorErrors, Twin, Unmodelled};
 
-/// What the command line asks for.
+/// Command-line arguments.
 struct Arguments {
     seeds: std::ops::RangeInclusive<u32>,
     torque: String,
@@ -119,7 +119,7 @@ fn arguments() -> Result<Arguments> {
     Ok(asked)
 }
 
-/// What the twin is, by the names of the estimates.
+/// True values of the twin, by the names of the estimates.
 fn truths(fmu: &Fmu, twin: &Twin) -> Result<BTreeMap<String, f64>> {
     let mut instance = fmu.instantiate_at_rest("truth")?;
     for (name, value) in &twin.settings {

@@ -42,15 +42,15 @@ struct Row {
     time: f64,
     /// Commanded, N·m.
     torque: f64,
-    /// Of the hub, rad.
+    /// Angle of the hub, rad.
     angle: f64,
-    /// Of the hub, rad/s.
+    /// Rate of the hub, rad/s.
     rate: f64,
-    /// Of the liquid, rad.
+    /// Slosh angle, rad.
     slosh_angle: f64,
 }
 
-/// What may act on the hub: in words, the unit of k, and φ.
+/// Possible torque on the hub: in words, the unit of k, and φ.
 struct Kind {
     words: &'static str,
     unit: &'static str,
@@ -78,7 +78,7 @@ const KINDS: [Kind; 7] = [
 /// A torque k φ that the model lacks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missing {
-    /// What φ is.
+    /// Meaning of φ.
     pub follows: String,
     /// k.
     pub factor: f64,

@@ -1,11 +1,11 @@
-//! What is told while a method works.
+//! Progress of a method.
 
 /// A line of news.
 #[derive(Clone, Debug)]
 pub enum News {
     /// A step of the way.
     Step(String),
-    /// How it is gone: the attempts of a search.
+    /// Details: the attempts of a search.
     Detail(String),
 }
 

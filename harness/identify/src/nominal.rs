@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use formulas::cylinder::pendulum;
 use host::fmu::{Fmu, Instance};
 
-/// What is known of the bench without the recording.
+/// Known values of the bench without the recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
     /// tank.r, m.
@@ -15,7 +15,7 @@ pub struct Bench {
     pub gravity: f64,
 }
 
-/// What is estimated of the bench in the time domain, where a search starts; SI units.
+/// Start of a search: estimated values of the bench in the time domain; SI units.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]
 pub struct Start {
@@ -30,7 +30,7 @@ pub struct Start {
 }
 
 impl Start {
-    /// What it is in one line.
+    /// Description in one line.
     pub fn line(&self) -> String {
         format!(
             "d {:.4} m, h {:.4} m, damping ratio {:.4}, hub.I {:.4} kg·m²",
@@ -39,10 +39,10 @@ impl Start {
     }
 }
 
-/// What the FMU says of the bench.
+/// The FMU's values of the bench.
 #[derive(Clone, Copy, Debug)]
 pub struct Nominal {
-    /// What recordings of torque and rate do not tell.
+    /// Values that recordings of torque and rate do not show.
     pub bench: Bench,
     /// Its parameters.
     pub start: Start,
@@ -96,7 +96,7 @@ impl Bench {
 }
 
 impl Nominal {
-    /// Of the FMU with settings, and with what is `expected` of parameters that are estimated.
+    /// Nominal bench of the FMU with settings, and with the `expected` values of estimated parameters.
     pub fn of(
         fmu: &Fmu,
         settings: &[(String, String)],

@@ -1,4 +1,4 @@
-//! What is asked of an identification.
+//! Options of an identification.
 
 use anyhow::Result;
 use host::fmu::Fmu;
@@ -8,26 +8,26 @@ use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::tolerance::Tolerances;
 
-/// What is asked for.
+/// Options of an identification.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Slosh models to be tried, by the names of `slosh.model`'s items.
     pub models: Vec<String>,
     /// Friction laws to be tried, by the names of `friction.model`'s items.
     pub friction: Vec<String>,
-    /// What is known of the bench, by FMU name; these are not estimated.
+    /// Known parameters of the bench, by FMU name; these are not estimated.
     pub settings: Vec<(String, String)>,
-    /// What is known of a parameter that is estimated: name, mean and standard deviation.
+    /// Priors of estimated parameters: name, mean and standard deviation.
     pub known: Vec<(String, f64, f64)>,
     /// Starts in place of those from the data, by FMU name.
     pub starts: Vec<(String, f64)>,
-    /// Whether delay, gyro bias and friction asymmetry are estimated as well.
+    /// True to estimate delay, gyro bias and friction asymmetry as well.
     pub sensor_errors: bool,
     /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
     pub gyro_scale: f64,
-    /// How well is known what is not estimated.
+    /// Tolerances of values that are not estimated.
     pub tolerances: Tolerances,
-    /// What the torque does between rows; `None`: what fits best.
+    /// Intersample behaviour of the torque; `None` chooses the best fit.
     pub intersample: Option<Intersample>,
     /// The rate's time stamps may be early: a delay below zero is no doubt.
     pub acausal: bool,

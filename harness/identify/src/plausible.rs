@@ -1,5 +1,5 @@
-//! Whether a recording can be of this bench: sizes that only a wrong unit makes, and what further columns
-//! say of the torque and of other axes.
+//! Plausibility of a recording for this bench: sizes that only a wrong unit produces, and evidence of further columns
+//! about the torque and other axes.
 
 use anyhow::{Result, bail};
 
@@ -39,7 +39,7 @@ pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
 /// Time over which wheel speed and torque are compared, s.
 const WINDOW: f64 = 0.1;
 
-/// What further columns say: notes for the reader, and doubts that no fit can remove.
+/// Evidence of further columns: notes for the reader, and doubts that no fit can remove.
 pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
     let (mut notes, mut doubts) = (Vec::new(), Vec::new());
     if let Some(speed) = &recording.wheel_speed {
@@ -80,7 +80,7 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
 struct Actuator {
     /// wheel.I, kg·m².
     inertia: f64,
-    /// Where the speed first does not go with the torque, s, and for how long in all.
+    /// First time at which the speed does not follow the torque, s, and total duration.
     missing: Option<(f64, f64)>,
 }
 

@@ -34,7 +34,7 @@ const MOVES: f64 = 2.0;
 /// One uninterrupted recording.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Where it is from.
+    /// Source of the recording.
     pub name: String,
     /// Times of the rows, s, growing.
     pub time: Vec<f64>,
@@ -52,7 +52,7 @@ pub struct Recording {
     pub off_axis: [Option<Vec<f64>>; 2],
     /// It begins at rest (else the initial state is unknown).
     pub from_rest: bool,
-    /// Which rows hold a new value of the gyro that belongs to its motion; the others are not fitted. `None`: all.
+    /// Rows with a new value of the gyro that belongs to its motion; the others are not fitted. `None`: all.
     pub fresh: Option<Vec<bool>>,
 }
 
@@ -83,7 +83,7 @@ impl Recording {
         }
     }
 
-    /// Of a value for each row, those of the rows with a new value of the gyro.
+    /// Values of the rows with a new value of the gyro.
     pub fn of_fresh(&self, values: &[f64]) -> Vec<f64> {
         match &self.fresh {
             None => values.to_vec(),
@@ -173,12 +173,12 @@ pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
 /// Columns that are used if they are there.
 pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
 
-/// Which columns a file has, and which rows are used.
+/// Columns of a file, and the rows to use.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// Columns and units of the signals.
     pub columns: Columns,
-    /// What becomes of a torque that is slower than the rows.
+    /// Treatment of a torque that is sampled more slowly than the rows.
     pub slow: Between,
     /// First and last time, s.
     pub trim: Option<(f64, f64)>,
@@ -216,7 +216,7 @@ pub fn read(
     prepare(trimmed(all, source.trim, done), coarsest, done)
 }
 
-/// What a free decay is seen by, in the order in which they are looked for.
+/// Signals of a free decay, in the order of preference.
 pub const DECAYING: [&str; 4] = ["wave_height", "force", "theta", "omega"];
 
 /// Reads a free decay, one signal of [`DECAYING`] without a torque: that of `source.columns`, else the first that the
@@ -484,7 +484,7 @@ fn check_signals(part: &Recording) -> Result<()> {
     Ok(())
 }
 
-/// Whether the rate is noise, in which the torque is not seen: neither itself nor much else.
+/// Returns true if the rate is noise that shows no effect of the torque.
 fn is_stuck(part: &Recording) -> bool {
     let (mean, noise) = (mean(&part.rate), noise_level(&part.rate));
     let unit: Vec<f64> = part.rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();

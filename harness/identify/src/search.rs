@@ -18,14 +18,14 @@ use analysis::innovations::Tests;
 /// Sum of squares over the rows below which a model may be near its minimum: that of noise, and half as much again.
 const NEAR: f64 = 1.5;
 
-/// What the steps of one set of sensitivities leave of the sum of squares, where they lead far.
+/// Share of the sum of squares that remains after the steps of one set of sensitivities that lead far.
 const LEADS: f64 = 0.7;
 
 /// The search for one model's minimum.
 pub struct Search<'a, 'h> {
-    /// What is solved; noise and intersample behaviour are found on the way.
+    /// Problem to solve; noise and intersample behaviour are determined during the search.
     pub problem: Problem<'a>,
-    /// Where it may start, the likeliest first.
+    /// Starts, the likeliest first.
     pub starts: Vec<Vec<f64>>,
     /// The first start is a user's, which may be far off.
     pub far: bool,
@@ -37,11 +37,11 @@ pub struct Search<'a, 'h> {
     pub alone: bool,
     /// Name of the model.
     pub model: &'h str,
-    /// What other Stribeck speeds make of the sum of squares, once that was asked: speed, rad/s, and how much more at least.
+    /// Other Stribeck speeds once they were tried: speed, rad/s, and the least increase of the sum of squares.
     pub speeds: Vec<(f64, f64)>,
-    /// What the torque may be between rows instead, once that was asked.
+    /// Other intersample behaviours of the torque, once they were tried.
     pub others: Option<between::Others>,
-    /// What the lines so far were told to cost.
+    /// Cost of the lines so far.
     pub since: Since,
     /// Is told what happens.
     pub progress: &'h mut dyn FnMut(String),
@@ -49,7 +49,7 @@ pub struct Search<'a, 'h> {
 
 /// A minimum that another model has near.
 pub struct Sibling<'f, 'a> {
-    /// What was solved.
+    /// Solved problem.
     pub problem: &'f Problem<'a>,
     /// The minimum.
     pub minimum: &'f Polished,
@@ -66,7 +66,7 @@ struct Attempt {
     accept: Accept,
 }
 
-/// Where an attempt starts.
+/// Start of an attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum From {
     /// At one of the starts.
@@ -77,7 +77,7 @@ enum From {
     Sibling,
 }
 
-/// How an attempt searches.
+/// Search method of an attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum How {
     /// Gauss and Newton's steps over the whole recordings, with so many sets of sensitivities at most.
@@ -93,7 +93,7 @@ enum How {
     Loudest,
 }
 
-/// What must hold of the best minimum so far for an attempt to be made.
+/// Condition on the best minimum so far for an attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum When {
     Always,
@@ -110,7 +110,7 @@ enum When {
     Unfinished,
 }
 
-/// What an attempt must do better than the best so far.
+/// Condition for accepting an attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Accept {
     /// Less sum of squares, of the same noise.
@@ -119,7 +119,7 @@ enum Accept {
     BetterFit,
 }
 
-/// What the attempts before have found.
+/// Best result of the attempts so far.
 #[derive(Default)]
 struct Best {
     found: Option<Polished>,
@@ -140,7 +140,7 @@ impl Attempt {
         Attempt { from, how, when, accept: Accept::BetterFit }
     }
 
-    /// Where it starts and how it searches, in words.
+    /// Describes start and method in words.
     fn words(&self) -> String {
         let from = match self.from {
             From::Start(i) => format!("from start {}", i + 1),
@@ -325,7 +325,7 @@ impl<'a> Search<'a, '_> {
         Ok(other)
     }
 
-    /// Whether it is a minimum whose residual is only noise.
+    /// Returns true for a minimum whose residual is only noise.
     fn explains(&self, found: &Polished) -> bool {
         found.converged() && tests(&self.problem, &found.answer).iter().all(Tests::passed)
     }
@@ -506,7 +506,7 @@ impl<'a> Search<'a, '_> {
         x
     }
 
-    /// Whether an attempt is to be made.
+    /// Returns true if an attempt is due.
     fn is_due(&self, when: When, best: &Best) -> bool {
         let Some(minimum) = &best.found else {
             return matches!(when, When::Always | When::Unexplained | When::Poor);
@@ -527,7 +527,7 @@ impl<'a> Search<'a, '_> {
         }
     }
 
-    /// Whether what was found is better than the best so far, of the problem as it was then, and why in words.
+    /// Decides whether a result is better than the best so far, of the problem as it was then, with the reason in words.
     fn accepts(
         &self,
         rule: Accept,

@@ -21,11 +21,11 @@ pub struct Motion {
     pub rate: Vec<f64>,
     /// rad/s².
     pub acceleration: Vec<f64>,
-    /// Of the liquid's first mode, rad.
+    /// Angle of the first slosh mode, rad.
     pub slosh_angle: Vec<f64>,
 }
 
-/// What of a [`Motion`] is read at every row; the rest stays empty.
+/// Parts of a [`Motion`] read in every row; the rest stays empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Read {
     /// All of it.
@@ -41,7 +41,7 @@ pub enum Intersample {
     FirstOrderHold,
     /// The row's value until the next.
     ZeroOrderHold,
-    /// What a band-limited signal does that was sampled: see [`smooth`].
+    /// Band-limited interpolation of the samples: see [`smooth`].
     BandLimited,
 }
 
@@ -87,12 +87,12 @@ pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
     (0..n).map(|k| signal[k] - two[k] / 12.0 + four[k] / 90.0).collect()
 }
 
-/// How the FMU is set up and driven.
+/// Setup and drive of the FMU.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Values by FMU name, as text, set first.
     pub settings: Vec<(String, String)>,
-    /// What the torque does between rows.
+    /// Intersample behaviour of the torque.
     pub intersample: Intersample,
 }
 

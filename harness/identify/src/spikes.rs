@@ -79,7 +79,7 @@ fn cubic(y: &[f64], sound: &[bool], k: usize) -> f64 {
     nodes.iter().map(|j| y[*j] * weight(j)).sum()
 }
 
-/// Whether the torque steps near a row.
+/// Returns true if the torque steps near a row.
 fn near_step(torque: &[f64], row: usize) -> bool {
     let step = STEP * peak(torque);
     let near = row.saturating_sub(NEAR_STEP)..(row + NEAR_STEP).min(torque.len() - 1);

@@ -17,7 +17,7 @@ use signals::fourier::Forward;
 use crate::nominal::{Bench, Nominal, Start};
 use crate::recording::Recording;
 
-/// What a frequency response says of the bench.
+/// Bench parameters from a frequency response.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Response {
     /// Slosh frequency, Hz: of the zeros.
@@ -180,7 +180,7 @@ pub fn from_data(
     Ok((responses.first().copied().or(Some(first)), all))
 }
 
-/// What the balance of torques says in bands of the recordings, the least residual first.
+/// Balances of torques in bands of the recordings, the least residual first.
 fn balances(
     recordings: &[Recording],
     bench: Bench,
@@ -207,7 +207,7 @@ fn octaves(low: f64, high: f64) -> Vec<(f64, f64)> {
 }
 
 impl Response {
-    /// What it is in one line.
+    /// Description in one line.
     pub fn line(&self) -> String {
         format!(
             "frequency response: slosh at {:.4} Hz, damping ratio {:.4}, resonance at {:.4} Hz, slosh mass {:.3} kg, \
@@ -220,7 +220,7 @@ impl Response {
         )
     }
 
-    /// Whether a search from another one would lead to the same minimum.
+    /// Returns true if a search from the other start would reach the same minimum.
     fn is_near(&self, other: &Response) -> bool {
         let ratio = |a: f64, b: f64| (a / b).ln().abs();
         ratio(self.slosh_frequency, other.slosh_frequency) < 0.05
@@ -242,7 +242,7 @@ impl Response {
     }
 }
 
-/// What the balance of torques says of the bench.
+/// Bench parameters from the balance of torques.
 #[derive(Clone, Copy, Debug)]
 pub struct Balance {
     /// Slosh frequency, Hz, and damping ratio.

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::unknown::Unknown;
 
-/// Where b, c, d and ω_s stand among the unknowns.
+/// Indices of b, c, d and ω_s among the unknowns.
 #[derive(Clone, Copy, Debug)]
 pub struct Indices {
     /// friction.b

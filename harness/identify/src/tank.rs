@@ -13,7 +13,7 @@ use formulas::cylinder::XI;
 use crate::nominal::Bench;
 use crate::unknown::Unknown;
 
-/// Where d, h and I stand among the unknowns.
+/// Indices of d, h and I among the unknowns.
 #[derive(Clone, Copy, Debug)]
 pub struct Indices {
     /// tank.d.

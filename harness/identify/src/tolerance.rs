@@ -1,8 +1,8 @@
-//! How well is known what is not estimated: relative standard deviations.
+//! Tolerances of values that are not estimated: relative standard deviations.
 
 use anyhow::{Context, Result, bail, ensure};
 
-/// Of the numbers that the recording cannot show.
+/// Relative standard deviations of numbers that the recording cannot show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
     /// Scale of the torque: torque that acts over the recorded one.

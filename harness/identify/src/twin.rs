@@ -13,7 +13,7 @@ use crate::design::Multisine;
 use crate::recording::Recording;
 use crate::simulate::{Intersample, TORQUE_BESIDES};
 
-/// What the gyro and the data link add to the FMU's own noise.
+/// Errors of gyro and data link in addition to the FMU's own noise.
 #[derive(Clone, Copy, Debug)]
 pub struct SensorErrors {
     /// Delay from torque to rate, s; a multiple of the sampling time is exact.
@@ -30,7 +30,7 @@ impl Default for SensorErrors {
     }
 }
 
-/// What a bench may do and no model that is tried does.
+/// Effects of a bench that no tried model has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unmodelled {
     /// The bearing's axis leans by 1°: gravity turns hub and liquid back to where they began.
@@ -59,7 +59,7 @@ const AIR: f64 = 0.02;
 const WARMING: f64 = 600.0;
 
 impl Unmodelled {
-    /// By its name: tilt, nutation, warming, clipping or drag.
+    /// Effect by its name: tilt, nutation, warming, clipping or drag.
     pub fn named(name: &str) -> Result<Self> {
         Ok(match name {
             "tilt" => Unmodelled::Tilt,
@@ -96,13 +96,13 @@ pub struct Twin {
     pub rate: f64,
     /// Values of the gyro a second; `None`: as many as rows.
     pub gyro: Option<f64>,
-    /// What the torque does between rows.
+    /// Intersample behaviour of the torque.
     pub intersample: Intersample,
-    /// What gyro and data link add.
+    /// Errors of gyro and data link.
     pub sensor_errors: SensorErrors,
     /// Standard deviation of an encoder's angle, rad; `None`: there is no encoder.
     pub encoder: Option<f64>,
-    /// What the models do not have.
+    /// Unmodelled effects.
     pub unmodelled: Vec<Unmodelled>,
 }
 

@@ -25,7 +25,7 @@ const VAGUE: f64 = 0.05;
 /// Covariance of the variables x.
 #[derive(Clone, Debug)]
 pub struct Covariance {
-    /// Of x, priors included.
+    /// Covariance of x, priors included.
     pub x: DMatrix<f64>,
     /// Condition number of J with columns of unit length.
     pub condition: f64,
@@ -108,18 +108,18 @@ pub fn spread_out(matrix: &DMatrix<f64>, places: &[usize], n: usize) -> DMatrix<
     all
 }
 
-/// What makes the estimates uncertain, as covariances of the variables x.
+/// Sources of uncertainty, as covariances of the variables x.
 #[derive(Clone, Copy, Debug)]
 pub struct Sources<'a> {
     /// The recording's noise, (JᵀJ)⁻¹, with the gyro's scale known to its tolerance alone.
     pub noise: &'a DMatrix<f64>,
-    /// Of all variables over the profile of the friction's curves: of the noise the better account.
+    /// Covariance of all variables over the profile of the friction's curves: the better account of the noise.
     pub friction_curves: Option<&'a DMatrix<f64>>,
-    /// Of the same variables because another slosh model may be the right one.
+    /// Covariance from the choice of slosh model.
     pub models: Option<&'a DMatrix<f64>>,
-    /// Of all variables because the torque may be another one between rows.
+    /// Covariance from the intersample behaviour of the torque.
     pub between_rows: Option<&'a DMatrix<f64>>,
-    /// Of all variables, by tolerances of what is not estimated.
+    /// Covariance from tolerances of values that are not estimated.
     pub tolerances: Option<&'a DMatrix<f64>>,
     /// The sandwich, where the residual is more than noise: no variance is less than there.
     pub residual: Option<&'a DMatrix<f64>>,

@@ -1,4 +1,4 @@
-//! What is estimated: parameters of the FMU, and what is between it and the recording.
+//! Unknowns: parameters of the FMU, and properties of sensors and data link.
 
 use host::description::{ModelDescription, Variable};
 use serde::Serialize;
@@ -6,17 +6,17 @@ use serde::Serialize;
 /// One unknown number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknown {
-    /// What it is.
+    /// Estimated quantity.
     pub quantity: Quantity,
     /// Unit, as in modelDescription.xml.
     pub unit: String,
-    /// Where the search begins.
+    /// Start of the search.
     pub start: f64,
-    /// What is known of it beforehand: mean and standard deviation.
+    /// Prior: mean and standard deviation.
     pub prior: Option<(f64, f64)>,
-    /// That is only its size, which keeps a search from going astray; it does not count as knowledge.
+    /// True if the prior only states the order of magnitude, to guide the search; it does not count as knowledge.
     pub vague: bool,
-    /// How it is made a variable without bounds.
+    /// Transformation to a variable without bounds.
     pub scale: Scale,
     /// Least and largest value that the FMU allows.
     pub range: [f64; 2],
@@ -169,7 +169,7 @@ impl Unknown {
         x <= low || x >= high
     }
 
-    /// Whether its value must be positive.
+    /// Returns true if the value must be positive.
     pub fn is_positive(&self) -> bool {
         matches!(self.scale, Scale::Log | Scale::Softplus(_))
     }

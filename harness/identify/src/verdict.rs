@@ -13,35 +13,35 @@ use analysis::innovations::{self, Tests};
 /// Newton decrement from which on it is told.
 const TOLD: f64 = 0.1;
 
-/// How the sentence begins that says that the model is invalidated.
+/// Beginning of the sentence about an invalidated model.
 pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
-/// How the sentence begins that says that a search has not converged.
+/// Beginning of the sentence about a search that has not converged.
 pub const NO_MINIMUM: &str = "The search did not end at a minimum";
 
-/// What there was to choose from.
+/// Candidates of the choice.
 pub struct Question<'a> {
     /// Slosh models, those that cannot be told from the best first.
     pub slosh: &'a [ModelFit],
-    /// How many those are.
+    /// Number of those.
     pub near: usize,
     /// Friction laws, with one slosh model.
     pub laws: &'a [ModelFit],
-    /// What makes the recordings doubtful before any fit.
+    /// Doubts about the recordings before any fit.
     pub doubts: &'a [String],
 }
 
-/// What the chosen model's minimum shows besides values.
+/// Findings at the chosen model's minimum other than values.
 pub struct Findings {
-    /// What the choice of the torque between rows rests on, in words.
+    /// Reasons for the choice of the torque's intersample behaviour, in words.
     pub torque: Vec<String>,
     /// Torques that the model lacks.
     pub missing: Vec<Missing>,
-    /// What makes recordings or model doubtful, in words.
+    /// Doubts about recordings or model, in words.
     pub doubts: Vec<String>,
 }
 
 impl Findings {
-    /// Whether the model with this fit explains the recordings.
+    /// Returns true if the model with this fit explains the recordings.
     pub fn fits(&self, fit: &ModelFit) -> bool {
         fit.tests.iter().all(Tests::passed) && self.missing.is_empty() && self.doubts.is_empty()
     }
@@ -183,7 +183,7 @@ fn modes(parameters: &BTreeMap<String, Estimated>, budget: &[Effect]) -> Option<
     })
 }
 
-/// Which tests of the residual fail, and by how many standard deviations.
+/// Failed tests of the residual, and by how many standard deviations.
 fn reasons(tests: &Tests) -> String {
     let (time, frequency) = (tests.in_time, tests.in_frequency);
     let all = [

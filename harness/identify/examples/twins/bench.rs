@@ -25,7 +25,7 @@ const TOLERANCE: f64 = 1e-11;
 const SAME: f64 = 1e-13;
 /// Rate of a hub that rests, rad/s.
 const REST: f64 = 1e-13;
-/// What a hub at rest may be driven by beyond what holds it and be held, N·m.
+/// Largest torque beyond static friction at which the hub still counts as held, N·m.
 const TOUCH: f64 = 1e-12;
 /// Longest time without a look whether a hub that sticks breaks away, s.
 const LOOK: f64 = 5e-3;
@@ -36,7 +36,7 @@ type State = SVector<f64, 9>;
 /// Place of the time.
 const TIME: usize = 8;
 
-/// What the liquid is taken for.
+/// Model of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Liquid {
     /// All of it turns with the hub.
@@ -136,7 +136,7 @@ impl Drive<'_> {
     }
 }
 
-/// How bearing and hub move against each other.
+/// Relative motion of bearing and hub.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Contact {
     /// With the sign of ω.
@@ -153,7 +153,7 @@ pub struct Motion {
     pub angle: Vec<f64>,
     /// rad/s.
     pub rate: Vec<f64>,
-    /// How often the hub stopped.
+    /// Number of stops of the hub.
     pub stops: usize,
     /// Largest angle of the liquid, rad.
     pub slosh: f64,
@@ -249,7 +249,7 @@ impl Equations<'_> {
         (c + d) * (1.0 + asymmetry * direction.signum())
     }
 
-    /// Where a hub at rest goes on.
+    /// Contact with which a hub at rest continues.
     fn after_rest(&self, t: f64, y: &State) -> Contact {
         let at_rest = Equations { contact: Contact::Sticks, ..*self };
         let driving = at_rest.rates(t, y).driving;

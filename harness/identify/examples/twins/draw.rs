@@ -17,7 +17,7 @@ use identify::tolerance::Tolerances;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 
-/// How far truths are from the nominal bench, relatively.
+/// Relative spread of truths around the nominal bench.
 const SPREAD: f64 = 0.3;
 /// White noise of a MEMS gyro, rad/s/√Hz; its drift, rad/s, with its correlation time, s; its least step, rad/s.
 const GYRO: (f64, f64, f64, f64) = (5.75e-5, 7.85e-5, 100.0, 1.53e-4);
@@ -144,7 +144,7 @@ impl Twin {
         all.filter(|name| self.seed.is_multiple_of(3) || *name == own).map(String::from).collect()
     }
 
-    /// What it is in few words.
+    /// Short description.
     pub fn words(&self) -> String {
         format!(
             "{:?} {:?}, {}{}, {} Hz",

@@ -26,7 +26,7 @@ use identify::methods::identification::Identification;
 /// that is open says that it does not know.
 const WRONG: f64 = 5.0;
 
-/// What was found of one parameter, over all twins.
+/// Results for one parameter over all twins.
 #[derive(Default)]
 struct Row {
     /// Error over its standard deviation.
@@ -34,7 +34,7 @@ struct Row {
     inside: usize,
 }
 
-/// What was found in all twins.
+/// Results over all twins.
 #[derive(Default)]
 struct Tally {
     rows: BTreeMap<String, Row>,

@@ -167,7 +167,7 @@ impl<'fmu> Run<'fmu> {
         Ok(dx)
     }
 
-    /// Whether an indicator changes sign between here and a point.
+    /// Returns true if an indicator changes sign between here and a point.
     fn crosses(&mut self, t: f64, x: &[f64]) -> Result<bool> {
         if self.z.is_empty() {
             return Ok(false);

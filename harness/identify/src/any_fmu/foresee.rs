@@ -1,4 +1,4 @@
-//! What a planned recording will tell: the Cramér–Rao bound of each unknown from its sensitivities along the planned inputs.
+//! Information from a planned recording: the Cramér–Rao bound of each unknown from its sensitivities along the planned inputs.
 
 use anyhow::{Result, ensure};
 use serde::Serialize;

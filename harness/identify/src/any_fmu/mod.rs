@@ -51,7 +51,7 @@ pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
 /// Turns of noise and fit.
 const TURNS: usize = 4;
 
-/// What there is to say besides the estimates.
+/// Results other than the estimates.
 #[derive(Clone, Debug, Serialize)]
 pub struct Details {
     /// The outputs of the recordings.
@@ -129,7 +129,7 @@ impl Output {
     }
 }
 
-/// What is found of any FMU.
+/// Result of fitting any FMU.
 pub type Identification = Identified<Details>;
 
 /// Identifies.
@@ -425,7 +425,7 @@ fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { f64::NAN }
 }
 
-/// What is to be said about one estimate.
+/// Writes remarks about one estimate.
 fn say(
     unknown: &Unknown,
     e: &Estimated,

@@ -24,7 +24,7 @@ use super::unknown::{Unknown, What};
 use analysis::gauss_markov::{Noise, Whitening};
 use analysis::statistics::median;
 
-/// By how much a difference moves the answer to either side, in units of the noise's norm of one degree of freedom.
+/// Change of the outputs by a difference to either side, in units of the noise's norm of one degree of freedom.
 const MOVE: f64 = 0.5;
 /// Bounds of the differences' steps, in units of an unknown's reach.
 const STEPS: (f64, f64) = (1e-7, 2e-2);
@@ -46,7 +46,7 @@ pub struct Channel {
     pub output: usize,
     /// Its noise.
     pub noise: Noise,
-    /// Which rows have a value.
+    /// Rows that have a value.
     pub sampled: Vec<bool>,
 }
 
@@ -58,11 +58,11 @@ pub type Motion = Vec<Vec<Vec<f64>>>;
 pub struct Problem<'a> {
     /// The FMU.
     pub model: &'a Model,
-    /// How it is set up.
+    /// Setup of the simulation.
     pub setup: &'a Setup,
-    /// What is fitted, together.
+    /// Recordings, fitted together.
     pub records: &'a [Record],
-    /// What is estimated.
+    /// Unknowns.
     pub unknowns: Vec<Unknown>,
     /// Outputs with their noise.
     pub channels: Vec<Channel>,

@@ -15,7 +15,7 @@ use super::search::{Curvature, Minimum};
 pub const Z: f64 = 1.96;
 /// Part by which √Δ may differ from that of a parabola.
 const PARABOLIC: f64 = 0.1;
-/// How far an end is searched for, in standard deviations.
+/// Largest distance to search for an end, in standard deviations.
 const FARTHEST: f64 = 20.0;
 /// Steps of the others to their minimum at one point.
 const INNER_STEPS: usize = 3;
@@ -27,9 +27,9 @@ const POINTS: usize = 10;
 pub struct Interval {
     /// Its ends.
     pub ends: [f64; 2],
-    /// Whether there is an end, or only a bound.
+    /// True for an end, false for a bound.
     pub ended: [bool; 2],
-    /// Whether the profile is a parabola.
+    /// True if the profile is a parabola.
     pub quadratic: bool,
 }
 
@@ -78,7 +78,7 @@ struct Profile<'a> {
     j: usize,
     others: Vec<usize>,
     curvature: Curvature,
-    /// How the others go with it near the minimum.
+    /// Derivative of the other unknowns by this one near the minimum.
     slope: DVector<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! What is asked of an FMU's identification, as text and with the FMU's own names, units and bounds.
+//! Input of an FMU's identification, as text and with the FMU's own names, units and bounds.
 
 use std::str::FromStr;
 
@@ -13,11 +13,11 @@ pub const EACH: &str = "@each";
 /// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
-    /// By its name in the FMU.
+    /// Name in the FMU.
     pub name: String,
     /// Each recording has its own, as a start has.
     pub each: bool,
-    /// Where the search begins.
+    /// Start of the search.
     pub start: f64,
     /// Bounds; `None`: the FMU's min and max.
     pub bounds: Option<(f64, f64)>,
@@ -130,7 +130,7 @@ impl FromStr for Triad {
 /// `NAME=VALUE` or, of the second recording alone, `NAME@2=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// By its name in the FMU.
+    /// Name in the FMU.
     pub name: String,
     /// The recording, from 0; `None`: all.
     pub recording: Option<usize>,
@@ -165,14 +165,14 @@ pub enum Solver {
     Host(f64),
 }
 
-/// What is asked.
+/// Input of an identification.
 #[derive(Clone, Debug)]
 pub struct Question {
-    /// What is estimated.
+    /// Unknowns.
     pub free: Vec<Free>,
-    /// What is known of it beforehand.
+    /// Priors.
     pub priors: Vec<Prior>,
-    /// What is set.
+    /// Settings.
     pub settings: Vec<Setting>,
     /// Inputs that are driven.
     pub inputs: Vec<String>,
@@ -186,7 +186,7 @@ pub struct Question {
     pub biases: Vec<Bias>,
     /// Instruments with three axes.
     pub triads: Vec<Triad>,
-    /// Whether the noise of each output also drifts.
+    /// True if the noise of each output also drifts.
     pub drift: bool,
     /// Whose solver steps the FMU.
     pub solver: Solver,

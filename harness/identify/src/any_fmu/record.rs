@@ -83,7 +83,7 @@ impl Record {
         Ok(())
     }
 
-    /// Which rows have a value of an output.
+    /// Rows that have a value of an output.
     pub fn sampled(&self, output: usize) -> Vec<bool> {
         self.outputs[output].iter().map(|y| !y.is_nan()).collect()
     }

@@ -30,7 +30,7 @@ const COARSE: f64 = 0.03;
 /// Residual over the noise from row to row beyond which a fit counts as bad, and another start is tried.
 const BAD: f64 = 1.5;
 
-/// Where a search ended.
+/// End of a search.
 #[derive(Clone)]
 pub struct Minimum {
     /// The unknowns.

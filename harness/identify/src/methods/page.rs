@@ -17,7 +17,7 @@ const POINTS: usize = 700;
 /// Length of the stretch that is drawn row by row, s.
 const STRETCH: f64 = 8.0;
 
-/// Of every page on an identification.
+/// Style sheet of every page about an identification.
 pub(crate) const STYLE: &str = "
 :root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--warn:#fde8d7}
 @media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--paper:#16171a;--soft:#a0a0a8;--rule:#3a3b40;--a:#6cb1ff;--b:#ff9a5c;--warn:#4a2a12}}
