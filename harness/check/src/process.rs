@@ -118,6 +118,11 @@ fn run(
         }
         Cause::EndlessCall => (endless(limits.call), true),
         Cause::TooLong => (endless(options.limit), true),
+        Cause::Hoard => {
+            let most = limits.memory >> 20;
+            let why = "its temporary files or its shared memory take";
+            (format!("{why} more than {most} MiB (allowed: less)"), true)
+        }
         Cause::Flood => {
             (format!("it prints more than {} bytes (allowed: nothing)", guard::FLOOD), true)
         }

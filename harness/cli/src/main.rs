@@ -228,6 +228,11 @@ fn guarded(cli: &Cli) -> Result<u8> {
             "a call of the FMU has not returned within {} s (--call-limit gives more time)",
             cli.call_limit
         ),
+        Cause::Hoard => bail!(
+            "the temporary files or the shared memory of the FMU take more than {} MiB (--memory \
+             gives more)",
+            limits.memory >> 20
+        ),
         Cause::Flood => {
             bail!("the FMU has printed more than {} GiB (allowed: less)", guard::FLOOD_SHOWN >> 30)
         }

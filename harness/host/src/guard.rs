@@ -50,7 +50,8 @@ pub struct Limits {
     pub call: Duration,
     /// Time for everything, if that is limited.
     pub total: Option<Duration>,
-    /// Bytes of memory beyond what the process has when the first binary is loaded.
+    /// Bytes of memory beyond what the process has when the first binary is loaded; as many of
+    /// temporary files, and as many of shared memory.
     pub memory: u64,
     /// Bytes that a file may have.
     pub file: u64,
@@ -69,6 +70,9 @@ pub enum Cause {
     TooLong,
     /// It was ended because it printed more than [`FLOOD`] or [`FLOOD_SHOWN`].
     Flood,
+    /// It was ended because its temporary files or its shared memory took more than
+    /// [`Limits::memory`].
+    Hoard,
 }
 
 /// Result of a process.
@@ -172,6 +176,7 @@ fn watch(
     // a process says four times a second that it lives; one that is stopped does not
     let silence = limits.call.max(Duration::from_secs(3));
     let (mut heard, mut heard_at, mut done_at) = (0, started, None);
+    let mut counted_at = started;
     let mut cause = None;
     let mut pause = Duration::from_millis(1);
     while !has_ended(&mut child)? {
@@ -194,6 +199,15 @@ fn watch(
         } else if floods() {
             cause = Some(Cause::Flood);
             break;
+        } else if now - counted_at > COUNTING
+            && let Some(before) = news.loaded()
+        {
+            counted_at = now;
+            let most = limits.memory;
+            if stored(files).saturating_sub(before) > most || shared(child.id()) > most {
+                cause = Some(Cause::Hoard);
+                break;
+            }
         }
         std::thread::sleep(pause);
         pause = (pause * 2).min(Duration::from_millis(10));
@@ -208,6 +222,74 @@ fn watch(
         (None, Some(cause)) => cause,
         (None, None) => Cause::Ended(status),
     })
+}
+
+/// How often temporary files and shared memory are counted.
+const COUNTING: Duration = Duration::from_millis(50);
+/// Most entries of a folder that are counted.
+const COUNTED: usize = 100_000;
+
+/// Bytes that the files below a folder take on the disk.
+fn stored(folder: &Path) -> u64 {
+    let (mut folders, mut bytes, mut entries) = (vec![folder.to_path_buf()], 0, 0);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            entries += 1;
+            if entries > COUNTED {
+                return u64::MAX;
+            }
+            // of a link itself, not of what it leads to
+            match entry.metadata() {
+                Ok(found) if found.is_dir() => folders.push(entry.path()),
+                Ok(found) => bytes += on_disk(&found),
+                Err(_) => {} // it is gone already
+            }
+        }
+    }
+    bytes
+}
+
+#[cfg(unix)]
+fn on_disk(file: &std::fs::Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::blocks(file) * 512
+}
+
+#[cfg(not(unix))]
+fn on_disk(file: &std::fs::Metadata) -> u64 {
+    file.len()
+}
+
+/// Bytes of shared memory of a process, and of its open files that no folder has: the larger of
+/// what it has mapped and what it has open.
+#[cfg(target_os = "linux")]
+fn shared(id: u32) -> u64 {
+    let process = PathBuf::from(format!("/proc/{id}"));
+    let status = std::fs::read_to_string(process.join("status")).unwrap_or_default();
+    let mapped = kilobytes(&status, "RssShmem:").unwrap_or(0) << 10;
+    let is_hidden = |name: &str| {
+        ["/dev/shm/", "/memfd:"].iter().any(|place| name.starts_with(place))
+            || name.ends_with(" (deleted)")
+    };
+    let open = std::fs::read_dir(process.join("fd")).into_iter().flatten().flatten();
+    let hidden = open.filter_map(|entry| {
+        let name = std::fs::read_link(entry.path()).ok()?;
+        let found = is_hidden(name.to_str()?).then(|| std::fs::metadata(entry.path()))?.ok()?;
+        Some((identity(&found), on_disk(&found)))
+    });
+    // a file that is open twice takes its bytes once
+    let hidden: std::collections::BTreeMap<_, u64> = hidden.collect();
+    mapped.max(hidden.values().sum())
+}
+
+#[cfg(target_os = "linux")]
+fn identity(file: &std::fs::Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    (file.dev(), file.ino())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn shared(_: u32) -> u64 {
+    0
 }
 
 /// Ends a process, its group, and those that have left the group: they still name its folder for
@@ -302,7 +384,8 @@ fn kill_descendants(_: &Path) -> bool {
     false
 }
 
-/// What a process tells: a point as long as it lives, [`ENDLESS`], at the end [`DONE`] and a code.
+/// What a process tells: a point as long as it lives, [`LOADS`] with the bytes of its temporary files
+/// when it loads the first binary, [`ENDLESS`], at the end [`DONE`] and a code.
 struct News {
     file: File,
     text: Vec<u8>,
@@ -310,11 +393,22 @@ struct News {
 
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
+const LOADS: u8 = b'+';
+/// The end of the number after [`LOADS`].
+const LOADED: u8 = b';';
 const DONE: u8 = b'=';
 
 impl News {
     fn read(&mut self) {
         let _ = self.file.read_to_end(&mut self.text);
+    }
+
+    /// Bytes of temporary files when the first binary was loaded, if one was.
+    fn loaded(&self) -> Option<u64> {
+        let from = self.text.iter().position(|byte| *byte == LOADS)? + 1;
+        let rest = &self.text[from..];
+        let to = rest.iter().position(|byte| *byte == LOADED)?;
+        std::str::from_utf8(&rest[..to]).ok()?.parse().ok()
     }
 
     fn done(&self) -> Option<u8> {
@@ -512,6 +606,8 @@ pub(crate) fn before_loading() {
     static ONCE: Once = Once::new();
     let Some(guarded) = GUARDED.get() else { return };
     ONCE.call_once(|| {
+        let there = stored(&std::env::temp_dir()).to_string();
+        tell(&[&[LOADS], there.as_bytes(), &[LOADED]].concat());
         #[cfg(target_os = "linux")]
         {
             use rustix::process::Resource;
@@ -577,8 +673,12 @@ fn extend(resource: rustix::process::Resource, bytes: u64) {
 #[cfg(target_os = "linux")]
 fn in_use(kind: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix(kind));
-    let kilobytes =
-        line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
-    kilobytes.unwrap_or(1 << 20) << 10
+    kilobytes(&status, kind).unwrap_or(1 << 20) << 10
+}
+
+/// A number of /proc/…/status.
+#[cfg(target_os = "linux")]
+fn kilobytes(status: &str, kind: &str) -> Option<u64> {
+    let line = status.lines().find_map(|line| line.strip_prefix(kind))?;
+    line.trim().strip_suffix("kB")?.trim().parse().ok()
 }

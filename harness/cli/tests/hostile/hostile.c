@@ -1,6 +1,7 @@
 /* The FMU of model.c with a fault that harms its host, when it is loaded (-DAT_LOAD) or in its first
  * step (-DAT_STEP) or when a value is read (-DAT_GET; with NONE it is NaN then). -DHARM=… says which. */
 #define _GNU_SOURCE
+#include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
 #include <sys/mman.h>
@@ -16,7 +17,7 @@
 #undef fmi2DoStep
 #undef fmi2GetReal
 
-enum { EXIT = 1, ABORT, CRASH, LOOP, SLEEP, MEMORY, SHARED, STACK, DISK, PRINT, CHILDREN, STOP, FLUSH, NONE };
+enum { EXIT = 1, ABORT, CRASH, LOOP, SLEEP, MEMORY, SHARED, STACK, DISK, PRINT, CHILDREN, STOP, FLUSH, NONE, FILES, UNLINKED, MEMFD, SHM };
 
 static int deeper(int n)
 {
@@ -77,6 +78,30 @@ static void harm(void)
         exit(0);
     case STOP:
         raise(SIGSTOP);
+        break;
+    case FILES: /* many files, each within its limit */
+    case UNLINKED:
+    case MEMFD:
+    case SHM:
+        for (int n = 0; n < 1024; n++) {
+            char name[1000];
+            const char *folder = getenv("TMPDIR");
+            snprintf(name, sizeof name, "%s/%d", folder ? folder : "/tmp", n);
+            int file = HARM == MEMFD || HARM == SHM ? memfd_create("hoard", 0) : open(name, O_RDWR | O_CREAT, 0600);
+            for (int k = 0; k < 4; k++)
+                if (write(file, block, sizeof block) != sizeof block)
+                    abort();
+            if (HARM == SHM) {
+                volatile char sum = 0, *p = mmap(NULL, 4 << 20, PROT_READ, MAP_SHARED, file, 0);
+                for (int k = 0; k < 4 << 20; k += 4096)
+                    sum += p[k];
+            }
+            if (HARM == UNLINKED)
+                unlink(name);
+            else if (HARM != MEMFD)
+                close(file);
+            usleep(5000);
+        }
         break;
     case FLUSH:
 #if defined(__x86_64__)

@@ -372,6 +372,19 @@ fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says
 }
 
 #[test]
+fn temporary_files_and_shared_memory_count_against_the_budget() {
+    const FIRST: u32 = 15;
+    let sandbox = Sandbox::new();
+    for (harm, what) in (FIRST..).zip(["files", "unlinked files", "memfd", "mapped memory"]) {
+        std::fs::write(sandbox.path("a.fmu"), harmful(harm, "AT_STEP")).unwrap();
+        let run = ["run", "--memory", "48", "--profile", "zero", "--stop", "0.1"];
+        let said = sandbox.fails(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
+        assert!(said.contains("of the FMU take more than 48 MiB"), "{what}: {said}");
+        assert!(!sandbox.path("a.csv").exists(), "{what}");
+    }
+}
+
+#[test]
 fn what_loading_changes_for_the_host_is_told() {
     const FLUSH: u32 = 13;
     let sandbox = Sandbox::new();
