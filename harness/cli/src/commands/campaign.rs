@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use experiments::campaign::{Campaign, Folder};
+use experiments::campaign::{CURVES, Campaign, Folder};
 use experiments::plan::{self, Plan, Sweeps};
 use host::fmu::Fmu;
 use host::{budget, guard};
@@ -178,11 +178,13 @@ impl CampaignArgs {
 pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
     let cases = campaign.plan.cases(fmu.description())?;
     let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();
+    drop(cases);
     let columns = fmu.description().variables.iter().filter(|v| v.causality == "output").count();
     let jobs = budget::jobs(campaign.jobs, 0)?;
     let largest = rows.iter().max().copied().unwrap_or(0) * (columns + 20) * 8;
     // tables and the spectra made of them; what the report keeps of each run
-    guard::allow((jobs.min(rows.len()) * largest * 4 + rows.len() * (4 << 20)) as u64);
+    let kept = rows.len().min(CURVES) * (4 << 20) + rows.len() * (64 << 10);
+    guard::allow((jobs.min(rows.len()) * largest * 4 + kept) as u64);
     let bar = progress::of_runs()?;
     let results = campaign.execute(fmu, &folder, &|news| progress::show(&bar, news))?;
     bar.finish_and_clear();

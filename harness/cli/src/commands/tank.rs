@@ -136,7 +136,7 @@ impl TankArgs {
                 let found = data.capillarity.iter().flat_map(|found| &found.warnings);
                 // The table has them, and --parameters warns of its own.
                 let is_read = self.parameters.is_some() || !(self.json || self.out.is_some());
-                found.filter(|_| !is_read).for_each(|warning| terminal::warn(warning));
+                found.filter(|_| !is_read).for_each(terminal::warn);
                 if let Some(nu) = self.nu.filter(|_| !data.modes.is_empty()) {
                     let liquid = self.liquid();
                     data.damping = Some(damping_of(&tank, &data, nu, liquid).with_context(read)?);

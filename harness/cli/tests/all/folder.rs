@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use analysis::random::Random;
-use experiments::campaign::{Folder, MANIFEST};
+use experiments::campaign::{CURVES, Folder, MANIFEST};
 use host::output::sha256;
 use pack::packed_for_tests;
 
@@ -147,6 +147,35 @@ fn a_flipped_run_without_its_manifest_is_never_reused() {
     std::fs::remove_dir_all(directory.join("c/runs")).unwrap();
     successful(campaign(directory, plan));
     assert!(published(directory) == before);
+}
+
+#[test]
+fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
+    const RUNS: usize = CURVES + 10;
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let inertias: Vec<f64> = (0..RUNS).map(|i| 0.3 + i as f64 / 10_000.0).collect();
+    let plan = format!("profile = \"sine:duration=0.06\"\n[vary]\nhub.I = {inertias:?}\n");
+    successful(campaign(directory, &plan));
+    let rows = |name: &str| {
+        let mut reader = csv::Reader::from_path(directory.join("c").join(name)).unwrap();
+        reader.records().map(Result::unwrap).collect::<Vec<_>>()
+    };
+    let all = rows("runs.csv");
+    assert_eq!(all.len(), RUNS);
+    let report = std::fs::read_to_string(directory.join("c/report.html")).unwrap();
+    // every second run and the last
+    let words = format!("drawn of {} of the {RUNS} runs", RUNS / 2 + 1);
+    assert!(report.contains(&words), "{words}");
+    // a run without curves has the numbers that it has alone
+    let alone = format!("profile = \"sine:duration=0.06\"\n[vary]\nhub.I = [{:?}]\n", inertias[1]);
+    successful(campaign(directory, &alone));
+    let [one] = &rows("runs.csv")[..] else { panic!() };
+    let same = |row: &csv::StringRecord| {
+        // the last column is the plan's hash
+        row.iter().take(row.len() - 1).map(String::from).collect::<Vec<_>>()
+    };
+    assert!(all.iter().any(|row| same(row) == same(one)), "{one:?}");
 }
 
 #[test]

@@ -30,7 +30,8 @@ use signals::table;
 
 pub use self::folder::{Folder, MANIFEST};
 pub use self::outcome::{
-    Curve, Doubt, Estimate, History, Outcome, Passing, Range, Record, SloshPath, Totals, WAVE,
+    Curve, Doubt, Ending, Estimate, History, Outcome, Passing, Range, Record, SloshPath, Totals,
+    WAVE,
 };
 pub use self::rows::{FeatureRow, MadeFrom};
 use crate::plan::{Case, Plan};
@@ -125,10 +126,12 @@ pub struct Failure {
 pub struct Unanalysed {
     /// The run.
     pub case: Case,
-    /// Stored columns, thinned.
+    /// Stored columns, thinned; empty for most runs of a large campaign ([`keeps_curves`]).
     pub history: History,
-    /// Its last rows, as they are.
+    /// Its last rows, as they are; as `history`.
     pub tail: History,
+    /// The largest of its slosh angles, rad, and the angle's name; `None` if there are no such.
+    pub largest_angle: Option<(f64, String)>,
     /// It was not simulated but read.
     pub reused: bool,
 }
@@ -147,11 +150,34 @@ impl Results {
     }
 }
 
-/// Outcome of one run.
+/// Runs whose curves are kept for the report; of the others numbers alone. A campaign's memory does not
+/// grow with the curves of its runs.
+pub const CURVES: usize = 400;
+
+/// Whether the curves of run `i` of `runs` are kept: they are spread over the plan, and its last run
+/// is among them.
+pub fn keeps_curves(i: usize, runs: usize) -> bool {
+    i % runs.div_ceil(CURVES).max(1) == 0 || i + 1 == runs
+}
+
+/// What became of one run.
 enum Done {
     Analysed(Box<Outcome>),
     Unanalysed(Box<Unanalysed>),
     Failed(anyhow::Error),
+}
+
+impl Done {
+    fn without_curves(self) -> Done {
+        match self {
+            Done::Analysed(outcome) => Done::Analysed(Box::new(outcome.without_curves())),
+            Done::Unanalysed(mut run) => {
+                (run.history, run.tail) = Default::default();
+                Done::Unanalysed(run)
+            }
+            Done::Failed(error) => Done::Failed(error),
+        }
+    }
 }
 
 /// All that a campaign found.
@@ -203,8 +229,12 @@ impl Campaign {
                 watch(Progress::Note(format!("warning of run {}: {warning}", case.name)));
             }
         };
-        let done = |case| self.done(fmu, case, folder, watch, &warn);
-        let results: Result<Vec<Done>> = pool.install(|| cases.par_iter().map(done).collect());
+        let done = |(i, case)| {
+            let done = self.done(fmu, case, folder, watch, &warn)?;
+            Ok(if keeps_curves(i, cases.len()) { done } else { done.without_curves() })
+        };
+        let results: Result<Vec<Done>> =
+            pool.install(|| cases.par_iter().enumerate().map(done).collect());
 
         let mut collected = Results::default();
         for (case, done) in cases.into_iter().zip(results?) {
@@ -410,7 +440,13 @@ impl Campaign {
             let from = time.len().saturating_sub(2 * History::STRETCHES);
             let last: Vec<(&str, &[f64])> = columns.iter().map(|(n, v)| (*n, &v[from..])).collect();
             let tail = History::of(&time[from..], &last);
-            let run = Unanalysed { case: case.clone(), history, tail, reused };
+            let angles = columns.iter().filter(|(name, _)| is_slosh_angle(name));
+            let angles = angles.map(|(name, values)| {
+                (values.iter().fold(0.0, |most: f64, angle| most.max(angle.abs())), *name)
+            });
+            let largest = angles.max_by(|a, b| a.0.total_cmp(&b.0));
+            let largest_angle = largest.map(|(angle, name)| (angle, name.to_string()));
+            let run = Unanalysed { case: case.clone(), history, tail, largest_angle, reused };
             return Ok(Done::Unanalysed(Box::new(run)));
         }
         Ok(match Outcome::of(case, &run, &mut instance, &table, reused) {
@@ -465,5 +501,20 @@ impl Campaign {
         let header = [made_from, varied, header.clone()].concat();
         tables.push(("runs.csv", written(header, rows.collect::<Result<_>>()?)?));
         Ok(tables)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CURVES, keeps_curves};
+
+    #[test]
+    fn the_runs_with_curves_are_all_or_spread_over_the_plan_and_never_many() {
+        for runs in [1, 2, CURVES - 1, CURVES, CURVES + 1, 2 * CURVES + 7, 100_000] {
+            let kept: Vec<usize> = (0..runs).filter(|i| keeps_curves(*i, runs)).collect();
+            assert!(kept.len() <= CURVES + 1, "{runs}: {}", kept.len());
+            assert!(kept.len() == runs || 2 * kept.len() > CURVES, "{runs}: {}", kept.len());
+            assert_eq!((kept[0], kept[kept.len() - 1]), (0, runs - 1));
+        }
     }
 }

@@ -228,6 +228,37 @@ impl History {
     }
 }
 
+/// What is left at a run's end.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ending {
+    /// When the torque ends for good, s, if the run goes on after that: a manoeuvre.
+    pub manoeuvre: Option<f64>,
+    /// Largest |rate| after the manoeuvre, or in the last fifth of the run, rad/s.
+    pub rate: Option<f64>,
+    /// Largest |slosh_angle| there, rad.
+    pub slosh_angle: Option<f64>,
+}
+
+impl Ending {
+    fn of(history: &History) -> Ending {
+        let manoeuvre = manoeuvre(&history.curve("tau_cmd"));
+        let largest = |signal: &str| {
+            let curve = history.curve(signal);
+            let (first, last) = (curve.first()?.0, curve.last()?.0);
+            let from = manoeuvre.unwrap_or(first + 0.8 * (last - first));
+            let late = curve.iter().filter(|(t, _)| *t > from);
+            Some(late.fold(0.0, |most: f64, (_, value)| most.max(value.abs())))
+        };
+        Ending { manoeuvre, rate: largest("omega_imu"), slosh_angle: largest("slosh_angle") }
+    }
+}
+
+fn manoeuvre(torque: &Curve) -> Option<f64> {
+    let last = torque.iter().rposition(|(_, torque)| *torque != 0.0)?;
+    let (end, whole) = (torque.get(last + 1)?.0, torque.last()?.0);
+    (end < 0.9 * whole).then_some(end)
+}
+
 /// The path of the liquid surface's crest seen from above, in two short stretches of a run: time, s,
 /// and angles outwards and towards +θ, rad.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -283,7 +314,9 @@ pub struct Outcome {
     pub history: History,
     /// The crest's path seen from above.
     pub path: SloshPath,
-    /// Dominant force on the liquid if it was not weight ([`Range::without_weight`]).
+    /// What is left at its end.
+    pub ending: Ending,
+    /// What ruled the liquid where its weight did not ([`Range::without_weight`]).
     pub weightless: Option<String>,
     /// It was not simulated but read.
     pub reused: bool,
@@ -355,6 +388,11 @@ impl Estimate {
     fn with(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
         Estimate { deviation, deviations, ..self }
+    }
+
+    fn drop_curves(&mut self) {
+        self.response = FrequencyResponse::default();
+        self.deviation = Vec::new();
     }
 
     fn doubted(&mut self, doubt: Doubt) {
@@ -624,8 +662,10 @@ impl Outcome {
             profile.sweep()?.time_of(passing.rotary?.from?)
         });
         let frequency = linear.modes.first().map_or(1.0, |mode| mode.frequency);
+        let history = History::of(column("time"), &all);
         Ok(Outcome {
-            history: History::of(column("time"), &all),
+            ending: Ending::of(&history),
+            history,
             path: match case.recording {
                 Some(_) => SloshPath::default(),
                 None => SloshPath::of(table, onset, frequency),
@@ -643,6 +683,28 @@ impl Outcome {
             passing,
             reused,
         })
+    }
+
+    /// The run without its curves, which take a quarter of a megabyte; all numbers stay.
+    pub fn without_curves(mut self) -> Outcome {
+        (self.history, self.path) = Default::default();
+        if let Some(record) = &mut self.record {
+            record.spa.drop_curves();
+            record.h1.drop_curves();
+            record.rational.iter_mut().for_each(Estimate::drop_curves);
+            record.snr_over_band = Curve::new();
+            record.fit.iter_mut().for_each(|(_, coherence)| *coherence = Curve::new());
+        }
+        if let Some(passing) = &mut self.passing {
+            passing.rate.drop_curves();
+            passing.leakage = Vec::new();
+        }
+        self
+    }
+
+    /// Whether its curves are there ([`Outcome::without_curves`]).
+    pub fn has_curves(&self) -> bool {
+        !self.history.time.is_empty()
     }
 
     /// The estimate of a sweep that goes into `features.csv`, and its name: that of the demodulated

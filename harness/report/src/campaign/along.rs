@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 use super::colors;
 use super::figure::{Figure, Label, Panel, dots, line};
-use super::page::{Axis, Group, Page, best, distinct, exact_features, list_of, manoeuvre};
+use super::page::{Axis, Group, Page, best, distinct, exact_features, list_of};
 
 /// A quantity of a run: label, what it is, whether its axis is logarithmic, and a level to compare
 /// with.
@@ -137,19 +137,10 @@ fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     labels.into_iter().map(label).collect()
 }
 
-/// The largest of a signal at the end: after a manoeuvre, or in the last fifth of a run.
-pub(super) fn at_the_end(run: &Outcome, signal: &str) -> Option<f64> {
-    let curve = run.history.curve(signal);
-    let (first, last) = (curve.first()?.0, curve.last()?.0);
-    let from = manoeuvre(run).unwrap_or(first + 0.8 * (last - first));
-    let late = curve.iter().filter(|(t, _)| *t > from);
-    Some(late.fold(0.0, |most: f64, (_, value)| most.max(value.abs())))
-}
-
 /// Draws rate and slosh angle after the end of a manoeuvre's torque.
 pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
-    let rate = |run: &Outcome| Some(1e3 * at_the_end(run, "omega_imu")?);
-    let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
+    let rate = |run: &Outcome| Some(1e3 * run.ending.rate?);
+    let angle = |run: &Outcome| Some(run.ending.slosh_angle?.to_degrees());
     let title = format!("Residual motion after the manoeuvre, against {}", axis.name);
     let figure = small(
         page,
@@ -165,8 +156,8 @@ pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
 pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
     let radial = |run: &Outcome| Some(run.totals.peak_radial_angle.to_degrees());
     let tangential = |run: &Outcome| Some(run.totals.peak_slosh_angle.to_degrees());
-    let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
-    let rate = |run: &Outcome| at_the_end(run, "omega_imu");
+    let angle = |run: &Outcome| Some(run.ending.slosh_angle?.to_degrees());
+    let rate = |run: &Outcome| run.ending.rate;
     let title = format!("Slosh angles against {}", axis.name);
     let figure = small(
         page,

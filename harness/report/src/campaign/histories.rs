@@ -19,7 +19,7 @@ fn chosen<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
 
 /// Torque, rate, slosh angles and residual of some runs of a group.
 pub(super) fn history(page: &Page, group: &Group) -> Figure {
-    let runs = chosen(&group.runs);
+    let runs = chosen(&group.drawn);
     let mut traces = Vec::new();
     let panels = [
         "torque / N·m",
@@ -71,7 +71,7 @@ pub(super) fn after(page: &Page) -> Figure {
     let mut traces = Vec::new();
     let mut from = f64::INFINITY;
     for (i, group) in page.groups.iter().enumerate() {
-        let run = group.runs[group.runs.len() / 2];
+        let Some(run) = group.drawn.get(group.drawn.len() / 2) else { continue };
         from = from.min(manoeuvre(run).unwrap_or(f64::INFINITY));
         let name = format!("{}, {}", group.title(), page.name(run));
         for (p, (signal, scale)) in
@@ -99,7 +99,7 @@ pub(super) fn after(page: &Page) -> Figure {
 /// All runs of a plan over each other, if it has no axis to draw them along.
 pub(super) fn compared(page: &Page) -> Figure {
     let runs =
-        || page.groups.iter().flat_map(|group| group.runs.iter().map(move |run| (group, run)));
+        || page.groups.iter().flat_map(|group| group.drawn.iter().map(move |run| (group, run)));
     let signals = [
         ("omega_imu", "rate / (rad/s)", 1.0),
         ("slosh_angle", "tangential / deg", 1f64.to_degrees()),
@@ -147,7 +147,7 @@ pub(super) fn compared(page: &Page) -> Figure {
 /// The crest's path seen from above and over time, if the slosh leaves its plane.
 pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     let radial = |run: &Outcome| run.totals.peak_radial_angle;
-    let Some(last) = group.runs.iter().copied().max_by(|a, b| radial(a).total_cmp(&radial(b)))
+    let Some(last) = group.drawn.iter().copied().max_by(|a, b| radial(a).total_cmp(&radial(b)))
     else {
         return Vec::new();
     };
@@ -155,8 +155,8 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     if radial(last).is_nan() || radial(last) < rotary::LEAST {
         return Vec::new();
     }
-    let onset = group.runs.iter().find_map(|run| Some((*run, run.path.onset.as_ref()?)));
-    let planar = group.runs.iter().copied().take_while(|run| run.path.onset.is_none()).last();
+    let onset = group.drawn.iter().find_map(|run| Some((*run, run.path.onset.as_ref()?)));
+    let planar = group.drawn.iter().copied().take_while(|run| run.path.onset.is_none()).last();
     let mut parts: Vec<(String, &[[f64; 3]])> = Vec::new();
     if let (Some(planar), Some(_)) = (planar, onset) {
         parts.push((format!("planar, {}", page.name(planar)), &planar.path.largest));

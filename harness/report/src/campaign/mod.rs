@@ -129,7 +129,8 @@ fn bench_sections<'a>(
     let has_response = groups.iter().any(|group| group.band().is_some());
     let swept = groups.iter().any(|group| group.sweep.is_some());
     let axis = page.axis.as_ref();
-    let few = &groups[..groups.len().min(MOST_GROUPS)];
+    let few: Vec<&Group> =
+        groups.iter().filter(|group| !group.drawn.is_empty()).take(MOST_GROUPS).collect();
     let mut sections: Vec<(&str, Markup)> = Vec::new();
     let mut add = |all: Vec<Figure>| html! { @for figure in all { (figures.add(figure)) } };
 
@@ -150,8 +151,9 @@ fn bench_sections<'a>(
         first.push(histories::compared(page));
     }
     sections.push((if random { "What decides" } else { "In short" }, add(first)));
-    let histories =
-        |few: &[Group]| few.iter().map(|group| histories::history(page, group)).collect::<Vec<_>>();
+    let histories = |few: &[&Group]| {
+        few.iter().map(|group| histories::history(page, group)).collect::<Vec<_>>()
+    };
     if has_response {
         let responses = few.iter().filter(|g| g.band().is_some());
         let mut all: Vec<Figure> = responses.map(|g| responses::responses(page, g)).collect();
@@ -161,7 +163,7 @@ fn bench_sections<'a>(
         sections.push(("Frequency responses", add(all)));
     }
     sections.push(("The models beside the recordings", recordings::beside(results)));
-    sections.push(("Time histories", add(histories(few))));
+    sections.push(("Time histories", add(histories(&few))));
     if !random {
         let paths = few.iter().flat_map(|group| histories::paths(page, group));
         sections.push(("Rotary slosh", add(paths.collect())));
@@ -209,14 +211,18 @@ fn general_sections<'a>(
     figures: &mut Figures,
 ) -> Vec<(&'a str, Markup)> {
     let runs = &results.unanalysed;
+    let drawn = runs.iter().filter(|run| !run.history.time.is_empty());
     let content = html! {
-        @for run in runs.iter().take(MOST_GROUPS) {
+        @for run in drawn.take(MOST_GROUPS) {
             @for figure in general::run(fmu, &run.case.name, &run.history, &run.tail) {
                 (figures.add(figure))
             }
         }
         @if runs.len() > MOST_GROUPS {
-            p { "The first " (MOST_GROUPS) " of " (runs.len()) " runs." }
+            p {
+                @if runs.iter().all(|run| !run.history.time.is_empty()) { "The first " }
+                (MOST_GROUPS) " of " (runs.len()) " runs."
+            }
         }
     };
     vec![("Time histories", content)]
@@ -237,6 +243,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
     let groups = page.groups.iter().filter(|group| group.band().is_some());
     let result = result::sentence(page, results);
     let recorded = results.recordings();
+    let drawn = results.outcomes.iter().filter(|run| run.has_curves()).count();
     html! {
         h1 { @if plan.title.is_empty() { "A campaign" } @else { (plan.title) } }
         @if !result.is_empty() { p .result { (result) } }
@@ -246,6 +253,12 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
             }
             (runs(count - recorded)) " of the FMU " (fmu.model_name) " (version " (fmu.version)
             "), sampled at " (rate) " Hz: " (torques(results)) "."
+        }
+        @if drawn < results.outcomes.len() {
+            p {
+                "Responses and time histories are drawn of " (drawn) " of the "
+                (runs(results.outcomes.len())) ". Tables and figures of numbers have all of them."
+            }
         }
         div .cards { @for group in groups.take(2 * MOST_GROUPS) { (card(page, group)) } }
         @if !failures.is_empty() {

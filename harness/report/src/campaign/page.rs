@@ -18,12 +18,12 @@ pub(super) struct Group<'a> {
     /// Further differences from the other groups, such as `tank.d 111 mm`.
     pub others: Vec<String>,
     pub runs: Vec<&'a Outcome>,
+    /// Those of them whose curves are there.
+    pub drawn: Vec<&'a Outcome>,
     /// The sweep of its first run.
     pub sweep: Option<&'a Sweep>,
     /// Features of each run's exact linear response on the grid of its band.
     pub exact: Vec<Features>,
-    /// Exact linear response of the first run.
-    pub exact_response: FrequencyResponse,
 }
 
 impl Group<'_> {
@@ -42,6 +42,11 @@ impl Group<'_> {
 
     pub fn band(&self) -> Option<(f64, f64)> {
         band(self.runs[0])
+    }
+
+    /// The exact linear response of its first run, on the grid of its band.
+    pub fn exact_response(&self) -> FrequencyResponse {
+        exact_response(self.runs[0])
     }
 }
 
@@ -120,10 +125,14 @@ pub(super) fn band(run: &Outcome) -> Option<(f64, f64)> {
     }
 }
 
+fn exact_response(run: &Outcome) -> FrequencyResponse {
+    let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
+    run.linear.frequency_response(&grid)
+}
+
 /// Features of a run's exact linear response.
 pub(super) fn exact_features(run: &Outcome) -> Features {
-    let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
-    Features::of(&run.linear.frequency_response(&grid))
+    Features::of(&exact_response(run))
 }
 
 /// The unit of a variable, as it is printed.
@@ -224,12 +233,12 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
         let same = |g: &&mut Group| {
             g.model == run.range.model && (!one_fill || g.fill == run.range.fill) && g.others == key
         };
-        let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
-        let exact_response = run.linear.frequency_response(&grid);
-        let exact = Features::of(&exact_response);
+        let exact = exact_features(run);
+        let drawn = run.has_curves().then_some(run);
         match groups.iter_mut().find(same) {
             Some(group) => {
                 group.runs.push(run);
+                group.drawn.extend(drawn);
                 group.exact.push(exact);
             }
             None => {
@@ -238,9 +247,9 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
                     fill: run.range.fill.filter(|_| one_fill),
                     others: key,
                     runs: vec![run],
+                    drawn: drawn.into_iter().collect(),
                     sweep: sweep(run),
                     exact: vec![exact],
-                    exact_response,
                 });
             }
         }
@@ -255,10 +264,7 @@ pub(super) fn runs(count: usize) -> String {
 
 /// End time of the torque, s, if the run continues afterwards (a manoeuvre).
 pub(super) fn manoeuvre(run: &Outcome) -> Option<f64> {
-    let torque = run.history.curve("tau_cmd");
-    let last = torque.iter().rposition(|(_, torque)| *torque != 0.0)?;
-    let (end, whole) = (torque.get(last + 1)?.0, torque.last()?.0);
-    (end < 0.9 * whole).then_some(end)
+    run.ending.manoeuvre
 }
 
 /// A sentence that lists at most four of several things; nothing if there are none.

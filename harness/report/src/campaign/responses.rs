@@ -11,7 +11,7 @@ use super::page::{Axis, Group, MOST_CURVES, Page, best, cm, distinct, passing, z
 /// Magnitude and phase of every run of a group.
 pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     let mut traces = Vec::new();
-    let runs = group.runs.iter().filter_map(|run| Some((run, best(run)?)));
+    let runs = group.drawn.iter().filter_map(|run| Some((run, best(run)?)));
     let runs: Vec<_> = runs.take(MOST_CURVES).collect();
     let mut names = Vec::new();
     for (i, (run, (estimate, name))) in runs.iter().enumerate() {
@@ -30,7 +30,12 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
         }
     }
     if !page.plan.is_random() {
-        traces.extend(bode("exact, linear and viscous", colors::INK, "dot", &group.exact_response));
+        traces.extend(bode(
+            "exact, linear and viscous",
+            colors::INK,
+            "dot",
+            &group.exact_response(),
+        ));
     }
     let near = near(group);
     let panel = |y: &str| Panel { log_x: true, range: near, ..Panel::new("frequency / Hz", y) };
@@ -118,9 +123,9 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
             groups.sort_by_key(|group| group.runs[0].is_recording());
             let mut traces = Vec::new();
             for (i, group) in groups.iter().enumerate() {
-                let ends = distinct([group.runs.first(), group.runs.last()].into_iter().flatten().map(|r| r.case.name.as_str()));
+                let ends = distinct([group.drawn.first(), group.drawn.last()].into_iter().flatten().map(|r| r.case.name.as_str()));
                 for (k, name) in ends.iter().enumerate() {
-                    let run = group.runs.iter().find(|run| run.case.name == **name);
+                    let run = group.drawn.iter().find(|run| run.case.name == **name);
                     let Some((run, (estimate, _))) = run.and_then(|run| Some((run, best(run)?))) else { continue };
                     let doubted = if estimate.doubt.is_some() { " (not trusted)" } else { "" };
                     let name = format!("{}, {}{doubted}", group.model, page.name(run));
@@ -128,7 +133,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
                     traces.push(line(0, &name, colors::category(i), dash, &thinned(&zip(&estimate.response.frequency, &estimate.response.decibels()), true)));
                 }
             }
-            let exact = &groups[0].exact_response;
+            let exact = groups[0].exact_response();
             let exact = thinned(&zip(&exact.frequency, &exact.decibels()), true);
             traces.push(line(0, "exact, linear and viscous", colors::INK, "dot", &exact));
             let what = fill.map_or("any fill".into(), |fill| format!("{} cm fill", cm(fill)));
@@ -192,9 +197,9 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     let (mut panels, mut traces) = (Vec::new(), Vec::new());
     for (p, quantity) in quantities.iter().enumerate() {
         let rows: Vec<Vec<serde_json::Value>> =
-            group.runs.iter().map(|run| cells(&(quantity.of)(run), (from, to))).collect();
+            group.drawn.iter().map(|run| cells(&(quantity.of)(run), (from, to))).collect();
         let y: Vec<String> =
-            group.runs.iter().filter_map(|run| axis.of(run)).map(|x| x.to_string()).collect();
+            group.drawn.iter().filter_map(|run| axis.of(run)).map(|x| x.to_string()).collect();
         let mut trace = serde_json::json!({
             "type": "heatmap", "panel": p, "colorscale": "Viridis", "name": quantity.label,
             "x": numbers(grid.iter().copied()), "y": y, "z": rows, "hoverongaps": false,

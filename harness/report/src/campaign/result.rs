@@ -2,7 +2,6 @@
 
 use experiments::campaign::{Outcome, Results};
 
-use super::along::at_the_end;
 use super::draws::moments;
 use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre};
 use super::recordings;
@@ -318,7 +317,7 @@ fn left_behind(page: &Page) -> String {
     let of = |group: &Group| {
         let rates = group.runs.iter().filter_map(|run| {
             let x = page.axis.as_ref().and_then(|axis| axis.of(run));
-            Some((1e3 * at_the_end(run, "omega_imu")?, x))
+            Some((1e3 * run.ending.rate?, x))
         });
         let rates: Vec<(f64, Option<f64>)> = rates.collect();
         let most = rates.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -371,17 +370,9 @@ fn largest_angle(page: &Page) -> String {
 
 /// The largest slosh angle of runs of another FMU.
 fn elsewhere(results: &Results) -> String {
-    let angles = results.unanalysed.iter().flat_map(|run| {
-        let signals = run.history.signals.iter();
-        signals.filter(|(name, _)| experiments::campaign::is_slosh_angle(name)).map(
-            |(name, values)| {
-                (
-                    values.iter().fold(0.0, |most: f64, v| most.max(v.abs())),
-                    name.as_str(),
-                    run.case.name.as_str(),
-                )
-            },
-        )
+    let angles = results.unanalysed.iter().filter_map(|run| {
+        let (angle, signal) = run.largest_angle.as_ref()?;
+        Some((*angle, signal.as_str(), run.case.name.as_str()))
     });
     match angles.max_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((angle, signal, run)) if angle > 0.0 => finished(&[format!(

@@ -381,7 +381,7 @@ const STATEMENTS: &[Statement] = &[
             let resonance = group.exact[0].f_res?;
             let (mut near, mut all) = (0.0, 0.0);
             run.off_axis()?;
-            let passing = run.passing.as_ref()?;
+            let passing = run.passing.as_ref().filter(|_| run.has_curves())?;
             for (f, l) in passing.rate.response.frequency.iter().zip(&passing.leakage) {
                 let square = l * l;
                 all += square;
@@ -509,7 +509,7 @@ fn peak_acceleration(group: &Group, torque: f64, measured: f64) -> Option<Shown>
 /// Mean residual coherence of a run within 0.2 Hz of the linear resonance, and elsewhere.
 fn coherence_near_and_far(group: &Group, run: &Outcome) -> Option<(f64, f64)> {
     let resonance = group.exact[0].f_res?;
-    let (_, over_band) = run.record.as_ref()?.fit.as_ref()?;
+    let (_, over_band) = run.record.as_ref().filter(|_| run.has_curves())?.fit.as_ref()?;
     let (near, rest): (Vec<_>, Vec<_>) =
         over_band.iter().partition(|(f, _)| (f - resonance).abs() < 0.2);
     let values = |points: Vec<(f64, f64)>| points.iter().map(|(_, v)| *v).collect::<Vec<_>>();
