@@ -60,14 +60,14 @@ pub(crate) struct BobNow<T> {
 /// One bob: its parameters and the power series of its motion.
 #[derive(Clone, Debug)]
 pub struct Bob {
-    /// Which tank it is in and which mode of it it is, from 0.
+    /// Tank and mode of the bob, from 0.
     pub tank: usize,
     pub mode: usize,
     pub m: f64,
     pub l: f64,
     c: f64,
     k: f64,
-    /// Whether c depends on acceleration or amplitude; then as a series, and c p'.
+    /// True if c depends on acceleration or amplitude; c and c p' are then series.
     follows: bool,
     drag: Drag,
     dragged: Vector,
@@ -95,7 +95,7 @@ pub struct Bob {
     tension: Series,
     /// p.e
     height: Series,
-    /// Of the order at hand: what does not depend on [a; w'] of this order.
+    /// Terms of the present order that do not depend on [a; w'] of this order.
     turned: [[f64; 2]; 3],
     centripetal: Vec3,
     p_perp: Vec3,
@@ -233,7 +233,7 @@ impl Bob {
         self.drag.set_axial(N, x);
     }
 
-    /// Whether the drag depends on acceleration or amplitude.
+    /// Returns true if the drag depends on acceleration or amplitude.
     pub fn follows(&self) -> bool {
         self.follows
     }
@@ -384,7 +384,7 @@ impl Bob {
         [force, add(cross(constant(self.hinge), force), twist)]
     }
 
-    /// What the outputs need.
+    /// Values that the outputs need.
     pub fn now<T: Number>(&self) -> BobNow<T> {
         let [p, p_d, _] = self.state::<T>();
         let p_perp = self.perpendicular(p);

@@ -1,4 +1,4 @@
-//! What is in a tank that may drain: masses, lengths and heights follow the liquid that is left.
+//! Contents of a tank that may drain: masses, lengths and heights follow the remaining liquid.
 //!
 //! ```text
 //! f  outflow, kg/s: m_liq' = -f;  m_0 = m_liq - sum of m_n   every quantity of the tank's table by m_liq
@@ -76,7 +76,7 @@ pub struct MountedTank {
     axes: Mat3,
     e: Vec3,
     d: Vec3,
-    /// Whether there are planar modes, and their b, body axes.
+    /// True if there are planar modes; their b, body axes.
     planar: bool,
     across: [Option<Vec3>; MODES],
     /// The rigid liquid and all liquid at rest, where they are not alike all around the axis.
@@ -146,7 +146,7 @@ impl MountedTank {
         MountedTank { tank: *tank, curves, axes, e, d, planar: tank.is_planar(), across, uneven }
     }
 
-    /// Whether any mode's drag depends on acceleration or amplitude.
+    /// Returns true if any mode's drag depends on acceleration or amplitude.
     pub fn follows(&self) -> bool {
         (0..self.tank.modes).any(|n| self.tank.follows(n))
     }
@@ -357,7 +357,7 @@ impl MountedTank {
         }
     }
 
-    /// What the outputs need of the bobs.
+    /// Values of the bobs that the outputs need.
     pub fn bobs_now<T: Number>(&self, contents: &Contents<'_, T>) -> [Option<BobNow<T>>; MODES] {
         let axes: Mat3<T> = self.axes.map(constant);
         let mut bobs = [(); MODES].map(|()| None);
@@ -387,7 +387,7 @@ impl MountedTank {
         }
     }
 
-    /// Whether its liquid follows a table.
+    /// Returns true if the tank's liquid follows a table.
     pub fn drains(&self) -> bool {
         self.tank.fill.points > 0
     }
@@ -509,7 +509,7 @@ impl<T: Number> Contents<'_, T> {
 pub struct Outflow<'a> {
     pub mounted: &'a MountedTank,
     pub flow: Line,
-    /// Where the mass of liquid stands in the states.
+    /// Index of the mass of liquid in the states.
     pub at: usize,
     /// Number of the tank, from 1; 0: there is only one.
     pub tank: usize,
@@ -520,7 +520,7 @@ impl Outflow<'_> {
         liquid - self.flow.integral(t)
     }
 
-    /// Whether the flow can go on for `h`.
+    /// Refuses a flow that the liquid cannot sustain for `h`, s.
     pub fn check(&self, liquid: f64, h: f64) -> Result<(), StepError> {
         let Outflow { mounted, flow, tank, .. } = *self;
         let [Some(low), Some(high)] =
@@ -608,8 +608,8 @@ pub trait Drains<const D: usize>: System<D> + Sized {
     }
 }
 
-/// Whether a trial step of an extrapolation, too long for it, has left all that can be: rates would overflow. They
-/// need not go on for the step to be rejected.
+/// Returns true if a trial step of an extrapolation was so long that rates would overflow; the step is then rejected without
+/// evaluating them.
 pub fn has_diverged(x: &[f64]) -> bool {
     x.iter().any(|x| x.abs() > 1e50)
 }

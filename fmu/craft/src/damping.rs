@@ -24,7 +24,7 @@ use crate::parameters::{DampingLaw, Tank};
 /// A_0, rad.
 const SMALLEST: f64 = 1e-4;
 
-/// What one mode's drag follows from, in a tank whose contents stay.
+/// Data of one mode's drag in a tank with constant contents.
 #[derive(Clone, Debug)]
 pub struct Drag {
     law: DampingLaw,
@@ -64,7 +64,7 @@ fn exponent(law: DampingLaw) -> f64 {
 }
 
 impl Drag {
-    /// Of mode `n` of a tank.
+    /// Drag of mode `n` of a tank.
     pub fn new(tank: &Tank, n: usize) -> Drag {
         let (m, l) = (tank.mass[n], tank.length[n]);
         let floor = tank.smallest_acceleration();

@@ -29,7 +29,7 @@ use crate::rigid::{Factors, Mat6, Rigid};
 use crate::sizes::{MODES, TANKS};
 use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
 
-/// What acts from outside, as numbers of the wanted kind.
+/// Inputs of the craft over a number type.
 pub struct Acting<T> {
     pub force: Vec3<T>,
     /// tau - h_w'
@@ -175,7 +175,7 @@ impl Draining {
         })
     }
 
-    /// Whether the liquids are within their tables.
+    /// Refuses masses of liquid outside their tables.
     pub fn check(&self, x: &[f64; STATES]) -> Result<(), StepError> {
         self.outflows(&Default::default()).try_for_each(|flow| flow.check(x[flow.at], 0.0))
     }
@@ -217,7 +217,7 @@ impl Draining {
         }
     }
 
-    /// Of everything, J.
+    /// Total energy, J.
     fn energy(&self, state: &State) -> f64 {
         let acting = Acting::flowing(state.flow, [0.0; TANKS]);
         self.evaluate(&state.x, &acting).1.outputs(&state.x).energy

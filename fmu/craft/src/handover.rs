@@ -27,7 +27,7 @@ pub(crate) trait Carrier {
 
     fn lump(&self, lump: usize) -> &Lump;
 
-    /// What its liquid does.
+    /// State of the detached liquid.
     fn ball_state(&mut self, lump: usize) -> &mut BallState;
 
     /// Its six numbers among the states.
@@ -51,7 +51,7 @@ pub(crate) trait Carrier {
     /// a, w, w'
     fn motion(&self) -> [&Vector; 3];
 
-    /// Of the matrix with all that hangs on the carrier.
+    /// Factors of the mass matrix with everything attached to the carrier.
     fn factors(&self) -> &Factors;
 
     /// Energy dissipated since the start, J.
@@ -63,7 +63,7 @@ pub(crate) trait Carrier {
     /// Moves the carrier, if that can be.
     fn shift(&mut self, by: Vec3);
 
-    /// Whether the wall presses on the lump in its present state.
+    /// Returns true if the wall presses on the lump in its present state.
     fn is_pressed(&mut self, lump: usize, t: f64) -> bool;
 
     /// Does what is due.

@@ -77,7 +77,7 @@ const PRESSING: f64 = 1e-9;
 /// Square of the sine of 30 degrees: how far the pendulums may swing that take the liquid back.
 const SWING: f64 = 0.25;
 
-/// What happens to a tank's liquid.
+/// Event of a tank's liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
     /// It leaves the bottom.
@@ -101,7 +101,7 @@ pub(crate) type Directions = [Vec3; MODES];
 #[derive(Clone, Debug)]
 pub(crate) struct Lump {
     pub tank: usize,
-    /// What the motion has been arranged for.
+    /// State for which the motion has been set up.
     pub state: BallState,
     pub m: f64,
     restitution: f64,
@@ -155,7 +155,7 @@ pub(crate) struct Lump {
     u_turned: Vec3,
     /// Derivative of the shape's inertia J_a along the seeded direction, kg m2, body axes; 0 in an expansion over time.
     pub shape_slope: Mat3,
-    /// Of the order at hand: what does not depend on [a; w'] of this order.
+    /// Terms of the present order that do not depend on [a; w'] of this order.
     known_pull: f64,
     known_force: Vec3,
     known_specific: Vec3,
@@ -182,8 +182,8 @@ fn product(a: &Series, b: &Series, n: usize) -> f64 {
 }
 
 impl Lump {
-    /// Of the tank that is number `index`, from 0, with all that follows from its parameters; `None` where it has no
-    /// ball regime.
+    /// Lump of tank `index`, from 0, whose derived parameters are resolved; `None` without a
+    /// model of detached liquid.
     pub fn new(tank: &Tank, index: usize) -> Option<Lump> {
         let surface = tank.ball_surface()?;
         let axes = rotation(&unit_quaternion(tank.q));
@@ -252,12 +252,12 @@ impl Lump {
         })
     }
 
-    /// Where the settled liquid's centre is, and at rest; tank axes.
+    /// Position of the settled liquid's centre, at rest; tank axes.
     pub fn at_rest(&self) -> [f64; 6] {
         [0.0, 0.0, self.height - self.half, 0.0, 0.0, 0.0]
     }
 
-    /// Whether it is under way: the pendulums are not in use.
+    /// Returns true if the liquid is detached: the pendulums are not in use.
     pub fn is_loose(&self) -> bool {
         self.state != BallState::Settled
     }
@@ -285,7 +285,7 @@ impl Lump {
         })
     }
 
-    /// Where bob n is from O, with its rod along `p`, body axes.
+    /// Position of bob n from O, with its rod along `p`, body axes.
     fn bob_at(&self, n: usize, p: Vec3) -> Vec3 {
         add(self.hinges[n], scale(self.lengths[n], p))
     }
@@ -511,7 +511,7 @@ impl Lump {
         self.slides().then(|| (squared.recip() * self.m, along()))
     }
 
-    /// What the outputs need.
+    /// Values that the outputs need.
     pub fn now<T: Number>(&self) -> BobNow<T> {
         BobNow {
             m: T::constant(self.m),
@@ -525,7 +525,7 @@ impl Lump {
         }
     }
 
-    /// What an impulse of the craft does to its rate: in flight the lump keeps its velocity, on the wall across the normal.
+    /// Applies an impulse of the craft to the lump's rate: in flight the lump keeps its velocity, on the wall its velocity across the normal.
     pub fn after_impulse(&self, x: &mut [f64], dv: Vec3, dw: Vec3) {
         let mut kick = add(dv, cross(dw, self.rho[0]));
         if self.slides() {
@@ -557,7 +557,7 @@ impl Lump {
         (self.restitution, self.contact_speed)
     }
 
-    /// Whether something presses it to the wall.
+    /// Returns true if the lump is pressed to the wall.
     pub fn is_pressed(&self) -> bool {
         self.pull[0] > 0.0
     }
@@ -569,8 +569,8 @@ impl Lump {
         [[x, y, -libm::sqrt((1.0 - x * x - y * y).max(0.0))]; MODES]
     }
 
-    /// What the tank catches of its parts, which all move with `rate` against it, rods along `p`: the impulse on the craft, and
-    /// the bobs' rates p'.
+    /// Impulse on the craft when the tank catches the parts of the lump, and the bobs' rates p' afterwards. All parts move with `rate`
+    /// relative to the tank, rods along `p`.
     pub fn caught(&self, p: &Directions, rate: Vec3) -> ([Vec3; 2], Directions) {
         let mut impulse = scale(self.m_0, rate);
         let mut torque = cross(self.s, impulse);
@@ -641,7 +641,7 @@ impl Lump {
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
 
-    /// What happens next to the liquid, within `h` after the start of the expansion cut after order n, and when. `bobs` are
+    /// Next event of the liquid within `h` after the start of the expansion cut after order n, with its time. `bobs` are
     /// the tank's.
     pub fn next<'a>(
         &self,
@@ -743,7 +743,7 @@ impl Lump {
         if self.meets_wall([f, -2.0 * dot(g, x_d), -bent], x_2) { f } else { TOUCHING }
     }
 
-    /// Whether a host that has integrated up to here has passed an event, by its indicators here.
+    /// Returns true if a host that has integrated up to here has passed an event, by its indicators here.
     pub fn is_overdue(&self, [leaves, ends]: [f64; 2]) -> bool {
         // Past the nearest passage of the axis that indicator of a held lump stays below zero.
         leaves <= 0.0 || ends < 0.0 && self.state != BallState::Held
@@ -775,7 +775,7 @@ impl Lump {
         excess
     }
 
-    /// When it comes nearest to the tank's axis.
+    /// Time of the closest approach to the tank's axis.
     fn next_passage(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
         let across = |y: Vec3| sub(y, scale(dot(self.e, y), self.e));
@@ -800,7 +800,7 @@ impl Lump {
         if many == 0 { Some((0.0, Due::Settle)) } else { first.map(|t| (t, due)) }
     }
 
-    /// Whether the pendulums may take the liquid back at the start of the expansion.
+    /// Returns true if the pendulums may take the liquid back at the start of the expansion.
     pub fn may_settle(&self, a: &Vector, w: &Vector, w_d: &Vector) -> bool {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }

@@ -106,13 +106,13 @@ pub struct CraftMotion {
     pub bobs: Vec<Bob>,
     /// Bobs of the tanks whose liquid has left its bottom.
     parked: Vec<Bob>,
-    /// Of each tank with a ball regime.
+    /// Detached liquid of each tank that models it.
     pub lumps: Vec<Lump>,
-    /// Whether the liquid of any has left its bottom.
+    /// True if any liquid is detached.
     any_loose: bool,
-    /// What happens to the liquid of which lump at the end of the expansion.
+    /// Lump and event at the end of the expansion.
     due: Option<(usize, Due)>,
-    /// Whether any bob's drag follows the acceleration.
+    /// True if any bob's drag follows the acceleration.
     follows: bool,
     /// Craft and liquids at rest as one rigid body, and what of its motion is along each bob's tank (on a pivot of
     /// [a; torque], else of [force; torque]).
@@ -486,7 +486,7 @@ impl CraftMotion {
         }
     }
 
-    /// How far ahead the series of the pivot's dry friction reach, s.
+    /// Time over which the series of the pivot's dry friction are valid, s.
     #[inline(never)]
     fn reach_of_friction(&self) -> f64 {
         let about = |(i, rubbing): (usize, &Rubbing)| {

@@ -1,4 +1,4 @@
-//! What the craft shows at one instant, and its derivative along a direction.
+//! Outputs of the craft at one instant, and their derivatives along a direction.
 //!
 //! ```text
 //! P = C [ m V + w x S + sum of m (V + w x rho + l p') ]                          P' = C f
@@ -26,7 +26,7 @@ use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
 use crate::state::{BallState, Ranges, STATES, index};
 
-/// What one tank shows.
+/// Outputs of one tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TankOutputs {
     /// Force of the tank's whole liquid on the craft, N, body axes.
@@ -45,9 +45,9 @@ pub struct TankOutputs {
     pub wave_height: f64,
     /// Specific force along the tank's axis at the hinge of mode 1, m/s2; 0 without modes.
     pub axial: f64,
-    /// Where the pendulums stand for the liquid.
+    /// Ranges in which the pendulums represent the liquid.
     pub ranges: Ranges,
-    /// What the liquid does.
+    /// State of the detached liquid.
     pub ball_state: BallState,
     /// The lump's centre from the tank's origin, m, tank axes; while settled where the settled liquid's is at rest.
     pub ball_position: Vec3,
@@ -55,7 +55,7 @@ pub struct TankOutputs {
     pub ball_velocity: Vec3,
 }
 
-/// What the craft shows at one instant.
+/// Outputs of the craft at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outputs {
     /// Attitude, body to inertial, scalar first.
@@ -64,7 +64,7 @@ pub struct Outputs {
     pub omega: Vec3,
     /// Angular acceleration, rad/s2, body axes.
     pub omega_dot: Vec3,
-    /// What an accelerometer at O reads, m/s2, body axes.
+    /// Specific force at O as an accelerometer measures it, m/s2, body axes.
     pub specific_force: Vec3,
     /// Position of O, m, inertial (freely falling) axes.
     pub position: Vec3,
@@ -102,7 +102,7 @@ pub struct Outputs {
 }
 
 impl TankOutputs {
-    /// What a tank's modes show of their part of the states, or of a direction.
+    /// Outputs of a tank's modes from their part of the states, or of a direction.
     pub(crate) fn of_states(x: &[f64]) -> TankOutputs {
         let part = |n: usize, at: usize| {
             let at = 6 * n + at;
@@ -215,7 +215,7 @@ pub(crate) struct Now<T> {
     pub a: Vec3<T>,
     pub w: Vec3<T>,
     pub w_d: Vec3<T>,
-    /// Of O, body axes.
+    /// Velocity of O, body axes.
     pub velocity: Vec3<T>,
     pub h_wheels: Vec3<T>,
     /// Body to inertial.

@@ -1,4 +1,4 @@
-//! What describes the craft, its tanks and the start of its motion, and what of it is refused.
+//! Parameters of the craft, its tanks and the start of its motion, and the checks that refuse them.
 //!
 //! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
 
@@ -81,7 +81,7 @@ impl Craft {
     }
 }
 
-/// How the craft is held.
+/// Mounting of the craft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Mount {
@@ -97,7 +97,7 @@ impl Mount {
     pub const ALL: [Mount; 2] = [Mount::Free, Mount::Pivot];
 }
 
-/// How a mode's drag coefficient c follows its natural frequency w, and with it the acceleration along the tank.
+/// Dependence of a mode's drag coefficient c on its natural frequency w, and thus on the acceleration along the tank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum DampingLaw {
@@ -118,10 +118,10 @@ impl DampingLaw {
 /// The liquid as one lump that crosses the tank (`lump.rs`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
-    /// How far the liquid's centre is moved along the axis from the settled liquid's at the bottom to that at the top,
-    /// m. 0: no ball regime.
+    /// Distance along the axis from the settled liquid's centre at the bottom to that at the top,
+    /// m. 0: no model of detached liquid.
     pub travel: f64,
-    /// How far it gets from the axis, m; 0: as far as makes the surface's curvature at the bottom that of the pendulums'
+    /// Largest distance of the liquid's centre from the axis, m; 0 gives the surface the curvature at the bottom of the pendulums'
     /// common centre.
     pub radius: f64,
     /// Coefficient of restitution of an impact on the wall, 0 to 1.
@@ -175,13 +175,13 @@ pub struct Tank {
     pub i_0: f64,
     /// Its inertia about the axis, kg m2.
     pub i_z: f64,
-    /// How far its centre of mass is off the axis, x and y, m, tank axes.
+    /// Offset of its centre of mass from the axis, x and y, m, tank axes.
     pub r_0: [f64; 2],
-    /// By how much its inertia about the tank's y axis exceeds `i_0`, which then is that about x, kg m2.
+    /// Difference of its inertia about the tank's y axis from `i_0`, which is then that about x, kg m2.
     pub di_y: f64,
     /// Its products of inertia, elements xy, xz and yz, tank axes, kg m2.
     pub products: [f64; 3],
-    /// How many modes are kept, 0 to [`MODES`].
+    /// Number of modes, 0 to [`MODES`].
     pub modes: usize,
     /// Acceleration along the axis at which `zeta` holds, m/s2, > 0.
     pub g_ref: f64,
@@ -197,13 +197,13 @@ pub struct Tank {
     /// Direction in which the mode moves its mass, x and y, tank axes; normalised on reading. Where it is not 0, 0 the mode is
     /// planar: its bob swings in the plane of this direction and the tank's axis, and is held across.
     pub direction: [[f64; 2]; MODES],
-    /// How far that plane is off the tank's axis, m: the arm about it of a momentum in the direction.
+    /// Distance of that plane from the tank's axis, m: the arm of a momentum in the direction.
     pub arm: [f64; MODES],
     /// Centring stiffness (capillarity, diaphragm), N/m.
     pub k: [f64; MODES],
     /// Damping ratio at `g_ref`.
     pub zeta: [f64; MODES],
-    /// How it goes on from there.
+    /// Dependence of the damping on the acceleration.
     pub damping_law: DampingLaw,
     /// Acceleration along the axis, m/s2, around which the drag stops to follow it (`damping.rs`); 0: 1e-4 of
     /// `g_ref`.
@@ -212,14 +212,14 @@ pub struct Tank {
     pub zeta_amplitude: [f64; MODES],
     /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
-    /// How modes and rigid liquid follow the mass of liquid. With points in it the tank can drain, and
+    /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and
     /// m_0, h_0, i_0, i_z, mass, length and hinge are the table's.
     pub fill: FillTable,
     /// Mass of liquid at the start, kg, in a tank that can drain.
     pub liquid_0: f64,
     /// Height of the outlet on the tank's axis, m.
     pub outlet: f64,
-    /// Where the liquid leaves its bottom; of effect on a free craft.
+    /// Detached liquid; only on a free craft.
     pub ball: Ball,
     /// Direction from hinge to bob at the start, tank axes; normalised on reading.
     pub p_0: [Vec3; MODES],
@@ -299,18 +299,18 @@ impl Tank {
         own
     }
 
-    /// Whether the liquid moves alike in every direction across the axis.
+    /// Returns true if the liquid moves alike in every direction across the axis.
     pub(crate) fn is_axial(&self) -> bool {
         let rigid = self.r_0 == [0.0; 2] && self.di_y == 0.0 && self.products == [0.0; 3];
         rigid && !self.is_planar()
     }
 
-    /// Whether any mode is planar.
+    /// Returns true if any mode is planar.
     pub(crate) fn is_planar(&self) -> bool {
         self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
-    /// Whether its motion is extrapolated (`contents.rs`): it can drain or has planar modes.
+    /// Returns true if the motion is extrapolated (`contents.rs`): the tank can drain or has planar modes.
     pub(crate) fn is_extrapolated(&self) -> bool {
         self.fill.points > 0 || self.is_planar()
     }
@@ -404,7 +404,7 @@ impl Tank {
         if self.g_floor > 0.0 { self.g_floor } else { 1e-4 * self.g_ref }
     }
 
-    /// Whether the drag of mode n (from 0) depends on acceleration or amplitude.
+    /// Returns true if the drag of mode n (from 0) depends on acceleration or amplitude.
     pub(crate) fn follows(&self, n: usize) -> bool {
         let by_acceleration = self.damping_law != DampingLaw::Constant && self.zeta[n] > 0.0;
         by_acceleration || self.zeta_amplitude[n] > 0.0
@@ -417,7 +417,7 @@ impl Tank {
     }
 }
 
-/// Where the motion starts.
+/// Initial motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Init {
     /// Attitude, body to inertial, scalar first; normalised on reading.
@@ -435,17 +435,17 @@ pub struct Init {
 pub struct Parameters {
     /// The craft without its liquids.
     pub craft: Craft,
-    /// How it is held.
+    /// Mounting.
     pub mount: Mount,
     /// Gravity of mount [`Mount::Pivot`], m/s2, inertial axes. Of no effect on a free craft.
     pub gravity: Vec3,
-    /// What that mount does besides holding O. Of no effect on a free craft.
+    /// Stiffness, damping and friction of the pivot. Without effect on a free craft.
     pub pivot: Pivot,
-    /// How many tanks there are, 0 to [`TANKS`].
+    /// Number of tanks, 0 to [`TANKS`].
     pub tanks: usize,
     /// The tanks.
     pub tank: [Tank; TANKS],
-    /// Where the motion starts.
+    /// Initial motion.
     pub init: Init,
     /// The integrator's steps that one step may take, at least 1.
     pub max_steps: usize,
@@ -553,26 +553,23 @@ const HEAVIEST: f64 = 1e12;
 /// No length, speed or acceleration is larger.
 const FARTHEST: f64 = 1e9;
 
-/// What a principal moment may exceed the sum of the others by: a plate's, rounded to four digits.
+/// Largest ratio of a principal moment to the sum of the others: that of a plate, rounded to four digits.
 const PLATE: f64 = 1.0 + 1e-3;
 
 /// Tolerances that can be kept: from rounding to where error control has no meaning.
 const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 
-/// What is wrong with a tolerance, if anything.
+/// Error in a tolerance, if there is one.
 pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
     let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
     let is_wrong = !TOLERANCES.contains(&tolerance);
     is_wrong.then(|| format!("tolerance = {tolerance:?} (allowed: {low:?} to {high:?})"))
 }
 
-/// What is wrong with a bound on steps, if anything.
-/// The integrator's steps that one call may take, unless a parameter says otherwise: twelve modes need
-/// some seconds for them. It stops what would never end; what keeps any step below 0.1 s, 650 where twelve modes
-/// drain, would refuse single steps over minutes, which take thousands.
+/// Error in a bound on steps, if there is one.
 pub(crate) const MAX_STEPS: usize = 100_000;
 
-/// What one call may take.
+/// Limits of one call.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     /// Relative error.
@@ -769,7 +766,7 @@ impl Tank {
         }
     }
 
-    /// What is alike all around the axis does not go with what is not.
+    /// Reports parameters of axial symmetry combined with planar modes.
     fn find_axial_problems(&self, name: &str, problems: &mut Problems) {
         let uneven = [
             ("r_0", self.r_0 != [0.0; 2]),

@@ -1,4 +1,4 @@
-//! What a pivot does to the craft besides holding O: stiffness against tilt, damping and dry friction about each axis.
+//! Forces of a pivot other than holding O: stiffness against tilt, damping and dry friction about each axis.
 //!
 //! The pivot's axis is the inertial z axis; Z = C^T e_z is its direction in body axes, (0, 0, 1) for a craft that stands
 //! upright, and Z_y, -Z_x are its small angles of tilt about x and y.
@@ -37,7 +37,7 @@ pub struct Pivot {
 pub struct PivotFriction {
     /// Coulomb torque about each axis, N m.
     pub c: Vec3,
-    /// What the torque at rest exceeds it by, N m.
+    /// Excess of the static friction torque, N m.
     pub d: Vec3,
     /// Stribeck speed, rad/s, > 0.
     pub omega_s: f64,
@@ -52,7 +52,7 @@ impl Default for PivotFriction {
 }
 
 impl PivotFriction {
-    /// Whether there is any.
+    /// Returns true if there is dry friction.
     pub(crate) fn acts(&self) -> bool {
         self.c.iter().chain(&self.d).any(|torque| *torque > 0.0)
     }
@@ -68,7 +68,7 @@ impl PivotFriction {
 }
 
 impl Pivot {
-    /// Whether it does anything but hold O.
+    /// Returns true if the pivot does more than hold O.
     pub(crate) fn acts(&self) -> bool {
         let Pivot { k, c, friction } = *self;
         k != [0.0; 2] || c != [0.0; 3] || friction.acts()
@@ -161,7 +161,7 @@ impl Rubbing {
         (self.r[n], series::mul(n, &self.r, &self.w))
     }
 
-    /// How far ahead the series show what they hold, s, from w, w' and w''/2.
+    /// Time over which the series show all their terms, s, from w, w' and w''/2.
     ///
     /// tanh has its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and is so flat away from 0 that its
     /// coefficients there do not tell; half the way is safe. exp(-v^2), v = w/w_s, has none; beyond v = 3 no tolerance sees its
@@ -199,7 +199,7 @@ mod tests {
     const Z: Vec3 = [0.25, -0.5, 0.75];
     const W: Vec3 = [0.5, -1.0, 2.0];
 
-    /// By hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 + 5/16.
+    /// The values by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 + 5/16.
     #[test]
     fn torque_dissipation_and_energy_are_those_of_spring_and_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];

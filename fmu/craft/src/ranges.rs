@@ -1,4 +1,4 @@
-//! Where the pendulums stand for the liquid.
+//! Ranges in which the pendulums represent the liquid.
 //!
 //! Linear theory reaches as far as the wave at the wall stays low against the radius R of the free surface: below 0.15 R
 //! it holds, up to 0.25 R it is left, above forces are indications (Rubaga's thesis 2.3.5, after Dodge). R is that of
@@ -18,18 +18,18 @@ use crate::parameters::Tank;
 use crate::sizes::MODES;
 use crate::state::{BallState, Ranges};
 
-/// What a tank's ranges follow from. Of a tank that drains they are those of its contents at the start.
+/// Bounds of a tank's ranges. For a tank that drains they hold for its contents at the start.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,
     /// R, m; 0 where no wave is given.
     radius: f64,
-    /// What x is at least, per mode: less pulls the liquid off the bottom.
+    /// Lower bound of x, per mode: below it the liquid leaves the bottom.
     lowest: [f64; MODES],
 }
 
 impl Bounds {
-    /// Of a tank with all that follows from its parameters.
+    /// Bounds of a tank whose derived parameters are resolved.
     pub fn new(tank: &Tank) -> Bounds {
         Bounds {
             modes: tank.modes,
@@ -55,7 +55,7 @@ impl Bounds {
         Ranges { regime, in_range }
     }
 
-    /// Whether the tank is in its range, with the bobs' p_z and the specific force along it.
+    /// Returns true if the tank is in its range, with the bobs' p_z and the specific force along it.
     pub fn contain(&self, heights: [f64; MODES], axial: f64) -> bool {
         let held = self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest);
         held && self.are_upright(heights)

@@ -128,14 +128,14 @@ pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
 /// up to 1e12 kg and arms up to 1e9 m, is far from overflow.
 const LARGEST_INVERSE: f64 = 1e30;
 
-/// What is divided by at least, so that the factors of any matrix are finite. Its inverse is above
+/// Smallest divisor, so that the factors of any matrix are finite. Its inverse is above
 /// [`LARGEST_INVERSE`].
 const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
 
 /// A symmetric positive definite matrix as L D L^T, L with ones on its diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors<T = f64> {
-    /// What is below L's diagonal; the rest is not read.
+    /// Entries below L's diagonal; the rest is not read.
     l: Mat6<T>,
     /// 1/D
     inverse: [T; 6],

@@ -1,4 +1,4 @@
-//! How many of everything there can be: arrays have these lengths.
+//! Largest numbers of tanks and modes: the lengths of arrays.
 //!
 //! A variant with fewer tanks and modes is built with HUBSLOSH_TANKS and HUBSLOSH_MODES in the environment
 //! (`hubslosh pack --tanks 1 --modes 1`).

@@ -111,7 +111,7 @@ const DISSIPATED: usize = 6 * MODES;
 const LIQUID: usize = DISSIPATED + 1;
 const BALL: usize = LIQUID + 1;
 
-/// What `bias` and `added_mass` stand for.
+/// Meaning of `bias` and `added_mass`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Coupling {
@@ -135,7 +135,7 @@ impl Coupling {
 pub struct TankParameters {
     /// The tank; position and attitude are against the host's O and axes.
     pub tank: Tank,
-    /// What the host does with `bias` and `added_mass`.
+    /// Use of `bias` and `added_mass` by the host.
     pub coupling: Coupling,
     /// The host's mass properties without this tank: for [`SloshTank::coupling_ratio`], and what impulses of a tank with a
     /// ball regime do, which has to know them.
@@ -172,7 +172,7 @@ impl TankParameters {
         problems
     }
 
-    /// What a ball regime does not go with on somebody else's craft.
+    /// Lists settings that cannot be combined with detached liquid on a host.
     fn ball_problems(&self) -> Vec<&'static str> {
         let drains = self.tank.fill.points > 0;
         let all = [
@@ -234,7 +234,7 @@ impl TankInputs {
     }
 }
 
-/// What the tank shows at one instant.
+/// Outputs of the tank at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SloshTankOutputs {
     /// Force and torque about O on the host, and the modes.
@@ -265,7 +265,7 @@ pub struct TankState {
     x: [f64; TANK_STATES],
     /// Ranges of the motion since the last event, for hosts that integrate themselves.
     ranges: Ranges,
-    /// What the liquid does.
+    /// State of the detached liquid.
     ball: BallState,
     /// [`SloshTankOutputs::impulse`].
     impulse: [f64; 6],
@@ -275,7 +275,7 @@ impl TankState {
     /// Length of the flat form.
     pub const WORDS: usize = Self::REALS + 2;
 
-    /// How many of the words are real numbers; ranges and state of the liquid follow.
+    /// Number of words that are real numbers; ranges and state of the liquid follow.
     const REALS: usize = 7 + TANK_STATES;
 
     /// The state as plain words, for saving.
@@ -322,7 +322,7 @@ struct TankMotion {
     ball: Option<Loose>,
 }
 
-/// What a tank with a ball regime has besides.
+/// Additional data of a tank that models detached liquid.
 #[derive(Clone, Debug)]
 struct Loose {
     lump: Lump,
@@ -331,11 +331,11 @@ struct Loose {
     /// The host without the tank, and the factors of its matrix with all of the tank that hangs on it.
     host: Rigid,
     factors: Factors,
-    /// What impulses have changed w by that the host does not know yet.
+    /// Change of w by impulses that the host does not know yet.
     turned: Vec3,
     /// The rest of the forces on the host, from before the first change within a step.
     rest: Option<[Vec3; 2]>,
-    /// What happens at the end of the expansion.
+    /// Event at the end of the expansion.
     due: Option<Due>,
     /// 1 over what is allowed of the lump's u.
     inv_allowed: f64,
@@ -617,7 +617,7 @@ impl TankMotion {
         rate
     }
 
-    /// What the outputs follow from, of coefficients 0 and 1.
+    /// Inputs of the outputs, from coefficients 0 and 1.
     fn parts<T: Number>(&self) -> Parts<T> {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
@@ -782,7 +782,7 @@ impl TankMotion {
         }
     }
 
-    /// What the liquid does.
+    /// State of the detached liquid.
     fn state_of_ball(&self) -> BallState {
         if self.ball.is_some() { self.state.ball } else { BallState::Settled }
     }
@@ -884,7 +884,7 @@ impl Carrier for TankMotion {
 }
 
 impl TankMotion {
-    /// What bobs and lump keep of their velocities when the host's are changed, after [`Motion::start`].
+    /// Updates the rates of bobs and lump, which keep part of their velocities when the host's change, after [`Motion::start`].
     fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
         for bob in &self.bobs {
             let at = 6 * bob.mode;
@@ -896,7 +896,7 @@ impl TankMotion {
     }
 }
 
-/// What the outputs follow from.
+/// Quantities that the outputs are computed from.
 struct Parts<T> {
     /// a, w, w'
     motion: [Vec3<T>; 3],
@@ -1079,17 +1079,17 @@ impl SloshTank {
         self.motion.state.ranges
     }
 
-    /// Whether the tank has a ball regime.
+    /// Returns true if the tank models detached liquid.
     pub fn has_ball(&self) -> bool {
         self.motion.ball.is_some()
     }
 
-    /// Whether its liquid is not at its bottom.
+    /// Returns true if the liquid is detached.
     pub fn has_lump(&self) -> bool {
         self.motion.state_of_ball() != BallState::Settled
     }
 
-    /// Whether the motion is in the tank's range at the end of the step that it has made last, `h` long; a ball regime has none.
+    /// Returns true if the motion is in the tank's range at the end of its last step, `h` long; detached liquid has no range.
     pub fn is_in_range_after(&self, inputs: &TankInputs, h: f64) -> bool {
         let TankMotion { state, bobs, ball, .. } = &*self.motion;
         if ball.is_some() {
@@ -1136,14 +1136,14 @@ impl SloshTank {
         Ok(changed)
     }
 
-    /// What the tank shows now, under the inputs' present values.
+    /// Outputs of the tank under the inputs' present values.
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let mut outputs = self.outputs_held(inputs);
         outputs.tank.ranges = self.bounds.of(&outputs.tank);
         outputs
     }
 
-    /// As [`SloshTank::outputs`], with the ranges as the last event has left them.
+    /// [`SloshTank::outputs`] with the ranges as the last event left them.
     pub fn outputs_held(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let x = self.motion.state.x;
         if let Some(mounted) = &self.draining {
@@ -1229,7 +1229,7 @@ impl SloshTank {
         self.motion.state.x
     }
 
-    /// As [`SloshTank::continuous_states`], without a copy.
+    /// [`SloshTank::continuous_states`] without a copy.
     pub fn borrow_states(&self) -> &[f64; TANK_STATES] {
         &self.motion.state.x
     }
@@ -1293,7 +1293,7 @@ impl SloshTank {
         self.output_derivatives(inputs, &dx, &du)
     }
 
-    /// What an impulse of the host does to the bobs, whose velocities across their rods stay: O
+    /// Applies an impulse of the host to the bobs, whose velocities across their rods stay: O
     /// changes its velocity by `dv`, m/s, and the host its rate by `dw`, rad/s, host axes.
     pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, .. } = &mut *self.motion;

@@ -24,7 +24,7 @@ pub struct Spacecraft {
     /// Equations with draining tanks or planar modes, if there are any.
     draining: Option<Box<Draining>>,
     limits: Limits,
-    /// Of the tanks in use.
+    /// Bounds of the tanks in use.
     bounds: Vec<ranges::Bounds>,
 }
 
@@ -141,7 +141,7 @@ impl Spacecraft {
         done
     }
 
-    /// What the craft shows now, under the inputs' present values; a jump of `h_wheels` or
+    /// Outputs of the craft under the inputs' present values; a jump of `h_wheels` or
     /// `mass_flow` since the last step has had its effect.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.motion.state;
@@ -164,7 +164,7 @@ impl Spacecraft {
         self.motion.state.ranges
     }
 
-    /// Whether a tank without a ball regime is out of its range.
+    /// Returns true if a tank without a model of detached liquid is out of its range.
     pub fn leaves_range(&self, ranges: &[Ranges; TANKS]) -> bool {
         (0..TANKS).any(|i| !ranges[i].in_range && !self.has_ball(i))
     }
@@ -173,7 +173,7 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.tank == tank)
     }
 
-    /// Whether every tank without a ball regime is in its range after a step, of the liquid's directions then and the accelerations in it.
+    /// Returns true if every tank without a model of detached liquid is in its range after a step, judged by the liquid's directions at its end and the accelerations during it.
     pub fn is_in_range(&self) -> bool {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
@@ -194,7 +194,7 @@ impl Spacecraft {
         }
     }
 
-    /// As [`Spacecraft::outputs`], with the states as the last step or event has left them.
+    /// [`Spacecraft::outputs`] with the states as the last step or event left them.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
@@ -214,7 +214,7 @@ impl Spacecraft {
         self.motion.state.x
     }
 
-    /// As [`Spacecraft::continuous_states`], without a copy.
+    /// [`Spacecraft::continuous_states`] without a copy.
     pub fn borrow_states(&self) -> &[f64; STATES] {
         &self.motion.state.x
     }
@@ -267,7 +267,7 @@ impl Spacecraft {
         self.motion.now::<Dual>().outputs(dx)
     }
 
-    /// Of a craft that drains.
+    /// Derivatives of a craft that drains.
     fn along(
         &self,
         inputs: &Inputs,
@@ -296,7 +296,7 @@ impl Spacecraft {
         draining.set_flow(&mut self.motion.state, &inputs.mass_flow) || turned
     }
 
-    /// Whether the liquid of a tank with a ball regime is not at its bottom.
+    /// Returns true if liquid of any tank is detached.
     pub fn has_lump(&self) -> bool {
         let CraftMotion { lumps, state, .. } = &*self.motion;
         !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)
@@ -334,7 +334,7 @@ impl Spacecraft {
         Ok(changed)
     }
 
-    /// Whether the mass of liquid that the host has integrated is within the tanks' tables.
+    /// Refuses masses of liquid, integrated by the host, outside the tanks' tables.
     pub fn check_liquids(&self) -> Result<(), StepError> {
         let x = &self.motion.state.x;
         self.draining.as_ref().map_or(Ok(()), |it| it.check(x))

@@ -35,12 +35,12 @@ pub mod index {
     /// tanks with a ball regime.
     pub const BALLS: usize = DRAINED + 1;
 
-    /// Where position and rate of a lump begin; tank from 0.
+    /// Index of a lump's position and rate; tank from 0.
     pub const fn ball(tank: usize) -> usize {
         BALLS + 6 * tank
     }
 
-    /// Where direction and rate of a bob begin; tank and mode from 0.
+    /// Index of a bob's direction and rate; tank and mode from 0.
     pub const fn bob(tank: usize, mode: usize) -> usize {
         BOBS + 6 * (tank * MODES + mode)
     }
@@ -58,7 +58,7 @@ pub type Ramp = taylor::ramp::Ramp<Vec3>;
 /// A number that is linear in time: `value + slope t`.
 pub type Line = taylor::ramp::Ramp;
 
-/// What acts on the craft from outside over one step; body axes.
+/// Inputs of the craft over one step; body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Inputs {
     /// Force at O, N. On a pivot the bearing takes it.
@@ -77,9 +77,9 @@ pub struct Inputs {
 /// The ranges that a tank's motion is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ranges {
-    /// How high the wave is.
+    /// Amplitude class of the wave.
     pub regime: Regime,
-    /// Whether the liquid is held at the tank's bottom, and every bob within 45 degrees of the axis.
+    /// True if the liquid is held at the tank's bottom, and every bob is within 45 degrees of the axis.
     pub in_range: bool,
 }
 
@@ -90,7 +90,7 @@ impl Default for Ranges {
 }
 
 impl Ranges {
-    /// As a word, for saving.
+    /// Returns the ranges as a word, for saving.
     pub(crate) fn to_word(self) -> u64 {
         self.regime as u64 | u64::from(self.in_range) << 8
     }
@@ -105,7 +105,7 @@ impl Ranges {
     }
 }
 
-/// What a tank's liquid does.
+/// State of a tank's liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum BallState {
@@ -144,7 +144,7 @@ pub struct State {
     pub(crate) flow: [f64; TANKS],
     /// Ranges of the tanks' motion since the last event, for hosts that integrate themselves.
     pub(crate) ranges: [Ranges; TANKS],
-    /// What the tanks' liquids do.
+    /// States of the tanks' liquids.
     pub(crate) ball: [BallState; TANKS],
 }
 
@@ -152,7 +152,7 @@ impl State {
     /// Length of the flat form.
     pub const WORDS: usize = Self::REALS + 2 * TANKS;
 
-    /// How many of the words are real numbers; the ranges follow.
+    /// Number of words that are real numbers; the ranges follow.
     const REALS: usize = 4 + TANKS + STATES;
 
     /// The wheels' momentum that the motion has taken account of, N m s.
@@ -200,7 +200,7 @@ impl State {
     }
 }
 
-/// Whether a quaternion or a vector can be normalised.
+/// Returns true if a quaternion or a vector can be normalised.
 pub(crate) fn has_direction(x: &[f64]) -> bool {
     x.iter().any(|x| x.abs() > 1.0 / MAX_MAGNITUDE)
 }

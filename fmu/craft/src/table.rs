@@ -1,5 +1,5 @@
-//! How a tank's modes and rigid liquid follow the mass of its liquid: a table, and between its points
-//! monotone interpolation with two continuous derivatives, so that the forces of what flows have no steps.
+//! Table of a tank's modes and rigid liquid over the mass of its liquid, with
+//! monotone interpolation of two continuous derivatives, so that the forces of flowing liquid have no steps.
 //!
 //! ```text
 //! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   H_0, I_0, I_z
@@ -24,7 +24,7 @@ pub(crate) const LIGHTEST: f64 = 1e-9;
 /// Modes and rigid liquid at some masses of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FillTable {
-    /// How many points are used: 0 for a tank whose liquid stays, or 2 to [`POINTS`].
+    /// Number of points: 0 for a tank whose liquid stays, or 2 to [`POINTS`].
     pub points: usize,
     /// Mass of the whole liquid, kg, rising.
     pub liquid: [f64; POINTS],
@@ -54,7 +54,7 @@ impl FillTable {
         curves.mode(n, curves.place(liquid)).map(|jet| jet[0])
     }
 
-    /// What a tank with these modes computes with while it drains.
+    /// Interpolated curves of a tank with these modes while it drains.
     pub(crate) fn curves(&self, modes: usize) -> FillCurves {
         let curve = |y: [f64; POINTS]| Curve::new(self.masses(), y);
         let of_mode = |n: usize| {
@@ -124,7 +124,7 @@ pub(crate) struct FillCurves {
     modes: [ModeCurves; MODES],
 }
 
-/// Where a mass of liquid is in a table: interval, place in it from 0 to 1, and its width.
+/// Position of a mass of liquid in a table: interval, position in it from 0 to 1, and its width.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<T> {
     liquid: T,

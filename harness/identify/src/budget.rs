@@ -303,7 +303,7 @@ fn modes(
     None
 }
 
-/// What tolerances add to the covariance of x.
+/// Contribution of tolerances to the covariance of x.
 pub fn of_tolerances(effects: &[Effect], n: usize) -> DMatrix<f64> {
     let each = effects.iter().filter(|effect| effect.tolerance).map(|e| &e.x * e.x.transpose());
     each.fold(DMatrix::zeros(n, n), |sum, one| sum + one)

@@ -41,7 +41,7 @@ fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| v[i] + 2.0 * outer[i])
 }
 
-/// What has come in, and how large everything has been.
+/// Accumulated inputs, and the largest size of every quantity.
 struct Balance {
     start: Outputs,
     impulse: [f64; 3],

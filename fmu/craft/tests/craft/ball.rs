@@ -321,7 +321,7 @@ fn a_ball_regime_whose_liquid_stays_changes_no_bit() {
     );
 }
 
-/// What follows from Newton's laws with the wall's force as an unknown.
+/// Solution of Newton's laws with the wall's force as an unknown.
 struct Rates {
     a: V,
     w_d: V,

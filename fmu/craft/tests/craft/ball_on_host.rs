@@ -116,7 +116,7 @@ impl Craft {
         (self.taken, self.impulses) = (impulse, self.impulses + 1);
     }
 
-    /// What a Spacecraft shows in the same state.
+    /// Outputs of a Spacecraft in the same state.
     pub(super) fn shown(&self, u: &Inputs) -> Outputs {
         let spacecraft = Spacecraft::new(&self.p, u, 0.0, 1e-12).unwrap();
         let tank = self.tank.continuous_states();

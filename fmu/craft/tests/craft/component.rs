@@ -1,3 +1,3 @@
-//! What is under test. `tests/six` has the packed FMUs in its place.
+//! The components under test.
 
 pub use craft::{SloshTank, Spacecraft};

@@ -84,7 +84,7 @@ pub fn after(u: &Inputs, t: f64) -> Inputs {
     }
 }
 
-/// What comes in by force, torque and the flows: P' and H' about the inertial origin.
+/// Inflow by force, torque and the flows: P' and H' about the inertial origin.
 fn rates(p: &Parameters, u: &Inputs, out: &Outputs) -> [V; 2] {
     let turn = attitude(&out.q);
     let (force, r) = (turn * v(&u.force.value), v(&out.position));
@@ -392,7 +392,7 @@ fn energy_is_kept_while_tanks_drain() {
     }
 }
 
-/// What flows within gets its momentum from the craft, not out of nothing.
+/// Liquid that flows inside the craft gets its momentum from the craft.
 #[test]
 fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
     for seed in 0..6 {

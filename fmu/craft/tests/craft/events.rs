@@ -104,7 +104,7 @@ enum Mode {
     Light,
 }
 
-/// What the liquid's centre does in the tank, body axes: from the wall's centre, its rate, the gradient D x, and f.
+/// Motion of the liquid's centre in the tank, body axes: position from the wall's centre, rate, gradient D x, and f.
 struct InTank {
     x: V,
     rate: V,
@@ -379,7 +379,7 @@ impl Simulator<'_> {
         self.y[DISSIPATED] += (1.0 - e * e) * mu * approach * approach / 2.0;
     }
 
-    /// What hosts are compared with: rate, the liquid's place and rate in the tank (tank axes), velocity of O, energy dissipated.
+    /// Compared quantities of hosts: rate, the liquid's position and rate in the tank (tank axes), velocity of O, dissipated energy.
     fn shown(&self) -> Shown {
         let tank = &self.case.p.tank[0];
         let axes = rotation(&tank.q).inverse();

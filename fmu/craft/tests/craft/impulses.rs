@@ -10,7 +10,7 @@ use super::random::Random;
 
 type V = Vector3<f64>;
 
-/// Where the bob is from the host's O, and its rate on the rod, with `liquid` in the tank: l, rho, axes.
+/// Position of the bob from the host's O, and its rate on the rod, with `liquid` in the tank: l, rho, axes.
 fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
     let drains = tank.fill.points > 0;
     let [_, l, h] =
@@ -109,7 +109,7 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_craft_that_has_drained_an
     assert!(by_rods > 1e3 * h, "{by_rods:e} J");
 }
 
-/// What a host that integrates itself makes of the mass of liquid is held against the table.
+/// The table bounds the mass of liquid that a host integrates.
 #[test]
 fn liquids_beyond_their_tables_are_refused() {
     let mut random = Random::new(1);
@@ -141,7 +141,7 @@ fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
     enough
 }
 
-/// Of a tank that stays and one that drains, at the tolerances 1e-5 and 1e-10 each: alone and on a craft.
+/// Internal steps of a tank that stays and one that drains, at the tolerances 1e-5 and 1e-10 each: alone and on a craft.
 /// More would be slower, fewer less exact.
 const STEPS: [[[usize; 2]; 4]; 2] =
     [[[16, 6], [31, 12], [19, 10], [27, 13]], [[8, 7], [16, 13], [18, 8], [23, 15]]];

@@ -20,7 +20,7 @@ fn rotation(q: &[f64]) -> Rotation3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
 }
 
-/// What follows from the system's solution; body axes.
+/// Solution of the system of equations; body axes.
 struct Solution {
     a: V,
     w_d: V,
@@ -127,7 +127,7 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
     2.0 * m * w(above) * (zeta + tank.zeta_amplitude[n] * amplitude)
 }
 
-/// What one gets wrong.
+/// Deliberate mistakes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mistake {
     Nothing,

@@ -243,7 +243,7 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
     }
 }
 
-/// What followed continuously is no jump.
+/// A continuous change is not a jump.
 #[test]
 fn followed_wheels_give_no_impulse() {
     let p = Parameters::default();
@@ -390,8 +390,8 @@ fn every_problem_with_the_parameters_is_returned() {
     assert!(problems[1].starts_with("host.mass = -1.0"));
 }
 
-/// Of the principal moments of a body none exceeds the sum of the others: neither one that stands in the diagonal nor one
-/// that rotated axes hide. A plate has the sum itself, and numbers of four digits.
+/// No principal moment of a body exceeds the sum of the others, whether it stands in the diagonal or
+/// rotated axes hide it. A plate has the sum itself, and numbers of four digits.
 #[test]
 fn principal_moments_that_no_body_has_are_refused() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {

@@ -1,4 +1,4 @@
-//! What must hold of the craft and of the tank alone.
+//! Tests of the craft and of the tank alone.
 //!
 //! `tests/six`, at the root of the project, runs most of these once more through the packed FMUs,
 //! and has the coupling by co-simulation.

@@ -200,7 +200,7 @@ pub fn slosh_tank(record: &Value, tolerance: f64) -> SloshTank {
     SloshTank::new(&tank_parameters(record), &TankInputs::default(), 0.0, tolerance).unwrap()
 }
 
-/// How many communication steps a record has, and how many lie between two samples.
+/// Number of communication steps of a record, and number between two samples.
 pub fn steps(record: &Value) -> (usize, usize) {
     let whole = |t: f64| (t / STEP).round() as usize;
     (whole(number(&record["t_end"])), whole(number(&record["dt"])))

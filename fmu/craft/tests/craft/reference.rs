@@ -27,7 +27,7 @@ impl Deviations {
         assert_eq!(*scale, largest);
     }
 
-    /// What is beyond the digits that the record promises for a signal. The record's numbers
+    /// Differences beyond the digits that the record promises for a signal. The record's numbers
     /// are rounded to 14 digits, which `digits_of` includes.
     fn excess(&self, record: &Value) -> Vec<String> {
         let name = record["name"].as_str().unwrap();

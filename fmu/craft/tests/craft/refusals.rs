@@ -5,7 +5,7 @@ use craft::{Inertia, Inputs, MODES, Mount, POINTS, Parameters, Spacecraft, Tank,
 /// A parameter: its name in messages, its place, its range.
 type Number = (&'static str, fn(&mut Parameters) -> &mut f64, f64, f64);
 
-/// Of any craft.
+/// Numbers of any craft.
 const NUMBERS: [Number; 22] = [
     ("craft.mass", |p| &mut p.craft.mass, 1e-9, 1e12),
     ("craft.r[3]", |p| &mut p.craft.r[2], -1e9, 1e9),
@@ -31,14 +31,14 @@ const NUMBERS: [Number; 22] = [
     ("tank[1].p_dot_0[2][3]", |p| &mut p.tank[0].p_dot_0[1][2], -1e9, 1e9),
 ];
 
-/// Of a tank by its dimensions.
+/// Numbers of a tank given by its dimensions.
 const CYLINDER: [Number; 3] = [
     ("tank[1].diameter", |p| &mut p.tank[0].diameter, 1e-6, 1e3),
     ("tank[1].depth", |p| &mut p.tank[0].depth, 1e-3, 1e3),
     ("tank[1].density", |p| &mut p.tank[0].density, 1e-3, 1e5),
 ];
 
-/// Of a tank that can drain.
+/// Numbers of a tank that can drain.
 const FILL: [Number; 6] = [
     ("tank[1].fill.H_0[2]", |p| &mut p.tank[0].fill.h_0[1], -1e9, 1e9),
     ("tank[1].fill.I_0[1]", |p| &mut p.tank[0].fill.i_0[0], 0.0, 1e12),
@@ -57,7 +57,7 @@ fn craft() -> Parameters {
     p
 }
 
-/// What is said of that parameter with `value` for it.
+/// Message for that parameter with this `value`.
 fn said(p: &Parameters, (name, place, ..): &Number, value: f64) -> Option<String> {
     let mut p = *p;
     *place(&mut p) = value;

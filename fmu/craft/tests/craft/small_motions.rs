@@ -243,7 +243,7 @@ fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
 const K_P: f64 = 0.04;
 const K_D: f64 = 0.28;
 
-/// Where the lateral force acts, from O, m.
+/// Point of attack of the lateral force, from O, m.
 const ENGINE: f64 = -1.3;
 
 /// Growth rate of the slosh pole, 1/s, in a loop that makes tau = -K_p theta - K_d theta' by a

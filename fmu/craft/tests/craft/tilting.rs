@@ -172,7 +172,7 @@ fn liquid_on_a_tilting_platform_swings_as_a_double_pendulum() {
     }
 }
 
-/// As the stiffness grows the hub turns about its axis alone, as HubSlosh's does: the difference falls as 1/k.
+/// A stiffer pivot approaches HubSlosh's hub, which turns about its axis alone: the difference falls as 1/k.
 #[test]
 fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
     let u = Inputs { torque: Ramp::held([0.0, 0.0, 0.05]), ..Inputs::default() };
@@ -294,7 +294,7 @@ fn the_leakage_of_the_books_platform_is_that_of_its_linear_equations() {
     assert!((sharp / 0.135 - 1.0).abs() < 5e-3, "{sharp}");
 }
 
-/// Of the leakage on a logarithmic grid from 1.25 to 3.5 Hz.
+/// Root mean square of the leakage on a logarithmic grid from 1.25 to 3.5 Hz.
 fn rms(p: &Parameters) -> f64 {
     let squares: f64 = (0..2000)
         .map(|k| {

@@ -30,7 +30,7 @@ pub struct AnalyseArgs {
     /// The torque that was commanded; its amplitude is taken from the recording.
     #[arg(long, value_name = "PROFILE", default_value = "exp-sweep:f0=1.25,f1=3.5,duration=2700")]
     profile: String,
-    /// Slosh models to simulate beside the recordings.
+    /// Slosh models to simulate for comparison with the recordings.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear,spherical")]
     model: Vec<String>,
     /// Sets what is known of the bench by its FMU name: tank.h, tank.d, hub.I, friction.b.

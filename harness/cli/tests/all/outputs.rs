@@ -10,7 +10,7 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(program).current_dir(directory).args(arguments).output().unwrap()
 }
 
-/// What the command says where it fails, in one line.
+/// Error message of the command, in one line.
 fn refused(directory: &Path, arguments: &[&str]) -> String {
     let output = hubslosh(directory, arguments);
     let said = String::from_utf8_lossy(&output.stderr).trim().to_string();

@@ -10,7 +10,7 @@
 #[path = "../../src/set_file.rs"]
 mod set_file;
 
-/// What `set_file` says warnings to.
+/// Warnings of `set_file`.
 mod terminal {
     pub fn warn(_: impl std::fmt::Display) {}
 }
@@ -107,7 +107,7 @@ fn memory() -> u64 {
     line.and_then(|rest| rest.split_whitespace().next()?.parse().ok()).unwrap_or(0)
 }
 
-/// Where an input that breaks something is kept.
+/// Keeps an input that breaks something and returns its path.
 fn keep(name: &str, ending: &str, bytes: &[u8]) -> PathBuf {
     let path = std::env::temp_dir().join(format!("hubslosh-fuzz-{name}.{ending}"));
     std::fs::write(&path, bytes).unwrap();

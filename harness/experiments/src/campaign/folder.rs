@@ -180,7 +180,7 @@ impl Folder {
         self.path.join(file_of(run))
     }
 
-    /// Whether a run was stored, and is missing now.
+    /// Returns true if a run was stored and is missing now.
     pub fn lacks(&self, run: &str) -> bool {
         self.lost.contains(&file_of(run)) && !self.run(run).exists()
     }

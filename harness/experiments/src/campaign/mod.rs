@@ -157,7 +157,7 @@ pub const CURVES: usize = 400;
 /// Whether the curves of run `i` of `runs` are kept: they are spread over the plan, and its last run
 /// is among them.
 pub fn keeps_curves(i: usize, runs: usize) -> bool {
-    i % runs.div_ceil(CURVES).max(1) == 0 || i + 1 == runs
+    i.is_multiple_of(runs.div_ceil(CURVES).max(1)) || i + 1 == runs
 }
 
 /// What became of one run.

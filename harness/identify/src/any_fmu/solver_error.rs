@@ -24,16 +24,16 @@ pub const DECIDES: f64 = 0.3;
 /// Part of it below which they are not added: they would make it 0.1 % larger.
 pub const ADDED: f64 = 0.05;
 
-/// What the solver's errors do.
+/// Effect of the solver's errors.
 #[derive(Clone, Debug)]
 pub struct SolverError {
-    /// By how much they move each estimate, in its unit.
+    /// Shift of each estimate, in its unit.
     pub shift: Vec<f64>,
     /// Relative error of each derivative: from noise, and with the curvature within its step.
     pub derivative: Vec<(f64, f64)>,
-    /// Whether a finer tolerance changes the outputs.
+    /// True if a finer tolerance changes the outputs.
     pub heeds_tolerance: bool,
-    /// Whether any run with smaller errors of the solver has changed the outputs.
+    /// True if any run with smaller errors of the solver changed the outputs.
     pub is_seen: bool,
 }
 

@@ -40,7 +40,7 @@ use crate::unknown::{self, Scale};
 use crate::verdict::DOES_NOT_FIT;
 use analysis::least_squares::{self, Minimum};
 
-/// How rows are weighted (thesis 5.2.3).
+/// Weights of the rows (thesis 5.2.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weights {
@@ -54,7 +54,7 @@ pub enum Weights {
     RunTime,
 }
 
-/// Which torques are set against the difference of rates.
+/// Torques compared with the difference of rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// Those at t_k; the residual is the thesis's, r_k (5.4).
@@ -63,7 +63,7 @@ pub enum Form {
     Averaged,
 }
 
-/// What is asked for.
+/// Options of the method.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Weights.
@@ -74,7 +74,7 @@ pub struct Options {
     pub starts: Vec<(String, f64)>,
     /// Harmonics of the hub's angle in the friction, 0 to 2; more than 0 needs the column theta.
     pub harmonics: usize,
-    /// What is known of the bench, by FMU name.
+    /// Known values of the bench, by FMU name.
     pub settings: Vec<(String, String)>,
     /// The torque keeps a row's value until the next, else it goes to the next along a line.
     pub held: bool,
@@ -83,7 +83,7 @@ pub struct Options {
 /// The result; `measurement` is the inertia of hub and all the liquid, and each recording's gyro bias.
 pub type Found = Identified<Details>;
 
-/// What this method alone has to say.
+/// Results of this method alone.
 #[derive(Clone, Debug, Serialize)]
 pub struct Details {
     /// Sizes.
@@ -104,7 +104,7 @@ pub struct Details {
 
 /// Least squares of the acceleration.
 pub struct Acceleration {
-    /// What is asked for.
+    /// Options of the method.
     pub options: Options,
 }
 
@@ -144,7 +144,7 @@ pub struct Fit {
     pub rows: usize,
     /// Root mean square of the residual over I, rad/s².
     pub rmse: f64,
-    /// What the gyro's noise makes of it, rad/s².
+    /// Expected value from the gyro's noise, rad/s².
     pub expected: f64,
     /// The gyro's noise of one row, rad/s, for each recording.
     pub noise: Vec<f64>,
@@ -194,7 +194,7 @@ const FIRST: [&str; 6] =
 const BLOCK: f64 = 0.01;
 /// Rows by which the starts are told apart; the best is followed over all.
 const ROUGH: usize = 20_000;
-/// Of the grid of Stribeck speeds, every so many are fitted for intervals.
+/// Stride over the grid of Stribeck speeds for intervals.
 const EVERY: usize = 2;
 /// Place of the Stribeck speed among them.
 const STRIBECK: usize = 4;
@@ -275,7 +275,7 @@ impl Rows {
         }
     }
 
-    /// What the noise makes of w_k y_k² on average.
+    /// Mean of w_k y_k² from noise alone.
     fn noise_power(&self, k: usize) -> f64 {
         let interval = self.time[k + 1] - self.time[k - 1];
         2.0 * (self.weight[k - 1] * self.noise / interval).powi(2)
@@ -628,19 +628,19 @@ impl Problem {
         Profile { points, intervals, speeds }
     }
 
-    /// What the gyro's noise makes of the sum of w_k y_k² on average.
+    /// Mean of the sum of w_k y_k² from the gyro's noise.
     fn noise_power(&self) -> f64 {
         self.rows.iter().flat_map(|rows| rows.inner().map(|k| rows.noise_power(k))).sum()
     }
 
-    /// Whether a value of b, c or d is zero, the least that there is.
+    /// Returns true if a value of b, c or d is zero, the lowest possible.
     fn is_zero(&self, place: usize, value: f64) -> bool {
         let least = self.bounded(place, f64::NEG_INFINITY);
         let half = 0.5 * self.bounded(place, f64::INFINITY);
         (1..=3).contains(&place) && least == 0.0 && value < half && self.is_at_bound(place, value)
     }
 
-    /// Whether a value is at one of its bounds.
+    /// Returns true if a value is at one of its bounds.
     fn is_at_bound(&self, place: usize, value: f64) -> bool {
         match self.scales[place] {
             Scale::Logit(a, b) => (value - a).min(b - value) < 1e-5 * (b - a),
@@ -649,7 +649,7 @@ impl Problem {
     }
 }
 
-/// What is known at a minimum.
+/// Information at a minimum.
 struct Known {
     covariance: Covariance,
     jacobian: DMatrix<f64>,

@@ -161,7 +161,7 @@ fn held(found: &Identification) -> (usize, usize) {
     (given.clone().filter(holds).count(), given.count())
 }
 
-/// What is said where the solver decides: no judgement, no number that could be taken for an interval, and what to do.
+/// Checks the refusal of a fit that the solver's errors decide: no judgement, no number that looks like an interval, and a remedy.
 fn check_refusal(found: &Identification, remedy: &str) {
     assert_ne!(found.fits, Some(true), "{:?}", found.verdict);
     let decided = &found.details.decided_by_solver;

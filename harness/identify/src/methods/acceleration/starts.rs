@@ -43,7 +43,7 @@ impl Rows {
         stuck
     }
 
-    /// What the gyro reads where the hub rests and no torque acts, rad/s; `None` without such a part.
+    /// Reading of the gyro while the hub rests without torque, rad/s; `None` without such a part.
     fn reading_at_rest(&self) -> Option<f64> {
         let length = (REST / self.step).ceil().max(RUN as f64) as usize;
         let largest = self.torque.iter().fold(0.0_f64, |most, t| most.max(t.abs()));
