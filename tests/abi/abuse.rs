@@ -3,7 +3,7 @@
 //!
 //! The hosts are C programs with the FMI's official headers, linked with the binary that users
 //! get, each compiled for FMI 2.0 and for 3.0 (`fmi.h`). What is tried with many values is divided between the versions,
-//! whose calls end in the same instance; `in_both_versions` tries everything with each: some minutes, in `.ci/run`. `.ci/valgrind` runs them under valgrind (it sets `HUBSLOSH_VALGRIND`), `.ci/fuzz` looks
+//! whose calls end in the same instance; `in_both_versions` tries everything with each, by hand. `.ci/valgrind` runs them under valgrind (it sets `HUBSLOSH_VALGRIND`), `.ci/fuzz` looks
 //! for bad bytes for as long as one likes.
 
 use std::path::{Path, PathBuf};
@@ -594,7 +594,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// What the suite divides between the versions, each of them tries here: some minutes, in `.ci/run`.
+/// What the suite divides between the versions, each of them tries here: minutes, by hand.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes"]

@@ -101,7 +101,14 @@ fn identity(path: &Path) -> Option<Identity> {
     path.canonicalize().ok().map(Identity)
 }
 
-static PROTECTED: Mutex<Vec<(Identity, PathBuf)>> = Mutex::new(Vec::new());
+/// A protected input. The file stays open: otherwise a new file could get the number of an input that was deleted.
+struct Protected {
+    identity: Identity,
+    path: PathBuf,
+    _open: Option<File>,
+}
+
+static PROTECTED: Mutex<Vec<Protected>> = Mutex::new(Vec::new());
 
 /// Protects an input: from now on no output of this process replaces the file. A path without a file is ignored.
 pub fn protect(path: &Path) {
@@ -110,8 +117,9 @@ pub fn protect(path: &Path) {
     }
     if let Some(identity) = identity(path) {
         let mut all = PROTECTED.lock().unwrap_or_else(PoisonError::into_inner);
-        if !all.iter().any(|(other, _)| *other == identity) {
-            all.push((identity, path.to_path_buf()));
+        if !all.iter().any(|other| other.identity == identity) {
+            let open = if cfg!(unix) { File::open(path).ok() } else { None };
+            all.push(Protected { identity, path: path.to_path_buf(), _open: open });
         }
     }
 }
@@ -123,11 +131,11 @@ pub fn protect(path: &Path) {
 pub fn check_replaceable(path: &Path) -> Result<()> {
     let Some(identity) = identity(path) else { return Ok(()) };
     let all = PROTECTED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, input)) = all.iter().find(|(other, _)| *other == identity) {
+    if let Some(input) = all.iter().find(|other| other.identity == identity) {
         bail!(
             "{} is not written: it is the input {} (allowed: an output that is not an input of the same command)",
             path.display(),
-            input.display()
+            input.path.display()
         );
     }
     Ok(())
@@ -136,6 +144,21 @@ pub fn check_replaceable(path: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_new_file_is_never_taken_for_a_deleted_input() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["a", "b", "c"].map(|name| directory.path().join(name)) {
+            std::fs::write(&name, "input").unwrap();
+            protect(&name);
+            std::fs::remove_file(&name).unwrap();
+            let output = directory.path().join("output");
+            std::fs::write(&output, "").unwrap();
+            check_replaceable(&output).unwrap();
+            std::fs::remove_file(&output).unwrap();
+        }
+    }
 
     #[cfg(unix)]
     #[test]
