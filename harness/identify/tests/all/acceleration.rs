@@ -133,9 +133,10 @@ fn the_preferential_direction_has_its_sign_with_harmonics_of_the_angle_too() {
     assert_eq!(wrong(3, 1, 0.002), [""; 0]);
 }
 
-/// Eight seeds, without harmonics and with one.
+/// Eight seeds, without harmonics and with one. Seed 2 without harmonics still fails: the bias of the ramp is 4.9 standard deviations off, and
+/// `friction.d` with it 3.4. The other fifteen cases pass.
 #[test]
-#[ignore = "a minute of CPU time; the tests above have three of these cases"]
+#[ignore = "30 s of CPU time, and seed 2 without harmonics is 3.4 standard deviations off in friction.d"]
 fn friction_of_eight_recordings_ends_in_no_false_minimum() {
     let all = (1..=8).flat_map(|seed| [wrong(seed, 0, 0.002), wrong(seed, 1, 0.002)].concat());
     assert_eq!(all.collect::<Vec<_>>(), [""; 0]);
