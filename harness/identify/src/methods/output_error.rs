@@ -387,7 +387,10 @@ fn finish(
         if let Some((_, ends)) = of_deep {
             interval = *ends;
         }
-        interval[0] = interval[0].max(unknown.range[0]);
+        // an end that is open is 0 or infinite, whatever the range
+        if interval[0] != 0.0 {
+            interval[0] = interval[0].max(unknown.range[0]);
+        }
         if interval[1].is_finite() {
             interval[1] = interval[1].min(unknown.range[1]);
         }
