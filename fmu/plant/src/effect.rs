@@ -97,7 +97,9 @@ impl Parameters {
         let is_planar = matches!(slosh.model, SloshModel::Linear | SloshModel::Planar);
         let is_askew = slosh.source == SloshSource::Table && slosh.table.is_askew(slosh.modes);
         if slosh.model == SloshModel::Frozen {
-            return Some("slosh.model = frozen".into());
+            // A start at rest is that of rigid liquid, too: hosts that start at rest set it for every model.
+            let at_rest = field == "slosh_angle" && self.init.slosh_angle == 0.0;
+            return (!at_rest).then(|| "slosh.model = frozen".into());
         }
         (field.ends_with("_radial") && is_planar && !is_askew)
             .then(|| "modes of slosh.model = linear and planar move along the tangent".into())

@@ -330,6 +330,12 @@ mod tests {
         p.init.slosh_angle_radial = -0.3;
         p.init.slosh_rate = 2.0;
         p.init.slosh_rate_radial = 3.0;
+        if p.slosh.source == SloshSource::Table {
+            // along the direction of mode 1
+            let across = libm::tan(p.slosh.table.direction[0]);
+            p.init.slosh_angle_radial = across * p.init.slosh_angle;
+            p.init.slosh_rate_radial = across * p.init.slosh_rate;
+        }
         let inputs = Inputs {
             tau_cmd: Ramp::held(0.1),
             tau_ext: Ramp::held(-0.03),
