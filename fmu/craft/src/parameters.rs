@@ -967,8 +967,8 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     })
 }
 
-/// The least of `pivot` over all angles of the planar modes that a search finds, and where: one angle after the other, from
-/// several starts, with steps that are halved.
+/// The least of `pivot` over the angles of the planar modes within their range, 45 degrees, that a search finds, and where: one
+/// angle after the other, from several starts, with steps that are halved.
 fn least_pivot(
     pivot: &impl Fn(&[[f64; MODES]; TANKS]) -> f64,
     tanks: &[Tank],
@@ -976,7 +976,7 @@ fn least_pivot(
 ) -> f64 {
     let modes = |i: usize| (0..tanks[i].modes).filter(move |n| tanks[i].across(*n).is_some());
     let mut least = f64::INFINITY;
-    for start in [0.0, 0.5, 1.0, -0.5] {
+    for start in [0.0, 0.25, -0.25] {
         let mut now = [[start * core::f64::consts::PI; MODES]; TANKS];
         let mut best = pivot(&now);
         let mut step = core::f64::consts::PI / 4.0;
@@ -985,7 +985,8 @@ fn least_pivot(
             for i in 0..tanks.len() {
                 for n in modes(i) {
                     let before = now[i][n];
-                    for angle in (-3..=4).map(|k| before + k as f64 * step) {
+                    let all = (-3..=4).map(|k| before + k as f64 * step);
+                    for angle in all.filter(|angle| angle.abs() <= core::f64::consts::FRAC_PI_4) {
                         let kept = now[i][n];
                         now[i][n] = angle;
                         let found = pivot(&now);

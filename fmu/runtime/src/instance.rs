@@ -244,7 +244,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 continue;
             }
             let why = M::without_effect(&parameters, variable.name, &variable.indices(*element));
-            let Some(why) = why else { continue };
+            let Some(why) = why.filter(|why| M::warns_of(why)) else { continue };
             match reasons.iter_mut().find(|(reason, _)| *reason == why) {
                 Some((_, names)) => names.push(scalar.name()),
                 None => reasons.push((why, vec![scalar.name()])),

@@ -82,6 +82,13 @@ pub trait Model: Clone + Debug + Sized + 'static {
         None
     }
 
+    /// Returns true if hosts get a warning of a parameter without effect for this reason of [`Model::without_effect`]. A part of
+    /// the model that a user has switched off needs none: the same parameters often serve several models.
+    fn warns_of(reason: &str) -> bool {
+        let _ = reason;
+        true
+    }
+
     /// Appends the saved state other than parameters and inputs as words: always
     /// [`About::saved_words`](crate::table::About::saved_words) of them.
     fn save(&self, words: &mut Vec<u64>);

@@ -186,6 +186,10 @@ impl runtime::Model for Model {
         warnings
     }
 
+    fn warns_of(_reason: &str) -> bool {
+        false
+    }
+
     fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
         let p = parameters.resolved().ok()?;
         if let Some(field) = name.strip_prefix("tank.") {

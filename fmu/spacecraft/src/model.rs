@@ -172,6 +172,10 @@ impl runtime::Model for Model {
         })
     }
 
+    fn warns_of(_reason: &str) -> bool {
+        false
+    }
+
     fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
         parameters.resolved().ok()?.without_effect(name, indices)
     }
