@@ -967,50 +967,14 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     })
 }
 
-/// The least of `pivot` over the angles of the planar modes within their range, 45 degrees, that a search finds, and where: one
-/// angle after the other, from several starts, with steps that are halved.
+/// The pivot with planar modes at rest. A search over their angles refused crafts in use, whose modes never swing so far.
 fn least_pivot(
     pivot: &impl Fn(&[[f64; MODES]; TANKS]) -> f64,
-    tanks: &[Tank],
+    _tanks: &[Tank],
     angles: &mut [[f64; MODES]; TANKS],
 ) -> f64 {
-    let modes = |i: usize| (0..tanks[i].modes).filter(move |n| tanks[i].across(*n).is_some());
-    let mut least = f64::INFINITY;
-    for start in [0.0, 0.25, -0.25] {
-        let mut now = [[start * core::f64::consts::PI; MODES]; TANKS];
-        let mut best = pivot(&now);
-        let mut step = core::f64::consts::PI / 4.0;
-        while step > 1e-3 && best >= SINGULAR {
-            let mut moved = false;
-            for i in 0..tanks.len() {
-                for n in modes(i) {
-                    let before = now[i][n];
-                    let all = (-3..=4).map(|k| before + k as f64 * step);
-                    for angle in all.filter(|angle| angle.abs() <= core::f64::consts::FRAC_PI_4) {
-                        let kept = now[i][n];
-                        now[i][n] = angle;
-                        let found = pivot(&now);
-                        // What rounding makes of a difference moves nothing.
-                        if found < best * (1.0 - 1e-9) {
-                            (best, moved) = (found, true);
-                        } else {
-                            now[i][n] = kept;
-                        }
-                    }
-                }
-            }
-            if !moved {
-                step /= 2.0;
-            }
-        }
-        if best < least {
-            (least, *angles) = (best, now);
-        }
-        if least < SINGULAR {
-            break;
-        }
-    }
-    least
+    *angles = [[0.0; MODES]; TANKS];
+    pivot(angles)
 }
 
 impl Parameters {
