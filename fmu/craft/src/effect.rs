@@ -70,7 +70,7 @@ impl Tank {
 }
 
 impl Parameters {
-    /// As [`Tank::without_effect`], for all parameters of a craft by their names in the FMU, `tank[].mass`. The first index of
+    /// [`Tank::without_effect`] for all parameters of a craft by their names in the FMU, `tank[].mass`. The first index of
     /// a tank's is the tank.
     pub fn without_effect(&self, name: &str, indices: &[usize]) -> Option<String> {
         if let (Some(field), [i, rest @ ..]) = (name.strip_prefix("tank[]."), indices) {

@@ -120,7 +120,7 @@ pub(crate) struct Lump {
     d: Mat3,
     /// R_p
     gyration: f64,
-    /// Of mode 1.
+    /// Value of mode 1.
     hinge: Vec3,
     /// Each mode's share of the modal mass, and the length l_s whose inverse is the mean of 1/l by these shares.
     shares: [f64; MODES],
@@ -267,7 +267,7 @@ impl Lump {
         if self.state == BallState::Sliding { self.drag } else { 0.0 }
     }
 
-    /// Whether a drag acts. Without one a lump that is released would alternate between sliding and light by rounding.
+    /// True if a drag acts. Without one a lump that is released would alternate between sliding and light by rounding.
     pub fn drags(&self) -> bool {
         self.drag() > 0.0
     }

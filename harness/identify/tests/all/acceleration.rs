@@ -54,7 +54,7 @@ pub fn push(seed: u64) -> Recording {
     Recording::of("push", time, tau, rate)
 }
 
-/// The asymmetry is said not to be determined, and the friction forwards is within four standard deviations of the truth.
+/// The verdict calls the asymmetry not determined, and the friction forwards is within four standard deviations of the truth.
 pub fn is_one_way(
     parameters: &BTreeMap<String, Estimated>,
     combinations: &[Combination],
