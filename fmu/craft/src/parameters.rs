@@ -926,55 +926,21 @@ impl Craft {
 /// Below this smallest pivot a mass matrix counts as singular.
 const SINGULAR: f64 = 1e-12;
 
-/// Where a body with the liquid of `tanks` lacks mass along or inertia about some axis, as words that follow "is singular"; `None`
-/// where it has both in every state of the liquid.
+/// States where the mass matrix of a body with the liquid of `tanks` is singular, as words that follow "is singular"; `None` if it
+/// is regular with planar modes at rest and in flight. Angles of planar modes are not searched: crafts in use are singular far
+/// out of the range of their modes.
 pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     let matrix = |rigid: fn(&Tank) -> Rigid| {
         tanks.iter().fold(body, |sum, tank| sum.and(&rigid(tank))).mass_matrix()
     };
-    let rigid = matrix(Tank::rigid);
-    let at = |angles: &[[f64; MODES]; TANKS]| {
-        let mut matrix = rigid;
-        tanks
-            .iter()
-            .zip(angles)
-            .for_each(|(tank, angles)| tank.add_planar_bobs(&mut matrix, angles));
-        smallest_pivot(&matrix)
-    };
-    let mut angles = [[0.0; MODES]; TANKS];
-    if at(&angles) < SINGULAR {
+    let mut at_rest = matrix(Tank::rigid);
+    tanks.iter().for_each(|tank| tank.add_planar_bobs(&mut at_rest, &[0.0; MODES]));
+    if smallest_pivot(&at_rest) < SINGULAR {
         return Some(String::new());
     }
-    if smallest_pivot(&matrix(Tank::least_rigid)) < SINGULAR && !tanks.iter().any(Tank::is_planar) {
-        return Some(
-            " in flight of detached liquid or with tanks at the start of their tables".into(),
-        );
-    }
-    // Bobs only add to the rigid part: where that is enough, no direction is singular.
-    if smallest_pivot(&rigid) >= SINGULAR {
-        return None;
-    }
-    (least_pivot(&at, tanks, &mut angles) < SINGULAR).then(|| {
-        let mut found = String::new();
-        for (i, tank) in tanks.iter().enumerate() {
-            for n in (0..tank.modes).filter(|n| tank.across(*n).is_some()) {
-                let degrees = libm::round(angles[i][n].to_degrees());
-                let comma = if found.is_empty() { "" } else { ", " };
-                found += &format!("{comma}mode {} of tank {} at {degrees}", n + 1, i + 1);
-            }
-        }
-        format!(" where planar modes swing as far as this, in degrees from rest: {found}")
-    })
-}
-
-/// The pivot with planar modes at rest. A search over their angles refused crafts in use, whose modes never swing so far.
-fn least_pivot(
-    pivot: &impl Fn(&[[f64; MODES]; TANKS]) -> f64,
-    _tanks: &[Tank],
-    angles: &mut [[f64; MODES]; TANKS],
-) -> f64 {
-    *angles = [[0.0; MODES]; TANKS];
-    pivot(angles)
+    let flies = smallest_pivot(&matrix(Tank::least_rigid)) < SINGULAR;
+    (flies && !tanks.iter().any(Tank::is_planar))
+        .then(|| " in flight of detached liquid or with tanks at the start of their tables".into())
 }
 
 impl Parameters {
