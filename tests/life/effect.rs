@@ -133,3 +133,21 @@ fn no_warning_names_a_parameter_of_spacecraft_that_changes_an_output() {
 fn no_warning_names_a_parameter_of_sloshtank_that_changes_an_output() {
     check::<SloshTank::Model>(&[]);
 }
+
+/// Some parameters that others replace, each with the reason.
+#[test]
+fn a_warning_names_parameters_that_others_replace() {
+    fn said<M: Model>(values: Values) -> Vec<String> {
+        let scalar = |name: &str| &M::table().scalars[M::table().find(name).unwrap() as usize];
+        let values: Vec<_> =
+            values.iter().map(|(name, x)| (scalar(name), value_of(scalar(name), *x))).collect();
+        run::<M>(&values).expect("the values are accepted").1
+    }
+    let hub = said::<HubSlosh::HubSlosh>(&[("slosh.zeta", 0.01)]);
+    assert!(hub[0].starts_with("slosh.zeta has no effect: slosh.zeta_from_correlation is true"));
+    let hub = said::<HubSlosh::HubSlosh>(&[("slosh.zeta", 0.01), ("slosh.model", 1.0)]);
+    assert_eq!(hub, [""; 0], "what is switched off needs no warning");
+    let craft =
+        said::<Spacecraft::Model>(&[("tank[1].frequency[1]", 0.5), ("tank[1].length[1]", 0.3)]);
+    assert!(craft[0].starts_with("tank[1].length[1] has no effect: tank[1].frequency[1] = 0.5 Hz"));
+}

@@ -179,15 +179,8 @@ impl Model for HubSlosh {
         parameters.resolved().map_or(Vec::new(), |p| Plant::warnings(&p, inputs))
     }
 
-    fn warns_of(reason: &str) -> bool {
-        ["slosh.zeta_from_correlation", "slosh.source = table"]
-            .iter()
-            .any(|by| reason.starts_with(by))
-    }
-
-    fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
-        let index = indices.first().copied().unwrap_or(0);
-        parameters.resolved().ok()?.without_effect(name, index)
+    fn overridden(parameters: &Parameters, name: &str, _: &[usize]) -> Option<String> {
+        parameters.resolved().ok()?.overridden(name)
     }
 
     fn save(&self, words: &mut Vec<u64>) {

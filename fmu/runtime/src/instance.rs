@@ -230,7 +230,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 
     /// Warnings about the motion that begins: those of [`Model::warnings`], and one for each reason for which parameters that
-    /// differ from their start values have no effect ([`Model::without_effect`]).
+    /// differ from their start values have no effect ([`Model::overridden`]).
     pub fn warnings(&self) -> Vec<String> {
         let Some(model) = &self.model else { return Vec::new() };
         let parameters = self.given_parameters();
@@ -243,8 +243,8 @@ impl<M: Model, V: Version> Instance<M, V> {
             if value == start {
                 continue;
             }
-            let why = M::without_effect(&parameters, variable.name, &variable.indices(*element));
-            let Some(why) = why.filter(|why| M::warns_of(why)) else { continue };
+            let why = M::overridden(&parameters, variable.name, &variable.indices(*element));
+            let Some(why) = why else { continue };
             match reasons.iter_mut().find(|(reason, _)| *reason == why) {
                 Some((_, names)) => names.push(scalar.name()),
                 None => reasons.push((why, vec![scalar.name()])),

@@ -70,23 +70,13 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Vec::new()
     }
 
-    /// Returns why a parameter has no effect on the motion or on any output, as "name = value" of the parameter that decides
-    /// it; `None` if it has an effect. `name` is the table's, `indices` are the element's, from 0, none for a scalar. Hosts
-    /// get a warning of such parameters that differ from their start values.
-    fn without_effect(
-        parameters: &Self::Parameters,
-        name: &str,
-        indices: &[usize],
-    ) -> Option<String> {
+    /// Returns why the value of a parameter is not used although the part of the model that it describes is, as "name = value" of
+    /// the parameter that replaces it. `name` is the table's, `indices` are the element's, from 0, none for a scalar. Hosts get a
+    /// warning of such parameters that differ from their start values. Parts that are switched off need none: the same
+    /// parameters often serve several models.
+    fn overridden(parameters: &Self::Parameters, name: &str, indices: &[usize]) -> Option<String> {
         let _ = (parameters, name, indices);
         None
-    }
-
-    /// Returns true if hosts get a warning of a parameter without effect for this reason of [`Model::without_effect`]. A part of
-    /// the model that a user has switched off needs none: the same parameters often serve several models.
-    fn warns_of(reason: &str) -> bool {
-        let _ = reason;
-        true
     }
 
     /// Appends the saved state other than parameters and inputs as words: always

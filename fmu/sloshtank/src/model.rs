@@ -186,16 +186,9 @@ impl runtime::Model for Model {
         warnings
     }
 
-    fn warns_of(_reason: &str) -> bool {
-        false
-    }
-
-    fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
-        let p = parameters.resolved().ok()?;
-        if let Some(field) = name.strip_prefix("tank.") {
-            return Some(format!("tank.{}", p.tank.without_effect(field, indices)?));
-        }
-        (name.starts_with("host.") && p.host.is_none()).then(|| "host.mass = 0".into())
+    fn overridden(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
+        let tank = parameters.resolved().ok()?.tank;
+        Some(format!("tank.{}", tank.overridden(name.strip_prefix("tank.")?, indices)?))
     }
 
     fn save(&self, words: &mut Vec<u64>) {

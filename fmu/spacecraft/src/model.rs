@@ -172,12 +172,8 @@ impl runtime::Model for Model {
         })
     }
 
-    fn warns_of(_reason: &str) -> bool {
-        false
-    }
-
-    fn without_effect(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
-        parameters.resolved().ok()?.without_effect(name, indices)
+    fn overridden(parameters: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
+        parameters.resolved().ok()?.overridden(name, indices)
     }
 
     fn save(&self, words: &mut Vec<u64>) {

@@ -368,7 +368,7 @@ fn a_radial_start_without_effect_is_warned_of() {
         let mut p = askew(model, FrictionModel::None);
         p.slosh.table.direction = [0.0; plant::MODES];
         p.slosh.table.direction[0] = direction;
-        let reason = p.without_effect("init.slosh_angle_radial", 0);
+        let reason = p.overridden("init.slosh_angle_radial");
         assert_eq!(reason.is_some(), warned, "{model:?} {direction} {reason:?}");
     }
 }

@@ -190,7 +190,7 @@ impl Model for Vessels {
         if p.k > 5.0 { vec![all] } else { Vec::new() }
     }
 
-    fn without_effect(p: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
+    fn overridden(p: &Parameters, name: &str, indices: &[usize]) -> Option<String> {
         let is_first = indices.first().is_none_or(|i| *i == 0);
         let is_of_lid = ["number", "gauges", "start.level"].contains(&name) && is_first;
         (is_of_lid && p.has_lid).then(|| "has_lid is true".into())

@@ -317,12 +317,6 @@ impl Setup {
         self.late(record, read)
     }
 
-    /// Whether inputs follow lines that the FMU cannot be told of. They are held over shorter communication steps then.
-    pub fn holds_lines(&self, model: &Model) -> bool {
-        let Model::Own(fmu) = model else { return false };
-        self.held.iter().any(|held| !held) && !interpolates(fmu.description())
-    }
-
     /// By the FMU's own solver: inputs are set at a row, with their slopes where the FMU takes them, the outputs are read and the
     /// step to the next row is made. Where the FMU takes no slopes, inputs that follow lines are held over [`HELD_STEPS`] parts of
     /// the way, each at its value in the middle of the part.

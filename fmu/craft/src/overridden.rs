@@ -1,0 +1,43 @@
+//! Parameters whose value another parameter replaces.
+
+use alloc::format;
+use alloc::string::String;
+
+use crate::parameters::{Parameters, Tank};
+
+impl Tank {
+    /// Returns why the value of a parameter is not used although its tank and mode are; `None` if it is used, or if the mode is
+    /// not. `field` is its name in the FMUs behind `tank.`, `indices` are the element's, from 0.
+    pub fn overridden(&self, field: &str, indices: &[usize]) -> Option<String> {
+        let n = *indices.first().unwrap_or(&0);
+        let is_of_mode = matches!(field, "mass" | "length" | "hinge" | "wave");
+        if is_of_mode && n >= self.modes {
+            return None;
+        }
+        match field {
+            "m_0" | "H_0" | "I_0" | "I_z" | "mass" | "length" | "hinge" if self.fill.points > 0 => {
+                Some(format!("fill.points = {}; the table has it", self.fill.points))
+            }
+            "m_0" | "H_0" | "I_0" | "mass" | "length" | "hinge" | "wave" if self.diameter > 0.0 => {
+                Some(format!(
+                    "diameter = {:?} m; it follows from diameter and depth",
+                    self.diameter
+                ))
+            }
+            "length" if self.frequency[n] > 0.0 => {
+                Some(format!("frequency[{}] = {:?} Hz", n + 1, self.frequency[n]))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Parameters {
+    /// [`Tank::overridden`] for all parameters of a craft by their names in the FMU, `tank[].mass`. The first index of
+    /// a tank's is the tank.
+    pub fn overridden(&self, name: &str, indices: &[usize]) -> Option<String> {
+        let (field, (i, rest)) = (name.strip_prefix("tank[].")?, indices.split_first()?);
+        let tank = self.tank[..self.tanks].get(*i)?;
+        Some(format!("tank[{}].{}", i + 1, tank.overridden(field, rest)?))
+    }
+}

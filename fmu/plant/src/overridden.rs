@@ -1,0 +1,42 @@
+//! Parameters whose value another parameter replaces.
+
+use alloc::string::String;
+
+use crate::parameters::{Parameters, SloshModel, SloshSource};
+
+impl Parameters {
+    /// Returns why the value of a parameter is not used although the part of the model that it describes is; `None` if it is
+    /// used, or if that part is switched off. `name` is the FMU's, with `_kind` where a number stands for a Boolean. Enumerations
+    /// and Booleans have their `…kind` applied.
+    pub fn overridden(&self, name: &str) -> Option<String> {
+        let slosh = &self.slosh;
+        if slosh.model == SloshModel::Frozen {
+            return None;
+        }
+        let is_table = slosh.source == SloshSource::Table;
+        let is_planar = matches!(slosh.model, SloshModel::Linear | SloshModel::Planar);
+        let is_askew = is_table && slosh.table.is_askew(slosh.modes);
+        match name.strip_suffix("_kind").unwrap_or(name) {
+            "init.slosh_angle_radial" | "init.slosh_rate_radial" if is_planar && !is_askew => {
+                Some("modes of slosh.model = linear and planar move along the tangent".into())
+            }
+            table if table.starts_with("slosh.table.") && !is_table => {
+                Some("slosh.source = geometry".into())
+            }
+            "tank.h"
+            | "fluid.nu"
+            | "slosh.zeta"
+            | "slosh.zeta_from_correlation"
+            | "slosh.capillarity"
+                if is_table =>
+            {
+                Some("slosh.source = table, where slosh.table says what the liquid is".into())
+            }
+            "slosh.zeta" if slosh.zeta_from_correlation => Some(
+                "slosh.zeta_from_correlation is true; with false the damping ratio is slosh.zeta"
+                    .into(),
+            ),
+            _ => None,
+        }
+    }
+}
