@@ -1,6 +1,5 @@
-//! HubSlosh as an FMU: its variables ([`table`]) and its plant as a model of the runtime
-//! ([`model`]). The physics is the crate `plant` and knows nothing of this; what FMI demands is
-//! the crate `runtime`.
+//! HubSlosh as an FMU: its variables ([`table`]) and the runtime's `Model` for its plant ([`model`]).
+//! The physics is in the crate `plant`, FMI is in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]
@@ -19,26 +18,26 @@ pub type Instance = runtime::instance::Instance<HubSlosh, Fmi2>;
 /// One scalar of the FMU's variables.
 pub type Scalar = runtime::table::Scalar<HubSlosh>;
 
-/// An instance as a host gets it through FMI 2.0, for hosts and tests in Rust.
+/// Returns an instance as a host gets it through FMI 2.0, for hosts and tests in Rust.
 pub fn instance(interface: Interface) -> Instance {
     Instance::new(interface)
 }
 
-/// The saved state that the bytes hold, or why they hold none.
+/// Reads a saved state from bytes. Returns the reason if they do not hold a saved state.
 pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     runtime::snapshot::from_bytes(bytes)
 }
 
 /// The functions of FMI 2.0 that the binary exports.
 pub mod fmi2 {
-    // Their parameters are of the types of the standard's header.
+    // Parameter types of the standard's header.
     pub use runtime::v2::*;
 
     runtime::export_fmi2!(crate::HubSlosh);
 }
 
-/// The functions of FMI 3.0 that the binary exports; none in a module for WebAssembly, whose host speaks 2.0 and which
-/// a page has to carry.
+/// The functions of FMI 3.0 that the binary exports. A WebAssembly module leaves them out: its host uses FMI 2.0, and
+/// web pages must load the module.
 #[cfg(not(target_arch = "wasm32"))]
 pub mod fmi3 {
     pub use runtime::v3::*;

@@ -1,4 +1,4 @@
-//! The plant as a model of the runtime.
+//! Implements the runtime's `Model` for the plant.
 
 use std::ops::{Deref, DerefMut};
 
@@ -16,7 +16,7 @@ use crate::table::{self, TABLE};
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
-    /// True once the present inputs are applied, see [`Model::apply_present_inputs`].
+    /// True once the current inputs are applied, see [`Model::apply_present_inputs`].
     present: bool,
 }
 
@@ -32,20 +32,21 @@ impl HubSlosh {
     }
 }
 
-/// The plant's parameters, and the ways round enumerations for hosts that set none, and round Booleans for
-/// hosts that misread them. By default the liquid is let go at [`START_ANGLE`].
+/// The plant's parameters, and integer twins of enumerations (for hosts that cannot set them) and of Booleans (for
+/// hosts that misread them). By default the liquid is released at [`START_ANGLE`].
 #[derive(Clone, Debug)]
 pub struct Parameters {
     plant: plant::Parameters,
-    /// The number of the slosh model, 0: as the enumeration says.
+    /// Integer twin of `slosh.model`: number of its item, 0 to use the enumeration; likewise for the enumerations below.
     pub slosh_kind: i32,
-    /// The number of the source of the modes, 0: as the enumeration says.
+    /// Integer twin of `slosh.source`.
     pub slosh_source_kind: i32,
-    /// The number of the law of damping, 0: as the enumeration says.
+    /// Integer twin of `slosh.damping_law`.
     pub damping_law_kind: i32,
-    /// The number of the friction law, 0: as the enumeration says.
+    /// Integer twin of `friction.model`.
     pub friction_kind: i32,
-    /// 1 for false, 2 for true, 0: as the Boolean says; likewise below.
+    /// Integer twin of `slosh.zeta_from_correlation`: 1 for false, 2 for true, 0 to use the Boolean; likewise for the
+    /// Booleans below.
     pub zeta_from_correlation_kind: i32,
     /// Integer twin of `slosh.capillarity`.
     pub capillarity_kind: i32,
@@ -57,8 +58,8 @@ pub struct Parameters {
     pub imu_enabled_kind: i32,
 }
 
-/// `init.slosh_angle` of an FMU that nobody has set anything of, rad: 2 degrees, so that the first plot shows how
-/// the liquid swings, what it does to the hub and how the bearing catches it.
+/// Start value of `init.slosh_angle`, rad: 2 degrees, so that a first plot without settings shows the liquid swinging,
+/// the hub's response and the bearing sticking.
 pub const START_ANGLE: f64 = 0.035;
 
 impl Default for Parameters {
@@ -95,8 +96,8 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Parameters of the plant with the `…kind` of enumerations and Booleans applied. An enumeration that
-    /// contradicts its kind is refused; a Boolean is not, because the hosts that need the kind set it at random.
+    /// Returns the plant's parameters with the integer twins applied. Refuses an enumeration that contradicts its
+    /// twin. A Boolean may contradict its twin, because the hosts that need the twin set the Boolean at random.
     fn resolved(&self) -> Result<plant::Parameters, Vec<String>> {
         let mut p = self.plant;
         let start = plant::Parameters::default();
@@ -104,8 +105,8 @@ impl Parameters {
         let mut conflict = |(name, model): (&str, i32), start: i32, (number, kind): (&str, i32)| {
             if kind != 0 && model != start && model != kind {
                 problems.push(format!(
-                    "{number} = {kind} contradicts {name} = {model} (allowed: 0, or the same \
-                     number, or {name} left at its start value {start})"
+                    "{number} = {kind} contradicts {name} = {model}: set {number} to 0 or {model}, \
+                     or leave {name} at its start value {start}"
                 ));
             }
         };

@@ -1,4 +1,4 @@
-//! The tank as a model of the runtime.
+//! Implements the runtime's `Model` for the tank.
 
 use std::ops::{Deref, DerefMut};
 
@@ -11,52 +11,54 @@ use runtime::table::Table;
 
 use crate::table::TABLE;
 
-/// Coupling by the total wrench, both sides extrapolated, is stable up to 2/sqrt(3) - 1 = 0.155.
+/// Limit of `coupling_ratio` for the warning. Coupling by the total wrench, extrapolated on both sides, is stable up to
+/// 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
-/// Said once.
-const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range): thrust pulls it off its liquid and nothing \
-                            centres it, or a bob is more than 45 degrees from the axis; the pendulums go on, but \
-                            stand for no liquid there";
+/// Warning that a run logs once.
+const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range). Thrust pulls the tank off its liquid and nothing \
+                            centres the liquid, or a bob is more than 45 degrees from the axis. Results are not \
+                            physical from here on";
 
-/// Said once.
-const LUMP: &str = "the liquid leaves the tank's bottom and goes on as one lump (tank.ball.state): times and momenta of crossings \
-                    hold, forces of impacts are indications of their order, and so is what follows them; the host takes impulse";
+/// Warning that a run logs once.
+const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached liquid (tank.ball.state). Times and \
+                    momenta of crossings are valid. Impact forces, and the motion after an impact, are right only to an \
+                    order of magnitude. The host must apply impulse";
 
-/// One tank.
+/// One tank of sloshing liquid.
 #[derive(Clone, Debug)]
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// True once the present inputs are applied: in Co-Simulation ranges are those of the present motion.
+    /// True once the current inputs are applied. In Co-Simulation `in_range` belongs to the current motion.
     present: bool,
     /// True once the motion of a tank without a model of detached liquid has left its range.
     has_left_range: bool,
-    /// True once the liquid of a tank with such a model has detached.
+    /// True once the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
 }
 
 impl Model {
-    /// Largest eigenvalue of the host's inverse mass matrix times the added mass; 0 if the host's
-    /// mass is not known.
+    /// Returns the largest eigenvalue of the host's inverse mass matrix times the added mass, or 0 if the host's mass
+    /// is unknown.
     pub fn coupling_ratio(&self) -> f64 {
         self.coupling_ratio
     }
 }
 
-/// The tank's parameters; the number of modes is an integer here, and a host without mass is none.
+/// The tank's parameters, with counts as integers.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     tank: TankParameters,
-    /// The coupling's number if it is not 0, for hosts that set no enumerations.
+    /// Integer twin of `coupling`, for hosts that cannot set enumerations; 0 to use the enumeration.
     pub coupling_kind: i32,
-    /// The number of the law of damping if it is not 0, for hosts that set no enumerations.
+    /// Integer twin of `tank.damping_law`.
     pub damping_law_kind: i32,
     /// Number of slosh modes.
     pub modes: i32,
-    /// Number of points of the tank's table.
+    /// Number of points of the tank's fill table.
     pub points: i32,
-    /// The host's mass properties; mass 0: not known.
+    /// The host's mass properties; mass 0 if they are unknown.
     pub host: Craft,
 }
 
@@ -84,14 +86,14 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Parameters of the tank. `coupling_kind` may not contradict a `coupling` that has been set.
+    /// Returns the tank's parameters with the integer twins applied. Refuses an enumeration that contradicts its twin.
     fn resolved(&self) -> Result<TankParameters, Vec<String>> {
         let mut p = self.tank;
         let (coupling, kind) = (p.coupling as i32, self.coupling_kind);
         if kind != 0 && p.coupling != TankParameters::default().coupling && coupling != kind {
             return Err(vec![format!(
-                "coupling_kind = {kind} contradicts coupling = {coupling} (allowed: 0, or the same number; coupling \
-                 left at its start value)"
+                "coupling_kind = {kind} contradicts coupling = {coupling}: set coupling_kind to 0 or {coupling}, or \
+                 leave coupling at its start value"
             )]);
         }
         if let Some(coupling) = usize::try_from(kind - 1).ok().and_then(|i| Coupling::ALL.get(i)) {
@@ -103,8 +105,8 @@ impl Parameters {
             if law != TankParameters::default().tank.damping_law && law != *given {
                 let law = law as i32;
                 return Err(vec![format!(
-                    "tank.damping_law_kind = {kind} contradicts tank.damping_law = {law} (allowed: 0, or the same \
-                     number; tank.damping_law left at its start value)"
+                    "tank.damping_law_kind = {kind} contradicts tank.damping_law = {law}: set tank.damping_law_kind \
+                     to 0 or {law}, or leave tank.damping_law at its start value"
                 )]);
             }
             p.tank.damping_law = *given;
@@ -116,18 +118,17 @@ impl Parameters {
     }
 }
 
-/// The host's motion. A slope that a host gives for omega is not used: it follows from omega_dot. By default
-/// the tank stands on the ground and is pushed with [`START_ACCELERATION`].
+/// The host's motion. The slope of omega follows from omega_dot; a slope that the host sets has no effect. By default
+/// the tank has the specific force [`START_ACCELERATION`].
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
-    /// Inputs in the form that the tank takes.
     pub tank: TankInputs,
     /// The slope of omega, rad/s2.
     pub omega_slope: [f64; 3],
 }
 
-/// `a` of an FMU that no host has connected, m/s2: standard gravity along the tank's axis, and a push to the
-/// side, so that the first plot shows the liquid swing.
+/// Start value of `a`, m/s2: standard gravity along the tank's axis and a lateral acceleration, so that a first plot
+/// without connections shows the liquid swinging.
 pub const START_ACCELERATION: [f64; 3] = [0.1, 0.0, 9.80665];
 
 impl Default for Inputs {
@@ -174,14 +175,14 @@ impl runtime::Model for Model {
         }
         let ratio = self.coupling_ratio;
         let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
-        // With a ball regime the host has to say its mass, and cannot take the wrench as it is.
+        // With a model of detached liquid, host.mass is required and the host uses bias and added_mass anyway.
         if !is_split || ratio <= LIMIT || self.tank.has_ball() {
             return warnings;
         }
         warnings.push(format!(
-            "coupling_ratio = {ratio:.3}: a host that takes force and torque as they are diverges above 1 \
-             (values held), 1/3 or {LIMIT} (extrapolated), at any communication step; use bias and \
-             added_mass instead, and leave host.mass at 0 if you do"
+            "coupling_ratio = {ratio:.3}: a host that applies force and torque directly diverges, at any communication \
+             step, above 1 (values held) and above 1/3 or {LIMIT} (values extrapolated on one side or both). Use bias \
+             and added_mass instead; then leave host.mass at 0 to silence this warning"
         ));
         warnings
     }
@@ -261,8 +262,8 @@ impl runtime::Model for Model {
     }
 
     fn set_dependent_slopes(inputs: &mut Inputs, h: f64) -> bool {
-        // omega at the step's end is then omega + omega_dot h + omega_dot' h^2/2. Where that
-        // overflows the step is refused.
+        // With this slope omega at the step's end is omega + omega_dot h + omega_dot' h^2/2. If that overflows, the
+        // step is refused.
         let rate = &inputs.tank.omega_dot;
         let slope = [0, 1, 2].map(|i| rate.value[i] + rate.slope[i] * h / 2.0);
         inputs.omega_slope = slope.map(|x| if x.is_finite() { x } else { 0.0 });
@@ -311,7 +312,7 @@ mod tests {
 
     use super::*;
 
-    /// The host is pushed backwards; the liquid is half a metre above its tank, where the host has integrated it to.
+    /// Pushes the host backwards with the liquid half a metre above its tank, where the host has integrated it.
     #[test]
     fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
         let mut parameters = Parameters::default();

@@ -1,5 +1,5 @@
-//! Spacecraft as an FMU: a free spacecraft with sloshing tanks. Its variables are in [`table`], its physics in the
-//! crate `craft`, what FMI demands in the crate `runtime`.
+//! Spacecraft as an FMU: a free spacecraft with sloshing tanks. Its variables are in [`table`], its physics is in the
+//! crate `craft`, FMI is in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]
@@ -11,14 +11,14 @@ pub use model::Model;
 
 /// The functions of FMI 2.0 that the binary exports.
 pub mod fmi2 {
-    // Their parameters are of the types of the standard's header.
+    // Parameter types of the standard's header.
     pub use runtime::v2::*;
 
     runtime::export_fmi2!(crate::Model);
 }
 
-/// The functions of FMI 3.0 that the binary exports; none in a module for WebAssembly, whose host speaks 2.0 and which
-/// a page has to carry.
+/// The functions of FMI 3.0 that the binary exports. A WebAssembly module leaves them out: its host uses FMI 2.0, and
+/// web pages must load the module.
 #[cfg(not(target_arch = "wasm32"))]
 pub mod fmi3 {
     pub use runtime::v3::*;

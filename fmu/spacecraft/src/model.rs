@@ -1,4 +1,4 @@
-//! The craft as a model of the runtime.
+//! Implements the runtime's `Model` for the spacecraft.
 
 use std::ops::{Deref, DerefMut};
 
@@ -12,32 +12,34 @@ use crate::table::TABLE;
 #[derive(Clone, Debug)]
 pub struct Model {
     craft: Spacecraft,
-    /// True once the present inputs are applied: a jump of the wheels' momentum or of an outflow acts
-    /// at once in Co-Simulation.
+    /// True once the current inputs are applied. In Co-Simulation a jump of the wheels' momentum or of an outflow
+    /// acts at once.
     present: bool,
     wheels: Wheels,
     /// True once a tank without a model of detached liquid has left its range.
     has_left_range: bool,
-    /// True once liquid of a tank with such a model has detached.
+    /// True once the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
 }
 
-/// Said once.
-const OUT_OF_RANGE: &str = "a tank leaves its range (tank[].in_range): thrust pulls it off its liquid and nothing \
-                            centres it, or a bob is more than 45 degrees from the axis; the pendulums go on, but \
-                            stand for no liquid there";
+/// Warning that a run logs once.
+const OUT_OF_RANGE: &str = "a tank leaves its range (tank[].in_range). Thrust pulls the tank off its liquid and nothing \
+                            centres the liquid, or a bob is more than 45 degrees from the axis. Results for this tank \
+                            are not physical from here on";
 
-/// Said once.
-const LUMP: &str = "the liquid of a tank leaves its bottom and goes on as one lump (tank[].ball.state): times and momenta of \
-                    crossings hold, forces of impacts are indications of their order, and so is what follows them";
+/// Warning that a run logs once.
+const LUMP: &str = "the liquid of a tank leaves the bottom and moves on as detached liquid (tank[].ball.state). Times \
+                    and momenta of crossings are valid. Impact forces, and the motion after an impact, are right only \
+                    to an order of magnitude";
 
-/// Detects a Model Exchange host that omits the wheels' reaction -h_w' from the torque: h_wheels moves on an axis on which torque
-/// has always been 0.
+/// Detects a Model Exchange host that omits the wheels' reaction -h_w' from the torque: h_wheels changes on an axis on
+/// which torque has always been 0.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wheels {
-    /// The torque that there has been, by axis.
+    /// True for each axis on which torque has been other than 0.
     torque: [bool; 3],
-    /// Number of steps in which h_wheels moved without torque. A single one may be the end of a ramp whose torque has ended.
+    /// Number of steps in which h_wheels changed without torque. One such step may be the end of a ramp whose torque has
+    /// ended.
     moved: [u8; 3],
 }
 
@@ -48,7 +50,7 @@ impl Wheels {
         }
     }
 
-    /// Over a step from `before` to the present inputs.
+    /// Records a step in which h_wheels changed from `before` to its current value.
     fn see_step(&mut self, before: [f64; 3], inputs: &Inputs) {
         self.see_torque(inputs);
         for i in 0..3 {
@@ -63,24 +65,24 @@ impl Wheels {
     }
 }
 
-/// The craft's parameters; counts are integers here.
+/// The craft's parameters, with counts as integers.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     craft: craft::Parameters,
-    /// The mount's number if it is not 0, for hosts that set no enumerations.
+    /// Integer twin of `mount`, for hosts that cannot set enumerations; 0 to use the enumeration.
     pub mount_kind: i32,
-    /// The numbers of the tanks' laws of damping if they are not 0.
+    /// Integer twins of `tank[].damping_law`.
     pub damping_law_kind: [i32; TANKS],
     /// Number of tanks.
     pub tanks: i32,
     /// Number of slosh modes of each tank.
     pub modes: [i32; TANKS],
-    /// Number of points of each tank's table.
+    /// Number of points of each tank's fill table.
     pub points: [i32; TANKS],
 }
 
-/// `init.omega` of an FMU that nobody has set anything of, rad/s: a slow spin that is not about a principal
-/// axis, so that the first plot shows how it nutates and how the liquid answers.
+/// Start value of `init.omega`, rad/s: a slow spin that is not about a principal axis, so that a first plot without
+/// settings shows nutation and the liquid's response.
 pub const START_RATE: [f64; 3] = [0.02, 0.0, 0.1];
 
 impl Default for Parameters {
@@ -109,14 +111,14 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Parameters of the craft. `mount_kind` may not contradict a `mount` that has been set.
+    /// Returns the craft's parameters with the integer twins applied. Refuses an enumeration that contradicts its twin.
     fn resolved(&self) -> Result<craft::Parameters, Vec<String>> {
         let mut p = self.craft;
         let (mount, kind) = (p.mount as i32, self.mount_kind);
         if kind != 0 && p.mount != craft::Parameters::default().mount && mount != kind {
             return Err(vec![format!(
-                "mount_kind = {kind} contradicts mount = {mount} (allowed: 0, or the same number; mount left at its \
-                 start value)"
+                "mount_kind = {kind} contradicts mount = {mount}: set mount_kind to 0 or {mount}, or leave mount at its \
+                 start value"
             )]);
         }
         if let Some(mount) = usize::try_from(kind - 1).ok().and_then(|i| Mount::ALL.get(i)) {
@@ -130,8 +132,8 @@ impl Parameters {
                 if law != craft::Tank::default().damping_law && law != *given {
                     let (law, number) = (law as i32, i + 1);
                     return Err(vec![format!(
-                        "tank[{number}].damping_law_kind = {kind} contradicts tank[{number}].damping_law = {law} \
-                         (allowed: 0, or the same number; damping_law left at its start value)"
+                        "tank[{number}].damping_law_kind = {kind} contradicts tank[{number}].damping_law = {law}: set \
+                         damping_law_kind to 0 or {law}, or leave damping_law at its start value"
                     )]);
                 }
                 tank.damping_law = *given;
@@ -284,9 +286,9 @@ impl runtime::Model for Model {
             return Some(LUMP);
         }
         self.wheels.lack_reaction().then_some(
-            "h_wheels moves on an axis on which torque has always been 0: in Model Exchange the slope of an input is not \
-             known, and without the wheels' reaction momentum and angular_momentum are wrong; add -d(h_wheels)/dt \
-             to torque",
+            "h_wheels changes on an axis on which torque has always been 0. In Model Exchange the FMU does not know the \
+             slope of an input, and without the wheels' reaction momentum and angular_momentum are wrong: add \
+             -d(h_wheels)/dt to torque",
         )
     }
 }
@@ -299,8 +301,8 @@ mod tests {
 
     const STEP: f64 = 0.01;
 
-    /// A host's Euler steps over a second, with h_wheels[2] and the torque about y as functions of the time; whether it is
-    /// warned.
+    /// Simulates one second with a host's Euler steps, with h_wheels[2] and the torque about y as functions of time.
+    /// Returns true if the FMU warns.
     fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool) -> bool {
         let inputs = |t: f64| {
             let mut inputs = Inputs::default();
@@ -322,7 +324,7 @@ mod tests {
             }
             model.set_time(t + STEP);
             model.set_continuous_states(&x);
-            // Where inputs jump at events they are held in between.
+            // Inputs that jump at events are held between them.
             model.accept_step(&inputs(if with_events { t } else { t + STEP })).unwrap();
         }
         model.step_warning().is_some()
@@ -336,14 +338,14 @@ mod tests {
         assert!(!is_warned(sine, reaction, false));
         assert!(!is_warned(sine, |_| 0.0, true), "jumps at events turn the craft by impulses");
         assert!(!is_warned(|_| 5.0, |_| 0.0, false), "wheels that hold their momentum");
-        // A ramp between two knots, whose reaction is there within it alone.
+        // A ramp between two knots, with a reaction only within the ramp.
         let ramp = |t: f64| (10.0 * (t - 0.5)).clamp(0.0, 1.0);
         let reaction = |t: f64| if (0.5..0.6).contains(&t) { -10.0 } else { 0.0 };
         assert!(!is_warned(ramp, reaction, false));
         assert!(is_warned(ramp, |_| 0.0, false));
     }
 
-    /// Reversed thrust; the liquid is half a metre above its tank, where a host has integrated it to, and moves up or down.
+    /// Reverses thrust with the liquid half a metre above its tank, where a host has integrated it, moving up or down.
     #[test]
     fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
         let mut parameters = Parameters::default();

@@ -1,10 +1,10 @@
-//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`,
-//! turning with `model::START_RATE`.
+//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`
+//! with the angular velocity `model::START_RATE`.
 //!
-//! A variant for fewer tanks and modes is made of the same table: the arrays are shorter.
+//! A variant for fewer tanks and modes uses the same table with shorter arrays.
 //!
-//! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, …: tank,
-//! mode, axis.
+//! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, … with
+//! the indices tank, mode, axis.
 
 use craft::{BallState, DampingLaw, MODES, POINTS, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
@@ -14,7 +14,7 @@ use runtime::variable::{Dimension, Enumeration, Item, Variable};
 use crate::Model;
 use crate::model::Parameters;
 
-/// All that is said about the FMU's variables.
+/// Table of the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
     About {
         model: NAME,
@@ -43,7 +43,7 @@ const DESCRIPTION: &str = match TANKS {
     }
 };
 
-/// Each variant has a name of its own, by which a host tells one's library from another's.
+/// Each variant has its own name, so that a host does not confuse the variants' libraries.
 const NAME: &str = match (TANKS, MODES) {
     (1, 1) => "Spacecraft_1x1",
     (1, 2) => "Spacecraft_1x2",
@@ -61,8 +61,8 @@ const NAME: &str = match (TANKS, MODES) {
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// The accelerations balance all forces: the pull of the liquids' pendulums, their drag and centring
-// follow from directions and rates, a pivot's gravity from the attitude.
+// Direct dependencies. The accelerations balance all forces. Tension, drag and centring of the
+// pendulums depend on their directions and rates, gravity on a pivot depends on the attitude.
 const MOTION: &[&str] = &[
     "q",
     "omega",
@@ -104,7 +104,7 @@ const ENERGIES: &[&str] = &[
 ];
 const PLACES: &[&str] = &["tank[].p", "tank[].liquid", "tank[].ball.position"];
 const ANGLES: &[&str] = &["tank[].p"];
-// Where they start.
+// Dependencies of initial values.
 const EVERYTHING: &[&str] = &[
     "force",
     "torque",
@@ -134,28 +134,28 @@ const MODE_PAIR: &[Dimension] = &[TANK, Fixed(MODES), Fixed(2)];
 const TABLE_OF_TANK: &[Dimension] = &[TANK, Fixed(POINTS)];
 const TABLE_OF_MODE: &[Dimension] = &[TANK, Fixed(MODES), Fixed(POINTS)];
 
-/// Tank, mode and point of an element of the shape [`TABLE_OF_MODE`].
+/// Returns tank, mode and point of element `n` of the shape [`TABLE_OF_MODE`].
 const fn point(n: usize) -> (usize, usize, usize) {
     (n / (POINTS * MODES), n / POINTS % MODES, n % POINTS)
 }
 
-/// Tank, mode and axis of an element of the shape [`MODE_VECTOR`].
+/// Returns tank, mode and axis of element `n` of the shape [`MODE_VECTOR`].
 const fn place(n: usize) -> (usize, usize, usize) {
     (n / (3 * MODES), n / 3 % MODES, n % 3)
 }
 
-/// The same element's place among the continuous states.
+/// Returns the index of the same element among the continuous states.
 fn bob(n: usize) -> usize {
     let (tank, mode, axis) = place(n);
     index::bob(tank, mode) + axis
 }
 
-/// The place among the continuous states of an element of a lump's position.
+/// Returns the index among the continuous states of element `n` of `tank[].ball.position`.
 fn ball(n: usize) -> usize {
     index::ball(n / 3) + n % 3
 }
 
-/// Item of [`BALL_STATE`].
+/// Returns the item of [`BALL_STATE`].
 fn ball_state(state: BallState) -> i32 {
     match state {
         BallState::Settled => 1,
@@ -174,115 +174,115 @@ static VARIABLES: &[Variable<Model>] = &[
         "Attitude quaternion, scalar first, body to inertial axes")
         .shape(QUATERNION).is_state(|n| index::Q + n).depends_on(&["q[]"]).initial_depends_on(&["init.q"]),
     V::output("omega", |o, n| o.omega[n], "rad/s",
-        "Angular velocity against the inertial frame, body axes")
+        "Angular velocity relative to the inertial frame, body axes")
         .display_unit("deg/s").shape(VECTOR).nominal(0.01).is_state(|n| index::OMEGA + n).reinit()
         .depends_on(&["omega[]"]).initial_depends_on(&["init.omega"]),
     V::output("omega_dot", |o, n| o.omega_dot[n], "rad/s2",
-        "Angular acceleration, body axes")
+        "Angular acceleration relative to the inertial frame, body axes")
         .display_unit("deg/s2").shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
     V::output("specific_force", |o, n| o.specific_force[n], "m/s2",
-        "What an accelerometer at O reads, body axes; on a pivot minus gravity")
+        "Specific force at O, as an accelerometer there measures it, body axes; on a pivot minus gravity")
         .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
     V::output("position", |o, n| o.position[n], "m",
-        "Position of O in the freely falling frame")
+        "Position of O in the freely falling frame, inertial axes")
         .shape(VECTOR).is_state(|n| index::POSITION + n).reinit().depends_on(&["position[]"]).initial_depends_on(&["init.position"]),
     V::output("velocity", |o, n| o.velocity[n], "m/s",
-        "Velocity of O against the freely falling frame, inertial axes")
+        "Velocity of O in the freely falling frame, inertial axes")
         .shape(VECTOR).is_state(|n| index::VELOCITY + n).reinit().depends_on(&["velocity[]"]).initial_depends_on(&["init.velocity"]),
     V::output("slosh_force", |o, n| o.slosh_force[n], "N",
-        "Force of all liquids on the craft, rigid liquid included, body axes")
+        "Force of all liquids (sloshing and rigid) on the craft, body axes")
         .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
     V::output("slosh_torque", |o, n| o.slosh_torque[n], "N.m",
-        "Torque of all liquids on the craft about O, body axes")
+        "Torque of all liquids (sloshing and rigid) on the craft about O, body axes")
         .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
 
     // Inputs
     V::input("force", |i, n| [&mut i.force.value[n], &mut i.force.slope[n]], "N",
-        "Applied force at O, body axes; held over a step unless its derivative is set")
+        "Applied force at O, body axes. Held over a communication step unless an input derivative is set, which applies to one step")
         .shape(VECTOR).range(-1e12, 1e12),
     V::input("torque", |i, n| [&mut i.torque.value[n], &mut i.torque.slope[n]], "N.m",
-        "Applied torque about O, body axes; held over a step unless its derivative is set")
+        "Applied torque about O, body axes. Held over a communication step unless an input derivative is set, which applies to one step")
         .shape(VECTOR).range(-1e12, 1e12),
     V::input("h_wheels", |i, n| [&mut i.h_wheels.value[n], &mut i.h_wheels.slope[n]], "N.m.s",
-        "Angular momentum of the wheels relative to the body, body axes. Its derivative turns the craft; a jump does so by an impulse that keeps the total angular momentum. In Model Exchange, where no derivative is known, put the reaction into torque")
+        "Angular momentum of the wheels relative to the body, body axes. Its input derivative turns the craft; a jump does so by an impulse that conserves total angular momentum. In Model Exchange, without input derivatives, add the wheels' reaction to torque")
         .shape(VECTOR).range(-1e12, 1e12),
 
     V::input("mass_flow", |i, n| [&mut i.mass_flow[n].value, &mut i.mass_flow[n].slope], "kg/s",
-        "Mass that flows out of each tank, with the tank's velocity at the outlet (its thrust is a part of force); in where negative. A jump sets what flows within in motion by an impulse that keeps the momentum. Of no effect in a tank with fill.points = 0")
+        "Mass flow out of each tank, negative for inflow; it leaves with the tank's velocity at the outlet, and its thrust is part of force. A jump starts the flow within the tank by an impulse that conserves momentum. Without effect in a tank with fill.points = 0")
         .shape(PER_TANK).range(-1e9, 1e9),
 
     // Locals
     V::local("pivot.torque", |o, n| o.pivot_torque[n], "N.m",
-        "Torque of a pivot's stiffness, damping and friction on the craft, body axes; 0 while free")
+        "Torque of the pivot's stiffness, damping and friction on the craft, body axes; 0 in free flight")
         .shape(VECTOR).depends_on(&["q", "omega"]),
     V::local("momentum", |o, n| o.momentum[n], "kg.m/s",
-        "Linear momentum of everything, inertial axes")
+        "Linear momentum of craft and liquids, inertial axes")
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("angular_momentum", |o, n| o.angular_momentum[n], "N.m.s",
-        "Angular momentum of everything about its centre of mass (on a pivot about O), wheels included, inertial axes")
+        "Angular momentum of craft, wheels and liquids about their centre of mass (on a pivot about O), inertial axes")
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("energy", |o, _| o.energy, "J",
-        "Kinetic energy of everything, of the centring springs, and on a pivot of gravity and of its stiffness; the wheels' spin and the flow towards an outlet left out")
+        "Kinetic energy of craft and liquids plus energy of the centring springs, on a pivot also of gravity and of the pivot's stiffness. Excludes the spin of the wheels and the flow towards an outlet")
         .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "tank[].ball.position", "tank[].ball.velocity", "mass_flow"]),
     V::local("work", |o, _| o.work, "J",
-        "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated - drained")
+        "Work done on the craft by force, torque and wheels since the start: energy - energy(0) = work - dissipated - drained")
         .is_state(|_| index::WORK).depends_on(&["work"]),
     V::local("dissipated", |o, _| o.dissipated, "J",
-        "Energy dissipated by the liquids and by a pivot's damping and friction since the start")
+        "Energy dissipated by the liquids and by the pivot's damping and friction since the start")
         .is_state(|_| index::DISSIPATED).depends_on(&["dissipated"]),
     V::local("drained", |o, _| o.drained, "J",
-        "Energy that has gone with the outflow since the start: the kinetic energy of what has left, and what the flow within the tanks has taken")
+        "Energy lost with the outflow since the start: kinetic energy of the liquid that has left, and energy taken by the flow within the tanks")
         .is_state(|_| index::DRAINED).depends_on(&["drained"]),
     V::local("mass", |o, _| o.mass, "kg",
-        "Mass of everything")
+        "Mass of craft and liquids")
         .depends_on(&["tank[].liquid"]),
     V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
-        "Centre of mass of everything from O, body axes")
+        "Centre of mass of craft and liquids from O, body axes")
         .shape(VECTOR).depends_on(PLACES),
     V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
-        "Inertia of everything about its centre of mass, each bob a point mass where it is, body axes")
+        "Inertia matrix of craft and liquids about their centre of mass, each bob a point mass at its current position, body axes")
         .shape(MATRIX).depends_on(PLACES),
     V::local("tank[].force", |o, n| o.tank[n / 3].force[n % 3], "N",
-        "Force of a tank's whole liquid on the craft, body axes")
+        "Force of a tank's whole liquid (sloshing and rigid) on the craft, body axes")
         .shape(TANK_VECTOR).depends_on(MOTION),
     V::local("tank[].torque", |o, n| o.tank[n / 3].torque[n % 3], "N.m",
-        "Torque of a tank's whole liquid on the craft about O, body axes")
+        "Torque of a tank's whole liquid (sloshing and rigid) on the craft about O, body axes")
         .shape(TANK_VECTOR).depends_on(MOTION),
     V::local("tank[].wave_height", |o, n| o.tank[n].wave_height, "m",
-        "Amplitude of a tank's surface at the wall, all modes together: wave times slosh angle")
+        "Wave height at the tank wall above the surface at rest, all modes together: wave times slosh angle")
         .display_unit("mm").shape(PER_TANK).depends_on(ANGLES),
     V::local_enumeration("tank[].regime", &REGIME, |o, n| o.tank[n].ranges.regime as i32,
-        "How far a tank's wave_height is inside the range of linear theory; nonlinear, too, where a bob is beyond 45 degrees or the liquid has left as one lump")
+        "Amplitude class of the wave, by tank[].wave_height over the free surface's radius; nonlinear also while a bob is beyond 45 degrees or the liquid is detached")
         .shape(PER_TANK).depends_on(ANGLES),
     V::local_boolean("tank[].in_range", |o, n| o.tank[n].ranges.in_range,
-        "The pendulums stand for the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis; false while the liquid is a lump")
+        "True while the pendulums represent the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis. False while the liquid is detached")
         .shape(PER_TANK).depends_on(MOTION),
     V::local_integer("tank[].in_range_kind", |o, n| i32::from(o.tank[n].ranges.in_range),
-        "tank[].in_range for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
+        "tank[].in_range as an integer, for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
         .shape(PER_TANK).depends_on(MOTION),
     V::local_enumeration("tank[].ball.state", &BALL_STATE, |o, n| ball_state(o.tank[n].ball_state),
-        "What the liquid of a tank does whose ball.travel is above 0; where it is not settled no pendulum stands for it (in_range), and the tank's angles and wave_height are 0")
+        "State of the liquid in a tank with tank[].ball.travel above 0. Unless it is settled, no pendulum represents the liquid (in_range), and slosh angles and wave_height are 0")
         .shape(PER_TANK).depends_on(MOTION),
     V::local("tank[].angle_x", |o, n| o.tank[n / MODES].angle_x[n % MODES], "rad",
-        "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
+        "Slosh angle of a mode along the tank's x axis; its sine is the bob's displacement over the pendulum's length")
         .display_unit("deg").shape(PER_MODE).depends_on(ANGLES),
     V::local("tank[].angle_y", |o, n| o.tank[n / MODES].angle_y[n % MODES], "rad",
-        "Slosh angle of a mode along the tank's y axis")
+        "Slosh angle of a mode along the tank's y axis; its sine is the bob's displacement over the pendulum's length")
         .display_unit("deg").shape(PER_MODE).depends_on(ANGLES),
 
     // The modes' directions and rates
     V::state("tank[].p", bob, "1",
-        "Direction from hinge to bob of a slosh mode, a unit vector in tank axes; at rest under thrust along the tank's axis (0, 0, -1)")
+        "Unit vector from hinge to bob of a slosh mode, tank axes; (0, 0, -1) at rest under thrust along the tank's axis")
         .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank[].p[]"]).initial_depends_on(BOBS),
     V::state("tank[].p_dot", |n| bob(n) + 3, "1/s",
-        "Rate of tank[].p against the tank, tank axes")
+        "Rate of tank[].p relative to the tank, tank axes")
         .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank[].p_dot[]"]).initial_depends_on(BOBS),
 
     V::state("tank[].ball.position", ball, "m",
-        "Centre of the liquid as one lump from the tank's origin, tank axes; while it is settled, where its centre is at rest; 0 in a tank with ball.travel = 0")
+        "Centre of the detached liquid from the tank's origin, tank axes; while the liquid is settled, its centre at rest; 0 if tank[].ball.travel is 0")
         .shape(TANK_VECTOR).reinit().depends_on(&["tank[].ball.position[]"]).initial_depends_on(BOBS),
     V::state("tank[].ball.velocity", |n| ball(n) + 3, "m/s",
-        "Velocity of the lump against the tank, tank axes; 0 while the liquid is settled")
+        "Velocity of the detached liquid's centre relative to the tank, tank axes; 0 while the liquid is settled")
         .shape(TANK_VECTOR).nominal(0.01).reinit().depends_on(&["tank[].ball.velocity[]"]).initial_depends_on(BOBS),
 
     V::state("tank[].liquid", |n| index::LIQUID + n, "kg",
@@ -322,156 +322,156 @@ static VARIABLES: &[Variable<Model>] = &[
         .range(1e-6, 1e12),
     V::parameter("craft.r", |p, n| &mut p.craft.r[n], "m", "Centre of mass of the dry craft from O, body axes")
         .shape(VECTOR).range(-1e4, 1e4),
-    V::parameter("craft.Jxx", |p, _| &mut p.craft.j.xx, "kg.m2", "Moment of inertia of the dry craft about its centre of mass")
+    V::parameter("craft.Jxx", |p, _| &mut p.craft.j.xx, "kg.m2", "Moment of inertia of the dry craft about its centre of mass, body x axis")
         .range(1e-9, 1e12),
-    V::parameter("craft.Jyy", |p, _| &mut p.craft.j.yy, "kg.m2", "Moment of inertia of the dry craft about its centre of mass")
+    V::parameter("craft.Jyy", |p, _| &mut p.craft.j.yy, "kg.m2", "Moment of inertia of the dry craft about its centre of mass, body y axis")
         .range(1e-9, 1e12),
-    V::parameter("craft.Jzz", |p, _| &mut p.craft.j.zz, "kg.m2", "Moment of inertia of the dry craft about its centre of mass")
+    V::parameter("craft.Jzz", |p, _| &mut p.craft.j.zz, "kg.m2", "Moment of inertia of the dry craft about its centre of mass, body z axis")
         .range(1e-9, 1e12),
-    V::parameter("craft.Jxy", |p, _| &mut p.craft.j.xy, "kg.m2", "Product of inertia, minus the integral of x y dm"),
-    V::parameter("craft.Jxz", |p, _| &mut p.craft.j.xz, "kg.m2", "Product of inertia, minus the integral of x z dm"),
-    V::parameter("craft.Jyz", |p, _| &mut p.craft.j.yz, "kg.m2", "Product of inertia, minus the integral of y z dm"),
+    V::parameter("craft.Jxy", |p, _| &mut p.craft.j.xy, "kg.m2", "Product of inertia of the dry craft about its centre of mass, body axes: minus the integral of x y dm"),
+    V::parameter("craft.Jxz", |p, _| &mut p.craft.j.xz, "kg.m2", "Product of inertia of the dry craft about its centre of mass, body axes: minus the integral of x z dm"),
+    V::parameter("craft.Jyz", |p, _| &mut p.craft.j.yz, "kg.m2", "Product of inertia of the dry craft about its centre of mass, body axes: minus the integral of y z dm"),
     V::choice("mount", &MOUNT, |p, _| p.mount as i32, |p, _, n| p.mount = if n == 2 { craft::Mount::Pivot } else { craft::Mount::Free },
-        "How the craft is held"),
+        "Support of the craft: free flight or a pivot at O"),
     V::integer("mount_kind", |p, _| &mut p.mount_kind,
-        "For hosts that set no enumerations: 0: as mount says; 1 free, 2 pivot. An error if mount has been set to another one")
+        "mount as an integer, for hosts that cannot set enumerations: 0 takes mount, other values are its item numbers. Setting mount to a different item is an error")
         .between(0, MOUNT.items.len() as i32),
-    V::parameter("gravity", |p, n| &mut p.gravity[n], "m/s2", "Uniform gravity, inertial axes: acts on a pivot alone")
+    V::parameter("gravity", |p, n| &mut p.gravity[n], "m/s2", "Uniform gravity, inertial axes; acts only on a pivot")
         .shape(VECTOR).range(-1e4, 1e4),
     V::parameter("pivot.k", |p, n| &mut p.pivot.k[n], "N.m/rad",
-        "Stiffness of a pivot against tilt of the body's z axis from the inertial z axis, about the body's x and y axis")
+        "Stiffness of the pivot about the body's x and y axes, against tilt of the body's z axis from the inertial z axis")
         .shape(&[Fixed(2)]).range(0.0, 1e12),
     V::parameter("pivot.c", |p, n| &mut p.pivot.c[n], "N.m.s/rad",
-        "Damping coefficient of a pivot about each body axis: against omega")
+        "Damping coefficient of the pivot about each body axis, against omega")
         .shape(VECTOR).range(0.0, 1e12),
     V::parameter("pivot.friction.c", |p, n| &mut p.pivot.friction.c[n], "N.m",
-        "Coulomb torque of a pivot about each body axis: against the sign of omega")
+        "Coulomb friction torque of the pivot about each body axis, against the sign of omega")
         .display_unit("mN.m").shape(VECTOR).range(0.0, 1e12),
     V::parameter("pivot.friction.d", |p, n| &mut p.pivot.friction.d[n], "N.m",
-        "What the pivot's dry friction at rest exceeds the Coulomb torque by, about each body axis")
+        "Static friction torque of the pivot in excess of the Coulomb torque, about each body axis")
         .display_unit("mN.m").shape(VECTOR).range(0.0, 1e12),
     V::parameter("pivot.friction.omega_s", |p, _| &mut p.pivot.friction.omega_s, "rad/s",
-        "Stribeck speed of the pivot's friction: the excess falls with exp(-(omega/omega_s)^2)")
+        "Stribeck speed of the pivot: the excess friction falls with exp(-(omega/omega_s)^2)")
         .display_unit("deg/s").range(1e-6, 1e6),
     V::parameter("pivot.friction.eps", |p, _| &mut p.pivot.friction.eps, "rad/s",
-        "Width of the smoothed sign, tanh(omega/eps): an axis that would stick creeps at less than that")
+        "Width of the smoothed sign function tanh(omega/eps) of the pivot; an axis that would stick creeps more slowly than this")
         .display_unit("deg/s").range(1e-7, 1e3),
     V::integer("tanks", |p, _| &mut p.tanks, "Number of tanks")
         .between(0, TANKS as i32),
 
     // Each tank
     V::parameter("tank[].position", |p, n| &mut p.tank[n / 3].position[n % 3], "m",
-        "The tank's origin from O, body axes")
+        "Position of the tank's origin from O, body axes")
         .shape(TANK_VECTOR).range(-1e4, 1e4),
     V::parameter("tank[].q", |p, n| &mut p.tank[n / 4].q[n % 4], "1",
-        "Attitude of the tank, tank to body axes, scalar first; normalised")
+        "Attitude quaternion of the tank, scalar first, tank to body axes; the FMU normalises it")
         .shape(&[TANK, Fixed(4)]),
-    V::parameter("tank[].diameter", |p, n| &mut p.tank[n].diameter, "m", "Diameter of an upright cylinder; above 0 it makes with depth and density m_0, H_0, I_0 and each mode's mass, length, hinge and wave by potential flow, and the tank's origin is the centre of its bottom")
+    V::parameter("tank[].diameter", |p, n| &mut p.tank[n].diameter, "m", "Diameter of an upright cylindrical tank, whose origin is the centre of its bottom; 0: not a cylinder. Above 0, potential flow gives m_0, H_0, I_0 and each mode's mass, length, hinge and wave from diameter, depth and density")
         .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
-    V::parameter("tank[].depth", |p, n| &mut p.tank[n].depth, "m", "Depth of the liquid in the cylinder, used where diameter is above 0")
+    V::parameter("tank[].depth", |p, n| &mut p.tank[n].depth, "m", "Fill height of the liquid in the cylinder, used if diameter is above 0")
         .display_unit("mm").shape(PER_TANK).range(1e-3, 1e3),
-    V::parameter("tank[].density", |p, n| &mut p.tank[n].density, "kg/m3", "Density of the liquid, used where diameter is above 0")
+    V::parameter("tank[].density", |p, n| &mut p.tank[n].density, "kg/m3", "Density of the liquid, used if diameter is above 0")
         .shape(PER_TANK).range(1e-3, 1e5),
-    V::parameter("tank[].m_0", |p, n| &mut p.tank[n].m_0, "kg", "Mass of the rigid liquid; below 0 allowed with planar modes (direction) alone")
+    V::parameter("tank[].m_0", |p, n| &mut p.tank[n].m_0, "kg", "Mass of the rigid liquid, which moves with the tank; below 0 only with planar modes (direction)")
         .shape(PER_TANK),
     V::parameter("tank[].H_0", |p, n| &mut p.tank[n].h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis")
         .shape(PER_TANK),
-    V::parameter("tank[].I_0", |p, n| &mut p.tank[n].i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass; with dI_y that about the tank's x axis; below 0 as m_0")
+    V::parameter("tank[].I_0", |p, n| &mut p.tank[n].i_0, "kg.m2", "Moment of inertia of the rigid liquid about its centre of mass, across the tank's axis (with dI_y: about the tank's x axis); below 0 only with planar modes (direction)")
         .shape(PER_TANK),
-    V::parameter("tank[].I_z", |p, n| &mut p.tank[n].i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis, through its centre of mass; below 0 as m_0")
+    V::parameter("tank[].I_z", |p, n| &mut p.tank[n].i_z, "kg.m2", "Moment of inertia of the rigid liquid about its centre of mass, along the tank's axis; below 0 only with planar modes (direction)")
         .shape(PER_TANK),
-    V::parameter("tank[].r_0", |p, n| &mut p.tank[n / 2].r_0[n % 2], "m", "How far the rigid liquid's centre of mass is off the tank's axis, along the tank's x and y axis")
+    V::parameter("tank[].r_0", |p, n| &mut p.tank[n / 2].r_0[n % 2], "m", "Offset of the rigid liquid's centre of mass from the tank's axis, along the tank's x and y axes")
         .shape(&[TANK, Fixed(2)]),
-    V::parameter("tank[].dI_y", |p, n| &mut p.tank[n].di_y, "kg.m2", "By how much the moment of inertia of the rigid liquid about the tank's y axis exceeds I_0")
+    V::parameter("tank[].dI_y", |p, n| &mut p.tank[n].di_y, "kg.m2", "Moment of inertia of the rigid liquid about the tank's y axis minus I_0")
         .shape(PER_TANK).range(-1e12, 1e12),
-    V::parameter("tank[].I_xy", |p, n| &mut p.tank[n].products[0], "kg.m2", "Product of inertia of the rigid liquid about its centre of mass, tank axes, minus the integral of x y dm")
+    V::parameter("tank[].I_xy", |p, n| &mut p.tank[n].products[0], "kg.m2", "Product of inertia of the rigid liquid about its centre of mass, tank axes: minus the integral of x y dm")
         .shape(PER_TANK).range(-1e12, 1e12),
-    V::parameter("tank[].I_xz", |p, n| &mut p.tank[n].products[1], "kg.m2", "Product of inertia of the rigid liquid, minus the integral of x z dm")
+    V::parameter("tank[].I_xz", |p, n| &mut p.tank[n].products[1], "kg.m2", "Product of inertia of the rigid liquid about its centre of mass, tank axes: minus the integral of x z dm")
         .shape(PER_TANK).range(-1e12, 1e12),
-    V::parameter("tank[].I_yz", |p, n| &mut p.tank[n].products[2], "kg.m2", "Product of inertia of the rigid liquid, minus the integral of y z dm")
+    V::parameter("tank[].I_yz", |p, n| &mut p.tank[n].products[2], "kg.m2", "Product of inertia of the rigid liquid about its centre of mass, tank axes: minus the integral of y z dm")
         .shape(PER_TANK).range(-1e12, 1e12),
     V::integer("tank[].modes", |p, n| &mut p.modes[n], "Number of slosh modes of the tank")
         .between(0, MODES as i32).shape(PER_TANK),
-    V::parameter("tank[].g_ref", |p, n| &mut p.tank[n].g_ref, "m/s2", "Acceleration along the tank's axis at which zeta holds")
+    V::parameter("tank[].g_ref", |p, n| &mut p.tank[n].g_ref, "m/s2", "Specific force along the tank's axis at which zeta and frequency hold")
         .shape(PER_TANK).range(1e-9, 1e6),
-    V::parameter("tank[].mass", |p, n| &mut p.tank[n / MODES].mass[n % MODES], "kg", "Mass of a mode's bob")
+    V::parameter("tank[].mass", |p, n| &mut p.tank[n / MODES].mass[n % MODES], "kg", "Mass of a slosh mode's pendulum (modal mass)")
         .shape(PER_MODE).range(1e-9, 1e9),
-    V::parameter("tank[].length", |p, n| &mut p.tank[n / MODES].length[n % MODES], "m", "Length of a mode's pendulum")
+    V::parameter("tank[].length", |p, n| &mut p.tank[n / MODES].length[n % MODES], "m", "Length of a slosh mode's pendulum")
         .shape(PER_MODE).range(1e-6, 1e4),
     V::parameter("tank[].frequency", |p, n| &mut p.tank[n / MODES].frequency[n % MODES], "Hz",
-        "Natural frequency of a mode with the tank held, at g_ref; above 0 it stands in place of length: (2 pi f)^2 = g_ref/l + k/m")
+        "Natural frequency of a slosh mode with the tank held, at g_ref; above 0 it replaces length: (2 pi f)^2 = g_ref/l + k/m")
         .shape(PER_MODE).range(0.0, 1e6),
-    V::parameter("tank[].hinge", |p, n| &mut p.tank[n / MODES].hinge[n % MODES], "m", "Height of a mode's hinge on the tank's axis")
+    V::parameter("tank[].hinge", |p, n| &mut p.tank[n / MODES].hinge[n % MODES], "m", "Height of a slosh mode's hinge on the tank's axis")
         .shape(PER_MODE),
     V::parameter("tank[].direction", |p, n| &mut p.tank[n / (2 * MODES)].direction[n / 2 % MODES][n % 2], "1",
-        "Direction in which a mode moves its mass, x and y in tank axes, normalised: the mode is planar, its bob swings in the plane of this direction and the tank's axis and is carried along across it; 0, 0: it swings in every direction")
+        "Direction in which a slosh mode moves its mass, x and y in tank axes; the FMU normalises it. The mode is then planar: its bob swings in the plane of this direction and the tank's axis and moves with the tank across it. The default 0, 0 lets the mode swing in every direction")
         .shape(MODE_PAIR),
     V::parameter("tank[].arm", |p, n| &mut p.tank[n / MODES].arm[n % MODES], "m",
-        "How far a planar mode's plane is off the tank's axis: the arm about it of a momentum in the mode's direction")
+        "Distance of a planar mode's plane from the tank's axis: lever arm about the axis of a momentum in the mode's direction")
         .shape(PER_MODE),
-    V::parameter("tank[].k", |p, n| &mut p.tank[n / MODES].k[n % MODES], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
+    V::parameter("tank[].k", |p, n| &mut p.tank[n / MODES].k[n % MODES], "N/m", "Centring stiffness of a slosh mode at its bob (capillarity, diaphragm)")
         .shape(PER_MODE).range(0.0, 1e12),
-    V::parameter("tank[].zeta", |p, n| &mut p.tank[n / MODES].zeta[n % MODES], "1", "Damping ratio of a mode at g_ref: there its drag coefficient is 2 zeta m sqrt(g_ref/l + k/m); tank[].damping_law says how it goes on")
+    V::parameter("tank[].zeta", |p, n| &mut p.tank[n / MODES].zeta[n % MODES], "1", "Damping ratio of a slosh mode at g_ref; its drag coefficient there is 2 zeta m sqrt(g_ref/l + k/m). For other specific forces see tank[].damping_law")
         .shape(PER_MODE).range(0.0, 10.0),
     V::choice("tank[].damping_law", &DAMPING_LAW, |p, n| p.tank[n].damping_law as i32, set_damping_law,
-        "How the drag of a tank's modes follows the acceleration along the tank, by their natural frequencies")
+        "Damping law: dependence of a mode's drag coefficient on its natural frequency, hence on the specific force along the tank's axis")
         .shape(PER_TANK),
     V::integer("tank[].damping_law_kind", |p, n| &mut p.damping_law_kind[n],
-        "For hosts that set no enumerations: 0: as damping_law says; otherwise the number of its item. An error if damping_law has been set to another one")
+        "tank[].damping_law as an integer, for hosts that cannot set enumerations: 0 takes tank[].damping_law, other values are its item numbers. Setting tank[].damping_law to a different item is an error")
         .between(0, DAMPING_LAW.items.len() as i32).shape(PER_TANK),
-    V::parameter("tank[].g_floor", |p, n| &mut p.tank[n].g_floor, "m/s2", "Acceleration along the axis around which the drag stops to follow it; 0: 1e-4 g_ref")
+    V::parameter("tank[].g_floor", |p, n| &mut p.tank[n].g_floor, "m/s2", "Specific force along the tank's axis around which the drag stops following it; 0: 1e-4 g_ref")
         .shape(PER_TANK).range(0.0, 1e6),
-    V::parameter("tank[].zeta_amplitude", |p, n| &mut p.tank[n / MODES].zeta_amplitude[n % MODES], "1/rad", "Growth of a mode's damping ratio with its amplitude A (angle and rate over natural frequency, both directions together): zeta(A) = zeta + zeta_amplitude A")
+    V::parameter("tank[].zeta_amplitude", |p, n| &mut p.tank[n / MODES].zeta_amplitude[n % MODES], "1/rad", "Growth of a mode's damping ratio with its amplitude A: zeta(A) = zeta + zeta_amplitude A; A combines angle and rate over natural frequency in both directions")
         .shape(PER_MODE).range(0.0, 10.0),
-    V::parameter("tank[].wave", |p, n| &mut p.tank[n / MODES].wave[n % MODES], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
+    V::parameter("tank[].wave", |p, n| &mut p.tank[n / MODES].wave[n % MODES], "m", "Surface elevation at the wall per slosh angle of a slosh mode, used for wave_height only")
         .shape(PER_MODE).range(0.0, 1e9),
     V::parameter("tank[].ball.travel", |p, n| &mut p.tank[n].ball.travel, "m",
-        "Above 0: where thrust pulls the liquid off the tank's bottom, or the bobs pass 45 degrees on average by modal mass, all of it goes on as one lump that flies, is thrown back by the wall and settles; how far its centre is moved along the axis from the bottom to the top. On a free craft without tanks that drain, in a tank with modes")
+        "Distance along the tank's axis that the detached liquid's centre can move, from bottom to top; 0: the liquid never detaches. Above 0, all liquid becomes one body if thrust pulls it off the bottom or the bobs pass 45 degrees (mean by modal mass). The liquid flies, bounces off the wall and settles. Allowed on a free craft without draining tanks, in a tank with modes")
         .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
     V::parameter("tank[].ball.radius", |p, n| &mut p.tank[n].ball.radius, "m",
-        "How far the lump's centre gets from the tank's axis; 0: as far as makes the surface that it reaches as curved at the bottom as the path of the pendulums' common centre")
+        "Largest distance of the detached liquid's centre from the tank's axis; 0: the surface within reach has, at the bottom, the curvature of the path of the pendulums' common centre")
         .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
     V::parameter("tank[].ball.restitution", |p, n| &mut p.tank[n].ball.restitution, "1",
-        "Coefficient of restitution of the lump's impacts on the wall: speed along the normal after over that before. A guess unless measured")
+        "Coefficient of restitution of the detached liquid's impacts on the wall: normal speed after over before; a guess unless measured")
         .shape(PER_TANK).range(0.0, 1.0),
     V::parameter("tank[].ball.contact_speed", |p, n| &mut p.tank[n].ball.contact_speed, "m/s",
-        "Speed after an impact below which a lump that is pressed to the wall stays on it")
+        "Speed after an impact below which detached liquid that is pressed to the wall stays on it")
         .shape(PER_TANK).range(1e-9, 1e3),
     V::parameter("tank[].ball.drag", |p, n| &mut p.tank[n].ball.drag, "1/s",
-        "Rate at which the lump's speed along the wall decays while it slides there. A guess unless measured")
+        "Rate at which the detached liquid's speed along the wall decays while it slides; a guess unless measured")
         .shape(PER_TANK).range(0.0, 1e3),
-    V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 1.2 m")
+    V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Number of points in the tank's fill table; 0: the liquid stays. From 2 on the tank can drain, and the table gives its modes and rigid liquid, interpolated monotonically with two continuous derivatives. The start values are the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32).shape(PER_TANK),
-    V::parameter("tank[].liquid_0", |p, n| &mut p.tank[n].liquid_0, "kg", "Mass of liquid at the start, used with fill.points > 0")
+    V::parameter("tank[].liquid_0", |p, n| &mut p.tank[n].liquid_0, "kg", "Mass of the whole liquid at the start, used if fill.points is above 0")
         .shape(PER_TANK).range(0.0, 1e9),
-    V::parameter("tank[].outlet", |p, n| &mut p.tank[n].outlet, "m", "Height of the outlet on the tank's axis, used with fill.points > 0")
+    V::parameter("tank[].outlet", |p, n| &mut p.tank[n].outlet, "m", "Height of the outlet on the tank's axis, used if fill.points is above 0")
         .shape(PER_TANK).range(-1e4, 1e4),
-    V::parameter("tank[].fill.liquid", |p, n| &mut p.tank[n / POINTS].fill.liquid[n % POINTS], "kg", "Mass of liquid at a point of the table, rising")
+    V::parameter("tank[].fill.liquid", |p, n| &mut p.tank[n / POINTS].fill.liquid[n % POINTS], "kg", "Mass of the whole liquid at each point of the fill table, increasing")
         .shape(TABLE_OF_TANK).range(0.0, 1e9),
-    V::parameter("tank[].fill.H_0", |p, n| &mut p.tank[n / POINTS].fill.h_0[n % POINTS], "m", "H_0 at a point of the table")
+    V::parameter("tank[].fill.H_0", |p, n| &mut p.tank[n / POINTS].fill.h_0[n % POINTS], "m", "H_0 at each point of the fill table")
         .shape(TABLE_OF_TANK),
-    V::parameter("tank[].fill.I_0", |p, n| &mut p.tank[n / POINTS].fill.i_0[n % POINTS], "kg.m2", "I_0 at a point of the table")
+    V::parameter("tank[].fill.I_0", |p, n| &mut p.tank[n / POINTS].fill.i_0[n % POINTS], "kg.m2", "I_0 at each point of the fill table")
         .shape(TABLE_OF_TANK).range(0.0, 1e12),
-    V::parameter("tank[].fill.I_z", |p, n| &mut p.tank[n / POINTS].fill.i_z[n % POINTS], "kg.m2", "I_z at a point of the table")
+    V::parameter("tank[].fill.I_z", |p, n| &mut p.tank[n / POINTS].fill.i_z[n % POINTS], "kg.m2", "I_z at each point of the fill table")
         .shape(TABLE_OF_TANK).range(0.0, 1e12),
-    V::parameter("tank[].fill.mass", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.mass[m][k] }, "kg", "Mass of a mode's bob at a point of the table")
+    V::parameter("tank[].fill.mass", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.mass[m][k] }, "kg", "Mass of a slosh mode's pendulum (modal mass) at each point of the fill table")
         .shape(TABLE_OF_MODE).range(0.0, 1e9),
-    V::parameter("tank[].fill.length", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.length[m][k] }, "m", "Length of a mode's pendulum at a point of the table")
+    V::parameter("tank[].fill.length", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.length[m][k] }, "m", "Length of a slosh mode's pendulum at each point of the fill table")
         .shape(TABLE_OF_MODE).range(0.0, 1e4),
-    V::parameter("tank[].fill.hinge", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.hinge[m][k] }, "m", "Height of a mode's hinge at a point of the table")
+    V::parameter("tank[].fill.hinge", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.hinge[m][k] }, "m", "Height of a slosh mode's hinge on the tank's axis at each point of the fill table")
         .shape(TABLE_OF_MODE),
     V::parameter("tank[].p_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_0[m][k] }, "1",
-        "Direction from hinge to bob at the start, tank axes; normalised, of a planar mode within its plane")
+        "Unit vector from hinge to bob at the start, tank axes; the FMU normalises it, for a planar mode within its plane")
         .shape(MODE_VECTOR),
     V::parameter("tank[].p_dot_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_dot_0[m][k] }, "1/s",
-        "Its rate at the start, tank axes; made tangential")
+        "Rate of the unit vector from hinge to bob at the start, tank axes; the FMU keeps its tangential part")
         .shape(MODE_VECTOR),
 
-    // Where the motion starts
-    V::parameter("init.q", |p, n| &mut p.init.q[n], "1", "q at the start; normalised")
+    // Initial conditions
+    V::parameter("init.q", |p, n| &mut p.init.q[n], "1", "q at the start; the FMU normalises it")
         .shape(QUATERNION),
     V::parameter("init.omega", |p, n| &mut p.init.omega[n], "rad/s",
-        "omega at the start. Not 0, so that with nothing set something moves; 0 to start at rest")
+        "omega at the start; not 0 by default, so that a run without settings moves")
         .display_unit("deg/s").shape(VECTOR).range(-1e3, 1e3),
     V::parameter("init.position", |p, n| &mut p.init.position[n], "m", "position at the start")
         .shape(VECTOR),
@@ -480,7 +480,7 @@ static VARIABLES: &[Variable<Model>] = &[
 
     // Solver
     V::count("solver.max_steps", |p, _| p.max_steps as i32, |p, _, n| p.max_steps = n.max(0) as usize,
-        "Internal steps that one communication step may take: a step that needs more is refused")
+        "Largest number of internal steps in one communication step; a step that needs more is refused")
         .between(1, 1_000_000_000),
 ];
 
@@ -492,39 +492,39 @@ fn set_damping_law(p: &mut Parameters, tank: usize, number: i32) {
 
 static DAMPING_LAW: Enumeration = Enumeration {
     name: "DampingLaw",
-    description: "Drag coefficient c of a mode against its natural frequency omega",
+    description: "Drag coefficient c of a mode as a function of its natural frequency omega",
     items: &[
         Item::new("laminar", "c ~ sqrt(omega): a laminar layer at the wall, for bare tanks"),
-        Item::new("constant_ratio", "c ~ omega: the damping ratio stays"),
-        Item::new("constant", "c stays, whatever the acceleration"),
+        Item::new("constant_ratio", "c ~ omega: constant damping ratio"),
+        Item::new("constant", "c constant, independent of the specific force"),
     ],
 };
 
 static REGIME: Enumeration = Enumeration {
     name: "Regime",
-    description: "Wave height at the wall against the free surface's radius R",
+    description: "Amplitude class of the wave at the wall, R being the free surface's radius",
     items: &[
         Item::new("linear", "Below 0.15 R: linear theory holds"),
         Item::new("transitional", "0.15 R to 0.25 R"),
-        Item::new("nonlinear", "Above 0.25 R: heights and forces are indications"),
+        Item::new("nonlinear", "Above 0.25 R: heights and forces are only indications"),
     ],
 };
 
 static BALL_STATE: Enumeration = Enumeration {
     name: "BallState",
-    description: "What the liquid of a tank does",
+    description: "State of a tank's liquid",
     items: &[
-        Item::new("settled", "It is at the bottom: rigid liquid and pendulums"),
-        Item::new("flying", "It flies through the tank as one lump; the craft feels none of it"),
-        Item::new("sliding", "The lump slides on the wall"),
+        Item::new("settled", "Liquid at the bottom: rigid liquid and pendulums"),
+        Item::new("flying", "Detached liquid in free flight through the tank, without force on the spacecraft"),
+        Item::new("sliding", "Detached liquid in contact with the wall"),
     ],
 };
 
 static MOUNT: Enumeration = Enumeration {
     name: "Mount",
-    description: "How the craft is held",
+    description: "Support of the craft",
     items: &[
-        Item::new("free", "It flies: position and velocity count from a freely falling frame"),
+        Item::new("free", "Free flight: position and velocity are those in a freely falling frame"),
         Item::new(
             "pivot",
             "O rests on a bearing in uniform gravity; the craft turns about it, freely unless pivot.k, pivot.c or pivot.friction is set",
