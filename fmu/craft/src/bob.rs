@@ -1,5 +1,5 @@
-//! One slosh mode: a bob at the end of a rod that swings about a hinge on the tank's axis in
-//! every direction, upwards too.
+//! One slosh mode: a bob at the end of a rod that can swing about a hinge on the tank's axis in
+//! every direction, also upwards.
 //!
 //! ```text
 //! m  mass, l  length, e  the tank's axis, P  the hinge from O, p  unit vector from hinge to bob
@@ -9,9 +9,9 @@
 //! T  tension of the rod, > 0 when it pulls the bob to the hinge
 //! ```
 //!
-//! The motion is expanded in p and in v = p' + w x p, the bob's velocity against the hinge over
-//! l, as seen without the rotation. In these Newton's law is a polynomial, and w' occurs at the
-//! hinge only:
+//! The motion is expanded in p and in v = p' + w x p, the bob's velocity relative to the hinge over
+//! l in inertial axes. In these variables Newton's law is a polynomial, and w' occurs only at the
+//! hinge:
 //!
 //! ```text
 //! p' = v - w x p
@@ -19,15 +19,15 @@
 //! T  = m (l |v|^2 - p.B) - k l |p_perp|^2                        (keeps |p| = 1 and p.v = 0)
 //! ```
 //!
-//! On the craft act T p at the hinge, and phi = c l p' + k l p_perp at the bob, where drag and
-//! centring react:
+//! The bob loads the craft with T p at the hinge and with phi = c l p' + k l p_perp at the bob, the
+//! reaction of drag and centring:
 //!
 //! ```text
 //! F = T p + phi,   moment about O = P x F + l p x phi
 //! ```
 //!
-//! Source: Newton's second law with the constraint eliminated; every vector in body axes.
-//! Checked against the same law in p'' (tests/craft/independent.rs).
+//! Source: Newton's second law with the constraint eliminated. All vectors are in body axes.
+//! An independent formulation in p'' checks it (tests/craft/independent.rs).
 
 use taylor::number::Number;
 use taylor::series::{self, Series, ZERO};
@@ -41,13 +41,13 @@ use crate::damping::Drag;
 use crate::parameters::Tank;
 use crate::rigid::{Rigid, along_rod};
 
-/// One bob, as the outputs need it.
+/// Values of one bob for the outputs.
 pub(crate) struct BobNow<T> {
     pub m: T,
-    /// From O, and its velocity against the tank.
+    /// Position from O, and velocity relative to the tank.
     pub rho: Vec3<T>,
     pub rate: Vec3<T>,
-    /// The hinge from O, and the tank's axis.
+    /// Position of the hinge from O, and direction of the tank's axis.
     pub hinge: Vec3<T>,
     pub e: Vec3,
     /// p in tank axes.
@@ -67,7 +67,7 @@ pub struct Bob {
     pub l: f64,
     c: f64,
     k: f64,
-    /// True if c depends on acceleration or amplitude; c and c p' are then series.
+    /// True if c depends on acceleration or amplitude. The series of c and c p' are then in use.
     follows: bool,
     drag: Drag,
     dragged: Vector,
@@ -77,7 +77,7 @@ pub struct Bob {
     inv_l: f64,
     e: Vec3,
     pub hinge: Vec3,
-    /// b of a planar mode (`contents.rs`), body axes, for impulses alone: its motion is not expanded here.
+    /// b of a planar mode (`contents.rs`), body axes, for impulses only: this file does not expand its motion.
     across: Option<Vec3>,
     /// Elevation at the wall per slosh angle, m/rad.
     pub wave: f64,
@@ -95,7 +95,7 @@ pub struct Bob {
     tension: Series,
     /// p.e
     height: Series,
-    /// Terms of the present order that do not depend on [a; w'] of this order.
+    /// Terms of the current order that do not depend on [a; w'] of this order.
     turned: [[f64; 2]; 3],
     centripetal: Vec3,
     p_perp: Vec3,
@@ -104,7 +104,7 @@ pub struct Bob {
 }
 
 impl Bob {
-    /// Mode `mode` of the tank that is number `index`, both from 0.
+    /// Creates the bob of mode `mode` of tank number `index`, both from 0.
     pub fn new(tank: &Tank, index: usize, mode: usize) -> Bob {
         let axes = rotation(&unit_quaternion(tank.q));
         let e = axes.map(|row| row[2]);
@@ -144,8 +144,8 @@ impl Bob {
         }
     }
 
-    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft turns
-    /// at `w`; both are normalised first.
+    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates
+    /// with `w`. Normalises both first.
     #[inline(always)]
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let p = times(&self.axes, [x[0], x[1], x[2]]);
@@ -156,8 +156,8 @@ impl Bob {
         self.both.set(0, p, self.v[0]);
     }
 
-    /// Sets coefficient 1 of direction and velocity to their derivative in the direction `dx` of
-    /// the six numbers `x` and `dw` of the rate.
+    /// Sets coefficient 1 of direction and velocity to their derivatives along `dx` (of the six
+    /// numbers `x`) and `dw` (of the angular velocity).
     pub fn seed_direction(&mut self, x: &[f64; 6], dx: &[f64; 6], w: Vec3, dw: Vec3) {
         let body = |x: &[f64], i: usize| times(&self.axes, [x[i], x[i + 1], x[i + 2]]);
         let [dp, dp_d] = on_sphere_slope(body(x, 0), body(x, 3), body(dx, 0), body(dx, 3));
@@ -166,12 +166,11 @@ impl Bob {
         self.both.set(1, dp, self.v[1]);
     }
 
-    /// Direction and rate `t` after the start at `x`, from the series cut after order n, when the
-    /// craft turns at `w` by then; normalised, tank axes.
+    /// Returns direction and rate at `t` after the start at `x` in tank axes, normalised, from the
+    /// series up to order n. `w` is the craft's angular velocity at that time.
     ///
-    /// What is turned back into tank axes is the change alone: the matrix is orthogonal to
-    /// rounding only, and turning everything there and back would shear direction and rate by the
-    /// same 1e-16 in every step.
+    /// Only the change is rotated back into tank axes. The matrix is orthogonal only to rounding,
+    /// so a rotation there and back would shear direction and rate by the same 1e-16 in every step.
     #[inline(always)]
     pub fn at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (p, v) = (space::value(&self.p, n, t), space::value(&self.v, n, t));
@@ -185,8 +184,9 @@ impl Bob {
         [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
     }
 
-    /// Coefficient N of what does not depend on [a; w'] of this order: force and torque about
-    /// O on the craft. `w` is the pair (w, w), `w2` coefficient N of the matrix of y -> w x (w x y).
+    /// Returns coefficient N of force and torque about O on the craft without the terms in [a; w']
+    /// of this order. `w` is the pair (w, w), `w2` is coefficient N of the matrix of y -> w x (w x
+    /// y).
     #[inline(always)]
     pub fn reaction<const N: usize>(&mut self, w: &Pair, w2: &Mat3) -> [Vec3; 2] {
         let Bob { m, l, c, k, .. } = *self;
@@ -209,7 +209,7 @@ impl Bob {
         if k > 0.0 {
             self.height[N] = dot(self.e, self.p[N]);
             self.p_perp = sub(self.p[N], scale(self.height[N], self.e));
-            // |p_perp|^2 = 1 - (p.e)^2, near rest without cancellation at order 0.
+            // |p_perp|^2 = 1 - (p.e)^2. At order 0 this form avoids cancellation near rest.
             let off_axis_2 = if N == 0 {
                 dot(self.p_perp, self.p_perp)
             } else {
@@ -227,7 +227,8 @@ impl Bob {
         [force, add(cross(self.hinge, force), scale(l, twist))]
     }
 
-    /// Coefficient N of the specific force along the tank's axis at the hinge that the drag follows.
+    /// Sets coefficient N of the specific force along the tank's axis at the hinge, which the drag
+    /// follows.
     #[inline(always)]
     pub fn set_axial<const N: usize>(&mut self, x: f64) {
         self.drag.set_axial(N, x);
@@ -238,17 +239,18 @@ impl Bob {
         self.follows
     }
 
-    /// e and P x e: along the tank's axis at the hinge.
+    /// Returns e and P x e, the direction along the tank's axis at the hinge.
     pub fn along_axis(&self) -> [Vec3; 2] {
         [self.e, cross(self.hinge, self.e)]
     }
 
-    /// The bob at rest as a point mass, from O.
+    /// Returns the position of the bob at rest from O.
     pub fn at_rest(&self) -> Vec3 {
         sub(self.hinge, scale(self.l, self.e))
     }
 
-    /// The body that it counts for with hosts that solve with a constant matrix (`slosh_tank.rs`).
+    /// Returns the body that represents the bob for hosts that solve with a constant matrix
+    /// (`slosh_tank.rs`).
     pub fn lumped(&self) -> Rigid {
         let Some(b) = self.across else { return Rigid::new(self.m, self.hinge, &[[0.0; 3]; 3]) };
         let own = 2.0 * self.m * self.l * self.l;
@@ -257,18 +259,19 @@ impl Bob {
         Rigid::new(2.0 * self.m, self.hinge, &own)
     }
 
-    /// [b; rho x b] of a planar mode, along which its bob is carried along; `x` is its six numbers.
+    /// Returns [b; rho x b] of a planar mode, the direction in which the tank carries its bob; `x`
+    /// is its six numbers.
     pub fn carried_along(&self, x: &[f64]) -> Option<[f64; 6]> {
         let b = self.across?;
         let rho = add(self.hinge, scale(self.l, times(&self.axes, [x[0], x[1], x[2]])));
         Some(along_rod(b, rho))
     }
 
-    /// Coefficient N of c p'.
+    /// Sets coefficient N of c p'.
     #[inline(never)]
     fn drag_of<const N: usize>(&mut self) {
         self.height[N] = dot(self.e, self.p[N]);
-        // |p + e|^2 = 2 + 2 p.e, near rest without cancellation at order 0.
+        // |p + e|^2 = 2 + 2 p.e. At order 0 this form avoids cancellation near rest.
         let chord2 = if N == 0 {
             let chord = add(self.p[0], self.e);
             dot(chord, chord)
@@ -279,8 +282,8 @@ impl Bob {
         self.dragged[N] = space::scale::<N>(&self.drag.c, &self.p_d);
     }
 
-    /// Coefficient N of the rest, and N + 1 of direction and velocity, from coefficient N of
-    /// [a; w'].
+    /// Sets coefficient N of tension and drag and N + 1 of direction and velocity, from coefficient
+    /// N of [a; w'].
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, a: Vec3, w_d: Vec3) {
         let at_hinge = add(a, cross(w_d, self.hinge));
@@ -303,7 +306,7 @@ impl Bob {
         [self.p[N + 1], self.v[N + 1]] = self.both.get(N + 1);
     }
 
-    /// Coefficient N of the power dissipated, c l^2 |p'|^2, W.
+    /// Returns coefficient N of the dissipated power, c l^2 |p'|^2, W.
     #[inline(always)]
     pub fn dissipation<const N: usize>(&self) -> f64 {
         if self.follows {
@@ -317,8 +320,8 @@ impl Bob {
         }
     }
 
-    /// Coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and
-    /// p'' = v' - w' x p - w x p'.
+    /// Returns coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and p'' = v'
+    /// - w' x p - w x p'.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let turned = add(space::cross::<N>(w_d, &self.p), space::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
@@ -327,8 +330,8 @@ impl Bob {
         [p_d[0], p_d[1], p_d[2], p_dd[0], p_dd[1], p_dd[2]]
     }
 
-    /// The scale of v: speed of the swing and what gravity or centring would make of the angle,
-    /// 1/s.
+    /// Scale of v for error control, 1/s: rate of the swing plus the rate that gravity or centring
+    /// gives to the angle.
     #[inline(always)]
     pub fn rate_scale(&self) -> f64 {
         let stiffness = largest(self.specific_force[0]) * self.inv_l + self.k_m;
@@ -336,27 +339,27 @@ impl Bob {
         largest(self.p_d[0]) + libm::sqrt(stiffness) * largest(off_axis)
     }
 
-    /// Size of coefficient n of v.
+    /// Magnitude of coefficient n of v.
     #[inline(always)]
     pub fn coefficient_norm(&self, n: usize) -> f64 {
         largest(self.v[n])
     }
 
-    /// p, p' and B as numbers of the wanted kind.
+    /// Returns p, p' and B as the number type `T`.
     fn state<T: Number>(&self) -> [Vec3<T>; 3] {
         let of = |a: &Vector| [0, 1, 2].map(|i| T::of(a[0][i], a[1][i]));
         [of(&self.p), of(&self.p_d), of(&self.specific_force)]
     }
 
-    /// Force on the craft and its torque about O.
+    /// Returns the force on the craft and its torque about O.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let tension = T::of(self.tension[0], self.tension[1]) * self.m;
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// The wrench at a = 0 and w' = 0, that is with the tension
-    /// T_0 = m (l |v|^2 - p.(w x (w x P))) - k l |p_perp|^2.
+    /// Returns the wrench at a = 0 and w' = 0, with the tension T_0 = m (l |v|^2 - p.(w x (w x P)))
+    /// - k l |p_perp|^2.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));
@@ -400,9 +403,9 @@ impl Bob {
         }
     }
 
-    /// What an impulse of the craft does to the rate: the bob keeps its velocity across the rod,
-    /// l p' changes by -(1 - p p^T)(dV + dw x rho), of a planar mode by -(1 - p p^T - b b^T)(dV + dw x rho). `x` is the six numbers that the bob was
-    /// started with; dV of O and dw in body axes.
+    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes. The bob keeps
+    /// its velocity across the rod: l p' changes by -(1 - p p^T)(dV + dw x rho), in a planar mode by -(1 - p p^T - b
+    /// b^T)(dV + dw x rho). `x` is the six numbers at the start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let p = self.p[0];
         let rho = add(self.hinge, scale(self.l, p));

@@ -1,4 +1,5 @@
-//! Contents of a tank that may drain: masses, lengths and heights follow the remaining liquid.
+//! Contents of a tank that may drain: masses, lengths and heights are functions of the remaining
+//! liquid.
 //!
 //! ```text
 //! f  outflow, kg/s: m_liq' = -f;  m_0 = m_liq - sum of m_n   every quantity of the tank's table by m_liq
@@ -10,45 +11,46 @@
 //! G = a + w' x rho + w x (w x rho) + 2 w x rho' + P'' + 2 l' p' + (c l/m) p' + (k l/m) p_perp
 //! ```
 //!
-//! The bob of a planar mode swings in the plane through P across b, a unit vector fixed in the tank, which holds it there:
+//! The bob of a planar mode swings in the plane through P perpendicular to b, a unit vector fixed in the tank. The tank
+//! guides it:
 //!
 //! ```text
 //! -N b to the right-hand side of Newton's law,   N = -m b.G = N_0 - m u.[a; w'],  u = [b; rho x b]
 //! p'' = -(1 - p p^T - b b^T) G/l - |p'|^2 p                  p.b = p'.b = 0
 //! ```
 //!
-//! Such a tank does not drain. Across its plane the bob is as rigid liquid: with modes along two directions m_0 is the liquid less
-//! the masses of both, and may be below 0.
+//! Such a tank does not drain. Perpendicular to its plane the bob moves as rigid liquid. With modes along two
+//! directions m_0 is the liquid less the masses of both and may be negative.
 //!
-//! Mass leaves a bob with the bob's velocity and the craft with the velocity of the tank at the outlet,
-//! r_out = d + z_out e. On its way, along the tank's axis and level to it from the bobs, it has the
-//! momentum K against the tank, and the moment of momentum L about O:
+//! Mass leaves a bob with the bob's velocity, and leaves the craft with the velocity of the tank at the outlet, r_out =
+//! d + z_out e. It flows along the tank's axis, and from the bobs to the axis on their level. Within the tank it has
+//! the momentum K relative to the tank and the moment of momentum L about O:
 //!
 //! ```text
 //! K = j e + sum of m_n' l p_perp,   j = (m_0 H_0)' + sum of m_n' b_n + f z_out,   b_n = h + l e.p
 //! L = d x j e + sum of (d + b_n e) x (m_n' l p_perp)
 //! ```
 //!
-//! What bobs and rigid liquid do to the craft beyond their forces at constant mass keeps the momentum of
-//! everything, with the flow that leaves, to the letter:
+//! Bobs and rigid liquid load the craft beyond their forces at constant mass, so that the momentum of the system
+//! including the leaving flow is conserved exactly:
 //!
 //! ```text
 //! force  = -2 w x K - K' - sum of m_n' rho_n'
 //! torque = -I_0' w - sum of m_n' (rho x (w x rho) + rho x rho') - f r_out x (w x r_out) - w x L - L'
 //! ```
 //!
-//! The energy of everything (outputs.rs) loses by it, besides what is dissipated,
+//! The flow reduces the total energy (outputs.rs), in addition to dissipation, by
 //!
 //! ```text
 //! drained' = -(force.V + torque.w + m_0' |V|^2/2 + V.(w x S_0') + w.I_0' w/2)
 //!     - sum of (m' |V + w x rho + rho'|^2/2 - T (h' e.p + l') - phi.(h' e + l' p) + k l l' |p_perp|^2)
 //! ```
 //!
-//! the power of force and torque, what the masses have that go from bobs and rigid liquid, and the work of rods whose
-//! ends move. S_0, I_0: the rigid liquid's moments about O; V: velocity of O.
+//! drained' contains the power of force and torque, the energy of the mass that leaves bobs and rigid liquid, and the
+//! work of rods whose ends move. S_0, I_0: the rigid liquid's moments about O. V: velocity of O.
 //!
-//! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out;
-//! the energy is that of `outputs.rs`, differentiated along the motion.
+//! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out.
+//! The energy is that of `outputs.rs`, differentiated along the motion.
 
 use alloc::format;
 use alloc::string::String;
@@ -68,7 +70,7 @@ use crate::sizes::MODES;
 use crate::state::Line;
 use crate::table::{FillCurves, Jet};
 
-/// A tank where it is mounted.
+/// A tank in its mounting position.
 #[derive(Clone, Debug)]
 pub struct MountedTank {
     pub tank: Tank,
@@ -79,16 +81,16 @@ pub struct MountedTank {
     /// True if there are planar modes; their b, body axes.
     planar: bool,
     across: [Option<Vec3>; MODES],
-    /// The rigid liquid and all liquid at rest, where they are not alike all around the axis.
+    /// The rigid liquid and all liquid at rest, if they are not axially symmetric.
     uneven: Option<[Rigid; 2]>,
 }
 
-/// A quantity that stays, with its derivatives by time.
+/// Returns a constant with its derivatives, which are 0.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
 
-/// A bob, with what its equation has besides [a; w'].
+/// A bob with the terms of its equation that do not contain [a; w'].
 pub struct Swing<T> {
     m: T,
     l: T,
@@ -115,7 +117,7 @@ pub struct Swing<T> {
 pub struct Contents<'a, T> {
     mounted: &'a MountedTank,
     pub rigid: Rigid<T>,
-    /// Force and torque about O that the flow within makes.
+    /// Force and torque about O from the flow within the tank.
     flow_wrench: [Vec3<T>; 2],
     /// K and L.
     pub flow_momentum: [Vec3<T>; 2],
@@ -146,12 +148,12 @@ impl MountedTank {
         MountedTank { tank: *tank, curves, axes, e, d, planar: tank.is_planar(), across, uneven }
     }
 
-    /// Returns true if any mode's drag depends on acceleration or amplitude.
+    /// Returns true if the drag of any mode depends on acceleration or amplitude.
     pub fn follows(&self) -> bool {
         (0..self.tank.modes).any(|n| self.tank.follows(n))
     }
 
-    /// The liquid at rest as a rigid body; `liquid` counts for tanks with a table.
+    /// Returns the liquid at rest as a rigid body. `liquid` matters only for tanks with a table.
     pub fn at_rest<T: Number>(&self, liquid: T) -> Rigid<T> {
         let MountedTank { tank, curves, .. } = self;
         if let Some([_, whole]) = &self.uneven {
@@ -179,8 +181,8 @@ impl MountedTank {
         bobs.and(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
     }
 
-    /// Hinge, p and p' of mode n (from 0) from those on the axis and in every direction.
-    // Apart, as all of planar modes: craft without take fewer instructions so.
+    /// Returns hinge, p and p' of mode n (from 0), projected into the plane of a planar mode.
+    // A separate function: craft without planar modes then take fewer instructions.
     #[inline(never)]
     fn guided<T: Number>(&self, n: usize, [hinge, p, p_d]: [Vec3<T>; 3]) -> [Vec3<T>; 3] {
         let Some(b) = self.across[n].map(constant) else { return [hinge, p, p_d] };
@@ -188,8 +190,8 @@ impl MountedTank {
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
     }
 
-    /// x: p and p' of each mode, tank axes; `a`, `w_d`: the motion whose acceleration along the tank the drag follows;
-    /// `liquid`, `flow` and its `slope` count for tanks with a table.
+    /// Evaluates the contents. x: p and p' of each mode, tank axes. `a` and `w_d` give the acceleration along the tank
+    /// that the drag follows. `liquid`, `flow` and its `slope` matter only for tanks with a table.
     pub fn contents<T: Number>(
         &self,
         x: &[T],
@@ -203,7 +205,8 @@ impl MountedTank {
         let c = T::constant;
         let flow = if drains { flow } else { c(0.0) };
         let slope = if drains { slope } else { 0.0 };
-        // By the mass of liquid, m' = -f, m'' = -f'.
+        // Converts derivatives by the mass of liquid to derivatives by time, with m' = -f, m'' =
+        // -f'.
         let follow = |[value, first, second]: Jet<T>| -> Jet<T> {
             [value, -(first * flow), second * flow * flow - first * slope]
         };
@@ -214,7 +217,8 @@ impl MountedTank {
         let axes: Mat3<T> = axes.map(constant);
         let zero = constant::<T>([0.0; 3]);
         let mut bobs = [(); MODES].map(|()| None);
-        // K and L without the axial part, with their derivatives; sum of m_n' b_n and its derivative.
+        // K and L without the axial part, with their derivatives; sum of m_n' b_n and its
+        // derivative.
         let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
         let mut sinking = [c(0.0); 2];
         let mut flow_wrench = [zero; 2];
@@ -251,7 +255,7 @@ impl MountedTank {
                 - l[0] * dot(p_perp, p_perp) * k;
             let known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
             let turned = cross(hinge, p);
-            // What leaves the bob.
+            // Flow out of the bob.
             let b = h[0] + l[0] * height;
             let b_d = h[1] + l[1] * height + l[0] * height_d;
             let lost = scale(m[1] * l[0], p_perp);
@@ -335,7 +339,7 @@ impl MountedTank {
         }
     }
 
-    /// The bobs' p' and p'' in tank axes, as six numbers each, under [a; w'].
+    /// Writes the bobs' p' and p'' in tank axes, six numbers each, under [a; w'].
     pub fn put_rates<T: Number>(
         &self,
         contents: &Contents<'_, T>,
@@ -357,7 +361,7 @@ impl MountedTank {
         }
     }
 
-    /// Values of the bobs that the outputs need.
+    /// Returns the bobs' values for the outputs.
     pub fn bobs_now<T: Number>(&self, contents: &Contents<'_, T>) -> [Option<BobNow<T>>; MODES] {
         let axes: Mat3<T> = self.axes.map(constant);
         let mut bobs = [(); MODES].map(|()| None);
@@ -376,7 +380,7 @@ impl MountedTank {
         bobs
     }
 
-    /// Puts the bobs of planar modes into their planes; x as in [`MountedTank::contents`].
+    /// Projects the bobs of planar modes into their planes; x as in [`MountedTank::contents`].
     pub fn flatten(&self, x: &mut [f64]) {
         for n in 0..self.tank.modes {
             let Some(b) = self.tank.across(n) else { continue };
@@ -394,18 +398,18 @@ impl MountedTank {
 }
 
 impl<T: Number> Swing<T> {
-    /// T under [a; w'].
+    /// Returns T under [a; w'].
     fn tension(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
         let u = self.u;
         self.t_0 - self.m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
     }
 
-    /// G under [a; w'].
+    /// Returns G under [a; w'].
     fn acceleration(&self, a: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
         add(add(a, cross(w_d, self.rho)), self.known)
     }
 
-    /// Force and torque about O on the craft at the tension T.
+    /// Returns force and torque about O on the craft at the tension T.
     fn wrench(&self, tension: T) -> [Vec3<T>; 2] {
         let force = add(scale(tension, self.p), self.phi);
         [force, cross(self.rho, force)]
@@ -413,7 +417,7 @@ impl<T: Number> Swing<T> {
 }
 
 impl<T: Number> Contents<'_, T> {
-    /// Adds the bobs' inertia along their rods and across the planes of planar modes, m u u^T.
+    /// Adds the bobs' inertia along their rods and perpendicular to the planes of planar modes, m u u^T.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
             for i in 0..6 {
@@ -439,13 +443,13 @@ impl<T: Number> Contents<'_, T> {
         }
     }
 
-    /// The bobs of planar modes with b.
+    /// Iterates over the bobs of planar modes and their b.
     fn planar(&self) -> impl Iterator<Item = (&Swing<T>, Vec3<T>)> {
         let across = self.bobs.iter().zip(&self.mounted.across);
         across.filter_map(|(bob, b)| Some((bob.as_ref()?, constant((*b)?))))
     }
 
-    /// Adds what holds planar modes in their planes under [a; w'].
+    /// Adds the guiding forces of planar modes under [a; w'].
     #[inline(never)]
     fn add_guides(&self, sum: [Vec3<T>; 2], [a, w_d]: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let guides = self.planar().map(|(bob, b)| {
@@ -456,7 +460,8 @@ impl<T: Number> Contents<'_, T> {
         guides.fold(sum, |sum, guide| [add(sum[0], guide[0]), add(sum[1], guide[1])])
     }
 
-    /// Force and torque about O on the craft at a = w' = 0, the rigid liquid's inertia left out.
+    /// Returns force and torque about O on the craft at a = w' = 0, without the rigid liquid's
+    /// inertia.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.t_0));
         let sum =
@@ -467,7 +472,7 @@ impl<T: Number> Contents<'_, T> {
         }
     }
 
-    /// Force and torque about O on the craft.
+    /// Returns force and torque about O on the craft.
     pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let rigid = self.rigid.inertial_wrench(a, w, w_d);
         let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.tension(a, w_d)));
@@ -479,7 +484,7 @@ impl<T: Number> Contents<'_, T> {
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 
-    /// drained', W, at the velocity `v` of O. On a pivot, where the energy has the potential a.S, v is 0.
+    /// Returns drained', W, at the velocity `v` of O. On a pivot, where the energy contains the potential a.S, v is 0.
     pub fn drained(&self, v: Vec3<T>, w: Vec3<T>, [a, w_d]: [Vec3<T>; 2], on_pivot: bool) -> T {
         let half = 0.5;
         let (m_0_d, [s_d, turning]) = self.shrinking;
@@ -509,9 +514,9 @@ impl<T: Number> Contents<'_, T> {
 pub struct Outflow<'a> {
     pub mounted: &'a MountedTank,
     pub flow: Line,
-    /// Index of the mass of liquid in the states.
+    /// Index of the mass of liquid among the states.
     pub at: usize,
-    /// Number of the tank, from 1; 0: there is only one.
+    /// Number of the tank, from 1; 0 if the system has only one.
     pub tank: usize,
 }
 
@@ -520,7 +525,7 @@ impl Outflow<'_> {
         liquid - self.flow.integral(t)
     }
 
-    /// Refuses a flow that the liquid cannot sustain for `h`, s.
+    /// Refuses a flow that the liquid cannot sustain for `h` seconds.
     pub fn check(&self, liquid: f64, h: f64) -> Result<(), StepError> {
         let Outflow { mounted, flow, tank, .. } = *self;
         let [Some(low), Some(high)] =
@@ -528,13 +533,13 @@ impl Outflow<'_> {
         else {
             return Ok(());
         };
-        // Where the flow turns, and at the end.
+        // Check where the flow reverses, and at the end.
         let turns = flow.value * flow.slope < 0.0 && flow.value.abs() < flow.slope.abs() * h;
         let turn = if turns { -flow.value / flow.slope } else { h };
         for t in [turn, h] {
             let liquid = self.left(liquid, t);
             let slack = 1e-12 * high;
-            // NaN is beyond, too.
+            // NaN is outside the range, too.
             if !(low - slack..=high + slack).contains(&liquid) {
                 let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
                 return Err(StepError::Model(format!(
@@ -546,7 +551,7 @@ impl Outflow<'_> {
         Ok(())
     }
 
-    /// The first time after `t` at which the tank passes a point of its table, or `h`.
+    /// Returns the first time after `t` at which the tank passes a point of its table, at most `h`.
     fn next_point(&self, liquid: f64, t: f64, h: f64) -> f64 {
         let (flow, mut next) = (self.flow, h);
         for point in self.mounted.tank.fill.masses() {
@@ -559,7 +564,8 @@ impl Outflow<'_> {
             let root = libm::sqrt(square);
             let sum = flow.value + if flow.value < 0.0 { -root } else { root };
             for (over, under) in [(2.0 * gone, sum), (-sum, flow.slope)] {
-                // Never, and where the division overflows after h.
+                // Skips a point that is not reached, also if the division would overflow to a time
+                // after h.
                 if over.abs() >= under.abs() * h {
                     continue;
                 }
@@ -575,13 +581,13 @@ impl Outflow<'_> {
 
 /// A system with tanks that drain.
 pub trait Drains<const D: usize>: System<D> + Sized {
-    /// Makes quaternions and directions what they are.
+    /// Normalises quaternions and directions.
     fn normalise(&self, x: &mut [f64; D], t: f64);
 
-    /// The flows of its tanks.
+    /// Iterates over the outflows of its tanks.
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>>;
 
-    /// Moves the states on by `h` from the time `begin`.
+    /// Advances the states by `h` from the time `begin`.
     fn advance(
         &self,
         x: &mut [f64; D],
@@ -614,7 +620,7 @@ pub fn has_diverged(x: &[f64]) -> bool {
     x.iter().any(|x| x.abs() > 1e50)
 }
 
-/// Directions and rates of bobs made so, from the first to the last place of the states.
+/// Normalises directions and rates of bobs, from the first to the last index of the states.
 pub fn normalise_bobs(x: &mut [f64]) {
     for bob in x.chunks_exact_mut(6) {
         let [p, p_d] = on_sphere(vec_of(bob, 0), vec_of(bob, 3));
@@ -627,8 +633,8 @@ pub fn normalise_bobs(x: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// A flow of 2 - t kg/s turns at 2 s: what is 1.5 kg below passes at 2 t - t^2/2 = 1.5, at 1 s, and comes back at 3 s.
-    /// One of 1 + t kg/s has passed it at 1 s for good.
+    /// A flow of 2 - t kg/s reverses at 2 s. It passes a point 1.5 kg below at 2 t - t^2/2 = 1.5, which is at 1 s and
+    /// again at 3 s. A flow of 1 + t kg/s passes it at 1 s and does not return.
     #[test]
     fn a_point_of_the_table_is_passed_again_after_the_flow_turns() {
         let tank = Tank::default();
@@ -647,7 +653,7 @@ mod tests {
             assert_eq!(passes(sign, sign, 0.0, liquid), 1.0);
             assert_eq!(passes(sign, sign, 1.0, liquid), 10.0);
         }
-        // a flow that is held takes 1.5 kg in 0.75 s; one that is shut nothing
+        // a constant flow drains 1.5 kg in 0.75 s, a closed outlet nothing
         assert_eq!(passes(2.0, 0.0, 0.0, 101.5), 0.75);
         assert_eq!(passes(-2.0, 0.0, 0.0, 98.5), 0.75);
         assert_eq!(passes(0.0, 0.0, 0.0, 101.5), 10.0);
@@ -656,8 +662,8 @@ mod tests {
         assert_eq!(passes(4.0, -2.0, 1.0, 103.0), 3.0);
     }
 
-    /// Liquid may stand at the ends of its table, to rounding, and go on for as long as it stays between them: a flow of
-    /// 1 - t kg/s has taken half a kilogram when it turns after a second, and by 4 s has brought back 4 kg.
+    /// Liquid may be at the ends of its table, to rounding, and may flow while it stays between them. A flow of 1 - t kg/s
+    /// has drained half a kilogram when it reverses after a second, and has returned 4 kg after 4 s.
     #[test]
     fn a_flow_goes_on_while_the_liquid_is_within_its_table() {
         let tank = Tank::default();
@@ -681,7 +687,7 @@ mod tests {
         }
         for h in [0.5, 4.0] {
             assert!(goes_on(1.0, -1.0, 100.6, h) && goes_on(-1.0, 1.0, 999.4, h));
-            // after 0.5 s 0.375 kg are gone, the most after 1 s
+            // 0.375 kg have drained after 0.5 s, the maximum is after 1 s
             assert_eq!(goes_on(1.0, -1.0, 100.4, h), h < 1.0);
             assert_eq!(goes_on(-1.0, 1.0, 999.6, h), h < 1.0);
         }

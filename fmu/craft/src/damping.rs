@@ -1,4 +1,4 @@
-//! A mode's drag: how it follows the acceleration along the tank, and the amplitude.
+//! Drag of a slosh mode as a function of the specific force along the tank and of the amplitude.
 //!
 //! ```text
 //! drag on the bob: -c l p',   c = 2 m [ zeta w_ref (w/w_ref)^q + zeta_A w A ]
@@ -7,13 +7,13 @@
 //! A^2 = angle^2 + |p'|^2/w^2 + A_0^2,   angle: of the rod from the axis (`taylor::angle`)
 //! ```
 //!
-//! q = 1/2: a laminar layer at the wall; 1: the damping ratio stays; 0: c does (`DampingLaw`). x is the specific force
-//! along the tank's axis at the hinge, of the given motion in SloshTank and of craft and liquids as one rigid body in
-//! Spacecraft (`motion.rs`): what the bobs' own drag makes of it, some 1e-4 of it, would be an equation to be solved.
-//! a_+ is x where thrust presses the liquid to the tank's bottom, falls smoothly to 0 where it pulls the tank
-//! away, and is a_f/2 without thrust. zeta_A makes the damping ratio grow with the amplitude, zeta + zeta_A A; A_0, far
-//! below any motion of interest, keeps the root where it has a power series. Every part of c is positive: the drag
-//! never drives.
+//! q = 1/2: a laminar layer at the wall; 1: constant damping ratio; 0: constant c (`DampingLaw`). x is the specific
+//! force along the tank's axis at the hinge. SloshTank takes x from the given motion, Spacecraft from craft and liquids
+//! as one rigid body (`motion.rs`). The bobs' own drag would change x by about 1e-4 and make it the solution of an
+//! equation. a_+ equals x if thrust presses the liquid to the tank's bottom, falls smoothly to 0 if thrust pulls the
+//! tank away, and is a_f/2 without thrust. zeta_A makes the damping ratio grow with the amplitude, zeta + zeta_A A.
+//! A_0, far below any motion of interest, keeps the root analytic. Every part of c is positive, so the drag always
+//! dissipates.
 
 use taylor::angle::{self, SquaredAngle};
 use taylor::number::Number;
@@ -30,7 +30,7 @@ pub struct Drag {
     law: DampingLaw,
     /// 2 m zeta_A, kg/rad
     growth: f64,
-    /// c at g_ref without the amplitude's part, N s/m
+    /// c at g_ref without its dependence on the amplitude, N s/m
     c_ref: f64,
     inv_l: f64,
     k_m: f64,
@@ -54,7 +54,7 @@ pub struct Drag {
     pub c: Series,
 }
 
-/// q of a law.
+/// Returns the exponent q of a law.
 fn exponent(law: DampingLaw) -> f64 {
     match law {
         DampingLaw::Laminar => 0.5,
@@ -64,7 +64,7 @@ fn exponent(law: DampingLaw) -> f64 {
 }
 
 impl Drag {
-    /// Drag of mode `n` of a tank.
+    /// Creates the drag of mode `n` of a tank.
     pub fn new(tank: &Tank, n: usize) -> Drag {
         let (m, l) = (tank.mass[n], tank.length[n]);
         let floor = tank.smallest_acceleration();
@@ -96,11 +96,11 @@ impl Drag {
         self.x[n] = x;
     }
 
-    /// Coefficient n of c, from those of x, of |p + e|^2 and of |p'|^2.
+    /// Returns coefficient n of c, from those of x, of |p + e|^2 and of |p'|^2.
     pub fn expand(&mut self, n: usize, chord2: f64, rate2: f64) -> f64 {
         let square = mul(n, &self.x, &self.x) + constant(n, self.floor2);
         self.root[n] = root(n, square, &self.root);
-        // For x < 0 without cancellation: a_f^2/2 over sqrt(x^2 + a_f^2) - x.
+        // This form avoids cancellation for x < 0: a_f^2/2 over sqrt(x^2 + a_f^2) - x.
         self.above[n] = if self.x[0] >= 0.0 {
             0.5 * (self.x[n] + self.root[n])
         } else {
@@ -128,7 +128,8 @@ impl Drag {
     }
 }
 
-/// Coefficient n of a root from that of what it is the root of, and its own below n.
+/// Returns coefficient n of a square root from that of the square and the root's own coefficients
+/// below n.
 fn root(n: usize, square: f64, y: &Series) -> f64 {
     if n == 0 {
         return libm::sqrt(square);
@@ -137,7 +138,8 @@ fn root(n: usize, square: f64, y: &Series) -> f64 {
     (square - both) / (2.0 * y[0])
 }
 
-/// c of mode `n` of a tank in which its mass m and length l change, from x, |p + e|^2 and |p'|^2.
+/// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and
+/// |p'|^2.
 pub fn coefficient<T: Number>(
     tank: &Tank,
     n: usize,
@@ -147,7 +149,7 @@ pub fn coefficient<T: Number>(
 ) -> T {
     let stiffness = m.recip() * tank.k[n];
     let reference = (l.recip() * tank.g_ref + stiffness).sqrt();
-    // At constant c in the words of `Tank::drag`.
+    // Evaluated in the order of `Tank::drag`, so that a constant c is bit-identical.
     let viscous = m * reference * (2.0 * tank.zeta[n]);
     if !tank.follows(n) {
         return viscous;

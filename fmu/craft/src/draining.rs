@@ -1,12 +1,12 @@
-//! A craft whose tanks drain or have planar modes, each with its contents as in `contents.rs`.
+//! A craft with tanks that drain or have planar modes, each with its contents from `contents.rs`.
 //!
 //! ```text
 //! M [a; w'] = [ f - w x (w x S) + sum of force ; tau - h_w' - w x (I w + h_w) + sum of torque ]
 //! M = M_R + sum of m u u^T
 //! ```
 //!
-//! as in `motion.rs`, with the loads of what flows within. When a flow jumps, its K and L do: an impulse, the same
-//! equations with the flow's slope alone.
+//! as in `motion.rs`, with the loads of the flow within the tanks. A jump of a flow changes K and L by an impulse. The
+//! same equations give this impulse if only the flow's slope acts.
 
 use alloc::vec::Vec;
 use taylor::error::StepError;
@@ -55,7 +55,7 @@ impl Acting<f64> {
 }
 
 impl Acting<f64> {
-    /// Flows, and nothing else.
+    /// Inputs with flows only.
     fn flowing(flow: [f64; TANKS], slope: [f64; TANKS]) -> Acting<f64> {
         let lines = core::array::from_fn(|i| Line { value: flow[i], slope: slope[i] });
         Acting::of(&Inputs { mass_flow: lines, ..Inputs::default() }, 0.0)
@@ -63,7 +63,7 @@ impl Acting<f64> {
 }
 
 impl Acting<Dual> {
-    /// With derivatives along du.
+    /// Inputs with derivatives along du.
     pub fn along(inputs: &Inputs, du: &[f64; INPUTS]) -> Acting<Dual> {
         let now = Acting::of(inputs, 0.0);
         let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::of(x[i], du[at + i]));
@@ -86,16 +86,15 @@ pub struct Draining {
     tanks: Vec<MountedTank>,
 }
 
-/// The same over one step.
+/// A craft during one step.
 pub struct Run<'a> {
     pub craft: &'a Draining,
     pub inputs: &'a Inputs,
 }
 
-/// Scales of attitude and directions, which are 1, of rate, position, velocity and of the bobs' rates, from where these
-/// stand in the states.
+/// Scales for error control: 1 for attitude and directions, and those of rate, position, velocity and the bobs' rates.
 fn scales(turn: f64, position: f64, velocity: f64, swing: impl Fn(usize) -> f64) -> [f64; STATES] {
-    // Work, energies and liquid follow from the rest.
+    // Work, energies and liquid follow from the other states.
     let mut scale = [f64::INFINITY; STATES];
     scale[..index::OMEGA].fill(1.0);
     scale[index::OMEGA..index::POSITION].fill(turn);
@@ -147,7 +146,7 @@ impl Drains<STATES> for Run<'_> {
 }
 
 impl Draining {
-    /// `None` if no tank can drain and none has planar modes.
+    /// Creates the equations; `None` if no tank can drain and none has planar modes.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
         tanks.iter().any(Tank::is_extrapolated).then(|| Draining {
@@ -159,7 +158,7 @@ impl Draining {
         })
     }
 
-    /// The tanks as they are with that much liquid.
+    /// Returns the tanks at the current masses of liquid.
     pub fn tanks<'a>(&'a self, x: &'a [f64; STATES]) -> [Tank; TANKS] {
         core::array::from_fn(|i| match self.tanks.get(i) {
             Some(mounted) => Tank { liquid_0: x[index::LIQUID + i], ..mounted.tank }.resolve(),
@@ -180,8 +179,8 @@ impl Draining {
         self.outflows(&Default::default()).try_for_each(|flow| flow.check(x[flow.at], 0.0))
     }
 
-    /// Takes account of the flows being `flow` from now on: where they jump, so does the momentum of what flows within,
-    /// by an impulse. What it makes of the energy has gone with the flow. Returns whether one jumps.
+    /// Applies a change of the flows to `flow`. Where a flow jumps, the momentum of the flow within the tank jumps by
+    /// an impulse, and its change of energy counts as drained. Returns true if a flow jumps.
     pub fn set_flow(&self, state: &mut State, flow: &[Line; TANKS]) -> bool {
         let now = flow.map(|flow| flow.value);
         if now == state.flow {
@@ -208,8 +207,8 @@ impl Draining {
         true
     }
 
-    /// Takes account of the impulse of the wheels that has moved the craft on from the state `before`: where the liquid
-    /// flows, it works on the rods' moving ends, too, as T does in drained' (`contents.rs`).
+    /// Accounts for the impulse of the wheels that has changed the state from `before`. Where liquid flows, the impulse
+    /// also does work on the rods' moving ends, as T does in drained' (`contents.rs`).
     pub fn drain_by_impulse(&self, before: &State, state: &mut State) {
         if state.flow != [0.0; TANKS] {
             let work = state.x[index::WORK] - before.x[index::WORK];
@@ -223,7 +222,7 @@ impl Draining {
         self.evaluate(&state.x, &acting).1.outputs(&state.x).energy
     }
 
-    /// [a; w'] from the equations of motion; on a pivot a is given.
+    /// Solves the equations of motion for [a; w']; on a pivot a is given.
     fn solve<T: Number>(
         &self,
         mut matrix: Mat6<T>,
@@ -247,7 +246,8 @@ impl Draining {
         Factors::of(&matrix).solve([force, torque])
     }
 
-    /// [a; w'] of craft and liquids at rest as one rigid body, if any drag follows it (`damping.rs`).
+    /// Returns [a; w'] of craft and liquids at rest as one rigid body, if any drag follows it
+    /// (`damping.rs`).
     fn rigid_motion<T: Number>(
         &self,
         x: &[T; STATES],
@@ -273,7 +273,7 @@ impl Draining {
         self.solve(whole.mass_matrix(), [force, torque], axes)
     }
 
-    /// The rates of the states, and what the outputs follow from.
+    /// Returns the rates of the states and the values for the outputs.
     pub fn evaluate<T: Number>(
         &self,
         x: &[T; STATES],
@@ -373,7 +373,7 @@ mod tests {
     use crate::parameters::{DampingLaw, Limits, MAX_STEPS};
     use crate::state::Ramp;
 
-    /// A run that counts how often its equations are evaluated.
+    /// A run that counts the evaluations of its equations.
     struct Counted<'a> {
         run: Run<'a>,
         evaluations: &'a Cell<usize>,
@@ -406,8 +406,8 @@ mod tests {
         }
     }
 
-    /// One to three tanks that drain and swing, rotated and off the axis, on a craft that starts at rest at the
-    /// origin: position and velocity begin at 0.
+    /// Returns a craft with one to three draining tanks with slosh, rotated and off the axis. The craft starts at rest
+    /// at the origin, so position and velocity begin at 0.
     fn draining_craft(seed: u64) -> (Parameters, Inputs) {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut size = |size: f64| size * (2.0 * rng.f64() - 1.0);
@@ -417,12 +417,12 @@ mod tests {
             tank.position = [size(0.6), size(0.6), size(0.4)];
             tank.q = [1.0, size(0.1), size(0.1), size(0.3)];
             tank.modes = (seed as usize + i) % 4;
-            // Every law, and drag that grows with the amplitude.
+            // All laws, and drag that grows with the amplitude.
             tank.damping_law = DampingLaw::ALL[(seed as usize + i + 1) % 3];
             tank.zeta_amplitude = [0.02 * (seed % 2) as f64; MODES];
             tank.fill.points = crate::POINTS;
             tank.p_0 = [(); MODES].map(|()| [size(0.2), size(0.2), -1.0]);
-            // 382 kg in it, of which 52 to 232 flow out in 30 s: past two to five points of its table.
+            // 382 kg in the tank, of which 52 to 232 kg flow out in 30 s, past two to five points of its table.
             mass_flow[i] = Line { value: 4.5 + size(2.0), slope: size(0.05) };
         }
         let mut ramp = |value: f64, slope: f64| Ramp {
@@ -444,7 +444,7 @@ mod tests {
         }
     }
 
-    /// Over 30 s in steps of `h`: the states at the end, and the evaluations that it took.
+    /// Runs 30 s in steps of `h`. Returns the states at the end and the number of evaluations.
     fn run(p: &Parameters, u: &Inputs, h: f64, tolerance: f64) -> ([f64; STATES], usize) {
         let mut x = Spacecraft::new(p, u, 0.0, tolerance).unwrap().continuous_states();
         let (craft, evaluations) = (Draining::new(p).unwrap(), Cell::new(0));
@@ -458,7 +458,8 @@ mod tests {
         (x, evaluations.get())
     }
 
-    /// A craft's long steps and its short ones end in the same, for at most twice the work.
+    /// Asserts that long and short steps of a craft end in the same state, and that long steps take
+    /// at most twice the work.
     fn compare_lengths_of_steps(seed: u64, tolerances: &[f64]) {
         let (p, u) = draining_craft(seed);
         let (exact, _) = run(&p, &u, 1.0, 1e-14);
@@ -468,8 +469,8 @@ mod tests {
             for (x, evaluations) in core::iter::once(&pieces).chain(&longer) {
                 let most = 2 * pieces.1;
                 assert!(*evaluations <= most, "{seed} {tolerance}: {evaluations} {most}");
-                // Of 1 rad, 1 rad/s, 600 m and 40 m/s. Errors grow as the liquid swings for 30 s, and so does
-                // rounding.
+                // Scales are 1 rad, 1 rad/s, 600 m and 40 m/s. Errors and rounding grow while the liquid swings for 30
+                // s.
                 let allowed =
                     scales(1.0, 600.0, 40.0, |_| 1.0).map(|size| size * (30.0 * tolerance + 1e-10));
                 for i in 0..STATES {
@@ -480,8 +481,7 @@ mod tests {
         }
     }
 
-    /// All tolerances occur; the tightest is where rounding makes trouble. Sixteen craft at every tolerance
-    /// take a minute: below.
+    /// Covers all tolerances. Rounding limits the tightest one. Sixteen craft at every tolerance, below, take a minute.
     #[test]
     fn a_long_step_of_a_draining_craft_ends_where_its_pieces_do_for_at_most_twice_their_work() {
         for seed in 0..4 {

@@ -1,7 +1,8 @@
-//! Changes of a liquid between pendulums and lump (`lump.rs`), and the lump's impacts: impulses on what carries the tank, a craft
-//! or a host.
+//! Hand-over of a liquid between pendulums and detached liquid (`lump.rs`), and impacts of the detached liquid:
+//! impulses on the carrier of the tank, a craft or a host.
 //!
-//! Both ways momentum is kept, angular momentum about the common centre of mass, and energy is lost; see `lump.rs`.
+//! Each hand-over conserves momentum and angular momentum about the common centre of mass, and loses energy; see
+//! `lump.rs`.
 
 use taylor::space::Vector;
 use taylor::vector::{Vec3, add, cross, dot, scale, sub, times};
@@ -12,17 +13,17 @@ use crate::rigid::{Factors, Rigid};
 use crate::sizes::MODES;
 use crate::state::BallState;
 
-/// What carries tanks with a ball regime. `lump` is which of its lumps, `t` the time since the start of the call, s; vectors
-/// are in body axes.
+/// Carrier of tanks whose liquid can detach. `lump` is the number of its lump, `t` is the time since the start of the
+/// call, s. Vectors are in body axes.
 pub(crate) trait Carrier {
-    /// All that a change may alter.
+    /// Everything that a change may alter.
     type Memory;
 
     fn memory(&self) -> Self::Memory;
 
     fn restore(&mut self, memory: &Self::Memory);
 
-    /// The equations at `t`.
+    /// Evaluates the equations at `t`.
     fn evaluate_at(&mut self, t: f64);
 
     fn lump(&self, lump: usize) -> &Lump;
@@ -30,13 +31,13 @@ pub(crate) trait Carrier {
     /// State of the detached liquid.
     fn ball_state(&mut self, lump: usize) -> &mut BallState;
 
-    /// Its six numbers among the states.
+    /// The six numbers of the detached liquid among the states.
     fn ball(&mut self, lump: usize) -> &mut [f64];
 
     /// The six numbers of a bob of its tank.
     fn bob(&mut self, lump: usize, n: usize) -> &mut [f64];
 
-    /// The directions of its tank's bobs.
+    /// The directions of the bobs of its tank.
     fn directions(&self, lump: usize) -> Directions;
 
     /// The bobs of its tank, after [`Carrier::evaluate_at`].
@@ -57,16 +58,16 @@ pub(crate) trait Carrier {
     /// Energy dissipated since the start, J.
     fn dissipated(&mut self) -> &mut f64;
 
-    /// An impulse on the carrier about O, and on all that hangs on it. Returns the changes of V and w.
+    /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of V and w.
     fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2];
 
-    /// Moves the carrier, if that can be.
+    /// Moves the carrier, if it can move.
     fn shift(&mut self, by: Vec3);
 
-    /// Returns true if the wall presses on the lump in its present state.
+    /// Returns true if the wall presses on the lump in its current state.
     fn is_pressed(&mut self, lump: usize, t: f64) -> bool;
 
-    /// Does what is due.
+    /// Performs the event `due`.
     #[inline(never)]
     fn change(&mut self, lump: usize, due: Due, t: f64) {
         self.evaluate_at(t);
@@ -102,8 +103,8 @@ pub(crate) trait Carrier {
         self.lump(lump).may_settle(a, w, w_d)
     }
 
-    /// Kinetic energy and that of the centring springs in a frame in which O moves with `v`, body axes, after
-    /// [`Carrier::evaluate_at`]; there nothing cancels, however fast the carrier is.
+    /// Returns the kinetic energy and that of the centring springs in a frame in which O moves with `v`, body axes,
+    /// after [`Carrier::evaluate_at`]. In this frame nothing cancels, however fast the carrier is.
     fn energy_with(&self, v: Vec3) -> f64 {
         let (w, rigid) = (self.motion()[1][0], self.rigid());
         let spin = dot(w, times(&rigid.inertia, w));
@@ -116,7 +117,7 @@ pub(crate) trait Carrier {
         energy
     }
 
-    /// Mass of everything, and its velocity against O as O turns, body axes.
+    /// Returns the mass of everything and the velocity of its centre relative to O, body axes.
     fn drift_of_center(&self) -> (f64, Vec3) {
         let (w, rigid) = (self.motion()[1][0], self.rigid());
         let mut momentum = cross(w, rigid.moment);
@@ -129,8 +130,8 @@ pub(crate) trait Carrier {
         (mass, scale(1.0 / mass, momentum))
     }
 
-    /// The liquid leaves its bottom: its centre keeps its velocity; motions within it are caught by the shape, whose
-    /// moment of momentum the carrier turns with.
+    /// The liquid leaves the bottom. Its centre keeps its velocity. The shape absorbs motions within the liquid, and
+    /// the carrier takes over the shape's moment of momentum.
     fn leave(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let center = self.lump(lump).center_of(&self.directions(lump));
@@ -147,7 +148,7 @@ pub(crate) trait Carrier {
         *self.dissipated() += loss;
     }
 
-    /// The wall throws the lump back, or holds it if it is slow and pressed to the wall.
+    /// The wall reflects the lump, or holds it if it is slow and pressed to the wall.
     fn throw_back(&mut self, lump: usize, t: f64) {
         let before = self.memory();
         let (e, contact_speed) = self.lump(lump).restitution();
@@ -166,8 +167,8 @@ pub(crate) trait Carrier {
         self.strike(lump, e, t);
     }
 
-    /// Puts a lump that a host has integrated through the wall on it. Its velocity, the centre of mass of the whole and the angular
-    /// momentum stay.
+    /// Moves a lump that a host has integrated through the wall back onto the wall. Keeps its velocity, the common
+    /// centre of mass and the angular momentum.
     fn bring_to_wall(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();
@@ -186,13 +187,13 @@ pub(crate) trait Carrier {
         *self.dissipated() += loss;
     }
 
-    /// Puts the lump on the wall in the state `on_wall`. Returns whether it is pressed there.
+    /// Puts the lump on the wall in the state `on_wall`. Returns true if the wall presses on it.
     fn try_on_wall(&mut self, lump: usize, on_wall: BallState, t: f64) -> bool {
         *self.ball_state(lump) = on_wall;
         self.is_pressed(lump, t)
     }
 
-    /// An impact with the coefficient of restitution `e`.
+    /// Performs an impact with the coefficient of restitution `e`.
     fn strike(&mut self, lump: usize, e: f64, t: f64) {
         let struck = self.lump(lump);
         let (m, v_n) = (struck.m, struck.approach());
@@ -208,14 +209,14 @@ pub(crate) trait Carrier {
         *self.dissipated() += (1.0 - e) * j * v_n / 2.0;
     }
 
-    /// The pendulums take the liquid back. Returns whether that costs energy; if not, the states are unusable.
+    /// The pendulums take over the liquid. Returns true if this loses energy; otherwise the states are unusable.
     fn settle(&mut self, lump: usize, t: f64) -> bool {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();
         let (settling, w) = (self.lump(lump), self.motion()[1][0]);
         let p = settling.hanging();
-        // The parts go to where they hang from, each with the velocity that it has: the whole turns on with the same angular
-        // momentum, about the same centre of mass.
+        // The parts move to their hinges, each with its velocity, so that the whole keeps its angular momentum about
+        // the same centre of mass.
         let moved = sub(settling.center_of(&p), settling.position());
         let velocity = add(cross(w, settling.position()), settling.rate());
         let lever = scale(-settling.m, cross(moved, sub(velocity, of_center)));
@@ -236,7 +237,7 @@ pub(crate) trait Carrier {
         self.evaluate_at(t);
         let loss = before - self.energy_with(dv);
         *self.dissipated() += loss;
-        // To rounding.
+        // Rounding error.
         loss >= -1e-14 * before
     }
 }

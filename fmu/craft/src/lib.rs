@@ -1,6 +1,6 @@
-//! The physics of a spacecraft in six degrees of freedom with sloshing tanks: a rigid body with
-//! up to four tanks of up to three spherical pendulums each, and one such tank alone, for
-//! somebody else's craft. No FMI, no I/O, no unsafe code, no allocation while stepping.
+//! The physics of a spacecraft in six degrees of freedom with sloshing tanks. The crate
+//! has a rigid body with up to four tanks of up to three pendulums each, and one such tank alone for
+//! a spacecraft that a host simulates. No FMI, no I/O, no unsafe code, no allocation while stepping.
 //!
 //! Frames and signs: the inertial frame falls freely with the craft. The body frame is fixed
 //! in the dry craft, its origin is O. The attitude q (scalar first) maps body to inertial
@@ -21,12 +21,10 @@
 //! assert!((shown.momentum[2] - 2400.0).abs() < 1e-3);
 //! ```
 //!
-//! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
-//! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
-//! the mass matrix, `lump.rs` liquid that has left its bottom, `handover.rs` its
-//! impulses on what carries it, `outputs.rs` energy and momentum; the crate `taylor` steps through time.
-//! `contents.rs` is what is in a tank that drains by a table (`table.rs`),
-//! `draining.rs` a craft with such tanks.
+//! `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees them. `motion.rs` has the craft's
+//! equations, `bob.rs` those of one slosh mode, and `rigid.rs` the mass matrix. `lump.rs` describes detached liquid,
+//! `handover.rs` its impulses on the carrier. `outputs.rs` has energy and momentum. `contents.rs` describes a tank that
+//! drains by a table (`table.rs`), `draining.rs` a craft with such tanks. The crate `taylor` integrates.
 
 #![cfg_attr(not(test), no_std)]
 

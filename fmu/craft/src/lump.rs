@@ -1,16 +1,16 @@
-//! The "ball" regime: liquid that has left the bottom of its tank, as one lump.
+//! The "ball" regime: liquid that has left the bottom of its tank, modelled as one body.
 //!
-//! Where thrust reverses, or the bobs pass 45 degrees (the mean cosine of their angles by modal mass), no pendulum stands for the
-//! liquid. Of a tank with
-//! `ball.travel` > 0 all liquid is then one body: its centre flies freely, is thrown back by the wall with losses,
-//! slides on it, and is handed back to the pendulums where it comes to lie at the bottom again.
+//! If thrust reverses, or if the bobs pass 45 degrees (mean cosine of their angles by modal mass), no pendulum
+//! represents the liquid. With `ball.travel` > 0 all liquid of the tank then becomes one body, the lump. Its centre
+//! flies freely, bounces off the wall with losses and slides on it. The pendulums take it over again when it comes to
+//! rest at the bottom.
 //!
-//! **What the centre reaches.** Liquid at rest under a specific force across any direction has its centre on the
-//! tank's surface of centres of buoyancy; there the surface is perpendicular to that force, and its radius of curvature
-//! is I/V, second moment of the free surface over the liquid's volume (Dupin 1822, as in the theory of ships).
-//! A mass point that slides on this surface rests where the liquid rests, with the same energy. Of a sphere it is a
-//! sphere about its centre through the settled liquid's centre; of any other tank it is taken for an ellipsoid of
-//! revolution about the tank's axis through the liquid's centres at bottom and top,
+//! **Surface within reach.** Liquid at rest under a specific force of any direction has its centre on the tank's
+//! surface of centres of buoyancy. There the surface is perpendicular to the force. Its radius of curvature is I/V, the
+//! second moment of the free surface over the liquid's volume (Dupin 1822, as in the theory of ships). A mass point
+//! that slides on this surface rests where the liquid rests, with the same energy. For a spherical tank the surface is
+//! a sphere about the tank's centre through the settled liquid's centre. For any other tank the model takes an
+//! ellipsoid of revolution about the tank's axis through the liquid's centres at bottom and top,
 //!
 //! ```text
 //! f = 1 - x.D x >= 0,   D = diag(1/b^2, 1/b^2, 1/a^2) in tank axes,   x from the surface's centre
@@ -18,12 +18,12 @@
 //! a   = travel/2,   b^2 = a R_p or more,   R_p = sum of m l/m_liq
 //! ```
 //!
-//! With b^2 = a R_p its curvature at the bottom is that of the pendulums' common centre, which for all modes is I/V; for
-//! R_p <= a the pendulums' centre, on a sphere of radius R_p, is then within the surface in every direction:
-//! f = q (1 - c)^2 (1 - q), q = R_p/a, c the cosine of the angle.
+//! With b^2 = a R_p the curvature at the bottom is that of the path of the pendulums' common centre, which is I/V for
+//! all modes. For R_p <= a the pendulums' centre, on a sphere of radius R_p, then lies within the surface in every
+//! direction: f = q (1 - c)^2 (1 - q), q = R_p/a, c the cosine of the angle.
 //!
-//! **Motion.** u = x' + w x rho, rho from O, n outwards. The lump's own inertia, that of the shape in which it has left,
-//! turns with the tank (J_a, a massless part of the craft).
+//! **Motion.** u = x' + w x rho, rho from O, n outwards. The lump has the inertia of the shape in which it left the
+//! bottom. This inertia rotates with the tank (J_a, a massless part of the craft).
 //!
 //! ```text
 //! x' = u - w x rho
@@ -31,24 +31,26 @@
 //! N  = (m/G.G) [x'.D x' - G.(a + w' x rho + w x (u + x'))]       keeps f = 0 while it slides, N > 0
 //! ```
 //!
-//! The drag's reaction may move the craft away from the lump; where it would, while without drag the lump stays, there is
-//! none until the wall's force exceeds it twice.
+//! The drag's reaction may push the craft away from the lump. If it would, while without drag the lump stays on the
+//! wall, the drag is off until the wall force exceeds twice the drag.
 //!
 //! Like a rod, the wall adds a matrix of rank one: N is affine in [a; w'], with slope -m G.(..)/G.G.
 //!
 //! **Impact** at the speed v_n = n.x': impulse J = (1 + e) mu v_n along n, 1/mu = 1/m + U.M^-1 U, U = [n; rho x n],
-//! M the craft's with all that hangs on it. Momentum is kept, (1 - e^2) mu v_n^2/2 dissipated. Below
-//! `ball.contact_speed` after an impact, pressed to the wall, the lump stays on it (e = 0): a sequence of bounces ends.
+//! with M of the craft and everything attached to it. Momentum is conserved, and (1 - e^2) mu v_n^2/2 is dissipated. A
+//! lump that is pressed to the wall and leaves an impact below `ball.contact_speed` stays on the wall (e = 0), which
+//! ends a sequence of bounces.
 //!
-//! **Hand-over.** Both ways each part of the liquid keeps its momentum until it is caught, plastically, by what it
-//! becomes a part of; so the whole keeps linear and angular momentum and its centre of mass, and loses energy (Carnot).
-//! Away: relative motions within the liquid are caught by the shape. Back: m_0 is caught by the tank, the bobs keep what
-//! their rods allow. They take it while |p_perp|^2 + |x'|^2/(g l_s) <= sin^2 30 deg, 1/l_s = sum of (m/l)/sum of m. This is the mean over
-//! the modes by modal mass of the energy that each takes over, so the mean cosine stays far above that of 45 degrees. A hand-over that would raise the energy (of
-//! centring, or because the shape changes while the craft turns) waits until the lump is nearest to the axis.
+//! **Hand-over.** In both directions each part of the liquid keeps its momentum until the body that it joins catches it
+//! plastically. The whole therefore keeps linear and angular momentum and its centre of mass, and loses energy
+//! (Carnot). On leaving, the shape absorbs relative motions within the liquid. On return, the tank catches m_0, and the
+//! bobs keep the motion that their rods allow. The pendulums take over while |p_perp|^2 + |x'|^2/(g l_s) <= sin^2 30
+//! deg, 1/l_s = sum of (m/l)/sum of m. The left side is the mean over the modes, by modal mass, of the energy that each
+//! takes over, so the mean cosine stays far above that of 45 degrees. A hand-over that would raise the energy (through
+//! centring, or because the shape changes while the craft rotates) waits until the lump is nearest to the axis.
 //!
-//! What it is worth: times and momenta of crossings, their order at impacts; not the wall's pressure, sprays, films or the
-//! liquid's way along the wall. e and d are guesses unless measured.
+//! **Validity.** Times and momenta of crossings are valid, impacts only to an order of magnitude. The model does not
+//! represent wall pressure, sprays, films or the liquid's path along the wall. e and d are guesses unless measured.
 
 use taylor::number::Number;
 use taylor::root::first_root;
@@ -65,54 +67,55 @@ use crate::rigid::{Factors, Rigid, along_rod};
 use crate::sizes::MODES;
 use crate::state::BallState;
 
-/// Cosine of the largest angle from the axis at which a bob stands for liquid.
+/// Cosine of the largest angle from the axis at which a bob represents liquid.
 pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
-/// f within which the lump touches the wall.
+/// Value of f within which the lump touches the wall.
 const TOUCHING: f64 = 1e-10;
-/// f' below which it does not move from or towards the wall, 1/s.
+/// Value of f' below which the lump moves neither from nor towards the wall, 1/s.
 const RESTING: f64 = 1e-9;
-/// f'' below which nothing presses it to the wall, over 1/s2 and what it is the sum of.
+/// Value of f'' below which nothing presses the lump to the wall, 1/s2, relative to the terms of
+/// f''.
 const PRESSING: f64 = 1e-9;
-/// Square of the sine of 30 degrees: how far the pendulums may swing that take the liquid back.
+/// Square of the sine of 30 degrees, the largest swing at which the pendulums take over the liquid.
 const SWING: f64 = 0.25;
 
 /// Event of a tank's liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
-    /// It leaves the bottom.
+    /// The liquid leaves the bottom.
     Leave,
-    /// It meets the wall.
+    /// The lump meets the wall.
     Impact,
-    /// Nothing presses it to the wall any more.
+    /// Nothing presses the lump to the wall any more.
     Release,
-    /// It is pressed to the wall enough for its drag.
+    /// The wall force is large enough for the drag.
     Drag,
-    /// The pendulums take it back.
+    /// The pendulums take over the liquid.
     Settle,
-    /// A condition has changed that does not decide alone.
+    /// A condition has changed that is not sufficient alone.
     Look,
 }
 
 /// The directions of a tank's bobs, tank axes.
 pub(crate) type Directions = [Vec3; MODES];
 
-/// One tank's liquid in the ball regime, and the series of its motion; body axes.
+/// One tank's detached liquid and the series of its motion; body axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Lump {
     pub tank: usize,
-    /// State for which the motion has been set up.
+    /// State for which the motion is set up.
     pub state: BallState,
     pub m: f64,
     restitution: f64,
     contact_speed: f64,
     /// d, 1/s
     drag: f64,
-    /// Tank axes to body axes, the tank's axis, and its origin from O.
+    /// Rotation from tank to body axes, direction of the tank's axis, and the tank's origin from O.
     axes: Mat3,
     e: Vec3,
     origin: Vec3,
-    /// The surface's centre, on the tank's axis and from O; its semi-axes a and b.
+    /// Centre of the surface within reach, on the tank's axis and from O; its semi-axes a and b.
     height: f64,
     center: Vec3,
     half: f64,
@@ -120,12 +123,12 @@ pub(crate) struct Lump {
     d: Mat3,
     /// R_p
     gyration: f64,
-    /// Value of mode 1.
+    /// Hinge of mode 1.
     hinge: Vec3,
     /// Each mode's share of the modal mass, and the length l_s whose inverse is the mean of 1/l by these shares.
     shares: [f64; MODES],
     swing_length: f64,
-    /// The rigid liquid, its centre from O, and its inertia about it.
+    /// The rigid liquid, its mass, centre from O, and inertia about its centre.
     pub rigid: Rigid,
     m_0: f64,
     s: Vec3,
@@ -134,7 +137,8 @@ pub(crate) struct Lump {
     masses: [f64; MODES],
     lengths: [f64; MODES],
     hinges: [Vec3; MODES],
-    /// Specific force along the axis: the liquid leaves below `lowest` and comes back above `floor`.
+    /// Limits of the specific force along the axis: the liquid leaves below `lowest` and comes back
+    /// above `floor`.
     lowest: f64,
     floor: f64,
 
@@ -155,7 +159,7 @@ pub(crate) struct Lump {
     u_turned: Vec3,
     /// Derivative of the shape's inertia J_a along the seeded direction, kg m2, body axes; 0 in an expansion over time.
     pub shape_slope: Mat3,
-    /// Terms of the present order that do not depend on [a; w'] of this order.
+    /// Terms of the current order that do not depend on [a; w'] of this order.
     known_pull: f64,
     known_force: Vec3,
     known_specific: Vec3,
@@ -182,8 +186,8 @@ fn product(a: &Series, b: &Series, n: usize) -> f64 {
 }
 
 impl Lump {
-    /// Lump of tank `index`, from 0, whose derived parameters are resolved; `None` without a
-    /// model of detached liquid.
+    /// Creates the lump of tank `index`, from 0, whose derived parameters are resolved. Returns
+    /// `None` without a model of detached liquid.
     pub fn new(tank: &Tank, index: usize) -> Option<Lump> {
         let surface = tank.ball_surface()?;
         let axes = rotation(&unit_quaternion(tank.q));
@@ -252,22 +256,22 @@ impl Lump {
         })
     }
 
-    /// Position of the settled liquid's centre, at rest; tank axes.
+    /// Returns the position of the settled liquid's centre, at rest; tank axes.
     pub fn at_rest(&self) -> [f64; 6] {
         [0.0, 0.0, self.height - self.half, 0.0, 0.0, 0.0]
     }
 
-    /// Returns true if the liquid is detached: the pendulums are not in use.
+    /// Returns true if the liquid is detached, so that the pendulums are not in use.
     pub fn is_loose(&self) -> bool {
         self.state != BallState::Settled
     }
 
-    /// d while it drags, 1/s.
+    /// Returns d while drag acts, 1/s, otherwise 0.
     fn drag(&self) -> f64 {
         if self.state == BallState::Sliding { self.drag } else { 0.0 }
     }
 
-    /// True if a drag acts. Without one a lump that is released would alternate between sliding and light by rounding.
+    /// Returns true if drag acts. With d = 0 a released lump would alternate between sliding and light by rounding.
     pub fn drags(&self) -> bool {
         self.drag() > 0.0
     }
@@ -276,7 +280,8 @@ impl Lump {
         matches!(self.state, BallState::Sliding | BallState::Light | BallState::Held)
     }
 
-    /// Masses of the rigid liquid and the bobs, and where they are from O with the rods along `p`.
+    /// Returns masses and positions from O of the rigid liquid and the bobs, with the rods along
+    /// `p`.
     fn parts(&self, p: &Directions) -> [(f64, Vec3); MODES + 1] {
         core::array::from_fn(|i| match i {
             0 => (self.m_0, self.s),
@@ -290,7 +295,7 @@ impl Lump {
         add(self.hinges[n], scale(self.lengths[n], p))
     }
 
-    /// The common centre of its parts from O.
+    /// Returns the common centre of the parts from O.
     pub fn center_of(&self, p: &Directions) -> Vec3 {
         let moment = self.parts(p).iter().fold([0.0; 3], |sum, (m, rho)| add(sum, scale(*m, *rho)));
         scale(1.0 / self.m, moment)
@@ -305,8 +310,8 @@ impl Lump {
         Rigid { mass: 0.0, moment: [0.0; 3], inertia }
     }
 
-    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre moves, too, but the first moment
-    /// about it is 0: its velocity drops out.
+    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre moves, too, but
+    /// the first moment about it is 0, so its velocity drops out.
     pub fn seed_shape(&mut self, p: &Directions, dp: &Directions) {
         let center = self.center_of(p);
         let mut slope = [[0.0; 3]; 3];
@@ -324,14 +329,15 @@ impl Lump {
         self.shape_slope = slope;
     }
 
-    /// Its six numbers when its centre is `rho` from O and moves with `rate` against the tank.
+    /// Returns the lump's six numbers for its centre at `rho` from O moving with `rate` relative to
+    /// the tank.
     pub fn numbers(&self, rho: Vec3, rate: Vec3) -> [f64; 6] {
         let at = transposed_times(&self.axes, sub(rho, self.origin));
         let rate = transposed_times(&self.axes, rate);
         [at[0], at[1], at[2], rate[0], rate[1], rate[2]]
     }
 
-    /// The same number, on the wall and along it.
+    /// Returns the six numbers moved onto the wall, with the velocity along it.
     fn on_wall(&self, x: &[f64; 6]) -> [f64; 6] {
         let [across, along] = [self.radius, self.half].map(|r| 1.0 / (r * r));
         let at = [x[0], x[1], x[2] - self.height];
@@ -342,8 +348,8 @@ impl Lump {
         [at[0], at[1], at[2] + self.height, rate[0], rate[1], rate[2]]
     }
 
-    /// Starts an expansion at position and rate (tank axes, six numbers) while the craft turns at `w`; of a lump that
-    /// slides both are brought to the wall first.
+    /// Starts an expansion at position and rate (tank axes, six numbers) while the craft rotates with `w`. Moves both
+    /// of a sliding lump onto the wall first.
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let x = if self.slides() { self.on_wall(x) } else { *x };
         self.x_0 = times(&self.axes, [x[0], x[1], x[2] - self.height]);
@@ -353,8 +359,8 @@ impl Lump {
         self.u[0] = add(self.x_d[0], cross(w, self.rho[0]));
     }
 
-    /// Sets coefficient 1 of position and velocity to their derivative in the direction `dx` of the six numbers and `dw`
-    /// of the rate; of a lump that slides, at numbers on the wall.
+    /// Sets coefficient 1 of position and velocity to their derivatives along `dx` (of the six numbers) and `dw` (of
+    /// the angular velocity); for a sliding lump at numbers on the wall.
     pub fn seed_direction(&mut self, dx: &[f64; 6], w: Vec3, dw: Vec3) {
         let mut at = times(&self.axes, part(dx, 0));
         let mut rate = times(&self.axes, part(dx, 3));
@@ -368,7 +374,8 @@ impl Lump {
         self.u[1] = add(rate, add(cross(dw, self.rho[0]), cross(w, at)));
     }
 
-    /// Position and rate `t` after the start at `x`, from the series cut after order n, when the craft turns at `w` by then.
+    /// Returns position and rate at `t` after the start at `x`, from the series up to order n; `w` is the craft's
+    /// angular velocity at that time.
     pub fn at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (rho, u) = (space::value(&self.rho, n, t), space::value(&self.u, n, t));
         let rate = sub(u, cross(w, rho));
@@ -380,7 +387,7 @@ impl Lump {
         if self.slides() { self.on_wall(&x) } else { x }
     }
 
-    /// Coefficient n of what does not depend on [a; w'] of this order: force and torque about O on the craft.
+    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this order.
     pub fn reaction(&mut self, n: usize, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         self.x_d[n] = sub(self.u[n], crosses(w, &self.rho, 0, n));
         self.u_turned = crosses(w, &self.u, 0, n);
@@ -411,28 +418,29 @@ impl Lump {
         [self.known_force, torque]
     }
 
-    /// n and rho x n at the start of the expansion, of a lump that slides: what it adds to the matrix.
+    /// Returns n and rho x n of a sliding lump at the start of the expansion, its direction in the mass matrix.
     pub fn along_normal(&self) -> Option<[f64; 6]> {
         self.slides().then(|| along_rod(self.outwards(), self.rho[0]))
     }
 
-    /// n at the start of the expansion.
+    /// Returns n at the start of the expansion.
     pub fn outwards(&self) -> Vec3 {
         let g = times(&self.d, self.x_0);
         scale(1.0 / libm::sqrt(dot(g, g)), g)
     }
 
-    /// From O at the start of the expansion.
+    /// Returns the position from O at the start of the expansion.
     pub fn position(&self) -> Vec3 {
         self.rho[0]
     }
 
-    /// x' at the start of the expansion.
+    /// Returns x' at the start of the expansion.
     pub fn rate(&self) -> Vec3 {
         self.x_d[0]
     }
 
-    /// Coefficient n of the rest, and n + 1 of position and velocity, from coefficient n of [a; w'].
+    /// Sets coefficient n of the forces and n + 1 of position and velocity, from coefficient n of
+    /// [a; w'].
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let specific = add(a, cross(w_d, self.rho[0]));
         if self.slides() {
@@ -449,13 +457,14 @@ impl Lump {
         self.rho[n + 1] = self.x_d[n].map(|x| x / order);
     }
 
-    /// Coefficient n of the power dissipated, m d |x'|^2, W.
+    /// Returns coefficient n of the dissipated power, m d |x'|^2, W.
     pub fn dissipation(&self, n: usize) -> f64 {
         let drag = self.drag();
         if drag > 0.0 { self.m * drag * dots(&self.x_d, &self.x_d, 0, n) } else { 0.0 }
     }
 
-    /// Coefficient n (0 or 1) of the rates of the six numbers: x', x'' = u' - w' x rho - w x x'.
+    /// Returns coefficient n (0 or 1) of the rates of the six numbers: x', x'' = u' - w' x rho - w
+    /// x x'.
     pub fn rates(&self, n: usize, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let u_d = scale((n + 1) as f64, self.u[n + 1]);
         let turned = add(crosses(w_d, &self.rho, 0, n), crosses(w, &self.x_d, 0, n));
@@ -464,12 +473,12 @@ impl Lump {
         [x_d[0], x_d[1], x_d[2], x_dd[0], x_dd[1], x_dd[2]]
     }
 
-    /// The scale of u within the time `t`, m/s.
+    /// Scale of u within the time `t`, m/s.
     pub fn speed_scale(&self, w: Vec3, t: f64) -> f64 {
         largest(self.x_d[0]) + self.half * largest(w) + largest(self.u[1]) * t
     }
 
-    /// Size of coefficient n of u.
+    /// Magnitude of coefficient n of u.
     pub fn coefficient_norm(&self, n: usize) -> f64 {
         largest(self.u[n])
     }
@@ -478,19 +487,19 @@ impl Lump {
         [0, 1, 2].map(|i| T::of(a[0][i], a[1][i]))
     }
 
-    /// Force on the craft and its torque about O.
+    /// Returns the force on the craft and its torque about O.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
         let force = Self::of::<T>(&self.force);
         [force, cross(Self::of(&self.rho), force)]
     }
 
-    /// G and G.G, of a lump that slides.
+    /// Returns G and G.G of a sliding lump.
     fn gradient<T: Number>(&self) -> (Vec3<T>, T) {
         let g = times(&self.d.map(constant), sub(Self::of(&self.rho), constant(self.center)));
         (g, dot(g, g))
     }
 
-    /// The wrench at a = 0 and w' = 0 (with w' = 0, too, in N).
+    /// Returns the wrench at a = 0 and w' = 0 (also in N).
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         if !self.slides() {
             return [constant([0.0; 3]); 2];
@@ -504,14 +513,14 @@ impl Lump {
         [force, cross(rho, force)]
     }
 
-    /// m and u of m u u^T, the added mass of a lump that slides: m/G.G and [G; rho x G].
+    /// Returns m and u of m u u^T, the added mass of a sliding lump: m/G.G and [G; rho x G].
     pub fn added_mass<T: Number>(&self) -> Option<(T, [T; 6])> {
         let (g, squared) = self.gradient::<T>();
         let along = || along_rod(g, Self::of::<T>(&self.rho));
         self.slides().then(|| (squared.recip() * self.m, along()))
     }
 
-    /// Values that the outputs need.
+    /// Returns values for the outputs.
     pub fn now<T: Number>(&self) -> BobNow<T> {
         BobNow {
             m: T::constant(self.m),
@@ -525,7 +534,8 @@ impl Lump {
         }
     }
 
-    /// Applies an impulse of the craft to the lump's rate: in flight the lump keeps its velocity, on the wall its velocity across the normal.
+    /// Applies an impulse on the craft to the lump's rate. In flight the lump keeps its velocity, on the wall its
+    /// velocity along the wall.
     pub fn after_impulse(&self, x: &mut [f64], dv: Vec3, dw: Vec3) {
         let mut kick = add(dv, cross(dw, self.rho[0]));
         if self.slides() {
@@ -538,7 +548,7 @@ impl Lump {
         }
     }
 
-    /// J n on the craft at rho for the speed v_n with which the wall throws it back.
+    /// Returns the impulse J n on the craft at rho for an impact at v_n with restitution e.
     pub fn impulse(&self, matrix: &Factors, e: f64) -> [Vec3; 2] {
         let n = self.outwards();
         let u = [n, cross(self.rho[0], n)];
@@ -547,12 +557,13 @@ impl Lump {
         u.map(|half| scale((1.0 + e) * mu * self.approach(), half))
     }
 
-    /// v_n at the start of the expansion, m/s.
+    /// Returns v_n at the start of the expansion, m/s.
     pub fn approach(&self) -> f64 {
         dot(self.outwards(), self.x_d[0]).max(0.0)
     }
 
-    /// Coefficient of restitution, and the speed after an impact below which the lump may stay on the wall, m/s.
+    /// Returns the coefficient of restitution, and the speed after an impact below which the lump may stay on the wall,
+    /// m/s.
     pub fn restitution(&self) -> (f64, f64) {
         (self.restitution, self.contact_speed)
     }
@@ -562,15 +573,15 @@ impl Lump {
         self.pull[0] > 0.0
     }
 
-    /// The directions of rods that put the pendulums' centre where the lump is, as far as it can.
+    /// Returns rod directions that put the pendulums' centre as near to the lump as possible.
     pub fn hanging(&self) -> Directions {
         let in_tank = transposed_times(&self.axes, self.x_0);
         let [x, y] = [in_tank[0] / self.gyration, in_tank[1] / self.gyration];
         [[x, y, -libm::sqrt((1.0 - x * x - y * y).max(0.0))]; MODES]
     }
 
-    /// Impulse on the craft when the tank catches the parts of the lump, and the bobs' rates p' afterwards. All parts move with `rate`
-    /// relative to the tank, rods along `p`.
+    /// Returns the impulse on the craft when the tank catches the parts of the lump, and the bobs' rates p' afterwards.
+    /// All parts move with `rate` relative to the tank, with rods along `p`.
     pub fn caught(&self, p: &Directions, rate: Vec3) -> ([Vec3; 2], Directions) {
         let mut impulse = scale(self.m_0, rate);
         let mut torque = cross(self.s, impulse);
@@ -587,7 +598,8 @@ impl Lump {
         ([impulse, torque], rates)
     }
 
-    /// Momentum of the bobs' motion in the tank over the liquid's mass, and its moment about the liquid's centre.
+    /// Returns the momentum of the bobs' motion in the tank over the liquid's mass, and its moment about the liquid's
+    /// centre.
     pub fn stirred(&self, center: Vec3, bobs: impl Iterator<Item = BobNow<f64>>) -> [Vec3; 2] {
         bobs.fold([[0.0; 3]; 2], |[rate, moment], bob| {
             let momentum = scale(bob.m, bob.rate);
@@ -596,7 +608,8 @@ impl Lump {
         })
     }
 
-    /// Coefficients below n of the specific force along the tank at the hinge of mode 1.
+    /// Returns the coefficients below n of the specific force along the tank at the hinge of mode
+    /// 1.
     fn axial(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> Series {
         let turned = cross(self.hinge, self.e);
         let height = dot(self.e, self.hinge);
@@ -612,8 +625,9 @@ impl Lump {
         axial
     }
 
-    /// Coefficients below n of what has to be positive for the pendulums to take the liquid back, each with what of it is
-    /// rounding: the swing that is left, thrust along the tank, depth below the surface's centre.
+    /// Returns the coefficients below n of three quantities that must be positive for the pendulums to take over the
+    /// liquid, each with the magnitude of its rounding terms: the remaining swing, thrust along the tank, depth below
+    /// the surface's centre.
     fn settling(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> [(Series, f64); 3] {
         let mut thrust = self.axial(n, a, w, w_d);
         thrust[0] -= self.floor;
@@ -631,7 +645,7 @@ impl Lump {
             swing[k] =
                 product(&thrust, &left, k) - dots(&self.x_d, &self.x_d, 0, k) / self.swing_length;
         }
-        // What rounds: the specific force of everything that turns, and what it is multiplied by.
+        // Rounding terms: the specific force of everything that rotates, and its factors.
         let arm = largest(self.hinge);
         let turning = largest(w[0]) * largest(w[0]) + largest(w_d[0]);
         let of_thrust = 1e-10 * self.floor + 1e-12 * (largest(a[0]) + turning * arm);
@@ -641,8 +655,8 @@ impl Lump {
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
 
-    /// Next event of the liquid within `h` after the start of the expansion cut after order n, with its time. `bobs` are
-    /// the tank's.
+    /// Returns the next event of the liquid within `h` after the start of the expansion up to order n, with its time.
+    /// `bobs` are those of the tank.
     pub fn next<'a>(
         &self,
         n: usize,
@@ -682,7 +696,8 @@ impl Lump {
         }
     }
 
-    /// Coefficients up to n of the mean cosine of the bobs' angles from the axis, by modal mass, less that of 45 degrees.
+    /// Returns the coefficients up to n of the mean cosine of the bobs' angles from the axis, by modal mass, minus cos
+    /// 45 degrees.
     fn upright<'a>(&self, bobs: impl Iterator<Item = &'a Bob>, n: usize) -> Series {
         let mut upright = ZERO;
         for bob in bobs {
@@ -705,7 +720,7 @@ impl Lump {
             return first_root(&f[..=n], h);
         }
         if f[1] > RESTING {
-            // The root at 0 is behind.
+            // The root at 0 is in the past.
             return first_root(&f[1..=n], h);
         }
         if self.meets_wall([f[0], f[1], f[2]], self.rho[2]) {
@@ -715,22 +730,23 @@ impl Lump {
         first_root(&f[..=n], h)
     }
 
-    /// Whether a lump on the wall or outside moves outwards or is pressed outwards. `f` has coefficients 0 to 2 of f, and `x_2` is
-    /// coefficient 2 of the position.
+    /// Returns true if a lump on or outside the wall moves or is pressed outwards. `f` has coefficients 0 to 2 of f,
+    /// and `x_2` is coefficient 2 of the position.
     fn meets_wall(&self, f: [f64; 3], x_2: Vec3) -> bool {
         if f[0] > TOUCHING || f[1] > RESTING {
             return false;
         }
-        // What f'' is the sum of rounds.
+        // Magnitude of the terms of f'', for rounding.
         let g = times(&self.d, self.x_0);
         let size =
             1.0 + 2.0 * largest(g) * largest(x_2) + dot(self.rho[1], times(&self.d, self.rho[1]));
         f[1] < -RESTING || f[2] < -PRESSING * size
     }
 
-    /// f for hosts that integrate themselves, after order 0 of the expansion: below zero only where an impact is due. After an
-    /// impact the lump may be outside by rounding and on its way inwards, or on the wall and not pressed: the value is above zero
-    /// there. So a bounce that is shorter than a host's step does not hide from a host that compares signs.
+    /// Returns f for hosts that integrate themselves, after order 0 of the expansion. It is below zero only if an
+    /// impact is due. After an impact the lump may be outside by rounding and move inwards, or be on the wall and not
+    /// pressed. The value is above zero there, so that a host that compares signs does not miss a bounce shorter than
+    /// its step.
     fn distance_to_wall(&self, w: &Vector, w_d: &Vector) -> f64 {
         let (x, x_d, g) = (self.x_0, self.x_d[0], times(&self.d, self.x_0));
         let f = 1.0 - dot(x, g);
@@ -743,25 +759,25 @@ impl Lump {
         if self.meets_wall([f, -2.0 * dot(g, x_d), -bent], x_2) { f } else { TOUCHING }
     }
 
-    /// Returns true if a host that has integrated up to here has passed an event, by its indicators here.
+    /// Returns true if a host that has integrated up to here has passed an event, judged by the current indicators.
     pub fn is_overdue(&self, [leaves, ends]: [f64; 2]) -> bool {
-        // Past the nearest passage of the axis that indicator of a held lump stays below zero.
+        // After the passage nearest to the axis, this indicator of a held lump stays below zero.
         leaves <= 0.0 || ends < 0.0 && self.state != BallState::Held
     }
 
-    /// Whether a host has integrated the lump through the wall.
+    /// Returns true if a host has integrated the lump through the wall.
     pub fn is_outside(&self) -> bool {
         1.0 - dot(self.x_0, times(&self.d, self.x_0)) < -TOUCHING
     }
 
-    /// The point of the wall in the lump's direction from the surface's centre, from O.
+    /// Returns the point of the wall, from O, in the lump's direction from the surface's centre.
     pub fn on_wall_beside(&self) -> Vec3 {
         let size = libm::sqrt(dot(self.x_0, times(&self.d, self.x_0)));
         add(self.center, scale(1.0 / size, self.x_0))
     }
 
-    /// Coefficients below n of the square of the wall's force over that of twice the drag that there would be, minus 1, times
-    /// the latter.
+    /// Returns the coefficients below n of (wall force^2/(twice the drag)^2 - 1) times (twice the drag)^2, with the
+    /// drag that would act.
     fn excess(&self, n: usize) -> Series {
         let (mut pull, mut excess) = (ZERO, ZERO);
         for (k, x) in pull.iter_mut().enumerate().take(n) {
@@ -775,7 +791,7 @@ impl Lump {
         excess
     }
 
-    /// Time of the closest approach to the tank's axis.
+    /// Returns the time of the closest approach to the tank's axis.
     fn next_passage(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
         let across = |y: Vec3| sub(y, scale(dot(self.e, y), self.e));
@@ -800,13 +816,13 @@ impl Lump {
         if many == 0 { Some((0.0, Due::Settle)) } else { first.map(|t| (t, due)) }
     }
 
-    /// Returns true if the pendulums may take the liquid back at the start of the expansion.
+    /// Returns true if the pendulums may take over the liquid at the start of the expansion.
     pub fn may_settle(&self, a: &Vector, w: &Vector, w_d: &Vector) -> bool {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }
 
-    /// Functions that cross zero at events, for hosts that integrate themselves; `bobs` are the tank's. They cross where
-    /// [`Lump::next`] finds the event: with directions of unit length, which a host's need not be.
+    /// Returns functions that cross zero at events, for hosts that integrate themselves; `bobs` are those of the tank.
+    /// They cross where [`Lump::next`] finds the event, with directions of unit length, which a host's need not be.
     pub fn indicators<'a>(
         &self,
         [a, w, w_d]: [&Vector; 3],
@@ -836,8 +852,8 @@ impl Lump {
     }
 }
 
-/// When the series of a, cut before order n, rises through zero from below, within h; at h = 0, where hosts ask that have found
-/// the event themselves, whether it has.
+/// Returns the time within h at which the series of a, up to order n, rises through zero. At h = 0, for hosts that have
+/// found the event themselves, returns 0 if a is positive.
 fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
     let size = a[..n].iter().rev().fold(0.0, |sum, x| sum * h.min(1.0) + x.abs());
     let below = a.map(|x| -x);
@@ -847,7 +863,7 @@ fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
     if below[0] > 1e-10 * size { first_root(&below[..n], h) } else { None }
 }
 
-/// The earlier of two times, if any.
+/// Returns the earlier of two optional times.
 fn earlier(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     match (a, b) {
         (Some(a), Some(b)) => Some(if b < a { b } else { a }),
@@ -859,7 +875,7 @@ fn earlier(a: Option<f64>, b: Option<f64>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// t - 1/4, 1/4 - t, t - 1/4 from far below, and what only touches zero.
+    /// Checks t - 1/4, 1/4 - t, t - 1/4 from far below, and a series that only touches zero.
     #[test]
     fn a_series_rises_where_it_passes_zero_from_below() {
         let of = |terms: &[f64]| {
@@ -872,12 +888,12 @@ mod tests {
         close(rise(&of(&[-0.25, 0.0, 1.0]), 3, 1.0), 0.5);
         close(rise(&of(&[-2.5e9, 1e10]), 2, 1.0), 0.25);
         assert_eq!(rise(&of(&[-0.25, 1.0]), 2, 0.2), None);
-        // coefficients from n on are not of the series
+        // coefficients from n on do not belong to the series
         assert_eq!(rise(&of(&[-0.25, 0.0, 1.0]), 2, 1.0), None);
         for falling in [[0.25, -1.0], [0.25, 1.0], [-0.25, -1.0], [-1e-12, 1.0]] {
             assert_eq!(rise(&of(&falling), 2, 1.0), None, "{falling:?}");
         }
-        // a host at an event: above zero or not
+        // a host at an event: value above zero or not
         assert_eq!([1e-9, -1e-9].map(|a| rise(&of(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
     }
 
@@ -894,7 +910,7 @@ mod tests {
         }
     }
 
-    /// A loose lump of the default tank, its surface 2 high and 2 wide about its centre, still at the bottom.
+    /// Detached liquid of the default tank at the bottom, in a surface 2 m high and 2 m wide.
     fn lump(state: BallState) -> Lump {
         let mut tank = Tank::default();
         tank.ball.travel = 0.6;
@@ -919,7 +935,8 @@ mod tests {
         along_x(terms).map(|[x, y, z]| [z, y, x])
     }
 
-    /// What is next within a second of a lump without specific force, which no pendulum takes.
+    /// Returns the next event within a second of a lump without specific force, which no pendulum
+    /// takes over.
     fn next(lump: &Lump) -> Option<(f64, Due)> {
         lump.next(4, 1.0, [&ZERO_VECTOR; 3], core::iter::empty())
     }
@@ -929,8 +946,8 @@ mod tests {
         assert!((found.0 - t).abs() < 1e-9 && found.1 == due, "{found:?} {t} {due:?}");
     }
 
-    /// N |n| of a wall's force N n is to be twice the drag m d |x'|: 2 x 5 kg x 0.3 1/s x 2 m/s are 6 N. Where it rises from
-    /// 4.5 N by 4 N/s that is after 0.375 s, and nothing is due of a lump that drags, or where |n| is a half.
+    /// The wall force N |n| must be twice the drag m d |x'|: 2 x 5 kg x 0.3 1/s x 2 m/s are 6 N. If it rises from 4.5 N
+    /// by 4 N/s, this happens after 0.375 s. No event is due if drag already acts, or if |n| is a half.
     #[test]
     fn a_light_lump_drags_from_twice_its_drag_on() {
         let mut lump = lump(BallState::Light);
@@ -949,7 +966,7 @@ mod tests {
         assert_eq!(lump.excess(3)[1], 36.0 - 36.0);
     }
 
-    /// The wall's force of 1 N that falls by 2 N/s is gone after 0.5 s; the axis is passed after 0.25 or 0.75 s.
+    /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s. The lump passes the axis after 0.25 or 0.75 s.
     #[test]
     fn of_release_and_passage_the_earlier_is_due() {
         let mut lump = lump(BallState::Held);
@@ -962,13 +979,14 @@ mod tests {
         }
         lump.pull[1] = 0.0;
         is(next(&lump), 0.75, Due::Settle);
-        // along the axis is no way from it
+        // motion along the axis is not motion away from it
         (lump.x_d, lump.rho) = (along_z(&[1.0]), along_z(&[0.0, 1.0]));
         assert_eq!(next(&lump), None);
     }
 
-    /// From halfway down with 3 m/s to the top in half a second; from the wall, which it leaves with 4 m/s, as well; at once
-    /// where it moves into the wall, or rests there and is pressed; never where it falls away from rest.
+    /// From halfway down, 3 m/s take the lump to the top in half a second; from the wall, which it leaves with 4 m/s,
+    /// as well. The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump that
+    /// falls away from rest never meets the wall.
     #[test]
     fn a_lump_in_flight_meets_the_wall_before_it() {
         let mut lump = lump(BallState::Flying);
@@ -989,12 +1007,13 @@ mod tests {
             let found = next(&lump);
             assert_eq!(found == Some((0.0, Due::Impact)), at_once, "{terms:?}: {found:?}");
         }
-        // beside the wall the round way counts: 1 m/s along it is 1 m/s² towards it
+        // near the wall its curvature counts: 1 m/s along it is 1 m/s² towards it
         lump.rho = along_x(&[0.0, 1.0]);
         assert_eq!(next(&lump), Some((0.0, Due::Impact)));
     }
 
-    /// 2 m/s and what it has from 3 rad/s in half of its surface's height and from 5 m/s² in a tenth of a second.
+    /// The scale is 2 m/s plus the speeds from 3 rad/s over half of the surface's height and from 5 m/s² in a tenth of
+    /// a second.
     #[test]
     fn a_lump_s_speed_is_measured_by_all_that_moves_it() {
         let mut lump = lump(BallState::Flying);

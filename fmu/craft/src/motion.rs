@@ -8,10 +8,11 @@
 //! work' = f.C^T V + (tau - h_w').w
 //! ```
 //!
-//! F and torque are what the bobs load O with, besides their added mass. M is factorised once
-//! per expansion: coefficient n of [a; w'] solves the same system at every order.
+//! F and torque are the bobs' loads on the craft at O without their added mass. M is factorised
+//! once per expansion, because coefficient n of [a; w'] solves the same system at every order.
 //!
-//! Velocity and position are expanded from where the step begins, V_0 and r_0, in body axes:
+//! Velocity and position are expanded from their values at the start of the step, V_0 and r_0, in
+//! body axes:
 //!
 //! ```text
 //! V = V_0 + C gain,        gain' = a - w x gain
@@ -19,15 +20,15 @@
 //! C^T V_0 = drift,        drift' = -w x drift
 //! ```
 //!
-//! so that they round by what they gain in a step, however fast and far the craft is.
+//! The rounding error is then relative to the change in a step, however fast and far the craft is.
 //!
-//! With O on a pivot a = -C^T g is given, a' = -w x a; the lower half of the system is left, and tau has the pivot's
-//! torque (pivot.rs) from its axis Z = C^T e_z, Z' = -w x Z.
+//! With O on a pivot a = -C^T g is given, a' = -w x a. Only the lower half of the system remains, and tau includes the
+//! pivot's torque (pivot.rs), with the pivot's axis Z = C^T e_z, Z' = -w x Z.
 //!
-//! A tank whose liquid has left its bottom has neither rigid liquid nor bobs, but a lump and the inertia that turns with the
-//! tank (lump.rs). Changes between the two are impulses, at the roots of what decides.
+//! A tank whose liquid has detached has neither rigid liquid nor bobs, but a lump and the inertia that rotates with the
+//! tank (lump.rs). Changes between the two are impulses at the roots of event functions.
 //!
-//! Source: Newton-Euler about O with the bobs' pulls eliminated.
+//! Source: Newton-Euler about O with the bobs' tensions eliminated.
 
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
@@ -54,7 +55,8 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 
 use crate::state::{BallState, Inputs, STATES, State, index};
 
-/// Rates change within this time at most, s: a step much longer does not see how fast they are.
+/// Longest time over which a rate scale is estimated, s. In a step much longer than this, rates
+/// change.
 pub const SCALE_TIME: f64 = 0.1;
 
 /// Coefficient n of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of
@@ -64,7 +66,7 @@ pub fn twice_crossed([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Mat3 {
     [[-yy - zz, xy, xz], [xy, -xx - zz, yz], [xz, yz, -xx - yy]]
 }
 
-/// w x (I w) from w w^T: its components are linear in those of w w^T.
+/// Returns w x (I w) from w w^T, linear in its components.
 #[inline(always)]
 fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     let columns = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
@@ -72,7 +74,8 @@ fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     [element(2, 1) - element(1, 2), element(0, 2) - element(2, 0), element(1, 0) - element(0, 1)]
 }
 
-/// Makes the upper half of what a matrix is solved for that of the right-hand side: a on a pivot.
+/// Replaces the upper half of a matrix so that the solution's upper half equals that of the
+/// right-hand side: a on a pivot.
 #[inline(always)]
 fn hold_upper_rows(matrix: &mut Mat6) {
     for i in 0..3 {
@@ -83,7 +86,7 @@ fn hold_upper_rows(matrix: &mut Mat6) {
     }
 }
 
-/// The craft at its present state and the series of its motion.
+/// The craft at its current state and the series of its motion.
 #[derive(Clone, Debug)]
 pub struct CraftMotion {
     pub state: State,
@@ -91,8 +94,8 @@ pub struct CraftMotion {
     pub mount: Mount,
     gravity: Vec3,
     pub pivot: Pivot,
-    /// Whether the craft is on a pivot that does more than hold it, its dry friction about each axis if there is any, Z,
-    /// and the present coefficients of the torque and of its dissipation.
+    /// True if the pivot has stiffness, damping or friction; its dry friction about each axis, if any; Z; and the
+    /// current coefficients of the torque and its dissipation.
     on_springs: bool,
     rubbing: Vec<Rubbing>,
     upright: Vector,
@@ -104,7 +107,7 @@ pub struct CraftMotion {
     mass_matrix: Mat6,
     pub liquids: Vec<Rigid>,
     pub bobs: Vec<Bob>,
-    /// Bobs of the tanks whose liquid has left its bottom.
+    /// Bobs of the tanks whose liquid has detached.
     parked: Vec<Bob>,
     /// Detached liquid of each tank that models it.
     pub lumps: Vec<Lump>,
@@ -114,8 +117,8 @@ pub struct CraftMotion {
     due: Option<(usize, Due)>,
     /// True if any bob's drag follows the acceleration.
     follows: bool,
-    /// Craft and liquids at rest as one rigid body, and what of its motion is along each bob's tank (on a pivot of
-    /// [a; torque], else of [force; torque]).
+    /// Craft and liquids at rest as one rigid body, and the part of its motion along each bob's tank (on a pivot from
+    /// [a; torque], else from [force; torque]).
     whole: Rigid,
     along: Vec<[Vec3; 2]>,
     /// M at the start of the expansion, and its factors.
@@ -139,9 +142,9 @@ pub struct CraftMotion {
     speed: Vector,
     pub work: Series,
     pub dissipation: Series,
-    /// 1 over what is allowed of attitude, rate, the bobs' v, and velocity
+    /// 1 over the allowed errors of attitude, rate, the bobs' v, and velocity
     inv_allowed: [f64; 4],
-    /// 1 over what is allowed of the lumps' u.
+    /// 1 over the allowed error of the lumps' u.
     lumps_allowed: f64,
     /// The longest pendulum, m.
     longest: f64,
@@ -149,7 +152,7 @@ pub struct CraftMotion {
 
 impl CraftMotion {
     pub fn new(p: &Parameters, state: State) -> CraftMotion {
-        // Only these: the numbers of unused tanks can be anything within their ranges.
+        // Only tanks in use: parameters of the others can be anything within their ranges.
         let tanks: Vec<Tank> = p.tank[..p.tanks].iter().map(Tank::resolve).collect();
         let liquids: Vec<Rigid> = tanks.iter().map(Tank::rigid).collect();
         let rigid = liquids.iter().fold(p.craft.rigid(), |sum, tank| sum.and(tank));
@@ -214,7 +217,7 @@ impl CraftMotion {
         motion
     }
 
-    /// Craft and liquids at rest as one rigid body: what the bobs' drag takes for the acceleration along their tanks.
+    /// Sets up craft and liquids at rest as one rigid body. The bobs' drag follows its acceleration along their tanks.
     fn freeze(&mut self) {
         let point = |bob: &Bob| Rigid::new(bob.m, bob.at_rest(), &[[0.0; 3]; 3]);
         self.whole = self.bobs.iter().fold(self.rigid, |sum, bob| sum.and(&point(bob)));
@@ -228,7 +231,8 @@ impl CraftMotion {
         }
     }
 
-    /// Takes other rigid liquids and bobs, of as many tanks and modes; the bobs of planar modes count where they are now.
+    /// Replaces rigid liquids and bobs by those of `tanks`, with as many tanks and modes. Bobs of planar modes count at
+    /// their current positions.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
@@ -248,7 +252,7 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// M at the present directions and its factors. On a pivot the upper rows hold a.
+    /// Computes M at the current directions and factorises it. On a pivot the upper rows hold a.
     #[inline(always)]
     fn factorise(&mut self) {
         self.matrix = self.mass_matrix;
@@ -270,7 +274,7 @@ impl CraftMotion {
         }
     }
 
-    /// [a; w'] from the right-hand side; on a pivot its upper half is a.
+    /// Solves for [a; w']; on a pivot the upper half of the right-hand side is a.
     #[inline(always)]
     fn solve(&self, [force, torque]: [Vec3; 2]) -> [Vec3; 2] {
         let mut torque = torque;
@@ -282,10 +286,9 @@ impl CraftMotion {
         self.factors.solve([force, torque])
     }
 
-    /// Takes account of the wheels' momentum being `h` from now on: what it jumps by turns the
-    /// craft by an impulse,
-    /// [dV; dw] = M^-1 [0; -dh], l dp' = -(1 - p p^T)(dV + dw x rho), work -dh.(w + dw/2).
-    /// Returns whether it jumps.
+    /// Applies a change of the wheels' momentum to `h`. A jump turns the craft by an impulse, [dV;
+    /// dw] = M^-1 [0; -dh], l dp' = -(1 - p p^T)(dV + dw x rho), work -dh.(w + dw/2). Returns true
+    /// if the momentum jumps.
     pub fn set_wheels(&mut self, h: Vec3) -> bool {
         if h == self.state.h_wheels {
             return false;
@@ -312,13 +315,13 @@ impl CraftMotion {
         true
     }
 
-    /// Evaluates the equations at the present instant.
+    /// Evaluates the equations at the current instant.
     pub fn evaluate(&mut self, inputs: &Inputs) {
         self.inputs = *inputs;
         self.evaluate_at(0.0);
     }
 
-    /// Coefficients 0 and 1 of everything along the direction (dx, du).
+    /// Computes coefficients 0 and 1 of every quantity along the direction (dx, du).
     pub fn evaluate_direction(
         &mut self,
         inputs: &Inputs,
@@ -359,8 +362,8 @@ impl CraftMotion {
         self.rates_of::<1>();
     }
 
-    /// The rotation, rad, body axes, that coefficient 1 of the attitude stands for:
-    /// q_1 = q_0 o (0, turn)/2.
+    /// Returns the rotation, rad, body axes, of coefficient 1 of the attitude: q_1 = q_0 o (0,
+    /// turn)/2.
     fn turn(&self) -> Vec3 {
         let [a, x, y, z] = self.q.get(0);
         let [b, v @ ..] = self.q.get(1);
@@ -369,20 +372,20 @@ impl CraftMotion {
         scale(2.0, sum)
     }
 
-    /// Moves the states on by `h` > 0; on an error they are unusable.
-    // Apart from what prepares a step: compiled together, both take more instructions.
+    /// Advances the states by `h` > 0. After an error they are unusable.
+    // Separate from the preparation of a step: compiled together, both take more instructions.
     #[inline(never)]
     pub fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
         let begin = self.state.time;
         integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps()).map(|_| ())
     }
 
-    /// Coefficient N of every quantity and N + 1 of the states.
-    // In WebAssembly, which a page has to carry, each order is there once.
+    /// Computes coefficient N of every quantity and N + 1 of the states.
+    // The WebAssembly module must stay small for web pages, so it has each order only once.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn rates_of<const N: usize>(&mut self) {
-        // First, while nothing else is at hand: between the sums below they cost every craft registers, 4 % of a step.
+        // The pivot comes first. Between the sums below it would take registers from every craft, 4 % of a step.
         if self.on_springs {
             self.set_torque_of_pivot::<N>();
         }
@@ -446,7 +449,7 @@ impl CraftMotion {
         self.dissipation[N] = dissipation;
     }
 
-    /// Coefficient N of what the pivot does, and N + 1 of Z.
+    /// Computes coefficient N of the pivot's torque and dissipation and N + 1 of Z.
     #[inline(never)]
     fn set_torque_of_pivot<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);
@@ -459,8 +462,8 @@ impl CraftMotion {
         self.upright[N + 1] = next::<N>(cross::<N>(&self.upright, &self.w));
     }
 
-    /// Coefficient N of the specific force along each tank at the hinges, e.(a + w' x P + w x (w x P)), of craft and
-    /// liquids as one rigid body.
+    /// Computes coefficient N of the specific force along each tank at the hinges, e.(a + w' x P + w x (w x P)), of
+    /// craft and liquids as one rigid body.
     #[inline(never)]
     fn set_axial<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);
@@ -488,14 +491,14 @@ impl CraftMotion {
 
     /// Time over which the series of the pivot's dry friction are valid, s.
     #[inline(never)]
-    fn reach_of_friction(&self) -> f64 {
+    fn friction_convergence_radius(&self) -> f64 {
         let about = |(i, rubbing): (usize, &Rubbing)| {
             rubbing.convergence_radius([self.w[0][i], self.w[1][i], self.w[2][i]])
         };
         self.rubbing.iter().enumerate().map(about).fold(f64::INFINITY, f64::min)
     }
 
-    /// Coefficient N (0 or 1) of x'.
+    /// Returns coefficient N (0 or 1) of x'.
     pub fn state_rates<const N: usize>(&self, x: &[f64; STATES]) -> [f64; STATES] {
         let mut rate = [0.0; STATES];
         let mut put = |at: usize, numbers: &[f64]| {
@@ -566,16 +569,16 @@ impl Motion for CraftMotion {
         let rate = RATE_FLOOR + largest(self.w[0]) + largest(self.w[1]) * time;
         let swing = rate
             + self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
-        // Force passes zero, too.
+        // The force may pass zero, too.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
         if self.any_loose {
             self.set_error_scale_of_lumps(time, allowed);
         }
-        if self.rubbing.is_empty() { h } else { h.min(self.reach_of_friction()) }
+        if self.rubbing.is_empty() { h } else { h.min(self.friction_convergence_radius()) }
     }
 
-    /// Of tanh from rest on three terms in succession may vanish by symmetry.
+    /// For tanh starting at rest, three successive terms may vanish by symmetry.
     #[inline(always)]
     fn convergence(&self) -> Convergence {
         if self.rubbing.is_empty() { Convergence::Decay } else { Convergence::Terms(4) }
@@ -643,8 +646,7 @@ impl Motion for CraftMotion {
     }
 }
 
-// Liquid that leaves its bottom, meets the wall, and settles (lump.rs). Apart from the equations of a craft without, which
-// take fewer instructions so.
+// Detached liquid (lump.rs), apart from the equations of a craft without it, which then take fewer instructions.
 impl CraftMotion {
     #[inline(never)]
     fn start_lumps(&mut self) {
@@ -655,7 +657,7 @@ impl CraftMotion {
         }
     }
 
-    /// Adds coefficient n of what the lumps do to the craft, about O.
+    /// Adds coefficient n of the lumps' force and torque on the craft, about O.
     #[inline(never)]
     fn add_reactions_of_lumps(
         &mut self,
@@ -667,7 +669,7 @@ impl CraftMotion {
             force = add(force, f);
             torque = add(torque, tau);
             if n == 1 {
-                // What the inertia's derivative takes: dJ w' + w x (dJ w).
+                // Wrench of the inertia's derivative: dJ w' + w x (dJ w).
                 let (w, slope) = (self.w[0], &lump.shape_slope);
                 let turned = vector::cross(w, times(slope, w));
                 torque = sub(torque, add(times(slope, self.w_d[0]), turned));
@@ -676,7 +678,8 @@ impl CraftMotion {
         [force, torque]
     }
 
-    /// Coefficients n of the lumps' accelerations, from those of the craft. Adds what they dissipate.
+    /// Computes coefficient n of the lumps' accelerations from those of the craft. Adds their
+    /// dissipation.
     #[inline(never)]
     fn accelerate_lumps(&mut self, n: usize, mut dissipation: f64) -> f64 {
         for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
@@ -701,7 +704,7 @@ impl CraftMotion {
         norms.fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
-    /// Rigid liquids and bobs as the liquids' states want them. Does not allocate.
+    /// Sets up rigid liquids and bobs for the states of the liquids. Does not allocate.
     fn arrange(&mut self) {
         let mut changed = false;
         for lump in &mut self.lumps {
@@ -709,7 +712,7 @@ impl CraftMotion {
             let was_loose = lump.is_loose();
             lump.state = state;
             if lump.is_loose() {
-                // Its directions are those with which it has left.
+                // The shape has the directions with which the liquid left the bottom.
                 let shape = lump.shape(&directions(&self.state.x, lump.tank));
                 changed |= self.liquids[lump.tank] != shape;
                 self.liquids[lump.tank] = shape;
@@ -739,7 +742,7 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Moves the lumps' states on by a step of length h. Returns whether they are numbers within bounds.
+    /// Advances the lumps' states by a step of length h. Returns true if they are finite and within bounds.
     #[inline(never)]
     fn take_lumps(&mut self, n: usize, h: f64, w: Vec3) -> bool {
         let (x, mut finite) = (&mut self.state.x, true);
@@ -769,11 +772,12 @@ impl CraftMotion {
         first
     }
 
-    /// Does all that is due now, for hosts that integrate themselves. Returns whether anything was.
+    /// Performs all events that are due now, for hosts that integrate themselves. Returns true if
+    /// there were any.
     pub fn take_due(&mut self, inputs: &Inputs) -> bool {
         self.inputs = *inputs;
         let mut any = false;
-        // As many as a lump can go through at once, for every tank.
+        // The largest number of successive events of a lump, for every tank.
         for _ in 0..4 * self.lumps.len() {
             self.evaluate_at(0.0);
             for n in 1..4 {
@@ -787,7 +791,7 @@ impl CraftMotion {
         any
     }
 
-    /// Functions that cross zero at events, two a tank.
+    /// Writes functions that cross zero at events, two per tank.
     pub fn indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         indicators.fill(1.0);
         if self.lumps.is_empty() {

@@ -8,10 +8,10 @@
 //!     + sum of k l^2 |p_perp|^2/2           E' = f.V + (tau - h_w').w - dissipation - drained'
 //! ```
 //!
-//! m, S, I: dry craft and rigid liquids about O; sums over the bobs; r_c: centre of mass of
-//! everything from O; V in body axes. H is about r_c and does not contain V: after a long
-//! thrust nothing cancels. drained': `contents.rs`. On a pivot H is about O, and E has the potential a.S with all masses
-//! and the pivot's U (`pivot.rs`).
+//! m, S, I: dry craft and rigid liquids about O. Sums run over the bobs. r_c: centre of mass of everything from O. V is
+//! in body axes. H is about r_c and does not contain V, so nothing cancels after a long thrust. drained':
+//! `contents.rs`. On a pivot H is about O, and E includes the potential a.S of all masses and the pivot's U
+//! (`pivot.rs`).
 
 use taylor::number::Number;
 use taylor::vector::{
@@ -31,17 +31,17 @@ use crate::state::{BallState, Ranges, STATES, index};
 pub struct TankOutputs {
     /// Force of the tank's whole liquid on the craft, N, body axes.
     pub force: Vec3,
-    /// Its torque about O, N m, body axes.
+    /// Torque of the tank's whole liquid about O, N m, body axes.
     pub torque: Vec3,
-    /// Direction from hinge to bob of each mode, tank axes.
+    /// Unit vector from hinge to bob of each mode, tank axes.
     pub p: [Vec3; MODES],
-    /// Its rate, 1/s, tank axes.
+    /// Rate of `p`, 1/s, tank axes.
     pub p_dot: [Vec3; MODES],
     /// Slosh angle of each mode, rad: sin(angle_x) = p_x, tank axes.
     pub angle_x: [f64; MODES],
     /// Slosh angle of each mode, rad: sin(angle_y) = p_y, tank axes.
     pub angle_y: [f64; MODES],
-    /// Amplitude of the surface at the wall, all modes together, m.
+    /// Wave height at the wall, all modes together, m.
     pub wave_height: f64,
     /// Specific force along the tank's axis at the hinge of mode 1, m/s2; 0 without modes.
     pub axial: f64,
@@ -49,9 +49,9 @@ pub struct TankOutputs {
     pub ranges: Ranges,
     /// State of the detached liquid.
     pub ball_state: BallState,
-    /// The lump's centre from the tank's origin, m, tank axes; while settled where the settled liquid's is at rest.
+    /// Centre of the detached liquid from the tank's origin, m, tank axes; while settled, the liquid's centre at rest.
     pub ball_position: Vec3,
-    /// Its velocity against the tank, m/s, tank axes.
+    /// Velocity of the detached liquid relative to the tank, m/s, tank axes.
     pub ball_velocity: Vec3,
 }
 
@@ -76,33 +76,33 @@ pub struct Outputs {
     pub slosh_torque: Vec3,
     /// Torque of the pivot's stiffness and damping on the craft, N m, body axes.
     pub pivot_torque: Vec3,
-    /// Momentum of everything, kg m/s, inertial axes.
+    /// Momentum of craft and liquids, kg m/s, inertial axes.
     pub momentum: Vec3,
-    /// Angular momentum of everything, wheels included, about the centre of mass of everything
-    /// (on a pivot: about O), N m s, inertial axes.
+    /// Angular momentum of craft, wheels and liquids about their centre of mass (on a pivot: about
+    /// O), N m s, inertial axes.
     pub angular_momentum: Vec3,
-    /// Kinetic energy, with the wheels as dead mass, and energy of the centring stiffness (on a
-    /// pivot: of gravity and of the pivot's stiffness, too), J.
+    /// Kinetic energy without the wheels' spin, plus energy of the centring stiffness (on a pivot
+    /// also of gravity and the pivot's stiffness), J.
     pub energy: f64,
     /// Work of force and torque since the start, J.
     pub work: f64,
     /// Energy dissipated by the liquids and the pivot since the start, J.
     pub dissipated: f64,
-    /// Energy that has gone with the outflow since the start, J.
+    /// Energy lost with the outflow since the start, J.
     pub drained: f64,
-    /// Mass of everything, kg.
+    /// Mass of craft and liquids, kg.
     pub mass: f64,
-    /// Centre of mass of everything from O, m, body axes.
+    /// Centre of mass of craft and liquids from O, m, body axes.
     pub center_of_mass: Vec3,
-    /// Inertia of everything with the bobs as point masses where they are, about the
-    /// centre of mass of everything, kg m2, body axes.
+    /// Inertia of craft and liquids about their centre of mass, with the bobs as point masses at
+    /// their current positions, kg m2, body axes.
     pub inertia: Mat3,
-    /// The tanks; those not used show no force.
+    /// The tanks; those not in use have zero force.
     pub tank: [TankOutputs; TANKS],
 }
 
 impl TankOutputs {
-    /// Outputs of a tank's modes from their part of the states, or of a direction.
+    /// Returns outputs of a tank's modes from their part of the states, or of a direction.
     pub(crate) fn of_states(x: &[f64]) -> TankOutputs {
         let part = |n: usize, at: usize| {
             let at = 6 * n + at;
@@ -144,7 +144,7 @@ impl TankOutputs {
     }
 }
 
-/// Rigid liquid and bobs where they are: mass, first and second moment about O.
+/// Mass, first and second moment about O of rigid liquid and bobs at their current positions.
 pub(crate) struct MassProperties<T> {
     pub mass: T,
     moment: Vec3<T>,
@@ -164,16 +164,16 @@ impl<T: Number> MassProperties<T> {
         self.inertia = add_matrices(self.inertia, point_inertia(m, rho));
     }
 
-    /// From O; O for nothing at all.
+    /// Returns the centre of mass from O, or 0 without any mass.
     pub fn center(&self) -> Vec3<T> {
         let is_something = self.mass.value() > 0.0;
-        // The compiler would divide before it looks whether there is a mass, and hosts can trap divisions by 0.
+        // The compiler would divide before it checks for mass, and hosts can trap divisions by 0.
         let divisor = core::hint::black_box(if is_something { self.mass.value() } else { 1.0 });
         let share = T::of(divisor, self.mass.result()).recip();
         if is_something { scale(share, self.moment) } else { constant([0.0; 3]) }
     }
 
-    /// About the centre of mass.
+    /// Returns the inertia about the centre of mass.
     pub fn inertia(&self) -> Mat3 {
         add_matrices(self.inertia, point_inertia(-self.mass, self.center())).map(result)
     }
@@ -183,7 +183,7 @@ fn result<T: Number>(a: Vec3<T>) -> Vec3 {
     a.map(T::result)
 }
 
-/// m (|s|^2 1 - s s^T).
+/// Returns m (|s|^2 1 - s s^T).
 fn point_inertia<T: Number>(m: T, s: Vec3<T>) -> Mat3<T> {
     let s2 = dot(s, s);
     let row = |i: usize| {
@@ -196,16 +196,16 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
-/// One tank.
+/// One tank at an instant.
 pub(crate) struct TankNow<T> {
     /// The rigid liquid about O.
     pub rigid: Rigid<T>,
     /// Force and torque about O on the craft.
     pub wrench: [Vec3<T>; 2],
-    /// Momentum and moment of momentum about O of the flow within (draining.rs).
+    /// Momentum and moment of momentum about O of the flow within the tank (draining.rs).
     pub flow_momentum: [Vec3<T>; 2],
     pub bobs: [Option<BobNow<T>>; MODES],
-    /// The liquid as one lump, while it has left its bottom.
+    /// The detached liquid, if any.
     pub lump: Option<BobNow<T>>,
     pub ball_state: BallState,
 }
@@ -221,7 +221,7 @@ pub(crate) struct Now<T> {
     /// Body to inertial.
     pub axes: Mat3<T>,
     pub mount: Mount,
-    /// Without stiffness and damping on a free craft.
+    /// The pivot, without stiffness and damping on a free craft.
     pub pivot: Pivot,
     /// The dry craft.
     pub craft: Rigid,
@@ -229,7 +229,7 @@ pub(crate) struct Now<T> {
 }
 
 impl CraftMotion {
-    /// From coefficients 0 and 1 of the motion.
+    /// Returns the craft at an instant from coefficients 0 and 1 of the motion.
     pub fn now<T: Number>(&self) -> Now<T> {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
@@ -277,7 +277,7 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    /// The outputs; `x` is the states, or the direction.
+    /// Returns the outputs; `x` is the states, or the direction.
     pub fn outputs(&self, x: &[f64; STATES]) -> Outputs {
         let Now { w, velocity, .. } = *self;
         let tanks = || self.tanks.iter().flatten();
@@ -299,7 +299,7 @@ impl<T: Number> Now<T> {
             slosh_force = add(slosh_force, out.force);
             slosh_torque = add(slosh_torque, out.torque);
         }
-        // m times what O does not share of the velocity, and its moment about O.
+        // m times the part of the velocity that O does not share, and its moment about O.
         let inner = cross(w, rigid.moment);
         let (mut inner_momentum, mut inner_angular) = (inner, times(&rigid.inertia, w));
         let half = 0.5;

@@ -1,4 +1,4 @@
-//! Parameters whose value another parameter replaces.
+//! Finds parameters whose value another parameter replaces.
 
 use alloc::format;
 use alloc::string::String;
@@ -6,8 +6,8 @@ use alloc::string::String;
 use crate::parameters::{Parameters, Tank};
 
 impl Tank {
-    /// Returns why the value of a parameter is not used although its tank and mode are; `None` if it is used, or if the mode is
-    /// not. `field` is its name in the FMUs behind `tank.`, `indices` are the element's, from 0.
+    /// Returns why the value of a parameter is not used although its tank and mode are in use; `None` if it is used, or
+    /// if the mode is not in use. `field` is its name in the FMUs after `tank.`, `indices` are the element's, from 0.
     pub fn overridden(&self, field: &str, indices: &[usize]) -> Option<String> {
         let n = *indices.first().unwrap_or(&0);
         let is_of_mode = matches!(field, "mass" | "length" | "hinge" | "wave");
@@ -16,7 +16,7 @@ impl Tank {
         }
         match field {
             "m_0" | "H_0" | "I_0" | "I_z" | "mass" | "length" | "hinge" if self.fill.points > 0 => {
-                Some(format!("fill.points = {}; the table has it", self.fill.points))
+                Some(format!("fill.points = {}; the fill table gives it", self.fill.points))
             }
             "m_0" | "H_0" | "I_0" | "mass" | "length" | "hinge" | "wave" if self.diameter > 0.0 => {
                 Some(format!(
@@ -33,8 +33,8 @@ impl Tank {
 }
 
 impl Parameters {
-    /// [`Tank::overridden`] for all parameters of a craft by their names in the FMU, `tank[].mass`. The first index of
-    /// a tank's is the tank.
+    /// Applies [`Tank::overridden`] to any parameter of a craft by its name in the FMU, such as `tank[].mass`. The
+    /// first index is the tank.
     pub fn overridden(&self, name: &str, indices: &[usize]) -> Option<String> {
         let (field, (i, rest)) = (name.strip_prefix("tank[].")?, indices.split_first()?);
         let tank = self.tank[..self.tanks].get(*i)?;

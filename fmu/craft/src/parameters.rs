@@ -1,4 +1,4 @@
-//! Parameters of the craft, its tanks and the start of its motion, and the checks that refuse them.
+//! Parameters of the craft and its tanks, initial conditions, and the checks of both.
 //!
 //! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
 
@@ -41,7 +41,8 @@ impl Inertia {
         [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
     }
 
-    /// The principal moments, kg m2, rising: eigenvalues of a symmetric matrix by the roots of its cubic.
+    /// Returns the principal moments in ascending order, kg m2: eigenvalues of a symmetric matrix by the roots of its
+    /// cubic.
     ///
     /// Source: Smith, Communications of the ACM 4 (1961).
     fn principal_moments(&self) -> [f64; 3] {
@@ -63,7 +64,7 @@ impl Inertia {
     }
 }
 
-/// The craft without its liquids; wheels are dead mass of it.
+/// The craft without its liquids, its wheels not rotating.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Craft {
     /// Mass, kg, > 0.
@@ -75,7 +76,7 @@ pub struct Craft {
 }
 
 impl Craft {
-    /// The rigid body that it is.
+    /// Returns the craft as a rigid body.
     pub(crate) fn rigid(&self) -> Rigid {
         Rigid::new(self.mass, self.r, &self.j.matrix())
     }
@@ -85,15 +86,16 @@ impl Craft {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Mount {
-    /// Not at all: it flies; gravity has no part in the motion, because position and velocity
-    /// are counted from a freely falling frame.
+    /// Free flight. Gravity has no effect, because position and velocity refer to a freely falling
+    /// frame.
     Free = 1,
-    /// O rests on a bearing in uniform gravity; the craft turns about it, freely unless it has stiffness or damping.
+    /// O rests on a bearing in uniform gravity. The craft turns about it, freely unless the pivot has stiffness,
+    /// damping or friction.
     Pivot = 2,
 }
 
 impl Mount {
-    /// All, by their numbers.
+    /// All mounts in the order of their numbers.
     pub const ALL: [Mount; 2] = [Mount::Free, Mount::Pivot];
 }
 
@@ -103,32 +105,33 @@ impl Mount {
 pub enum DampingLaw {
     /// c ~ w^(1/2): a laminar layer at the wall, for bare tanks.
     Laminar = 1,
-    /// c ~ w: the damping ratio stays, for one that was measured or prescribed.
+    /// c ~ w: constant damping ratio, for a measured or specified ratio.
     ConstantRatio = 2,
-    /// c stays, whatever the acceleration: for what is no layer, a diaphragm for example.
+    /// Constant c, for dissipation that is not in a laminar layer, for example in a diaphragm.
     Constant = 3,
 }
 
 impl DampingLaw {
-    /// All, by their numbers.
+    /// All laws in the order of their numbers.
     pub const ALL: [DampingLaw; 3] =
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::Constant];
 }
 
-/// The liquid as one lump that crosses the tank (`lump.rs`).
+/// Model of detached liquid, one body that crosses the tank (`lump.rs`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
     /// Distance along the axis from the settled liquid's centre at the bottom to that at the top,
     /// m. 0: no model of detached liquid.
     pub travel: f64,
-    /// Largest distance of the liquid's centre from the axis, m; 0 gives the surface the curvature at the bottom of the pendulums'
-    /// common centre.
+    /// Largest distance of the liquid's centre from the axis, m. With 0 the surface within reach has, at the bottom,
+    /// the curvature of the path of the pendulums' common centre.
     pub radius: f64,
     /// Coefficient of restitution of an impact on the wall, 0 to 1.
     pub restitution: f64,
-    /// Speed after an impact below which a lump that is pressed to the wall stays on it, m/s.
+    /// Speed after an impact below which detached liquid that is pressed to the wall stays on it,
+    /// m/s.
     pub contact_speed: f64,
-    /// Rate at which its speed along the wall decays while it slides, 1/s.
+    /// Rate at which the speed along the wall decays while the liquid slides there, 1/s.
     pub drag: f64,
 }
 
@@ -138,15 +141,15 @@ impl Default for Ball {
     }
 }
 
-/// The surface that a lump's centre reaches.
+/// Surface that the centre of detached liquid can reach.
 pub(crate) struct BallSurface {
     /// The liquid's mass, kg.
     pub mass: f64,
     /// R_p, m.
     pub gyration: f64,
-    /// The surface's centre on the tank's axis, m.
+    /// Position of the surface's centre on the tank's axis, m.
     pub height: f64,
-    /// Its semi-axes along the axis and across, a and b, m.
+    /// Semi-axes of the surface along the tank's axis and across it, a and b, m.
     pub half: f64,
     pub radius: f64,
 }
@@ -159,11 +162,11 @@ pub struct Tank {
     pub position: Vec3,
     /// Attitude of the tank: tank axes to body axes, scalar first; normalised on reading.
     pub q: Quaternion,
-    /// Diameter of an upright cylinder, m. Above 0 it makes, with `depth` and `density`, the rigid
-    /// liquid's m_0, H_0, I_0 and each mode's mass, length, hinge and wave by potential flow; the
-    /// tank's origin is then the centre of its bottom.
+    /// Diameter of an upright cylinder, m. Above 0, potential flow gives m_0, H_0, I_0 and each
+    /// mode's mass, length, hinge and wave from `diameter`, `depth` and `density`; the tank's
+    /// origin is then the centre of its bottom.
     pub diameter: f64,
-    /// Depth of the liquid in it, m.
+    /// Fill height of the liquid in the cylinder, m.
     pub depth: f64,
     /// Density of the liquid, kg/m3.
     pub density: f64,
@@ -171,64 +174,66 @@ pub struct Tank {
     pub m_0: f64,
     /// Height of the rigid liquid's centre of mass on the tank's axis, m.
     pub h_0: f64,
-    /// Its inertia across the axis about its own centre of mass, kg m2.
+    /// Inertia of the rigid liquid across the axis about its own centre of mass, kg m2.
     pub i_0: f64,
-    /// Its inertia about the axis, kg m2.
+    /// Inertia of the rigid liquid about the axis, kg m2.
     pub i_z: f64,
-    /// Offset of its centre of mass from the axis, x and y, m, tank axes.
+    /// Offset of the rigid liquid's centre of mass from the axis, x and y, m, tank axes.
     pub r_0: [f64; 2],
-    /// Difference of its inertia about the tank's y axis from `i_0`, which is then that about x, kg m2.
+    /// Inertia of the rigid liquid about the tank's y axis minus `i_0`, which is then that about x, kg m2.
     pub di_y: f64,
-    /// Its products of inertia, elements xy, xz and yz, tank axes, kg m2.
+    /// Products of inertia of the rigid liquid, elements xy, xz and yz, tank axes, kg m2.
     pub products: [f64; 3],
     /// Number of modes, 0 to [`MODES`].
     pub modes: usize,
-    /// Acceleration along the axis at which `zeta` holds, m/s2, > 0.
+    /// Specific force along the axis at which `zeta` and `frequency` hold, m/s2, > 0.
     pub g_ref: f64,
     /// Mass of the bob, kg.
     pub mass: [f64; MODES],
     /// Length of the pendulum, m.
     pub length: [f64; MODES],
-    /// Natural frequency with the tank held, Hz, at `g_ref`; where it is above 0 it stands in place
-    /// of the length: (2 pi f)^2 = g_ref/l + k/m.
+    /// Natural frequency with the tank held, Hz, at `g_ref`. Above 0 it replaces the length: (2 pi
+    /// f)^2 = g_ref/l + k/m.
     pub frequency: [f64; MODES],
     /// Height of the hinge on the tank's axis, m.
     pub hinge: [f64; MODES],
-    /// Direction in which the mode moves its mass, x and y, tank axes; normalised on reading. Where it is not 0, 0 the mode is
-    /// planar: its bob swings in the plane of this direction and the tank's axis, and is held across.
+    /// Direction in which the mode moves its mass, x and y, tank axes; normalised on reading. If it is not 0, 0, the
+    /// mode is planar: its bob swings in the plane of this direction and the tank's axis and moves with the tank across
+    /// it.
     pub direction: [[f64; 2]; MODES],
-    /// Distance of that plane from the tank's axis, m: the arm of a momentum in the direction.
+    /// Distance of that plane from the tank's axis, m: lever arm of a momentum in the direction.
     pub arm: [f64; MODES],
     /// Centring stiffness (capillarity, diaphragm), N/m.
     pub k: [f64; MODES],
     /// Damping ratio at `g_ref`.
     pub zeta: [f64; MODES],
-    /// Dependence of the damping on the acceleration.
+    /// Dependence of the drag on the specific force along the axis.
     pub damping_law: DampingLaw,
-    /// Acceleration along the axis, m/s2, around which the drag stops to follow it (`damping.rs`); 0: 1e-4 of
+    /// Specific force along the axis, m/s2, around which the drag stops following it (`damping.rs`); 0: 1e-4 of
     /// `g_ref`.
     pub g_floor: f64,
     /// Growth of the damping ratio with the amplitude, 1/rad.
     pub zeta_amplitude: [f64; MODES],
     /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
-    /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and
-    /// m_0, h_0, i_0, i_z, mass, length and hinge are the table's.
+    /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and the table
+    /// gives m_0, h_0, i_0, i_z, mass, length and hinge.
     pub fill: FillTable,
     /// Mass of liquid at the start, kg, in a tank that can drain.
     pub liquid_0: f64,
     /// Height of the outlet on the tank's axis, m.
     pub outlet: f64,
-    /// Detached liquid; only on a free craft.
+    /// Model of detached liquid, for a free craft.
     pub ball: Ball,
-    /// Direction from hinge to bob at the start, tank axes; normalised on reading.
+    /// Unit vector from hinge to bob at the start, tank axes; normalised on reading.
     pub p_0: [Vec3; MODES],
-    /// Its rate at the start, 1/s, tank axes; made tangential on reading.
+    /// Rate of `p_0`, 1/s, tank axes; only its tangential part is used.
     pub p_dot_0: [Vec3; MODES],
 }
 
 impl Tank {
-    /// The tank with modes and rigid liquid by its diameter, and lengths by its frequencies, if given.
+    /// Returns the tank with modes and rigid liquid from its diameter, and lengths from its frequencies, if these are
+    /// given.
     pub(crate) fn resolve(&self) -> Tank {
         let mut tank = *self;
         let modes = self.modes.min(MODES);
@@ -258,7 +263,8 @@ impl Tank {
         for n in 0..modes {
             if self.frequency[n] > 0.0 {
                 let w = core::f64::consts::TAU * self.frequency[n];
-                // Bounds below what is allowed: other values give lengths that are refused, without a division by 0.
+                // These bounds are below the allowed ranges. Values below them give lengths that are refused, without a
+                // division by 0.
                 let squared = w * w - self.k[n] / tank.mass[n].max(LIGHTEST);
                 tank.length[n] = self.g_ref / squared.max(1e-30);
             }
@@ -266,8 +272,8 @@ impl Tank {
         tank
     }
 
-    /// The rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T; without axial symmetry r_0 off it and
-    /// with dI_y and the products besides.
+    /// Returns the rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T. Without axial symmetry
+    /// r_0 and dI_y and the products are added.
     pub(crate) fn rigid(&self) -> Rigid {
         let axes = rotation(&unit_quaternion(self.q));
         let mut center = add(self.position, scale(self.h_0, axes.map(|row| row[2])));
@@ -277,7 +283,7 @@ impl Tank {
         Rigid::new(self.m_0, center, &self.own_inertia())
     }
 
-    /// J_0, kg m2, body axes.
+    /// Returns J_0, kg m2, body axes.
     pub(crate) fn own_inertia(&self) -> Mat3 {
         let axes = rotation(&unit_quaternion(self.q));
         let e = axes.map(|row| row[2]);
@@ -299,7 +305,7 @@ impl Tank {
         own
     }
 
-    /// Returns true if the liquid moves alike in every direction across the axis.
+    /// Returns true if the liquid moves equally in every direction across the axis.
     pub(crate) fn is_axial(&self) -> bool {
         let rigid = self.r_0 == [0.0; 2] && self.di_y == 0.0 && self.products == [0.0; 3];
         rigid && !self.is_planar()
@@ -310,26 +316,28 @@ impl Tank {
         self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
-    /// Returns true if the motion is extrapolated (`contents.rs`): the tank can drain or has planar modes.
+    /// Returns true if the motion is integrated by extrapolation (`contents.rs`): the tank can drain or has planar
+    /// modes.
     pub(crate) fn is_extrapolated(&self) -> bool {
         self.fill.points > 0 || self.is_planar()
     }
 
-    /// Mass of the whole liquid, kg.
+    /// Returns the mass of the whole liquid, kg.
     pub(crate) fn whole_mass(&self) -> f64 {
         self.mass[..self.modes].iter().fold(self.m_0, |sum, m| sum + m)
     }
 
-    /// Unit vector b, tank axes, across the plane in which the bob of mode n (from 0) swings: e x b is its direction backwards;
-    /// `None` where it swings in every direction.
+    /// Returns the unit vector b, tank axes, perpendicular to the plane in which the bob of mode n (from 0) swings; e x
+    /// b is minus the mode's direction. Returns `None` if the mode swings in every direction.
     pub(crate) fn across(&self, n: usize) -> Option<Vec3> {
         let [x, y] = self.direction[n];
-        // Of any use above 1e-6. A compiler may divide before it looks whether there is a direction.
+        // Only directions longer than 1e-6 are accepted. The bound avoids a division by 0 that a
+        // compiler may hoist above the check.
         let size = libm::hypot(x, y).max(1e-9);
         (self.direction[n] != [0.0; 2]).then(|| [-y / size, x / size, 0.0])
     }
 
-    /// The hinge of mode n (from 0) from O, m, and b of a planar mode; body axes.
+    /// Returns the hinge of mode n (from 0) from O, m, and b of a planar mode; body axes.
     pub(crate) fn hinge_and_across(&self, n: usize) -> (Vec3, Option<Vec3>) {
         let axes = rotation(&unit_quaternion(self.q));
         let on_axis = add(self.position, scale(self.hinge[n], axes.map(|row| row[2])));
@@ -339,8 +347,8 @@ impl Tank {
         }
     }
 
-    /// Adds what the bobs of planar modes are carried along with, across their planes and along their rods, at `angles` (rad)
-    /// from where they hang.
+    /// Adds the inertia of planar modes' bobs, perpendicular to their planes and along their rods, with rods at
+    /// `angles` (rad) from their positions at rest.
     fn add_planar_bobs(&self, matrix: &mut Mat6, angles: &[f64; MODES]) {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         for n in 0..self.modes {
@@ -354,8 +362,8 @@ impl Tank {
         }
     }
 
-    /// The least that the rigid liquid contributes: of liquid in flight the inertia that turns with the tank, of a tank that
-    /// drains that at its emptiest.
+    /// Returns the smallest contribution of the rigid liquid: for detached liquid the inertia that rotates with the
+    /// tank, for a draining tank the rigid liquid of the emptiest state.
     fn least_rigid(&self) -> Rigid {
         if self.ball.travel > 0.0 {
             return Rigid { mass: 0.0, moment: [0.0; 3], inertia: self.own_inertia() };
@@ -366,7 +374,7 @@ impl Tank {
         self.rigid()
     }
 
-    /// Direction and rate of the bob of mode n (from 0) at the start, tank axes.
+    /// Returns direction and rate of the bob of mode n (from 0) at the start, tank axes.
     pub(crate) fn at_start(&self, n: usize) -> [Vec3; 2] {
         let [p, p_d] = [self.p_0[n], self.p_dot_0[n]].map(|x| match self.across(n) {
             Some(b) => sub(x, scale(dot(b, x), b)),
@@ -375,14 +383,14 @@ impl Tank {
         on_sphere(p, p_d)
     }
 
-    /// The specific force along the axis below which mode n (from 0) does not stand for liquid, m/s2: thrust that is off is
-    /// not thrust that is reversed.
+    /// Returns the specific force along the axis below which mode n (from 0) does not represent liquid, m/s2. The
+    /// tolerance separates reversed thrust from thrust that is off.
     pub(crate) fn lowest(&self, n: usize) -> f64 {
         -self.smallest_acceleration() - self.k[n] * self.length[n] / self.mass[n]
     }
 
-    /// The surface that the lump's centre reaches, of a tank with all that follows from its parameters; `None` without a
-    /// ball regime.
+    /// Returns the surface that the detached liquid's centre can reach, for a tank with derived parameters resolved;
+    /// `None` without a model of detached liquid.
     pub(crate) fn ball_surface(&self) -> Option<BallSurface> {
         if self.ball.travel <= 0.0 || self.modes == 0 {
             return None;
@@ -399,7 +407,7 @@ impl Tank {
         Some(BallSurface { mass, gyration, height: moment / mass + half, half, radius })
     }
 
-    /// a_f, m/s2.
+    /// Returns a_f, m/s2.
     pub(crate) fn smallest_acceleration(&self) -> f64 {
         if self.g_floor > 0.0 { self.g_floor } else { 1e-4 * self.g_ref }
     }
@@ -410,7 +418,7 @@ impl Tank {
         by_acceleration || self.zeta_amplitude[n] > 0.0
     }
 
-    /// c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), at g_ref, N s/m.
+    /// Returns c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), at g_ref, N s/m.
     pub fn drag(&self, n: usize) -> f64 {
         let (m, l) = (self.mass[n], self.length[n]);
         2.0 * self.zeta[n] * m * libm::sqrt(self.g_ref / l + self.k[n] / m)
@@ -422,7 +430,7 @@ impl Tank {
 pub struct Init {
     /// Attitude, body to inertial, scalar first; normalised on reading.
     pub q: Quaternion,
-    /// Angular velocity against the inertial frame, rad/s, body axes.
+    /// Angular velocity relative to the inertial frame, rad/s, body axes.
     pub omega: Vec3,
     /// Position of O, m, inertial axes.
     pub position: Vec3,
@@ -430,14 +438,14 @@ pub struct Init {
     pub velocity: Vec3,
 }
 
-/// Everything that describes a [`Spacecraft`](crate::Spacecraft) before it moves.
+/// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// The craft without its liquids.
     pub craft: Craft,
-    /// Mounting.
+    /// Support of the craft.
     pub mount: Mount,
-    /// Gravity of mount [`Mount::Pivot`], m/s2, inertial axes. Of no effect on a free craft.
+    /// Gravity for [`Mount::Pivot`], m/s2, inertial axes. Without effect on a free craft.
     pub gravity: Vec3,
     /// Stiffness, damping and friction of the pivot. Without effect on a free craft.
     pub pivot: Pivot,
@@ -447,13 +455,14 @@ pub struct Parameters {
     pub tank: [Tank; TANKS],
     /// Initial motion.
     pub init: Init,
-    /// The integrator's steps that one step may take, at least 1.
+    /// Largest number of internal steps in one step, at least 1.
     pub max_steps: usize,
 }
 
-// The 1180 kg craft of the reference record `axial_pulse` (../tests/six.json) with a tank on its
-// axis: an upright cylinder of radius 0.45 m, 0.6 m deep in liquid of 1000 kg/m3, modes by
-// potential flow (Abramson, NASA SP-106); m_0, H_0 and I_0 belong to one mode kept.
+// The 1180 kg craft of the reference record `axial_pulse` (../tests/six.json), with a tank on its
+// axis. The tank is an upright cylinder of radius 0.45 m, filled 0.6 m deep with liquid of 1000
+// kg/m3. Its modes come from potential flow (Abramson, NASA SP-106); m_0, H_0 and I_0 are those for
+// one mode.
 impl Default for Craft {
     fn default() -> Self {
         let j = Inertia { xx: 910.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
@@ -462,7 +471,7 @@ impl Default for Craft {
 }
 
 /// The default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m, filled with water
-/// 0.1, 0.2, ... 1.2 m deep, one mode kept: numbers of `formulas::cylinder`.
+/// 0.1, 0.2, ... 1.2 m deep, with one mode: values from `formulas::cylinder`.
 #[rustfmt::skip]
 const CYLINDER: FillTable = FillTable {
     points: POINTS,
@@ -548,18 +557,19 @@ impl Default for Parameters {
     }
 }
 
-/// No mass, inertia or stiffness is larger: squares and products stay far from overflow.
+/// Upper limit of masses, inertias and stiffnesses, so that squares and products do not overflow.
 const HEAVIEST: f64 = 1e12;
-/// No length, speed or acceleration is larger.
+/// Upper limit of lengths, speeds and accelerations.
 const FARTHEST: f64 = 1e9;
 
-/// Largest ratio of a principal moment to the sum of the others: that of a plate, rounded to four digits.
+/// Largest ratio of a principal moment to the sum of the others: 1 for a plate, with a margin for moments given to four
+/// digits.
 const PLATE: f64 = 1.0 + 1e-3;
 
-/// Tolerances that can be kept: from rounding to where error control has no meaning.
+/// Range of tolerances, from rounding to where error control loses its meaning.
 const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 
-/// Error in a tolerance, if there is one.
+/// Returns the problem of a tolerance, if there is one.
 pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
     let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
     let is_wrong = !TOLERANCES.contains(&tolerance);
@@ -574,15 +584,15 @@ pub(crate) const MAX_STEPS: usize = 100_000;
 pub(crate) struct Limits {
     /// Relative error.
     pub tolerance: f64,
-    /// Steps of the integrator.
+    /// Internal steps.
     pub max_steps: usize,
 }
 
 impl Limits {
-    /// At the start of a call.
+    /// Returns the counter at the start of a call.
     pub fn steps(&self) -> Steps {
         let advice = ", or check for a very short pendulum (length) or a very stiff one (k)";
-        // A fuzzer's sanitizer makes each step of twelve modes dear.
+        // Under a fuzzer's sanitizer each step of twelve modes is slow.
         let max_steps = if cfg!(fuzzing) { self.max_steps.min(200) } else { self.max_steps };
         Steps::new(max_steps, advice)
     }
@@ -609,7 +619,7 @@ impl Problems {
         }
     }
 
-    /// A vector that is going to be normalised.
+    /// Checks a vector that will be normalised.
     fn direction(&mut self, name: &str, value: &[f64]) {
         let before = self.0.len();
         self.vector(name, value, "");
@@ -662,7 +672,7 @@ impl Tank {
             problems.number(&name_of("liquid"), masses[i], low, HEAVIEST, "kg");
             if i > 0 && masses[i] == low {
                 problems.0.push(format!(
-                    "{} = {low:?} kg (allowed: more than at the point before)",
+                    "{} = {low:?} kg (allowed: more than at the previous point)",
                     name_of("liquid")
                 ));
             }
@@ -693,7 +703,9 @@ impl Tank {
             ("frequency", self.frequency.iter().any(|f| *f > 0.0)),
         ] {
             if is_set {
-                problems.0.push(format!("{name}.{what} with {name}.fill (allowed: 0 then)"));
+                problems.0.push(format!(
+                    "{name}.{what} with {name}.fill (allowed: {name}.{what} = 0, because the table gives the modes)"
+                ));
             }
         }
     }
@@ -702,7 +714,8 @@ impl Tank {
         let before_all = problems.0.len();
         problems.vector(&format!("{name}.position"), &self.position, "m");
         problems.direction(&format!("{name}.q"), &self.q);
-        // Across their planes the bobs of planar modes are rigid liquid, too: what they have may be more than all.
+        // Perpendicular to their planes the bobs of planar modes count as rigid liquid, so their mass may exceed the
+        // liquid's mass.
         let least = if self.is_planar() { -HEAVIEST } else { 0.0 };
         problems.number(&format!("{name}.m_0"), self.m_0, least, HEAVIEST, "kg");
         problems.number(&format!("{name}.H_0"), self.h_0, -FARTHEST, FARTHEST, "m");
@@ -728,8 +741,8 @@ impl Tank {
                 let by_k = libm::sqrt(self.k[n] / self.mass[n]) / core::f64::consts::TAU;
                 let most = libm::sqrt(self.g_ref / SHORTEST) / core::f64::consts::TAU;
                 problems.0.push(format!(
-                    "{name}.frequency[{i}] = {f:?} Hz (allowed: above the {by_k:?} Hz that {name}.k[{i}] makes \
-                     without acceleration, and below {most:?} Hz)"
+                    "{name}.frequency[{i}] = {f:?} Hz (allowed: above the {by_k:?} Hz of {name}.k[{i}] alone, and \
+                     below {most:?} Hz)"
                 ));
             } else {
                 problems.number(&format!("{name}.length[{i}]"), length, SHORTEST, FARTHEST, "m");
@@ -782,8 +795,7 @@ impl Tank {
         for (what, _) in uneven.iter().filter(|(_, is_set)| *is_set) {
             for (other, _) in axial.iter().filter(|(_, is_set)| *is_set) {
                 problems.0.push(format!(
-                    "{name}.{other} with {name}.{what} (allowed: one of them 0; {other} is for tanks that are alike all \
-                     around their axis)"
+                    "{name}.{other} with {name}.{what} (allowed: one of them 0, because {other} is for axisymmetric tanks)"
                 ));
             }
         }
@@ -807,7 +819,7 @@ impl Tank {
         problems.number(&format!("{name}.ball.drag"), ball.drag, 0.0, 1e3, "1/s");
     }
 
-    /// What is wrong with the surface that the lump's centre reaches, of a tank in which nothing else is.
+    /// Checks the surface that the detached liquid's centre can reach, for a tank without other problems.
     fn find_ball_surface_problems(&self, name: &str, problems: &mut Problems) {
         let ball = &self.ball;
         if ball.travel <= 0.0 {
@@ -816,8 +828,8 @@ impl Tank {
         let mass = self.whole_mass();
         if mass <= 0.0 {
             problems.0.push(format!(
-                "{name}.ball.travel with {name}.m_0 = {:?} kg, which leaves {mass:?} kg of liquid with the bobs of all modes \
-                 (allowed: more than 0)",
+                "{name}.ball.travel with {name}.m_0 = {:?} kg: m_0 and the bobs of all modes add up to {mass:?} kg of \
+                 liquid (allowed: more than 0)",
                 self.m_0
             ));
             return;
@@ -825,7 +837,8 @@ impl Tank {
         let Some(surface) = self.ball_surface() else {
             let modes = self.modes;
             problems.0.push(format!(
-                "{name}.ball.travel with {name}.modes = {modes} (allowed: at least one mode, which says when the liquid leaves)"
+                "{name}.ball.travel with {name}.modes = {modes} (allowed: at least one mode, because its bob decides when the \
+                 liquid detaches)"
             ));
             return;
         };
@@ -841,14 +854,14 @@ impl Tank {
         let least = libm::sqrt(surface.half * surface.gyration);
         if ball.radius > 0.0 && ball.radius < least {
             problems.0.push(format!(
-                "{name}.ball.radius = {:?} (allowed: 0, or at least {least:?} m, where the surface is as curved at the bottom as \
-                 the path of the pendulums' common centre)",
+                "{name}.ball.radius = {:?} (allowed: 0, or at least {least:?} m, the curvature of the path of the pendulums' \
+                 common centre at the bottom)",
                 ball.radius
             ));
         }
     }
 
-    /// Everything that is wrong with a tank on somebody else's craft; `name` is `tank`.
+    /// Returns all problems of a tank on a host; `name` is `tank`.
     pub(crate) fn problems(&self, name: &str) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);
@@ -871,7 +884,8 @@ impl Craft {
         if problems.0.len() > before {
             return;
         }
-        // A principal moment below zero is one of the minors below zero.
+        // If two moments and their product of inertia are inconsistent, a principal minor is
+        // negative.
         let minors = [
             ("Jxx", "Jyy", "Jxy", xx * yy, xy * xy),
             ("Jxx", "Jzz", "Jxz", xx * zz, xz * xz),
@@ -896,21 +910,23 @@ impl Craft {
                  kg3.m6 (allowed: 0 and above)"
             ));
         }
-        // Of the integrals of y^2 + z^2, x^2 + z^2 and x^2 + y^2 none exceeds the sum of the others.
+        // None of the integrals of y^2 + z^2, x^2 + z^2 and x^2 + y^2 exceeds the sum of the other
+        // two.
         let [small, middle, large] = self.j.principal_moments();
         let sum = small + middle;
         if !indefinite && !negative && large > PLATE * sum {
-            // Six digits of each.
+            // Six digits of each value.
             let [small, middle, large, sum] = [small, middle, large, sum]
                 .map(|moment| format!("{moment:.5e}").parse().unwrap_or(moment));
             problems.0.push(format!(
                 "{name}.Jxx, {name}.Jyy, {name}.Jzz, with {name}.Jxy, {name}.Jxz, {name}.Jyz, have the principal moments \
-                 {small:?}, {middle:?} and {large:?} kg.m2: the largest exceeds {sum:?}, the sum of the others (allowed: up to that sum, as no body has more)"
+                 {small:?}, {middle:?} and {large:?} kg.m2: the largest exceeds {sum:?}, the sum of the others (allowed: up \
+                 to that sum)"
             ));
         }
     }
 
-    /// Everything that is wrong with a host's mass properties; `name` is `host`.
+    /// Returns all problems of a host's mass properties; `name` is `host`.
     pub(crate) fn problems(&self, name: &str) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);
@@ -923,12 +939,12 @@ impl Craft {
     }
 }
 
-/// Below this smallest pivot a mass matrix counts as singular.
+/// Smallest pivot below which a mass matrix counts as singular.
 const SINGULAR: f64 = 1e-12;
 
-/// States where the mass matrix of a body with the liquid of `tanks` is singular, as words that follow "is singular"; `None` if it
-/// is regular with planar modes at rest and in flight. Angles of planar modes are not searched: crafts in use are singular far
-/// out of the range of their modes.
+/// Returns where the mass matrix of a body with the liquid of `tanks` is singular, as words that follow "is singular".
+/// Returns `None` if it is regular with planar modes at rest and with detached liquid. Other angles of planar modes are
+/// not searched, because realistic craft are singular only far outside the range of their modes.
 pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     let matrix = |rigid: fn(&Tank) -> Rigid| {
         tanks.iter().fold(body, |sum, tank| sum.and(&rigid(tank))).mass_matrix()
@@ -944,7 +960,7 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
 }
 
 impl Parameters {
-    /// Everything that is wrong with the parameters; empty when nothing is.
+    /// Returns all problems of the parameters; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.craft.find_problems("craft", &mut problems);
@@ -976,8 +992,8 @@ impl Parameters {
         let that_drains = tanks.iter().position(|tank| tank.fill.points > 0);
         if let (Some(ball), Some(drains)) = (with_ball, that_drains) {
             problems.0.push(format!(
-                "tank[{}].ball.travel with tank[{}].fill.points (allowed: one of them 0; no tank of a craft with a ball \
-                 regime can drain)",
+                "tank[{}].ball.travel with tank[{}].fill.points (allowed: one of them 0, because a craft with detached \
+                 liquid cannot have a draining tank)",
                 ball + 1,
                 drains + 1
             ));
@@ -987,15 +1003,15 @@ impl Parameters {
             && ball != planar
         {
             problems.0.push(format!(
-                "tank[{}].ball.travel with tank[{}].direction (allowed: one of them 0; no tank of a craft with a ball \
-                 regime can have planar modes)",
+                "tank[{}].ball.travel with tank[{}].direction (allowed: one of them 0, because a craft with detached \
+                 liquid cannot have planar modes)",
                 ball + 1,
                 planar + 1
             ));
         }
         if let (Some(ball), Mount::Pivot) = (with_ball, self.mount) {
             problems.0.push(format!(
-                "tank[{}].ball.travel with mount = pivot (allowed with mount = pivot: 0)",
+                "tank[{}].ball.travel with mount = pivot (allowed on a pivot: 0)",
                 ball + 1
             ));
         }
@@ -1005,7 +1021,7 @@ impl Parameters {
         problems.vector("init.velocity", &self.init.velocity, "m/s");
         if self.mount == Mount::Pivot && self.init.velocity != [0.0; 3] {
             problems.0.push(format!(
-                "init.velocity = {:?} m/s (allowed with mount = pivot: 0, which holds O)",
+                "init.velocity = {:?} m/s with mount = pivot (allowed: 0, because the pivot holds O)",
                 self.init.velocity
             ));
         }
@@ -1013,9 +1029,9 @@ impl Parameters {
             let tanks: Vec<Tank> = self.tank[..self.tanks].iter().map(Tank::resolve).collect();
             if let Some(place) = singular_where(self.craft.rigid(), &tanks) {
                 problems.0.push(format!(
-                    "craft.J with the tanks' m_0, I_0 and I_z is singular{place}: the inertia of craft and rigid liquid about every \
-                     axis through their centre of mass, and their mass, must be above 0 (allowed: more of craft.mass or craft.J, or \
-                     of the tanks' m_0, I_0 and I_z)"
+                    "craft.J with the tanks' m_0, I_0 and I_z is singular{place}. Mass of craft and rigid liquid, and their inertia \
+                     about every axis through their centre of mass, must be above 0: increase craft.mass or craft.J, or the \
+                     tanks' m_0, I_0 and I_z"
                 ));
             }
         }

@@ -1,7 +1,7 @@
 //! Forces of a pivot other than holding O: stiffness against tilt, damping and dry friction about each axis.
 //!
-//! The pivot's axis is the inertial z axis; Z = C^T e_z is its direction in body axes, (0, 0, 1) for a craft that stands
-//! upright, and Z_y, -Z_x are its small angles of tilt about x and y.
+//! The pivot's axis is the inertial z axis. Z = C^T e_z is its direction in body axes, (0, 0, 1) for an upright craft.
+//! Z_y and -Z_x are the craft's small tilt angles about x and y.
 //!
 //! ```text
 //! U = (k_x Z_y^2 + k_y Z_x^2)/2
@@ -9,12 +9,12 @@
 //! r_i = (C_i + D_i exp(-(w_i/w_s)^2)) tanh(w_i/eps)                         dissipation sum of c_i w_i^2 + r_i w_i
 //! ```
 //!
-//! The torque of the stiffness follows from U exactly, for Z' = Z x w: U' = -torque.w. Turning about the axis is free but for
-//! c_z and r_z, through any number of revolutions. Without dry friction it is a polynomial in Z and w, which goes into the series as
-//! it stands.
+//! The torque of the stiffness follows from U exactly, because Z' = Z x w gives U' = -torque.w. Only c_z and r_z act on
+//! rotation about the axis, through any number of revolutions. Without dry friction the torque is a polynomial in Z and
+//! w and enters the series unchanged.
 //!
-//! r is Stribeck's curve (Rubaga's thesis, eq. 5.1) with its jump at rest smoothed over eps, as HubSlosh's friction
-//! `stribeck_smooth`: an axis that should stick creeps instead, at |w| ~ eps |torque|/(C + D).
+//! r is Stribeck's curve (Rubaga's thesis, eq. 5.1) with its jump at rest smoothed over eps, as in HubSlosh's friction
+//! `stribeck_smooth`. An axis that should stick creeps instead, at |w| ~ eps |torque|/(C + D).
 
 use taylor::number::Number;
 use taylor::series::{self, Series, ZERO};
@@ -57,7 +57,7 @@ impl PivotFriction {
         self.c.iter().chain(&self.d).any(|torque| *torque > 0.0)
     }
 
-    /// r at an instant, N m.
+    /// Returns r at an instant, N m.
     fn present<T: Number>(&self, w: Vec3<T>) -> Vec3<T> {
         core::array::from_fn(|i| {
             let v = w[i] * (1.0 / self.omega_s);
@@ -74,7 +74,8 @@ impl Pivot {
         k != [0.0; 2] || c != [0.0; 3] || friction.acts()
     }
 
-    /// Coefficient N of torque (N m) and dissipation (W) but for dry friction, from Z and w, with the products of w's components.
+    /// Returns coefficient N of torque (N m) and dissipation (W) without dry friction, from Z and w, with the products
+    /// of w's components.
     #[inline(always)]
     pub(crate) fn load<const N: usize>(&self, z: &Vector, w: &Vector, ww: [f64; 6]) -> (Vec3, f64) {
         let [_, _, _, xy, xz, yz] = products::<N>(z);
@@ -87,7 +88,8 @@ impl Pivot {
         (torque, c[0] * ww[0] + c[1] * ww[1] + c[2] * ww[2])
     }
 
-    /// The torque, N m, dissipation, W, and energy, J, at an instant; `axes` is body to inertial.
+    /// Returns torque, N m, dissipation, W, and energy, J, at an instant; `axes` is body to
+    /// inertial.
     pub(crate) fn present<T: Number>(&self, axes: &Mat3<T>, w: Vec3<T>) -> (Vec3<T>, T, T) {
         let [x, y, z] = axes[2];
         let Pivot { k: [k_x, k_y], c, friction } = *self;
@@ -128,7 +130,7 @@ pub(crate) struct Rubbing {
 }
 
 impl Rubbing {
-    /// About axis i, from 0.
+    /// Creates the dry friction about axis i, from 0.
     pub(crate) fn new(p: &PivotFriction, i: usize) -> Rubbing {
         Rubbing {
             c: p.c[i],
@@ -146,7 +148,7 @@ impl Rubbing {
         }
     }
 
-    /// Coefficient n of r and of r w, from that of w.
+    /// Returns coefficient n of r and of r w, from that of w.
     pub(crate) fn expand(&mut self, n: usize, w: f64) -> (f64, f64) {
         self.w[n] = w;
         let u = -series::square(n, &self.w) * self.inv_omega_s * self.inv_omega_s;
@@ -161,12 +163,13 @@ impl Rubbing {
         (self.r[n], series::mul(n, &self.r, &self.w))
     }
 
-    /// Time over which the series show all their terms, s, from w, w' and w''/2.
+    /// Returns the time over which the series converges reliably, s, from w, w' and w''/2.
     ///
-    /// tanh has its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and is so flat away from 0 that its
-    /// coefficients there do not tell; half the way is safe. exp(-v^2), v = w/w_s, has none; beyond v = 3 no tolerance sees its
-    /// terms, which grow before they decay: over dv the term of order n is (2 v dv)^n/n!. Either it is below 1e-12 at the
-    /// end, too, beyond v = 5.3, or the terms decay from order 5 on.
+    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so flat that
+    /// its coefficients do not show the poles, so the method uses half of this distance. exp(-v^2), v = w/w_s, has no
+    /// poles. Beyond v = 3 its terms are too small for any tolerance but grow before they decay: over dv the term of
+    /// order n is (2 v dv)^n/n!. The limit keeps the term below 1e-12 at the end as well, beyond v = 5.3, or makes the
+    /// terms decay from order 5 on.
     pub(crate) fn convergence_radius(&self, w: [f64; 3]) -> f64 {
         if self.c + self.d == 0.0 {
             return f64::INFINITY;
@@ -199,18 +202,19 @@ mod tests {
     const Z: Vec3 = [0.25, -0.5, 0.75];
     const W: Vec3 = [0.5, -1.0, 2.0];
 
-    /// The values by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 + 5/16.
+    /// Values by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 +
+    /// 5/16.
     #[test]
     fn torque_dissipation_and_energy_are_those_of_spring_and_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
         let (torque, dissipation, energy) = PIVOT.present(&axes, W);
         assert_eq!(torque, [1.125 - 0.25, 0.9375 + 0.25, 0.25 - 4.0]);
         assert_eq!((dissipation, energy), (8.375, 0.53125));
-        // U' = -torque.w, for Z' = Z x w, but for what is dissipated
+        // U' = -torque.w, for Z' = Z x w, minus the dissipation
         let turning = cross(Z, W);
         let change = 3.0 * Z[1] * turning[1] + 5.0 * Z[0] * turning[0];
         assert_eq!(change, -dot(torque, W) - dissipation);
-        // as series, and what each part acts by
+        // as series, and the effect of each part
         let series = |x: Vec3| {
             let mut all: Vector = [[0.0; 3]; taylor::series::ORDER + 1];
             all[0] = x;
@@ -235,7 +239,8 @@ mod tests {
         }
     }
 
-    /// Each axis by itself: at w = w_s = 10 eps (C + D/e) tanh 10, and what it dissipates.
+    /// Each axis has its own curve: at w = w_s = 10 eps the torque is (C + D/e) tanh 10, with its
+    /// dissipation.
     #[test]
     fn dry_friction_acts_against_each_axis_by_its_own_curve() {
         let friction =
@@ -261,8 +266,8 @@ mod tests {
         }
     }
 
-    /// Half the way to the nearest pole of tanh, v = i pi/2, by v'' t^2/2 alone and by v' t; with D, from w = 4 w_s on, where the
-    /// curve of Stribeck is seen, 2.5/4 of w_s if that is sooner.
+    /// Half of the distance to the nearest pole of tanh, v = i pi/2, by v'' t^2/2 alone and by v' t. With D, from w = 4
+    /// w_s on, 2.5/4 of w_s if this is shorter.
     #[test]
     fn series_of_dry_friction_reach_half_the_way_to_the_pole() {
         let friction = PivotFriction { c: [1.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 0.01 };
@@ -271,11 +276,11 @@ mod tests {
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
         near(rubbing.convergence_radius([0.0, 0.0, 3.0]), libm::sqrt(way / 300.0));
         near(rubbing.convergence_radius([0.0, -3.0, 0.0]), way / 300.0);
-        // both: (v')^2 + 4 v''/2 way = 10^2 + 4 100 way
+        // both terms: (v')^2 + 4 v''/2 way = 10^2 + 4 100 way
         let speed = 10.0 + libm::sqrt(100.0 + 400.0 * way);
         near(rubbing.convergence_radius([0.0, 0.1, -1.0]), 2.0 * way / speed);
         assert_eq!(rubbing.convergence_radius([0.0; 3]), f64::INFINITY);
-        // farther from 0 the pole is farther: v = 3
+        // away from 0 the pole is farther: v = 3
         near(rubbing.convergence_radius([0.03, 0.01, 0.0]), 0.5 * libm::sqrt(9.0 + 2.4674));
         let curved = Rubbing::new(&PivotFriction { d: [1.0; 3], ..friction }, 0);
         near(curved.convergence_radius([0.4, 0.01, 0.0]), 2.5 / 4.0 / 0.1);

@@ -10,7 +10,7 @@
 use taylor::number::Number;
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
-/// A symmetric matrix of six rows.
+/// A symmetric 6 x 6 matrix.
 pub type Mat6<T = f64> = [[T; 6]; 6];
 
 /// Mass, first and second moment about O.
@@ -25,7 +25,7 @@ pub struct Rigid<T = f64> {
 }
 
 impl Rigid {
-    /// A body of mass m at s with the inertia `own` about its centre of mass.
+    /// Creates a body of mass m at s with the inertia `own` about its centre of mass.
     pub fn new(m: f64, s: Vec3, own: &Mat3) -> Rigid {
         let s2 = dot(s, s);
         let mut inertia = *own;
@@ -37,7 +37,7 @@ impl Rigid {
         Rigid { mass: m, moment: scale(m, s), inertia }
     }
 
-    /// The same as numbers of another kind.
+    /// Returns the same body with another number type.
     pub fn lift<T: Number>(&self) -> Rigid<T> {
         Rigid {
             mass: T::constant(self.mass),
@@ -46,7 +46,7 @@ impl Rigid {
         }
     }
 
-    /// The same with an inertia whose derivative is `slope`, kg m2.
+    /// Returns the same body with the derivative `slope` of its inertia, kg m2.
     pub fn along<T: Number>(&self, slope: &Mat3) -> Rigid<T> {
         let element = |i: usize, j: usize| T::of(self.inertia[i][j], slope[i][j]);
         Rigid { inertia: [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j))), ..self.lift() }
@@ -54,8 +54,8 @@ impl Rigid {
 }
 
 impl<T: Number> Rigid<T> {
-    /// A body of mass m at s with the inertia i_0 across and i_z about the axis e, about its centre
-    /// of mass.
+    /// Creates a body of mass m at s with the inertia i_0 across and i_z about the axis e, about
+    /// its centre of mass.
     pub fn axial(m: T, s: Vec3<T>, i_0: T, i_z: T, e: Vec3<T>) -> Rigid<T> {
         let s2 = dot(s, s);
         let element = |i: usize, j: usize| {
@@ -66,7 +66,7 @@ impl<T: Number> Rigid<T> {
         Rigid { mass: m, moment: scale(m, s), inertia }
     }
 
-    /// Both bodies as one.
+    /// Returns both bodies as one.
     pub fn and(&self, b: &Rigid<T>) -> Rigid<T> {
         let mut sum = *self;
         sum.mass = sum.mass + b.mass;
@@ -77,7 +77,7 @@ impl<T: Number> Rigid<T> {
         sum
     }
 
-    /// M, unknowns a, w'.
+    /// Returns M for the unknowns a, w'.
     pub fn mass_matrix(&self) -> Mat6<T> {
         let [x, y, z] = self.moment;
         let [i_x, i_y, i_z] = self.inertia;
@@ -92,8 +92,8 @@ impl<T: Number> Rigid<T> {
         ]
     }
 
-    /// Force and torque about O that the body's motion takes:
-    /// M [a; w'] + [w x (w x S); w x (I w)].
+    /// Returns force and torque about O that the body's motion requires: M [a; w'] + [w x (w x S);
+    /// w x (I w)].
     pub fn inertial_wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let Rigid { mass, moment: s, inertia } = *self;
         let force = add(a.map(|x| x * mass), add(cross(w_d, s), cross(w, cross(w, s))));
@@ -102,8 +102,8 @@ impl<T: Number> Rigid<T> {
     }
 }
 
-/// Adds m u u^T, u = [p; P x p]: the inertia that a bob at the end of its rod adds, which has
-/// inertia along its rod only.
+/// Adds m u u^T, u = [p; P x p]: the inertia of a bob at the end of its rod, which acts only along
+/// the rod.
 #[inline(always)]
 pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     for i in 0..6 {
@@ -117,32 +117,32 @@ pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     }
 }
 
-/// [p; P x p].
+/// Returns [p; P x p].
 #[inline(always)]
 pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     let c = cross(hinge, p);
     [p[0], p[1], p[2], c[0], c[1], c[2]]
 }
 
-/// Inverses of mass (1/kg) and inertia (1/(kg m2)) stay below this: what is made of them, with masses
-/// up to 1e12 kg and arms up to 1e9 m, is far from overflow.
+/// Largest inverse of mass (1/kg) and inertia (1/(kg m2)). Products of it with masses up to 1e12 kg
+/// and arms up to 1e9 m do not overflow.
 const LARGEST_INVERSE: f64 = 1e30;
 
 /// Smallest divisor, so that the factors of any matrix are finite. Its inverse is above
 /// [`LARGEST_INVERSE`].
 const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
 
-/// A symmetric positive definite matrix as L D L^T, L with ones on its diagonal.
+/// Factorisation L D L^T of a symmetric positive definite matrix; L has ones on its diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors<T = f64> {
-    /// Entries below L's diagonal; the rest is not read.
+    /// Entries below L's diagonal. The other entries are not used.
     l: Mat6<T>,
     /// 1/D
     inverse: [T; 6],
 }
 
 impl<T: Number> Factors<T> {
-    /// Factors of a matrix of which the lower triangle is read.
+    /// Factorises a matrix. Only its lower triangle is read.
     #[inline(always)]
     pub fn of(matrix: &Mat6<T>) -> Factors<T> {
         let zero = T::constant(0.0);
@@ -151,8 +151,7 @@ impl<T: Number> Factors<T> {
         factors
     }
 
-    /// Becomes the factors of another matrix, in place: a step spends a fortieth of its instructions on copies of
-    /// matrices otherwise.
+    /// Factorises another matrix in place. Copies of matrices would take a fortieth of a step's instructions.
     #[inline(always)]
     pub fn set(&mut self, matrix: &Mat6<T>) {
         let Factors { l, inverse } = self;
@@ -175,7 +174,7 @@ impl<T: Number> Factors<T> {
         }
     }
 
-    /// The solution of matrix x = b.
+    /// Returns the solution of matrix x = b.
     #[inline(always)]
     pub fn solve(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let l = &self.l;
@@ -197,11 +196,11 @@ impl<T: Number> Factors<T> {
     }
 }
 
-/// The smallest element of D over the matrix's own diagonal; 0 for a matrix that is not positive definite,
-/// or so nearly singular that its inverse passes [`LARGEST_INVERSE`].
+/// Returns the smallest element of D over the matrix's own diagonal. Returns 0 for a matrix that is not positive
+/// definite, or so nearly singular that its inverse exceeds [`LARGEST_INVERSE`].
 pub fn smallest_pivot(matrix: &Mat6) -> f64 {
     let Factors { inverse, .. } = Factors::of(matrix);
-    // NaN is not in the range.
+    // NaN is outside the range.
     if !inverse.iter().all(|x| (0.0..=LARGEST_INVERSE).contains(x)) {
         return 0.0;
     }
@@ -210,8 +209,8 @@ pub fn smallest_pivot(matrix: &Mat6) -> f64 {
 }
 
 impl Factors {
-    /// L^-1 times b, each row over the root of its pivot: with it M_a turns into the symmetric
-    /// matrix that has the eigenvalues of M^-1 M_a.
+    /// Returns L^-1 b with each row divided by the root of its pivot. It turns M_a into the
+    /// symmetric matrix with the eigenvalues of M^-1 M_a.
     fn half_solve(&self, b: &[f64; 6]) -> [f64; 6] {
         let mut x = *b;
         for i in 1..6 {
@@ -223,16 +222,16 @@ impl Factors {
     }
 }
 
-/// The largest eigenvalue of M^-1 A, both symmetric, M with the given factors: Jacobi's
+/// Returns the largest eigenvalue of M^-1 A, both symmetric, M given by its factors: Jacobi
 /// rotations of the similar symmetric matrix.
 pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
     let rows = a.map(|row| m.half_solve(&row));
     let mut b: Mat6 = core::array::from_fn(|i| m.half_solve(&rows.map(|row| row[i])));
-    // Quadratic convergence: six sweeps reach rounding, the rest is margin.
+    // Convergence is quadratic: six sweeps reach rounding, the rest is margin.
     for _ in 0..12 {
         for p in 0..5 {
             for q in p + 1..6 {
-                // So small that it counts for nothing, and what follows would overflow.
+                // Negligible, and the following expressions would overflow.
                 if b[p][q].abs() <= 1e-150 * (b[q][q] - b[p][p]).abs() {
                     continue;
                 }
@@ -259,7 +258,7 @@ pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
 mod tests {
     use super::*;
 
-    /// A craft's matrix with a few bobs, and what it is multiplied with comes back.
+    /// Solves with a craft's matrix with a few bobs for a known vector.
     #[test]
     fn solving_undoes_multiplying() {
         let mut rng = fastrand::Rng::with_seed(5);
@@ -279,7 +278,8 @@ mod tests {
             let b = matrix.map(|row| (0..6).map(|i| row[i] * x[i]).sum::<f64>());
             let [a, w_d] = factors.solve([[b[0], b[1], b[2]], [b[3], b[4], b[5]]]);
             for (got, want) in a.iter().chain(&w_d).zip(x) {
-                // Rounding times the condition, below 100 with rows scaled to each other.
+                // Rounding times the condition number, which is below 100 with rows scaled to each
+                // other.
                 assert!((got - want).abs() < 1e-13, "{got} {want}");
             }
         }
@@ -292,7 +292,7 @@ mod tests {
         assert!(smallest_pivot(&matrix) < 1e-12);
     }
 
-    /// The eigenvalues of M^-1 A for A = m u u^T: m u.M^-1 u and five times 0.
+    /// The eigenvalues of M^-1 A for A = m u u^T are m u.M^-1 u and five times 0.
     #[test]
     fn the_largest_eigenvalue_of_a_rank_one_matrix_is_its_quadratic_form() {
         let own = [[910.0, 14.0, -9.0], [14.0, 860.0, 6.0], [-9.0, 6.0, 640.0]];

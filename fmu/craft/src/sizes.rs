@@ -9,10 +9,10 @@ pub const TANKS: usize = size(option_env!("HUBSLOSH_TANKS"), 4);
 /// Slosh modes of a tank: 1 to 3.
 pub const MODES: usize = size(option_env!("HUBSLOSH_MODES"), MOST_MODES);
 
-/// Modes that the default tank has numbers for.
+/// Number of modes for which the default tank has values.
 const MOST_MODES: usize = 3;
 
-/// Points of a table over a tank's fill.
+/// Largest number of points of a fill table.
 pub const POINTS: usize = 12;
 
 const fn size(chosen: Option<&str>, most: usize) -> usize {
@@ -26,7 +26,7 @@ const fn size(chosen: Option<&str>, most: usize) -> usize {
     size
 }
 
-/// The modes that there can be, of all that have numbers.
+/// Returns the first `MODES` of values for all modes.
 pub(crate) const fn modes_of<T: Copy>(all: [T; MOST_MODES]) -> [T; MODES] {
     let mut some = [all[0]; MODES];
     let mut n = 1;

@@ -1,7 +1,8 @@
-//! One tank on somebody else's craft.
+//! One tank on a spacecraft that a host simulates.
 //!
-//! The host's motion is given: specific force a at O and rate w with its derivative w'. Out
-//! come the liquid's wrench on the host, and what of it depends on [a; w']:
+//! The host gives its motion: specific force a at O, angular velocity w and its derivative w'. The
+//! tank returns the liquid's wrench on the host, split into the part that depends on [a; w'] and
+//! the rest:
 //!
 //! ```text
 //! [F; torque] = bias - M_a [a; w']
@@ -10,8 +11,7 @@
 //! ```
 //!
 //! M_0, I_s: the rigid liquid about O (`rigid.rs`); T_0: the tension at a = w' = 0 (`bob.rs`). A
-//! host that solves (M_host + M_a) [a; w'] = rest + bias has no algebraic loop, whatever the
-//! masses.
+//! host that solves (M_host + M_a) [a; w'] = rest + bias has no algebraic loop, at any mass ratio.
 //!
 //! [`Coupling::Lumped`] is for hosts that solve with a constant matrix: each whole bob counts as a
 //! point mass at its hinge,
@@ -20,22 +20,22 @@
 //! M_a^ = M_0 + sum of m [1; [P]x] [1; [P]x]^T = const,  bias^ = [F; torque] + M_a^ [a; w']
 //! ```
 //!
-//! with the [a; w'] given to the tank. M_a^ - M_a is positive semidefinite for every p, so the
-//! loop that is left converges at any mass ratio. In a tank that drains M_a^ is that of the start: what is less
-//! of it later makes the loop converge the faster.
+//! with the [a; w'] given to the tank. M_a^ - M_a is positive semidefinite for every p, so the remaining loop converges
+//! at any mass ratio. In a draining tank M_a^ is that of the start. The loop converges faster when the liquid becomes
+//! less.
 //!
-//! A planar mode (`contents.rs`) is carried along across its plane where its bob is, not where it hangs: m u u^T,
-//! u = [b; rho x b], besides. With the acceleration a_P of the hinge
+//! A planar mode (`contents.rs`) moves with the tank perpendicular to its plane at its bob, not at its hinge. This adds
+//! m u u^T, u = [b; rho x b]. With the acceleration a_P of the hinge
 //!
 //! ```text
 //! (u.[a; w'])^2 = (b.a_P + l w'.(p x b))^2 <= 2 (b.a_P)^2 + 2 l^2 |w' - b b.w'|^2
 //! ```
 //!
-//! because p x b is a unit vector in the plane. So it counts for 2 m at its hinge and for the inertia 2 m l^2 (1 - b b^T)
-//! about it.
+//! because p x b is a unit vector in the plane. The mode therefore counts with 2 m at its hinge and the inertia 2 m l^2
+//! (1 - b b^T) about it.
 //!
-//! [`Coupling::RigidBody`] is for hosts that are plain rigid bodies of M_host + M_a^. These have the centrifugal and
-//! gyroscopic terms of M_a^ (mass m^, moment S^, inertia I^) in their own equations, so that
+//! [`Coupling::RigidBody`] is for hosts that are plain rigid bodies of M_host + M_a^. Their equations include the
+//! centrifugal and gyroscopic terms of M_a^ (mass m^, moment S^, inertia I^), so
 //!
 //! ```text
 //! bias^ = [F; torque] + M_a^ [a; w'] + [w x (w x S^); w x (I^ w)]
@@ -43,31 +43,32 @@
 //!
 //! Within a step a and w' are linear in time, and w = w_n + w'_n t + w''_n t^2/2.
 //!
-//! A tank that drains or has planar modes (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A
-//! jump of its flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
+//! A tank that drains or has planar modes (`contents.rs`) is integrated by extrapolation instead of power series, as in
+//! a craft. A jump of its flow is an impulse on the host, which a force cannot represent. The model leaves it out, for
+//! host and bobs.
 //!
-//! **Liquid that leaves its bottom** (`lump.rs`, `handover.rs`) gives its host impulses. M_a and bias are those of what the liquid
-//! is: in flight of the inertia that turns with the tank alone, on the wall with m u u^T, u = [n; rho x n], besides. The host's matrix M_h
-//! is given with its mass properties, and with it what an impulse makes of the host,
+//! **Detached liquid** (`lump.rs`, `handover.rs`) acts on its host by impulses. M_a and bias belong to the liquid's
+//! state: in flight only the inertia that rotates with the tank, on the wall plus m u u^T, u = [n; rho x n]. The host's
+//! mass properties give its matrix M_h and its response to an impulse,
 //!
 //! ```text
 //! [dV; dw] = (M_h + what of the liquid hangs on it)^-1 [J n; rho x J n],   P = M_h [dV; dw]
 //! ```
 //!
-//! P is what the host's own momentum, about O, changes by, and the liquid's by -P: it adds M_h^-1 P to V and w. The tank goes on as if it
-//! had, within a step with w + dw; V is in none of its equations.
+//! P is the change of the host's own momentum, about O, and -P that of the liquid. The host adds M_h^-1 P to V and w.
+//! The tank continues as if the host had done so, within a step with w + dw. V is not in its equations.
 //!
-//! Where the liquid changes within a step, the a and w' given are those of a host that still answers to what the liquid was. From
-//! the first change to the step's end the tank moves with what the host would have, a^ and w'^, at a rest of the forces on the host that
-//! stays what it was then,
+//! If the liquid changes state within a step, the given a and w' are those of a host that responds to the liquid's old
+//! state. From the first change to the end of the step the tank uses the motion that the host would have, a^ and w'^.
+//! It assumes that the other forces on the host stay as they were at the change,
 //!
 //! ```text
 //! rest = M_h [a; w'] + [w x (w x S_h); w x (I_h w)] - [F; torque]
 //! (M_h + M_a) [a^; w'^] = rest - [w x (w x S_h); w x (I_h w)] + bias
 //! ```
 //!
-//! and M_h times the integral of [a^ - a; w'^ - w'], which the host lacks, goes into P. So momentum is not lost between two
-//! communication points.
+//! M_h times the integral of [a^ - a; w'^ - w'], which the host lacks, is added to P. Momentum is thus conserved
+//! between two communication points.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -97,8 +98,8 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenv
 use crate::sizes::MODES;
 use crate::state::{BallState, Line, Ramp, Ranges, has_direction};
 
-/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy, the
-/// mass of liquid, and the lump's position (m) and rate (m/s) from and against the tank's origin, tank axes.
+/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy, the mass of liquid, and
+/// the detached liquid's position (m) and rate (m/s) relative to the tank's origin, tank axes.
 pub const TANK_STATES: usize = 6 * MODES + 8;
 
 /// Number of a tank's inputs: a, omega, omega_dot, mass_flow.
@@ -115,32 +116,32 @@ const BALL: usize = LIQUID + 1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Coupling {
-    /// Wrench at a = w' = 0 and the added mass of the moment: for hosts that solve with them.
+    /// Wrench at a = w' = 0 and the current added mass, for hosts that solve with both.
     Split = 1,
-    /// The constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at
-    /// the a, w' given: for hosts that add a constant matrix to the one they solve with.
+    /// Constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at the given a, w';
+    /// for hosts that add a constant matrix to the matrix that they solve with.
     Lumped = 2,
-    /// The same for hosts that are plain rigid bodies with M in their mass, centre of mass and inertia:
-    /// bias has what their centrifugal and gyroscopic terms take of M, too, w x (w x S) and w x (I w).
+    /// The same matrix and wrench as `Lumped`, for hosts that are plain rigid bodies with M in their mass, centre of mass and inertia. bias also
+    /// contains their centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
     RigidBody = 3,
 }
 
 impl Coupling {
-    /// All, by their numbers.
+    /// All couplings in the order of their numbers.
     pub const ALL: [Coupling; 3] = [Coupling::Split, Coupling::Lumped, Coupling::RigidBody];
 }
 
-/// Everything that describes a [`SloshTank`] before it moves.
+/// All parameters and initial conditions of a [`SloshTank`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TankParameters {
-    /// The tank; position and attitude are against the host's O and axes.
+    /// The tank; position and attitude are relative to the host's O and axes.
     pub tank: Tank,
     /// Use of `bias` and `added_mass` by the host.
     pub coupling: Coupling,
-    /// The host's mass properties without this tank: for [`SloshTank::coupling_ratio`], and what impulses of a tank with a
-    /// ball regime do, which has to know them.
+    /// Mass properties of the host without this tank, for [`SloshTank::coupling_ratio`] and for the impulses of
+    /// detached liquid, which require them.
     pub host: Option<Craft>,
-    /// The integrator's steps that one step may take, at least 1.
+    /// Largest number of internal steps in one step, at least 1.
     pub max_steps: usize,
 }
 
@@ -156,7 +157,7 @@ impl Default for TankParameters {
 }
 
 impl TankParameters {
-    /// Everything that is wrong with the parameters; empty when nothing is.
+    /// Returns all problems of the parameters; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = self.tank.problems("tank");
         if let Some(host) = &self.host {
@@ -178,35 +179,36 @@ impl TankParameters {
         let all = [
             (
                 self.host.is_none(),
-                "tank.ball.travel with host.mass = 0 (allowed: one of them 0 and the other not; what an impact is follows \
-                 from the mass and the inertia that it meets, host.mass to host.Jyz)",
+                "tank.ball.travel with host.mass = 0 (allowed: host.mass above 0, because impacts depend on the mass and \
+                 inertia of the host, host.mass to host.Jyz)",
             ),
             (
                 self.coupling != Coupling::Split,
-                "tank.ball.travel with coupling = lumped or rigid_body (allowed: coupling = split; liquid that flies adds no \
-                 mass to the host)",
+                "tank.ball.travel with coupling = lumped or rigid_body (allowed: coupling = split, because detached liquid \
+                 adds no mass to the host)",
             ),
             (drains, "tank.ball.travel with tank.fill.points (allowed: one of them 0)"),
         ];
         all.into_iter().filter(|(is_so, _)| *is_so).map(|(_, said)| said).collect()
     }
 
-    /// Rigid liquid that is less than nothing, or off by more than the rest can bear, where it is not alike all around the axis.
+    /// Returns the problem of rigid liquid without axial symmetry whose mass is negative in total or whose inertia is
+    /// not positive.
     fn uneven_problem(&self) -> Option<String> {
         let tank = self.tank.resolve();
         let mass = tank.whole_mass();
         if mass <= 0.0 {
             return Some(format!(
-                "tank.m_0 = {:?} kg leaves {mass:?} kg of liquid with the bobs of all modes (allowed: more than 0)",
+                "tank.m_0 = {:?} kg and the bobs of all modes add up to {mass:?} kg of liquid (allowed: more than 0)",
                 tank.m_0
             ));
         }
         let host = self.host?;
         singular_where(host.rigid(), &[tank]).map(|place| {
             format!(
-                "host.J with the tank's m_0, I_0, dI_y, I_z and products is singular{place}: the inertia of host and rigid liquid \
-                 about every axis through their centre of mass, and their mass, must be above 0 (allowed: more of host.mass or \
-                 host.J, or of the tank's m_0, I_0 and I_z)"
+                "host.J with the tank's m_0, I_0, dI_y, I_z and products is singular{place}. Mass of host and rigid liquid, and \
+                 their inertia about every axis through their centre of mass, must be above 0: increase host.mass or host.J, or \
+                 the tank's m_0, I_0 and I_z"
             )
         })
     }
@@ -217,17 +219,16 @@ impl TankParameters {
 pub struct TankInputs {
     /// Specific force at O, m/s2.
     pub a: Ramp,
-    /// Angular velocity, rad/s, now. Its slope is omega_dot.
+    /// Angular velocity now, rad/s. Its slope is omega_dot.
     pub omega: Vec3,
     /// Angular acceleration, rad/s2.
     pub omega_dot: Ramp,
-    /// Mass that flows out of the tank, kg/s; in where below 0. Of no effect in a tank without a table
-    /// over its fill.
+    /// Mass flow out of the tank, kg/s, negative for inflow. Without effect in a tank without a fill table.
     pub mass_flow: Line,
 }
 
 impl TankInputs {
-    /// omega after `t` seconds.
+    /// Returns omega after `t` seconds.
     fn omega_at(&self, t: f64) -> Vec3 {
         let TankInputs { omega, omega_dot, .. } = self;
         [0, 1, 2].map(|i| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t)
@@ -239,22 +240,23 @@ impl TankInputs {
 pub struct SloshTankOutputs {
     /// Force and torque about O on the host, and the modes.
     pub tank: TankOutputs,
-    /// Bias, N and N m: see [`Coupling`].
+    /// Bias, N and N m; see [`Coupling`].
     pub bias: [f64; 6],
     /// Added mass, kg, kg m, kg m2: upper triangle by rows; see [`Coupling`].
     pub added_mass: [f64; TRIANGLE],
-    /// Impulses of a liquid in the ball regime on the host since the start, N s, and about O, N m s, each in the host's axes at
-    /// its time: the host adds M_host^-1 of what they change by to its velocity and rate. 0 in derivatives.
+    /// Sum of the impulses of detached liquid on the host since the start, N s, and about O, N m s, each in the host's
+    /// axes at its time. The host adds M_host^-1 times the change to its velocity and rate. 0 in derivatives.
     pub impulse: [f64; 6],
     /// Energy dissipated by the liquid since the start, J.
     pub dissipated: f64,
-    /// The state it is in a tank that drains, kg.
+    /// Mass of the whole liquid as a state of a draining tank, kg.
     pub liquid: f64,
     /// Mass of the whole liquid, kg.
     pub mass: f64,
-    /// Its centre of mass from O, m, host axes.
+    /// Centre of mass of the whole liquid from O, m, host axes.
     pub center_of_mass: Vec3,
-    /// Its inertia about it with the bobs as point masses where they are, kg m2, host axes.
+    /// Inertia of the whole liquid about its centre of mass, with the bobs as point masses at their
+    /// current positions, kg m2, host axes.
     pub inertia: Mat3,
 }
 
@@ -272,13 +274,13 @@ pub struct TankState {
 }
 
 impl TankState {
-    /// Length of the flat form.
+    /// Number of words of a saved state.
     pub const WORDS: usize = Self::REALS + 2;
 
     /// Number of words that are real numbers; ranges and state of the liquid follow.
     const REALS: usize = 7 + TANK_STATES;
 
-    /// The state as plain words, for saving.
+    /// Returns the state as words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [self.time.to_bits(); Self::WORDS];
         for (word, number) in words[1..].iter_mut().zip(self.x.iter().chain(&self.impulse)) {
@@ -289,7 +291,7 @@ impl TankState {
         words
     }
 
-    /// The reverse; `None` when the words are no state.
+    /// Reads a state from words; `None` if they are not a valid state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<TankState> {
         let numbers = words.map(f64::from_bits);
         let x: [f64; TANK_STATES] = core::array::from_fn(|i| numbers[1 + i]);
@@ -303,7 +305,7 @@ impl TankState {
     }
 }
 
-/// The tank at its present state and the series of its motion.
+/// The tank at its current state and the series of its motion.
 #[derive(Clone, Debug)]
 struct TankMotion {
     state: TankState,
@@ -316,9 +318,9 @@ struct TankMotion {
     w_both: Pair,
     w_d: Vector,
     dissipation: Series,
-    /// 1 over what is allowed of v
+    /// 1 over the allowed error of v
     inv_allowed: f64,
-    /// If the tank has a ball regime.
+    /// Data of the model of detached liquid, if the tank has one.
     ball: Option<Loose>,
 }
 
@@ -328,20 +330,20 @@ struct Loose {
     lump: Lump,
     /// The bobs, while they are not in use.
     parked: Vec<Bob>,
-    /// The host without the tank, and the factors of its matrix with all of the tank that hangs on it.
+    /// The host without the tank, and the factors of its matrix with everything of the tank that is attached to it.
     host: Rigid,
     factors: Factors,
-    /// Change of w by impulses that the host does not know yet.
+    /// Change of w by impulses that the host has not applied yet.
     turned: Vec3,
-    /// The rest of the forces on the host, from before the first change within a step.
+    /// The other forces on the host, from before the first change within a step.
     rest: Option<[Vec3; 2]>,
     /// Event at the end of the expansion.
     due: Option<Due>,
-    /// 1 over what is allowed of the lump's u.
+    /// 1 over the allowed error of the detached liquid's u.
     inv_allowed: f64,
 }
 
-/// One tank on somebody else's craft.
+/// One tank on a spacecraft that a host simulates.
 #[derive(Clone, Debug)]
 pub struct SloshTank {
     motion: Box<TankMotion>,
@@ -349,7 +351,7 @@ pub struct SloshTank {
     host: Option<Craft>,
     /// M of [`Coupling::Lumped`].
     lumped: Rigid,
-    /// If the tank can drain or has planar modes.
+    /// Equations of a tank that can drain or has planar modes.
     draining: Option<Box<MountedTank>>,
     limits: Limits,
     bounds: ranges::Bounds,
@@ -364,9 +366,10 @@ struct Run<'a> {
 /// a, w, w', outflow.
 type Acting<T> = ([Vec3<T>; 3], T);
 
-/// Scales of directions, which are 1, and of the bobs' rates, from where these stand in the states.
+/// Scales for error control: 1 for directions, and those of the bobs' rates.
 fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
-    // The dissipated energy and the liquid follow from the rest, and there is no lump.
+    // The dissipated energy and the liquid follow from the other states, and such a tank has no
+    // detached liquid.
     let mut scale = [f64::INFINITY; TANK_STATES];
     for at in (0..DISSIPATED).step_by(6) {
         scale[at..at + 3].fill(1.0);
@@ -430,7 +433,7 @@ fn draining_rates<T: Number>(
     rate
 }
 
-/// Values and derivatives along (dx, du).
+/// Returns values and derivatives along (dx, du).
 fn along(
     x: &[f64; TANK_STATES],
     inputs: &TankInputs,
@@ -538,7 +541,7 @@ impl Motion for TankMotion {
     }
 }
 
-/// The liquid as a lump, if it is one now.
+/// Returns the detached liquid, if any.
 #[inline(always)]
 fn loose(ball: &mut Option<Loose>) -> Option<&mut Lump> {
     ball.as_mut().map(|ball| &mut ball.lump).filter(|lump| lump.is_loose())
@@ -572,15 +575,15 @@ impl TankMotion {
         self.rates_of::<1>();
     }
 
-    /// Moves the states on by `h` > 0; on an error they are unusable.
-    // Apart from what prepares a step: compiled together, both take more instructions.
+    /// Advances the states by `h` > 0. After an error they are unusable.
+    // Separate from the preparation of a step: compiled together, both take more instructions.
     #[inline(never)]
     fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
         let begin = self.state.time;
         integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps()).map(|_| ())
     }
 
-    /// Coefficient N of every quantity and N + 1 of the states.
+    /// Computes coefficient N of every quantity and N + 1 of the states.
     #[inline(always)]
     fn rates_of<const N: usize>(&mut self) {
         self.w_both.set(N, self.w[N], self.w[N]);
@@ -617,7 +620,7 @@ impl TankMotion {
         rate
     }
 
-    /// Inputs of the outputs, from coefficients 0 and 1.
+    /// Returns the quantities for the outputs, from coefficients 0 and 1.
     fn parts<T: Number>(&self) -> Parts<T> {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
@@ -653,16 +656,16 @@ impl TankMotion {
     }
 }
 
-// Liquid that leaves its bottom (lump.rs, handover.rs). Apart from the equations of a tank without.
+// Detached liquid (lump.rs, handover.rs), apart from the equations of a tank without it.
 impl TankMotion {
-    /// Rigid liquid and bobs as the liquid's state wants them. Does not allocate. Returns what w has changed by.
+    /// Sets up rigid liquid and bobs for the liquid's state. Does not allocate. Returns the change of w.
     #[inline(never)]
     fn start_ball(&mut self) -> Vec3 {
         let Some(ball) = &mut self.ball else { return [0.0; 3] };
         let was_loose = ball.lump.is_loose();
         ball.lump.state = self.state.ball;
         if ball.lump.is_loose() {
-            // Its directions are those with which it has left.
+            // The shape has the directions with which the liquid left the bottom.
             self.rigid = ball.lump.shape(&directions(&self.state.x));
             ball.parked.append(&mut self.bobs);
         } else if was_loose {
@@ -672,7 +675,8 @@ impl TankMotion {
         ball.turned
     }
 
-    /// Coefficient n of what the lump does, and n + 1 of its motion. Returns what it dissipates.
+    /// Computes coefficient n of the detached liquid's loads and n + 1 of its motion. Returns its
+    /// dissipation.
     #[inline(never)]
     fn rates_of_ball(&mut self, n: usize) -> f64 {
         let Some(lump) = loose(&mut self.ball) else { return 0.0 };
@@ -689,7 +693,7 @@ impl TankMotion {
         next.map(|(t, _)| t)
     }
 
-    /// Does what is due `t` after the start of the call.
+    /// Performs the event `due` at `t` after the start of the call.
     #[inline(never)]
     fn answer(&mut self, due: Due, t: f64) {
         if self.loose().rest.is_none() {
@@ -702,7 +706,7 @@ impl TankMotion {
         self.change(0, due, t);
     }
 
-    /// The lump at the start of an expansion; after a change, a and w' of the host's answer to it, held.
+    /// Sets up detached liquid at the start of an expansion. After a change it holds a and w' of the host's response.
     #[inline(never)]
     fn start_lump(&mut self) {
         let w = self.w[0];
@@ -720,7 +724,7 @@ impl TankMotion {
         (self.w[1], self.w[2]) = (self.w_d[0], [0.0; 3]);
     }
 
-    /// Over the `h` before `t`, adds what the host does not do of its answer.
+    /// Over the `h` before `t`, adds the part of the host's response that the host does not apply.
     #[inline(never)]
     fn lag(&mut self, h: f64, t: f64) {
         if self.loose().rest.is_none() {
@@ -733,7 +737,7 @@ impl TankMotion {
         self.give(dv, dw);
     }
 
-    /// Adds an impulse that changes the host's velocity and rate so.
+    /// Adds an impulse that changes the host's velocity by `dv` and its rate by `dw`.
     fn give(&mut self, dv: Vec3, dw: Vec3) {
         let ball = self.loose_mut();
         ball.turned = add(ball.turned, dw);
@@ -755,12 +759,13 @@ impl TankMotion {
         ball.factors.set(&matrix);
     }
 
-    /// Does all that is due now, for hosts that integrate themselves. Returns whether anything was.
+    /// Performs all events that are due now, for hosts that integrate themselves. Returns true if
+    /// there were any.
     fn take_due(&mut self, inputs: &TankInputs) -> bool {
         self.inputs = *inputs;
         self.forget();
         let mut any = false;
-        // As many as a lump can go through at once.
+        // The largest number of successive events.
         for _ in 0..4 {
             self.evaluate_at(0.0);
             for n in 1..4 {
@@ -775,7 +780,7 @@ impl TankMotion {
         any
     }
 
-    /// The host knows what impulses have done to it.
+    /// Marks all impulses as applied by the host.
     fn forget(&mut self) {
         if let Some(ball) = &mut self.ball {
             (ball.turned, ball.rest, ball.due) = ([0.0; 3], None, None);
@@ -796,13 +801,13 @@ impl TankMotion {
     }
 }
 
-/// The directions of a tank's bobs.
+/// Returns the directions of a tank's bobs.
 fn directions(x: &[f64; TANK_STATES]) -> Directions {
     core::array::from_fn(|n| part(x, 6 * n))
 }
 
 impl Carrier for TankMotion {
-    /// The state, and what w has changed by.
+    /// The state and the change of w.
     type Memory = (TankState, Vec3);
 
     fn memory(&self) -> (TankState, Vec3) {
@@ -874,7 +879,7 @@ impl Carrier for TankMotion {
         [dv, dw]
     }
 
-    /// The host stays where it is.
+    /// The host does not move.
     fn shift(&mut self, _: Vec3) {}
 
     fn is_pressed(&mut self, _: usize, t: f64) -> bool {
@@ -884,7 +889,8 @@ impl Carrier for TankMotion {
 }
 
 impl TankMotion {
-    /// Updates the rates of bobs and lump, which keep part of their velocities when the host's change, after [`Motion::start`].
+    /// After [`Motion::start`], updates the rates of bobs and detached liquid, which keep part of their velocities when
+    /// the host's change.
     fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
         for bob in &self.bobs {
             let at = 6 * bob.mode;
@@ -896,20 +902,20 @@ impl TankMotion {
     }
 }
 
-/// Quantities that the outputs are computed from.
+/// Quantities from which the outputs are computed.
 struct Parts<T> {
     /// a, w, w'
     motion: [Vec3<T>; 3],
     /// The rigid liquid.
     rigid: Rigid<T>,
-    /// On the host about O.
+    /// Wrench on the host about O.
     wrench: [Vec3<T>; 2],
     /// The same at a = w' = 0, without the rigid liquid.
     loads: [Vec3<T>; 2],
     /// M_a
     matrix: Mat6<T>,
     bobs: [Option<BobNow<T>>; MODES],
-    /// The liquid as one lump, while it has left its bottom.
+    /// The detached liquid, if any.
     lump: Option<BobNow<T>>,
     ball_state: BallState,
 }
@@ -918,14 +924,14 @@ fn plus<T: Number>(a: [Vec3<T>; 2], b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
     [add(a[0], b[0]), add(a[1], b[1])]
 }
 
-/// m u u^T into a matrix of any kind of numbers.
+/// Adds the bob's m u u^T to a matrix.
 fn add_added_mass<T: Number>(matrix: &mut [[T; 6]; 6], bob: &Bob) {
     let p = [0, 1, 2].map(|i| T::of(bob.p[0][i], bob.p[1][i]));
     let c = cross(constant(bob.hinge), p);
     add_square(matrix, T::constant(bob.m), &[p[0], p[1], p[2], c[0], c[1], c[2]]);
 }
 
-/// m u u^T into a matrix of any kind of numbers.
+/// Adds m u u^T to a matrix.
 fn add_square<T: Number>(matrix: &mut [[T; 6]; 6], m: T, u: &[T; 6]) {
     for i in 0..6 {
         for j in 0..6 {
@@ -944,9 +950,8 @@ fn triangle<T: Number>(matrix: &[[T; 6]; 6]) -> [f64; TRIANGLE] {
 }
 
 impl SloshTank {
-    /// A tank at the start of its motion, at `start_time` (s); `tolerance` is the relative error
-    /// allowed in directions and rates, 1e-14 to 0.1. Refused parameters are returned with everything that is
-    /// wrong with them.
+    /// Creates a tank at the start of its motion, at `start_time` (s). `tolerance` is the allowed relative error of
+    /// directions and rates, 1e-14 to 0.1. Returns all problems of refused parameters.
     pub fn new(
         p: &TankParameters,
         inputs: &TankInputs,
@@ -977,7 +982,7 @@ impl SloshTank {
         Ok(tank)
     }
 
-    /// A tank that continues from a saved state of one with the same parameters, which
+    /// Creates a tank that continues from a saved state of one with the same parameters, which
     /// [`SloshTank::new`] has accepted.
     pub fn resume(p: &TankParameters, state: &TankState, tolerance: f64) -> SloshTank {
         let tank = p.tank.resolve();
@@ -1021,28 +1026,28 @@ impl SloshTank {
         }
     }
 
-    /// The present time, s.
+    /// Returns the current time, s.
     pub fn time(&self) -> f64 {
         self.motion.state.time
     }
 
-    /// Takes the time from the host, s.
+    /// Sets the time from the host, s.
     pub fn set_time(&mut self, time: f64) {
         self.motion.state.time = time;
     }
 
-    /// The state, for saving.
+    /// Returns the state, for saving.
     pub fn state(&self) -> &TankState {
         &self.motion.state
     }
 
-    /// Goes back to a saved state of this tank or of one with the same parameters.
+    /// Restores a saved state of this tank or of one with the same parameters.
     pub fn set_state(&mut self, state: &TankState) {
         self.motion.state = *state;
     }
 
-    /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps. On an error the
-    /// tank is as before.
+    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. After an error the
+    /// tank is unchanged.
     pub fn step(&mut self, inputs: &TankInputs, h: f64) -> Result<(), StepError> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
@@ -1068,13 +1073,13 @@ impl SloshTank {
         done
     }
 
-    /// The ranges that the motion is in now.
+    /// Returns the ranges of the current motion.
     pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
         self.bounds.of(&outputs.tank)
     }
 
-    /// The ranges as the last event has left them.
+    /// Returns the ranges as of the last event.
     pub fn ranges_held(&self) -> Ranges {
         self.motion.state.ranges
     }
@@ -1089,7 +1094,8 @@ impl SloshTank {
         self.motion.state_of_ball() != BallState::Settled
     }
 
-    /// Returns true if the motion is in the tank's range at the end of its last step, `h` long; detached liquid has no range.
+    /// Returns true if the motion is in the tank's range at the end of its last step, of length `h`. Detached liquid
+    /// has no range.
     pub fn is_in_range_after(&self, inputs: &TankInputs, h: f64) -> bool {
         let TankMotion { state, bobs, ball, .. } = &*self.motion;
         if ball.is_some() {
@@ -1103,8 +1109,8 @@ impl SloshTank {
         self.bounds.contain(core::array::from_fn(|n| state.x[6 * n + 2]), axial)
     }
 
-    /// Functions of states and inputs that cross zero at events: what leaves the present state of the liquid, and what ends its
-    /// sliding on the wall; 1 in a tank without a ball regime.
+    /// Returns functions of states and inputs that cross zero at events: at the end of the liquid's current state, and
+    /// at the end of its sliding on the wall. They are 1 in a tank without a model of detached liquid.
     pub fn event_indicators(&mut self, inputs: &TankInputs) -> [f64; 2] {
         if !self.has_ball() {
             return [1.0; 2];
@@ -1114,15 +1120,15 @@ impl SloshTank {
         self.motion.loose().lump.indicators([a, w, w_d], bobs.iter())
     }
 
-    /// Whether a host that integrates itself has passed an event of the liquid, whatever the indicators of its last steps have
-    /// shown.
+    /// Returns true if a host that integrates itself has passed an event of the liquid, whatever the indicators of its
+    /// last steps were.
     pub fn is_event_overdue(&mut self, inputs: &TankInputs) -> bool {
         let now = self.event_indicators(inputs);
         self.has_ball() && self.motion.loose().lump.is_overdue(now)
     }
 
-    /// Does what is due at an event: liquid leaves its bottom, meets the wall or settles, and the ranges are those of the present
-    /// motion from now on. Returns whether continuous states have changed. On an error nothing has.
+    /// Performs all events that are due: liquid leaves the bottom, meets the wall or settles, and the ranges become
+    /// those of the current motion. Returns true if continuous states have changed. After an error nothing has changed.
     pub fn take_event(&mut self, inputs: &TankInputs) -> Result<bool, StepError> {
         let before = self.motion.state;
         let changed = self.has_ball() && self.motion.take_due(inputs);
@@ -1136,14 +1142,14 @@ impl SloshTank {
         Ok(changed)
     }
 
-    /// Outputs of the tank under the inputs' present values.
+    /// Returns the outputs under the inputs' current values.
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let mut outputs = self.outputs_held(inputs);
         outputs.tank.ranges = self.bounds.of(&outputs.tank);
         outputs
     }
 
-    /// [`SloshTank::outputs`] with the ranges as the last event left them.
+    /// Returns [`SloshTank::outputs`] with the ranges as of the last event.
     pub fn outputs_held(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let x = self.motion.state.x;
         if let Some(mounted) = &self.draining {
@@ -1223,23 +1229,23 @@ impl SloshTank {
         }
     }
 
-    /// x: p and p' of each mode, tank axes, then the dissipated energy, J, the mass of liquid, kg, and position, m, and rate, m/s,
-    /// of the lump, tank axes.
+    /// Returns x: p and p' of each mode, tank axes; then the dissipated energy, J, the mass of liquid, kg, and
+    /// position, m, and rate, m/s, of the detached liquid, tank axes.
     pub fn continuous_states(&self) -> [f64; TANK_STATES] {
         self.motion.state.x
     }
 
-    /// [`SloshTank::continuous_states`] without a copy.
+    /// Returns [`SloshTank::continuous_states`] without a copy.
     pub fn borrow_states(&self) -> &[f64; TANK_STATES] {
         &self.motion.state.x
     }
 
-    /// Takes x from the host. Directions need not be of unit length.
+    /// Sets x from the host. Directions need not be of unit length.
     pub fn set_continuous_states(&mut self, x: &[f64; TANK_STATES]) {
         self.motion.state.x = *x;
     }
 
-    /// x'; directions and their rates are normalised first.
+    /// Returns x'. Directions and their rates are normalised first.
     pub fn derivatives(&mut self, inputs: &TankInputs) -> [f64; TANK_STATES] {
         if let Some(mounted) = &self.draining {
             return Run { mounted, inputs }.rates(0.0, &self.motion.state.x);
@@ -1248,7 +1254,7 @@ impl SloshTank {
         self.motion.state_rates::<0>()
     }
 
-    /// The derivative of x' in the direction (dx, du), du of a, omega, omega_dot, mass_flow; exact. The
+    /// Returns the exact derivative of x' in the direction (dx, du), with du of a, omega, omega_dot, mass_flow. The
     /// slope of mass_flow is held.
     pub fn directional_derivative(
         &mut self,
@@ -1265,7 +1271,7 @@ impl SloshTank {
         self.motion.state_rates::<1>()
     }
 
-    /// The derivative of the outputs in the direction (dx, du); exact.
+    /// Returns the exact derivative of the outputs in the direction (dx, du).
     pub fn output_derivatives(
         &mut self,
         inputs: &TankInputs,
@@ -1281,8 +1287,8 @@ impl SloshTank {
         SloshTankOutputs { impulse: [0.0; 6], ..self.outputs_from(dx, parts) }
     }
 
-    /// The derivative of the outputs with time, along the inputs' ramps: what a host needs to
-    /// extrapolate bias and added mass over its own step.
+    /// Returns the derivative of the outputs by time, along the inputs' ramps, with which a host
+    /// can extrapolate bias and added mass over its own step.
     pub fn output_slopes(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let dx = self.derivatives(inputs);
         let mut du = [0.0; TANK_INPUTS];
@@ -1293,8 +1299,9 @@ impl SloshTank {
         self.output_derivatives(inputs, &dx, &du)
     }
 
-    /// Applies an impulse of the host to the bobs, whose velocities across their rods stay: O
-    /// changes its velocity by `dv`, m/s, and the host its rate by `dw`, rad/s, host axes.
+    /// Applies an impulse of the host to the bobs, which keep their velocities across their rods.
+    /// The impulse changes the velocity of O by `dv`, m/s, and the host's angular velocity by `dw`,
+    /// rad/s, host axes.
     pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
@@ -1306,11 +1313,11 @@ impl SloshTank {
         self.motion.follow_impulse(dv, dw);
     }
 
-    /// The largest eigenvalue lambda of M_host^-1 M_a at the present directions; `None` when
-    /// the host's mass properties are not known.
+    /// Returns the largest eigenvalue lambda of M_host^-1 M_a at the current directions; `None` if
+    /// the host's mass properties are unknown.
     ///
-    /// A host that uses the total wrench a step late diverges, whatever the step, above 1 (held
-    /// values), 1/3 (Gauss-Seidel, linear) or 0.155 (Jacobi, linear).
+    /// A host that uses the total wrench one step late diverges, at any step, above 1 (held
+    /// values), 1/3 (Gauss-Seidel, linear extrapolation) or 0.155 (Jacobi, linear extrapolation).
     pub fn coupling_ratio(&mut self) -> Option<f64> {
         let host = self.host?;
         self.motion.start(0.0);
@@ -1330,8 +1337,8 @@ mod tests {
     use super::*;
     use taylor::ramp::Ramp;
 
-    /// Upright under 9.81 m/s2 along its axis; 2 s of 30 m/s2 across, and the pendulum has passed 45 degrees. At one m/s2 up,
-    /// whose liquid hangs from the lid, the specific force is the wrong way.
+    /// Upright under 9.81 m/s2 along its axis the tank is in range. After 2 s of 30 m/s2 across it, the pendulum has
+    /// passed 45 degrees. At 1 m/s2 downwards the specific force has the wrong sign.
     #[test]
     fn a_tank_is_in_range_while_its_bobs_are_upright_and_the_force_holds_them() {
         let after = |a: [f64; 3], h: f64| {

@@ -1,5 +1,5 @@
-//! A free spacecraft with sloshing tanks: the whole, its steps, and its equations for hosts
-//! that integrate themselves.
+//! A free spacecraft with sloshing tanks: its steps, and its equations for hosts that integrate
+//! themselves.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -21,7 +21,7 @@ use crate::state::{BallState, INPUTS, Inputs, Ranges, STATES, State, index};
 #[derive(Clone, Debug)]
 pub struct Spacecraft {
     motion: Box<CraftMotion>,
-    /// Equations with draining tanks or planar modes, if there are any.
+    /// Equations for draining tanks or planar modes, if there are any.
     draining: Option<Box<Draining>>,
     limits: Limits,
     /// Bounds of the tanks in use.
@@ -29,11 +29,11 @@ pub struct Spacecraft {
 }
 
 impl Spacecraft {
-    /// A craft at the start of its motion, at `start_time` (s), with the inputs that act
-    /// then; `tolerance` is the relative error allowed in rates, directions and attitude,
-    /// 1e-14 to 0.1.
+    /// Creates a craft at the start of its motion, at `start_time` (s), with the inputs that act
+    /// then. `tolerance` is the allowed relative error of rates, directions and attitude, 1e-14 to
+    /// 0.1.
     ///
-    /// Refused parameters are returned with everything that is wrong with them.
+    /// Returns all problems of refused parameters.
     pub fn new(
         p: &Parameters,
         inputs: &Inputs,
@@ -82,7 +82,7 @@ impl Spacecraft {
         Ok(craft)
     }
 
-    /// A craft that continues from a saved state of one with the same parameters, which
+    /// Creates a craft that continues from a saved state of one with the same parameters, which
     /// [`Spacecraft::new`] has accepted.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Spacecraft {
         let draining = Draining::new(p).map(Box::new);
@@ -92,29 +92,29 @@ impl Spacecraft {
         Spacecraft { motion, draining, limits, bounds: tanks.collect() }
     }
 
-    /// The present time, s.
+    /// Returns the current time, s.
     pub fn time(&self) -> f64 {
         self.motion.state.time
     }
 
-    /// Takes the time from the host, s.
+    /// Sets the time from the host, s.
     pub fn set_time(&mut self, time: f64) {
         self.motion.state.time = time;
     }
 
-    /// The state, for saving.
+    /// Returns the state, for saving.
     pub fn state(&self) -> &State {
         &self.motion.state
     }
 
-    /// Goes back to a saved state of this craft or of one with the same parameters.
+    /// Restores a saved state of this craft or of one with the same parameters.
     pub fn set_state(&mut self, state: &State) {
         self.motion.state = *state;
     }
 
-    /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps. A jump of
-    /// `h_wheels` or `mass_flow` since the last step acts as an impulse at the beginning. On an error
-    /// the craft is as before.
+    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. A jump of `h_wheels`
+    /// or `mass_flow` since the last step acts as an impulse at the beginning. After an error the
+    /// craft is unchanged.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
@@ -141,8 +141,8 @@ impl Spacecraft {
         done
     }
 
-    /// Outputs of the craft under the inputs' present values; a jump of `h_wheels` or
-    /// `mass_flow` since the last step has had its effect.
+    /// Returns the outputs under the inputs' current values, after the effect of a jump of
+    /// `h_wheels` or `mass_flow` since the last step.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.motion.state;
         self.take_jumps(inputs);
@@ -152,14 +152,14 @@ impl Spacecraft {
         outputs
     }
 
-    /// The ranges that the tanks' motion is in now.
+    /// Returns the ranges of the tanks' current motion.
     pub fn ranges(&mut self, inputs: &Inputs) -> [Ranges; TANKS] {
         let mut outputs = self.outputs_held(inputs);
         self.update_ranges(&mut outputs);
         outputs.tank.map(|tank| tank.ranges)
     }
 
-    /// The ranges as the last event has left them.
+    /// Returns the ranges as of the last event.
     pub fn ranges_held(&self) -> [Ranges; TANKS] {
         self.motion.state.ranges
     }
@@ -173,12 +173,13 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.tank == tank)
     }
 
-    /// Returns true if every tank without a model of detached liquid is in its range after a step, judged by the liquid's directions at its end and the accelerations during it.
+    /// Returns true if every tank without a model of detached liquid is in its range after a step, judged by the
+    /// liquid's directions at the end and the accelerations during the step.
     pub fn is_in_range(&self) -> bool {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
             let mut first = bobs.iter().filter(|bob| bob.tank == i && bob.mode == 0);
-            // The accelerations of a craft that drains are its equations' alone.
+            // The accelerations of a draining craft come from its equations.
             let axial = first
                 .next()
                 .filter(|_| self.draining.is_none())
@@ -187,14 +188,14 @@ impl Spacecraft {
         })
     }
 
-    /// Brings the ranges among the outputs to what the outputs are now.
+    /// Updates the ranges among the outputs to the current outputs.
     fn update_ranges(&self, outputs: &mut Outputs) {
         for (tank, limits) in outputs.tank.iter_mut().zip(&self.bounds) {
             tank.ranges = limits.of(tank);
         }
     }
 
-    /// [`Spacecraft::outputs`] with the states as the last step or event left them.
+    /// Returns [`Spacecraft::outputs`] with the states as the last step or event left them.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
@@ -209,26 +210,26 @@ impl Spacecraft {
         outputs
     }
 
-    /// x; see [`index`].
+    /// Returns x; see [`index`].
     pub fn continuous_states(&self) -> [f64; STATES] {
         self.motion.state.x
     }
 
-    /// [`Spacecraft::continuous_states`] without a copy.
+    /// Returns [`Spacecraft::continuous_states`] without a copy.
     pub fn borrow_states(&self) -> &[f64; STATES] {
         &self.motion.state.x
     }
 
-    /// Takes x from the host. Quaternion and directions need not be of unit length.
+    /// Sets x from the host. Quaternion and directions need not be of unit length.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.motion.state.x = *x;
     }
 
-    /// x'. Quaternion, directions and their rates are normalised first: those of x keep the
-    /// length they have.
+    /// Returns x'. Quaternion, directions and their rates are normalised first; those in x keep
+    /// their length.
     ///
-    /// `h_wheels` acts by w x h_w and by its slope. Where the slope is not known, the
-    /// reaction -h_w' belongs into `torque`.
+    /// `h_wheels` acts by w x h_w and by its slope. A host that does not know the slope adds the
+    /// reaction -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
             return draining.evaluate(&self.motion.state.x, &Acting::of(inputs, 0.0)).0;
@@ -237,8 +238,8 @@ impl Spacecraft {
         self.motion.state_rates::<0>(&self.motion.state.x)
     }
 
-    /// The derivative of x' in the direction (dx, du), du of force, torque, h_wheels: coefficient
-    /// 1 of x' along x + dx s, u + du s, exact. Slopes of the inputs are held.
+    /// Returns the exact derivative of x' in the direction (dx, du), with du of force, torque,
+    /// h_wheels: coefficient 1 of x' along x + dx s, u + du s. Slopes of the inputs are held.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -252,8 +253,8 @@ impl Spacecraft {
         self.motion.state_rates::<1>(dx)
     }
 
-    /// The derivative of the outputs in the direction (dx, du), exact. The slosh angles' is 0
-    /// where they have none, at 90 degrees.
+    /// Returns the exact derivative of the outputs in the direction (dx, du). At slosh angles of 90
+    /// degrees, which have no derivative, it is 0.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,
@@ -267,7 +268,7 @@ impl Spacecraft {
         self.motion.now::<Dual>().outputs(dx)
     }
 
-    /// Derivatives of a craft that drains.
+    /// Returns derivatives of a draining craft.
     fn along(
         &self,
         inputs: &Inputs,
@@ -280,7 +281,7 @@ impl Spacecraft {
         Some(draining.evaluate(&along, &Acting::along(inputs, du)))
     }
 
-    /// The impulses of what has jumped. Returns whether anything has.
+    /// Applies the impulses of jumped inputs. Returns true if any input has jumped.
     fn take_jumps(&mut self, inputs: &Inputs) -> bool {
         let Some(draining) = &self.draining else {
             return self.motion.set_wheels(inputs.h_wheels.value);
@@ -302,14 +303,15 @@ impl Spacecraft {
         !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)
     }
 
-    /// Functions of states and inputs that cross zero at events, two for each tank: what leaves the present state of the
-    /// liquid, and what ends its sliding on the wall; 1 where there is none.
+    /// Writes functions of states and inputs that cross zero at events, two for each tank: at the end of the liquid's
+    /// current state, and at the end of its sliding on the wall. They are 1 where there is no such event.
     pub fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         self.motion.indicators(inputs, indicators);
     }
 
-    /// Whether a host that integrates itself has passed an event of a liquid, whatever the indicators of its last steps have
-    /// shown: the liquid is outside its wall and moves out, or has to leave its bottom or the wall, or may settle.
+    /// Returns true if a host that integrates itself has passed an event of a liquid, whatever the indicators of its
+    /// last steps were: the liquid is outside its wall and moves outwards, or must leave its bottom or the wall, or may
+    /// settle.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let mut now = [1.0; 2 * TANKS];
         self.event_indicators(inputs, &mut now);
@@ -317,9 +319,9 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.is_overdue(at(lump.tank)))
     }
 
-    /// Does what is due at an event: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid leaves its bottom, meets
-    /// the wall or settles. Returns
-    /// whether continuous states have changed. On an error nothing has.
+    /// Performs all events that are due: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid leaves the
+    /// bottom, meets the wall or settles. Returns true if continuous states have changed. After an error nothing has
+    /// changed.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let before = self.motion.state;
         let mut changed = self.take_jumps(inputs);
@@ -334,14 +336,14 @@ impl Spacecraft {
         Ok(changed)
     }
 
-    /// Refuses masses of liquid, integrated by the host, outside the tanks' tables.
+    /// Refuses masses of liquid, as integrated by the host, outside the tanks' tables.
     pub fn check_liquids(&self) -> Result<(), StepError> {
         let x = &self.motion.state.x;
         self.draining.as_ref().map_or(Ok(()), |it| it.check(x))
     }
 
-    /// Takes account of `h_wheels` and `mass_flow` having changed continuously: no impulse is due
-    /// for it. For hosts that integrate themselves, after each of their steps.
+    /// Records that `h_wheels` and `mass_flow` have changed continuously, without an impulse. Hosts
+    /// that integrate themselves call it after each of their steps.
     pub fn follow_inputs(&mut self, inputs: &Inputs) {
         self.motion.state.h_wheels = inputs.h_wheels.value;
         self.motion.state.flow = inputs.mass_flow.map(|flow| flow.value);

@@ -1,4 +1,4 @@
-//! The craft's continuous states x in their order, its inputs, and its memory.
+//! The craft's continuous states x in their order, its inputs, and its saved state.
 
 use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
@@ -6,7 +6,8 @@ use taylor::vector::Vec3;
 
 use crate::sizes::{MODES, TANKS};
 
-/// Places in x. Units: 1, rad/s, m, m/s, J, J, 1 and 1/s for each bob, kg, J, then m and m/s for each lump.
+/// Indices of the states in x. Units: 1, rad/s, m, m/s, J, J, 1 and 1/s for each bob, kg, J, then m and m/s for each
+/// tank's detached liquid.
 pub mod index {
     use super::{MODES, TANKS};
 
@@ -22,25 +23,25 @@ pub mod index {
     pub const WORK: usize = 13;
     /// Energy dissipated by the liquids since the start.
     pub const DISSIPATED: usize = 14;
-    /// The bobs: for each tank, for each of its [`MODES`] modes, direction p and rate p', tank
-    /// axes. Bobs that are not used stay at rest.
+    /// The bobs: direction p and rate p' of each of the [`MODES`] modes of each tank, tank axes.
+    /// Bobs that are not in use stay at rest.
     pub const BOBS: usize = 15;
 
-    /// The mass of liquid in each tank, kg; of effect in tanks that can drain.
+    /// The mass of liquid in each tank, kg; used in tanks that can drain.
     pub const LIQUID: usize = BOBS + 6 * TANKS * MODES;
-    /// Energy that has gone with the outflow since the start, J.
+    /// Energy lost with the outflow since the start, J.
     pub const DRAINED: usize = LIQUID + TANKS;
 
-    /// The lumps: for each tank position from the tank's origin, m, and rate, m/s, tank axes. Of effect in
-    /// tanks with a ball regime.
+    /// Detached liquid: for each tank position from the tank's origin, m, and rate, m/s, tank axes. Used in tanks that
+    /// model it.
     pub const BALLS: usize = DRAINED + 1;
 
-    /// Index of a lump's position and rate; tank from 0.
+    /// Returns the index of the detached liquid's position and rate; tank from 0.
     pub const fn ball(tank: usize) -> usize {
         BALLS + 6 * tank
     }
 
-    /// Index of a bob's direction and rate; tank and mode from 0.
+    /// Returns the index of a bob's direction and rate; tank and mode from 0.
     pub const fn bob(tank: usize, mode: usize) -> usize {
         BOBS + 6 * (tank * MODES + mode)
     }
@@ -61,20 +62,20 @@ pub type Line = taylor::ramp::Ramp;
 /// Inputs of the craft over one step; body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Inputs {
-    /// Force at O, N. On a pivot the bearing takes it.
+    /// Force at O, N. On a pivot the bearing takes it up.
     pub force: Ramp,
     /// Torque about O, N m.
     pub torque: Ramp,
     /// Angular momentum of the wheels relative to the body, N m s. Its slope turns the craft by
-    /// -h_w'; a jump from one step to the next does so by an impulse, so that the angular
-    /// momentum of everything is kept either way.
+    /// -h_w'. A jump from one step to the next turns it by an impulse. Both conserve total angular
+    /// momentum.
     pub h_wheels: Ramp,
-    /// Mass that flows out of each tank, kg/s; in where below 0. Of no effect in a tank without a table
-    /// over its fill. A jump from one step to the next sets what flows within in motion by an impulse.
+    /// Mass flow out of each tank, kg/s, negative for inflow. Without effect in a tank without a fill table. A jump
+    /// from one step to the next starts the flow within the tank by an impulse.
     pub mass_flow: [Line; TANKS],
 }
 
-/// The ranges that a tank's motion is in.
+/// Ranges of a tank's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ranges {
     /// Amplitude class of the wave.
@@ -95,7 +96,7 @@ impl Ranges {
         self.regime as u64 | u64::from(self.in_range) << 8
     }
 
-    /// The reverse.
+    /// Reads the ranges from a word.
     pub(crate) fn from_word(word: u64) -> Option<Ranges> {
         let regime = Regime::from_number(word as u8)?;
         match word >> 8 {
@@ -109,22 +110,23 @@ impl Ranges {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum BallState {
-    /// It is at the bottom: rigid liquid and pendulums.
+    /// Liquid at the bottom: rigid liquid and pendulums.
     #[default]
     Settled = 1,
-    /// It flies through the tank as one lump.
+    /// Detached liquid in free flight through the tank.
     Flying = 2,
-    /// The lump slides on the wall with drag.
+    /// Detached liquid that slides on the wall with drag.
     Sliding = 3,
-    /// It slides without, so lightly that the drag's reaction on the craft would take the wall away from it.
+    /// The `Sliding` state without drag, because the wall force is so small that the drag's reaction would move the wall away
+    /// from the liquid.
     Light = 4,
-    /// The same, when the pendulums could have taken it back but for the energy that this would have raised: they try again
-    /// when it has come nearest to the tank's axis.
+    /// The `Light` state after a hand-over to the pendulums that would have raised the energy. The pendulums try again when
+    /// the liquid is nearest to the tank's axis.
     Held = 5,
 }
 
 impl BallState {
-    /// All, by their numbers.
+    /// All states in the order of their numbers.
     pub const ALL: [BallState; 5] = [
         BallState::Settled,
         BallState::Flying,
@@ -134,12 +136,12 @@ impl BallState {
     ];
 }
 
-/// The craft's memory: all that a saved state needs besides parameters and inputs.
+/// Everything that a saved state of the craft needs besides parameters and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,
     pub(crate) x: [f64; STATES],
-    /// The wheels' momentum and the outflows that the motion has taken account of.
+    /// The wheels' momentum and the outflows that the motion already includes.
     pub(crate) h_wheels: Vec3,
     pub(crate) flow: [f64; TANKS],
     /// Ranges of the tanks' motion since the last event, for hosts that integrate themselves.
@@ -149,18 +151,18 @@ pub struct State {
 }
 
 impl State {
-    /// Length of the flat form.
+    /// Number of words of a saved state.
     pub const WORDS: usize = Self::REALS + 2 * TANKS;
 
     /// Number of words that are real numbers; the ranges follow.
     const REALS: usize = 4 + TANKS + STATES;
 
-    /// The wheels' momentum that the motion has taken account of, N m s.
+    /// Returns the wheels' momentum that the motion already includes, N m s.
     pub fn h_wheels(&self) -> Vec3 {
         self.h_wheels
     }
 
-    /// The state as plain words, for saving.
+    /// Returns the state as words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
         let held = self.h_wheels.iter().chain(&self.flow);
@@ -177,7 +179,7 @@ impl State {
         words
     }
 
-    /// The reverse; `None` when the words are no state.
+    /// Reads a state from words; `None` if they are not a valid state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
         let numbers: [f64; Self::REALS] = core::array::from_fn(|i| f64::from_bits(words[i]));
         let mut ranges = [Ranges::default(); TANKS];
@@ -223,7 +225,7 @@ mod tests {
         };
         for place in 0..State::REALS {
             assert_eq!(with(place, f64::NAN), None);
-            // The time is the only one without squares.
+            // Only the time has no squares.
             assert_eq!(with(place, 1e100).is_none(), place > 0, "{place}");
         }
         // q = (1, 0, 0, 0), p = (0, 0, -1)

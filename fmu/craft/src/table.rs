@@ -1,13 +1,13 @@
-//! Table of a tank's modes and rigid liquid over the mass of its liquid, with
-//! monotone interpolation of two continuous derivatives, so that the forces of flowing liquid have no steps.
+//! Table of a tank's modes and rigid liquid over the mass of its liquid. The monotone interpolation has two continuous
+//! derivatives, so that the forces of flowing liquid have no steps.
 //!
 //! ```text
 //! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   H_0, I_0, I_z
 //! ```
 //!
-//! 1/l_n is omega^2/g. A shallow liquid has a long pendulum whose hinge is far above it, as 1/depth; its
-//! frequency, the height of its bob and its share of the liquid change little, and are met by few points.
-//! Each curve stays between its two points, so lengths and masses stay above 0.
+//! 1/l_n is omega^2/g. Shallow liquid has a long pendulum with a hinge far above it, proportional to 1/depth. Its
+//! frequency, the height of its bob and its share of the liquid change little, so few points represent them. Each curve
+//! stays between its two points, so lengths and masses stay above 0.
 //!
 //! Source: `formulas::interpolation`.
 
@@ -16,51 +16,51 @@ use taylor::number::Number;
 
 use crate::sizes::{MODES, POINTS};
 
-/// Shorter pendulums are too stiff, m.
+/// Shortest pendulum, m; shorter ones are too stiff.
 pub(crate) const SHORTEST: f64 = 1e-6;
-/// Lighter bobs have no effect, kg.
+/// Lightest bob, kg; lighter ones have no effect.
 pub(crate) const LIGHTEST: f64 = 1e-9;
 
 /// Modes and rigid liquid at some masses of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FillTable {
-    /// Number of points: 0 for a tank whose liquid stays, or 2 to [`POINTS`].
+    /// Number of points: 0 for a tank whose liquid stays, otherwise 2 to [`POINTS`].
     pub points: usize,
-    /// Mass of the whole liquid, kg, rising.
+    /// Mass of the whole liquid, kg, increasing.
     pub liquid: [f64; POINTS],
     /// Height of the rigid liquid's centre of mass on the tank's axis, m.
     pub h_0: [f64; POINTS],
-    /// Its inertia across the axis about its own centre of mass, kg m2.
+    /// Inertia of the rigid liquid across the axis about its own centre of mass, kg m2.
     pub i_0: [f64; POINTS],
-    /// Its inertia about the axis, kg m2.
+    /// Inertia of the rigid liquid about the axis, kg m2.
     pub i_z: [f64; POINTS],
     /// Mass of each mode's bob, kg.
     pub mass: [[f64; POINTS]; MODES],
-    /// Length of its pendulum, m.
+    /// Length of each mode's pendulum, m.
     pub length: [[f64; POINTS]; MODES],
-    /// Height of its hinge, m.
+    /// Height of each mode's hinge, m.
     pub hinge: [[f64; POINTS]; MODES],
 }
 
 impl FillTable {
-    /// The masses in use.
+    /// Returns the masses at the points in use.
     pub fn masses(&self) -> &[f64] {
         &self.liquid[..self.points]
     }
 
-    /// Mass, length and height of the hinge of mode `n`, from 0, with this mass of liquid, kg.
+    /// Returns mass, length and hinge height of mode `n`, from 0, at this mass of liquid, kg.
     pub fn mode(&self, n: usize, liquid: f64) -> [f64; 3] {
         let curves = self.curves(n + 1);
         curves.mode(n, curves.place(liquid)).map(|jet| jet[0])
     }
 
-    /// Interpolated curves of a tank with these modes while it drains.
+    /// Returns interpolated curves of a draining tank with `modes` modes.
     pub(crate) fn curves(&self, modes: usize) -> FillCurves {
         let curve = |y: [f64; POINTS]| Curve::new(self.masses(), y);
         let of_mode = |n: usize| {
             let (mass, l, h) = (&self.mass[n], &self.length[n], &self.hinge[n]);
-            // Only of the points and modes in use: the others' numbers can be anything within their ranges. The compiler may
-            // divide for all points before it selects, so divisors have a bound that no used number is below.
+            // Only points and modes in use count; the other values can be anything within their ranges. The compiler
+            // may divide for all points before it selects, so divisors have a lower bound below any value in use.
             let used = |f: &dyn Fn(usize) -> f64| {
                 core::array::from_fn(|i| if i < self.points && n < modes { f(i) } else { 0.0 })
             };
@@ -82,7 +82,7 @@ impl FillTable {
 /// A quantity and its first two derivatives, by the mass of liquid or by time.
 pub(crate) type Jet<T> = [T; 3];
 
-/// A quantity at the points of a table, with its slopes and second derivatives there.
+/// A quantity at the points of a table, with slopes and second derivatives there.
 #[derive(Clone, Copy, Debug)]
 struct Curve([[f64; 3]; POINTS]);
 
@@ -103,7 +103,7 @@ impl Curve {
     }
 }
 
-/// The sum of c_k t^k.
+/// Returns the sum of c_k t^k.
 fn polynomial<T: Number>(c: &[f64], t: T) -> T {
     c.iter().rev().fold(T::constant(0.0), |sum, c| sum * t + T::constant(*c))
 }
@@ -124,7 +124,8 @@ pub(crate) struct FillCurves {
     modes: [ModeCurves; MODES],
 }
 
-/// Position of a mass of liquid in a table: interval, position in it from 0 to 1, and its width.
+/// Position of a mass of liquid in a table: interval, position in the interval from 0 to 1, and its
+/// width.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<T> {
     liquid: T,
@@ -134,7 +135,7 @@ pub(crate) struct Place<T> {
 }
 
 impl FillCurves {
-    /// Finds a mass of liquid, kg; beyond the ends the tank is as it is there.
+    /// Locates a mass of liquid, kg. Beyond the ends of the table the tank is as at the end.
     pub fn place<T: Number>(&self, liquid: T) -> Place<T> {
         let masses = &self.liquid[..self.points];
         let (low, high) = (masses[0], masses[self.points - 1]);
@@ -149,12 +150,12 @@ impl FillCurves {
         Place { liquid, interval, t: (liquid - T::constant(masses[interval])) * (1.0 / h), h }
     }
 
-    /// H_0, I_0 and I_z.
+    /// Returns H_0, I_0 and I_z.
     pub fn rigid<T: Number>(&self, at: Place<T>) -> [Jet<T>; 3] {
         [0, 1, 2].map(|k| self.rigid[k].at(at))
     }
 
-    /// Mass, length and height of the hinge of a mode.
+    /// Returns mass, length and hinge height of a mode.
     pub fn mode<T: Number>(&self, n: usize, at: Place<T>) -> [Jet<T>; 3] {
         let ModeCurves { stiffness, bob, share } = &self.modes[n];
         let [k, k_d, k_dd] = stiffness.at(at);
@@ -179,8 +180,8 @@ mod tests {
     use alloc::vec::Vec;
     use taylor::number::Dual;
 
-    /// Random monotone data, also with flat stretches: never a slope of the wrong sign, values and
-    /// both derivatives the same from either side of a point.
+    /// Random monotone data, also with constant stretches: no slope has the wrong sign, and the
+    /// values and both derivatives agree on both sides of a point.
     #[test]
     fn interpolation_is_monotone_and_has_two_continuous_derivatives() {
         let mut rng = fastrand::Rng::with_seed(3);
@@ -258,13 +259,13 @@ mod tests {
         }
     }
 
-    /// Beyond its table's ends a tank is as it is there, and what is left of its liquid changes nothing.
+    /// Beyond the ends of its table a tank keeps its properties, and the remaining liquid changes nothing.
     #[test]
     fn beyond_the_ends_of_its_table_a_tank_is_as_it_is_there() {
         let table = FillTable { points: 3, ..crate::Tank::default().fill };
         let curves = table.curves(MODES);
         let all = |m: f64| {
-            // of the liquid's mass, by the liquid's mass
+            // derivative of the liquid's mass by itself
             let at = curves.place(Dual::of(m, 1.0));
             let modes = (0..MODES).flat_map(|n| curves.mode(n, at));
             let jets: Vec<_> = modes.chain(curves.rigid(at)).collect();

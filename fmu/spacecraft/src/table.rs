@@ -515,7 +515,10 @@ static BALL_STATE: Enumeration = Enumeration {
     description: "State of a tank's liquid",
     items: &[
         Item::new("settled", "Liquid at the bottom: rigid liquid and pendulums"),
-        Item::new("flying", "Detached liquid in free flight through the tank, without force on the spacecraft"),
+        Item::new(
+            "flying",
+            "Detached liquid in free flight through the tank, without force on the spacecraft",
+        ),
         Item::new("sliding", "Detached liquid in contact with the wall"),
     ],
 };

@@ -1,12 +1,12 @@
-//! Momentum, angular momentum and energy: what is in the craft is what came in.
+//! Momentum, angular momentum and energy equal their initial values plus what acts on the craft.
 //!
 //! ```text
 //! P' = C f,   H' = C (tau - r_c x f),   E = work - dissipated + const
 //! ```
 //!
-//! The integrals over a step are taken by Lobatto's rule of five points, of order 8: the
-//! craft turns by less than 0.03 rad and the liquid swings by less than 0.3 rad in a step, which
-//! leaves 1e-13 of a step's share. On a pivot gravity turns the craft, too; H is about O.
+//! Lobatto's rule of five points, of order 8, integrates over a step. In a step the craft turns by
+//! less than 0.03 rad and the liquid swings by less than 0.3 rad, so the error is 1e-13 of a step's
+//! contribution. On a pivot gravity turns the craft, too, and H is about O.
 
 use craft::{Inputs, Mount, Outputs, Parameters, Ramp};
 use serde_json::Value;

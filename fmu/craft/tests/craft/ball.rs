@@ -18,8 +18,8 @@ pub(super) fn thrust(force: f64) -> Inputs {
     Inputs { force: Ramp::held([0.0, 0.0, force]), ..Inputs::default() }
 }
 
-/// The default craft at rest; its liquid's centre rests 0.3 m above the bottom of a tank 1.2 m high, which it
-/// half fills: it crosses 0.6 m.
+/// The default craft at rest. Its tank, 1.2 m high, is half full, and the liquid's centre rests 0.3 m above the bottom,
+/// so it crosses 0.6 m.
 fn craft() -> Parameters {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
@@ -93,8 +93,8 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     assert!(height.abs() < 1e-8);
 }
 
-/// The indicator of settled liquid is the lesser of what the axial acceleration exceeds its limit by and of the bobs' mean cosine, by
-/// modal mass, less that of 45 degrees. A tank without a ball regime has 1.
+/// The indicator of settled liquid is the smaller of two margins: axial acceleration minus its limit, and the bobs'
+/// mean cosine, by modal mass, minus that of 45 degrees. In a tank without a model of detached liquid it is 1.
 #[test]
 fn a_host_sees_the_bobs_pass_45_degrees_by_modal_mass() {
     for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1)] {

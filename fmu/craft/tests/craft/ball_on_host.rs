@@ -1,4 +1,4 @@
-//! Liquid that leaves the bottom of a tank on somebody else's craft, beside the same tank of a Spacecraft.
+//! Liquid that leaves the bottom of a tank on a host, compared with the same tank of a Spacecraft.
 //!
 //! The host is a rigid body that solves (M_host + M_a) [a; w'] = rest + bias, and adds M_host^-1 of the tank's impulses to
 //! its velocity and rate. What is conserved is read off a Spacecraft in the same state.
@@ -321,8 +321,9 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
     (v(&a) - v(&b)).norm()
 }
 
-/// Reversed thrust, none, and thrust forwards. Runge-Kutta at 1 ms and events to 1e-16 s, the liquid's states given and taken
-/// as in Model Exchange; without thrust momentum is that of the start, by the Spacecraft's outputs.
+/// Reversed thrust, no thrust, and thrust forwards. The host uses Runge-Kutta at 1 ms, locates events to 1e-16 s, and
+/// exchanges the liquid's states as in Model Exchange. Without thrust the Spacecraft's outputs show the initial
+/// momentum.
 #[test]
 fn a_host_that_integrates_itself_moves_as_the_spacecraft_does_and_keeps_momenta_and_energy() {
     let (mut seen, mut impulses) = ([0; 6], 0);
@@ -381,8 +382,8 @@ fn a_host_that_integrates_itself_moves_as_the_spacecraft_does_and_keeps_momenta_
     assert!(seen[1..4].iter().all(|count| *count > 3_000), "{seen:?}");
 }
 
-/// On the axis nothing turns, and what the host lacks within a step is known: two steps a second give the host the velocity
-/// that it has as a Spacecraft, through a reversal, bounces and the settling at either end.
+/// Motion along the axis does not rotate the host, so the lag of the host within a step is known. Two steps a second
+/// give the host the same velocity as a Spacecraft, through a reversal, bounces and settling at both ends.
 #[test]
 fn on_the_axis_the_host_s_velocity_is_exact_at_any_communication_step() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };

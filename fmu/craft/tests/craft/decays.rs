@@ -151,9 +151,9 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_a_pushed_back_tank_is_out_of_
     assert!(ranges(800.0, -2000.0, 0.1).in_range);
 }
 
-/// Each mode's wave counts: 0.1 rad of the first are 0.084 R and linear, 0.1 rad of the second too, whose wave is half as
-/// high, are 0.126 R, and 0.15 rad of both 0.188 R. Of a tank whose waves are not given the first angle is that of a
-/// cylinder.
+/// The wave of each mode counts. 0.1 rad of the first mode are 0.084 R, in the linear range. 0.1 rad of both, with half
+/// as high a wave of the second, are 0.126 R, and 0.15 rad of both 0.188 R. If a tank's waves are not given, the first
+/// angle uses that of a cylinder.
 #[test]
 fn the_regime_is_that_of_all_modes_waves_together_and_a_cylinder_s_where_no_wave_is_given() {
     let with = |wave: [f64; MODES], angle: f64| {
@@ -218,8 +218,8 @@ fn each_tank_s_range_is_that_of_the_acceleration_along_its_own_axis() {
     }
 }
 
-/// However the host makes the acceleration at the hinge, by a, by w' or by w, the drag under it is the same: what zeta
-/// adds to p'' under 2 m/s2 along the tank.
+/// The drag does not depend on how a, w' or w produce the acceleration at the hinge. The test reads the contribution of
+/// zeta to p'' at 2 m/s2 along the tank.
 #[test]
 fn drag_follows_the_acceleration_at_the_hinge_whatever_makes_it() {
     let position = [0.7, -0.4, 0.2];
@@ -284,8 +284,9 @@ fn a_tank_that_could_drain_has_the_drag_of_one_that_cannot() {
     }
 }
 
-/// zeta_A A with A^2 = angle^2 + (rate/w)^2 + A_0^2, of the dissipated power 2 zeta_A A m w l^2 rate^2; the sine of the angle
-/// would take 8 % less at 0.7 rad at rest. A tank that could drain and one with planar modes are written apart.
+/// The expected value is zeta_A A with A^2 = angle^2 + (rate/w)^2 + A_0^2, from the dissipated power 2 zeta_A A m w l^2
+/// rate^2. The sine of the angle would give 8 % less at 0.7 rad at rest. Draining tanks and planar modes have their own
+/// equations.
 #[test]
 fn the_amplitude_of_the_damping_is_the_angle_not_its_sine() {
     let zeta_a = 0.05;

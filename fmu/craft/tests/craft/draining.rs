@@ -485,8 +485,9 @@ fn a_draining_tank_s_force_is_newton_s() {
     }
 }
 
-/// A host that solves with added mass and bias has the accelerations of the craft as a whole, and the
-/// tanks' bobs those of its own, while all of them drain: force and torque, Newton's and Euler's.
+/// While all tanks drain, a host that solves with added mass and bias has the accelerations of the
+/// whole craft, and the tanks' bobs have those of the craft's bobs. Force and torque match Newton's
+/// and Euler's laws.
 #[test]
 fn tanks_that_drain_on_a_rigid_body_are_the_craft() {
     for seed in 0..12 {

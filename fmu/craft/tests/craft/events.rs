@@ -1,5 +1,5 @@
-//! Events of detached liquid: impacts, release and settling come at the same instants whoever integrates and however long the
-//! steps are.
+//! Events of detached liquid: impacts, release and settling occur at the same instants for every integrator and every
+//! length of step.
 //!
 //! The reference is a simulator in maximal coordinates: the craft is a rigid body, the detached liquid is a point mass, and the
 //! wall is a constraint with a Lagrange multiplier. The integrator is an extrapolation method of order 10, and events are located by
@@ -28,7 +28,7 @@ impl Case {
         (0.1 * radius / f64::sqrt(4.0 * acceleration * semi.z)).min(0.02)
     }
 
-    /// Whether the liquid leaves its bottom at once and stays off, which is all that the simulator has equations of.
+    /// True if the liquid leaves its bottom at once and stays off, the only case for which the simulator has equations.
     fn stays_loose(&self) -> bool {
         let mut craft = Spacecraft::new(&self.p, &self.u, 0.0, 1e-9).unwrap();
         (0..100).all(|k| {
@@ -441,27 +441,27 @@ fn impacts_are_those_of_an_independent_simulator_at_any_communication_step() {
     }
 }
 
-/// What a host of Model Exchange integrates.
+/// Interface that a Model Exchange host integrates.
 pub(super) trait Equations {
     fn rates(&mut self, x: &[f64]) -> Vec<f64>;
 
     fn indicators(&mut self, x: &[f64]) -> Vec<f64>;
 
-    /// What `completedIntegratorStep` answers: whether the host has to handle an event.
+    /// Result of `completedIntegratorStep`: true if the host must handle an event.
     fn is_event_overdue(&mut self, x: &[f64]) -> bool;
 
     /// Handles events and returns the states after them.
     fn event(&mut self, x: &[f64]) -> Vec<f64>;
 }
 
-/// How a host integrates: the method of Dormand and Prince, of order 5.
+/// Integrator of a host: the method of Dormand and Prince, of order 5.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Method {
     /// Relative and absolute tolerance of a step; 0 for steps of the length `longest`.
     pub tolerance: f64,
     /// The longest step, s.
     pub longest: f64,
-    /// Whether events are located within a step. If not, they are handled at its end.
+    /// True if events are located within a step. Otherwise they are handled at its end.
     pub locates: bool,
 }
 
@@ -606,7 +606,7 @@ impl Equations for Own<'_> {
     }
 }
 
-/// By a host that integrates itself. Returns what it shows at the end, and how many impacts it has had.
+/// Simulates with a host that integrates itself. Returns the outputs at the end and the number of impacts.
 fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     let craft = Spacecraft::new(&case.p, &case.u, 0.0, 1e-12).unwrap();
     let start = craft.continuous_states();
@@ -677,12 +677,12 @@ fn a_host_of_model_exchange_that_locates_no_events_keeps_the_liquid_in_the_tank(
     }
 }
 
-/// What the runs of [`compare_hosts`] have come to.
+/// Results of the runs of [`compare_hosts`].
 #[derive(Debug, Default)]
 struct Figures {
     craft: usize,
-    /// How many craft are left out: their liquid settles, or a change of the thrust by a factor of 1 + 1e-7 changes the result by more
-    /// than 1e-3 or the number of impacts.
+    /// Number of craft left out. Their liquid settles, or a change of the thrust by a factor of 1 + 1e-7 changes the
+    /// result by more than 1e-3 or the number of impacts.
     settled: usize,
     too_sensitive: usize,
     impacts: usize,

@@ -77,8 +77,8 @@ fn a_host_that_integrates_itself_meets_the_crafts_own_steps() {
     }
 }
 
-/// A rigid body with tanks hung on it, q, w, r, V and the tanks' states, whose host solves
-/// (M_body + sum of M_a) [a; w'] = rest + sum of bias in every stage of its integrator.
+/// A rigid body with attached tanks: q, w, r, V and the tanks' states. Its host solves (M_body +
+/// sum of M_a) [a; w'] = rest + sum of bias in every stage of its integrator.
 pub struct HostWithTanks {
     p: Parameters,
     tanks: Vec<SloshTank>,

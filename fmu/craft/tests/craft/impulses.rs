@@ -179,9 +179,9 @@ fn a_step_takes_few_internal_steps() {
     }
 }
 
-/// Froude: lengths and accelerations times four, masses and stiffnesses as they are, and angles run through the same
-/// instants, to the last bit, for a factor of two is exact; what is dissipated, m l^2/s^2, is 16 times as much. So the
-/// steps that the tolerance asks for do not hang on the metre.
+/// Froude scaling: with four times the lengths and accelerations and equal masses and stiffnesses, angles pass through
+/// the same instants to the last bit, because a factor of two is exact. Dissipated energy, m l^2/s^2, is 16 times as
+/// much. The steps for a tolerance therefore do not depend on the unit of length.
 #[test]
 fn a_tank_four_times_as_large_under_four_times_the_acceleration_moves_the_same() {
     for seed in 0..10 {

@@ -1,5 +1,6 @@
-//! The same physics written another way: Newton's law of every body with the rods' pulls as
-//! unknowns, bobs in p'' instead of v, no added mass, no expansion; solved as one dense system.
+//! An independent formulation of the same physics: Newton's law of every body with the rods'
+//! tensions as unknowns, bobs in p'' instead of v, no added mass, no expansion. One dense system is
+//! solved.
 
 use craft::{
     Coupling, DampingLaw, Inputs, MODES, Mount, Parameters, STATES, SloshTank, Spacecraft, Tank,

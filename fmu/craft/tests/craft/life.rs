@@ -60,8 +60,8 @@ fn the_tolerance_is_kept() {
     }
 }
 
-/// What a step's errors are compared with begins at 0 in a craft at rest, and grows along with the motion: spun up by
-/// 1 rad/s2, so that a stiffly held bob, too light for the craft to feel it, begins to swing at 10 rad/s.
+/// In a craft at rest the scale of a step's errors begins at 0 and grows with the motion. The craft is spun up by 1
+/// rad/s2, so that a stiffly held bob, too light to affect the craft, begins to swing at 10 rad/s.
 #[test]
 fn the_tolerance_is_kept_from_rest() {
     let mut p = Parameters::default();
@@ -81,8 +81,8 @@ fn the_tolerance_is_kept_from_rest() {
     }
 }
 
-/// A tank that drains, alone and on a craft, over one step of 5 s, against runs at 1e-13: a hundred times the
-/// tolerance, which is what one internal step may leave.
+/// Runs a draining tank, alone and on a craft, over one step of 5 s and compares with runs at 1e-13. The limit is a
+/// hundred times the tolerance, the allowed error of one internal step.
 #[test]
 fn the_tolerance_is_kept_while_tanks_drain() {
     for seed in 0..4 {
@@ -180,8 +180,8 @@ fn words_that_are_no_state_are_refused() {
     assert_eq!(TankState::from_words(&[0; TankState::WORDS]), None);
 }
 
-/// The wheels' momentum jumps at the first step and again after a second, or rises within a step
-/// by as much; H is kept to rounding, energy is what the impulse worked.
+/// The wheels' momentum jumps at the first step and again after a second, or rises within a step by
+/// as much. H is conserved to rounding, and the energy is the work of the impulse.
 #[test]
 fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
     for seed in 0..28 {

@@ -10,8 +10,8 @@ use super::component::{SloshTank, Spacecraft};
 use super::exchange::{HostWithTanks, runge_kutta};
 use super::random::Random;
 
-/// A box of 1000 kg of liquid as wide as deep along y and twice as long along x: a mode along each axis, whose masses are more
-/// than the liquid's.
+/// Returns a box with 1000 kg of liquid, as wide as deep along y and twice as long along x. It has one mode along each
+/// axis, and their masses add up to more than the liquid's.
 fn a_box() -> Tank {
     let mut tank = Tank {
         position: [0.0; 3],
@@ -39,8 +39,8 @@ fn craft(tank: Tank) -> Parameters {
     p
 }
 
-/// Moving in one of its planes of symmetry, at any amplitude, a craft with a box has the motion of one with a tank all around, in
-/// which the mode along the other axis is frozen where it hangs.
+/// A craft with a box that moves in a plane of symmetry has, at any amplitude, the motion of a craft with an
+/// axisymmetric tank. The mode along the other axis is then rigid at its position at rest.
 #[test]
 fn in_a_plane_of_symmetry_the_mode_across_is_rigid_liquid() {
     for along in [0, 1] {
@@ -85,8 +85,8 @@ fn in_a_plane_of_symmetry_the_mode_across_is_rigid_liquid() {
     }
 }
 
-/// k/m (1 + m/M + m z^2/I_y + m y^2/I_z) of a free craft without thrust: z the bob's height and y the arm of its line of motion from
-/// the centre of mass of the rest, of mass M and moments of inertia I.
+/// Expected: k/m (1 + m/M + m z^2/I_y + m y^2/I_z) of a free craft without thrust. z is the bob's height and y the arm
+/// of its line of motion, both from the centre of mass of the remaining body, with mass M and moments of inertia I.
 #[test]
 fn a_free_body_with_a_planar_mode_off_its_axis_has_the_closed_form_s_frequency() {
     for along in [0, 1] {
@@ -225,8 +225,8 @@ fn a_craft_that_is_singular_without_its_liquid_is_refused_where_the_liquid_may_l
 
 type V = Vector3<f64>;
 
-/// Momentum and angular momentum about the origin of space, and energy, of a body with its tanks, from positions and velocities of
-/// every mass: a second sum that shares nothing with the outputs.
+/// Returns momentum and angular momentum about the inertial origin, and energy, of a body with its tanks, from
+/// positions and velocities of every mass. This sum is independent of the outputs.
 fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
     let v = |at: usize| V::from_column_slice(&x[at..at + 3]);
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(x[0], x[1], x[2], x[3]));
@@ -267,8 +267,8 @@ fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
     [p.x, p.y, p.z, h.x, h.y, h.z, energy + springs]
 }
 
-/// Nothing acts on a body whose host solves (M_body + sum of M_a) [a; w'] = rest + sum of bias: it keeps momentum and angular
-/// momentum, and loses of its energy what the tanks say that they dissipate, in every stage of the host's integrator.
+/// Nothing acts on a body whose host solves (M_body + sum of M_a) [a; w'] = rest + sum of bias. It conserves momentum
+/// and angular momentum in every stage of the host's integrator, and loses the energy that the tanks dissipate.
 #[test]
 fn a_host_with_its_tanks_keeps_momentum_and_loses_the_energy_that_they_dissipate() {
     let mut telling = 0;

@@ -121,7 +121,7 @@ fn ramp(terms: &Value, port: &str, k: usize) -> Ramp {
         let (dir, get) = (numbers(&term["dir"]), |name: &str| term[name].as_f64().unwrap_or(0.0));
         let middle = knot(k) + STEP / 2.0;
         // Frequencies are multiples of 0.001 Hz, so the cycles at a knot are a fraction of whole
-        // numbers: far from t = 0 an angle of many turns would have lost digits.
+        // numbers. Far from t = 0, an angle of many turns would have lost digits.
         let cycles = |k: usize| {
             let per_knot = (get("freq") * 1000.0).round() as usize * 2;
             (per_knot * k % 100_000) as f64 / 1e5

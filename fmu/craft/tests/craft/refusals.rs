@@ -165,8 +165,8 @@ fn products_of_inertia_need_moments_to_match() {
         let (s, c) = f64::from(degrees).to_radians().sin_cos();
         assert_eq!(with([s * s, c * c, 1.0, -s * c, 0.0, 0.0]), [""; 0], "{degrees}");
     }
-    // Every pair is in order and one principal moment is below 0: with equal moments 1 and products c the
-    // determinant is 1 + 2 c^3 - 3 c^2 = (1 - c)^2 (1 + 2 c), and negative below c = -1/2.
+    // Every pair is consistent and one principal moment is below 0. With equal moments 1 and products c the determinant
+    // is 1 + 2 c^3 - 3 c^2 = (1 - c)^2 (1 + 2 c), negative below c = -1/2.
     let equal = |c: f64| with([1.0, 1.0, 1.0, c, c, c].map(|x| 100.0 * x));
     let negative = equal(-0.51);
     assert!(negative.len() == 1, "{negative:?}");

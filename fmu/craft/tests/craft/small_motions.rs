@@ -1,8 +1,8 @@
-//! Small motions about steady thrust: poles, zeros and the attitude loop's danger zone from the
-//! directional derivatives, against closed forms.
+//! Small motions about steady thrust: poles, zeros and the danger zone of the attitude loop from
+//! directional derivatives, compared with closed forms.
 //!
-//! With all heights z from the centre of mass of the rigid part R (dry craft and rigid liquid),
-//! M = m_R, I its transverse inertia there, hinge h, bob b = h - l, lateral force at z_f:
+//! All heights are from the centre of mass of the rigid part R (dry craft and rigid liquid). M =
+//! m_R, I its transverse inertia there, hinge h, bob b = h - l, lateral force at z_f:
 //!
 //! ```text
 //! w_0^2 = g/l + k/m,  sigma = 1 + m/M + m b^2/I
@@ -246,8 +246,8 @@ const K_D: f64 = 0.28;
 /// Point of attack of the lateral force, from O, m.
 const ENGINE: f64 = -1.3;
 
-/// Growth rate of the slosh pole, 1/s, in a loop that makes tau = -K_p theta - K_d theta' by a
-/// lateral force at the engine: tau = (z_f - center) f.
+/// Returns the growth rate of the slosh pole, 1/s, in a loop that makes tau = -K_p theta - K_d
+/// theta' by a lateral force at the engine: tau = (z_f - center) f.
 fn growth(z: f64, c: f64) -> f64 {
     let p = craft_with_tank_at(z, 0.0, c);
     let closed = Closed::new(&p);
@@ -310,8 +310,8 @@ fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     low
 }
 
-/// Unstable where the hinge is above R's centre of mass (h > 0) and the bob below its centre of
-/// percussion (b < I/(M |z_f|)), the ends within 1 % of the zone's length.
+/// The loop is unstable if the hinge is above R's centre of mass (h > 0) and the bob is below its
+/// centre of percussion (b < I/(M |z_f|)). The ends of the zone are within 1 % of its length.
 #[test]
 fn danger_zone_lies_between_centre_of_mass_and_centre_of_percussion() {
     let at = |z: f64| Closed::new(&craft_with_tank_at(z, 0.0, 0.0));

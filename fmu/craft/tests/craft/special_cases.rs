@@ -217,8 +217,8 @@ fn a_pivot_is_a_free_craft_with_all_the_mass_of_the_world_at_o() {
         (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         let u = Inputs { torque: Ramp::held(random.vector(20.0)), ..Inputs::default() };
         let mut pivot = Spacecraft::new(&p, &u, 0.0, 1e-12).unwrap();
-        // Let the free one be pushed at O by -g times all its mass, in the inertial frame; over
-        // this short while only the start counts, so compare the rates there.
+        // Push the free craft at O by -g times its total mass, in the inertial frame. Over this
+        // short time only the start matters, so compare the rates there.
         let heavy = 1e11;
         let mut free = p;
         free.mount = Mount::Free;

@@ -48,8 +48,8 @@ fn tilted([x, y]: [f64; 2]) -> [f64; 4] {
     [1.0, x / 2.0, y / 2.0, 0.0]
 }
 
-/// With the angles of tilt theta = theta_x + i theta_y in axes that turn along, phi = theta e^(i W t) in space:
-/// I phi'' - i I_a W phi' + (k - M g h) phi = 0, W the spin, I and I_a about O across and along the axis.
+/// Tilt angles theta = theta_x + i theta_y in rotating axes, phi = theta e^(i W t) in space: I phi'' - i I_a W phi' +
+/// (k - M g h) phi = 0, with the spin W and I and I_a about O across and along the axis.
 #[test]
 fn a_spinning_platform_nutates_and_precesses_at_the_frequencies_of_a_top_on_a_spring() {
     let mut p = platform();
@@ -142,8 +142,8 @@ fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     assert!(out.omega.iter().all(|w| w.abs() < 1e-9));
 }
 
-/// Platform and bob are a double pendulum: (K - omega^2 M)(theta, phi) = 0 with the bob at z theta + l phi,
-/// M = [[I + m z^2, m z l], [m z l, m l^2]], K = diag(k - g (M h + m z), m g l).
+/// Platform and bob form a double pendulum: (K - omega^2 M)(theta, phi) = 0 with the bob at z theta + l phi, M = [[I +
+/// m z^2, m z l], [m z l, m l^2]], K = diag(k - g (M h + m z), m g l).
 #[test]
 fn liquid_on_a_tilting_platform_swings_as_a_double_pendulum() {
     let mut p = platform();
@@ -220,8 +220,9 @@ fn coulomb_friction_slows_a_platform_by_its_torque_over_the_inertia_and_lets_it_
     assert!(out.omega[2].abs() < 1e-20, "{}", out.omega[2]);
 }
 
-/// The law by itself, r = (C + D exp(-(w/w_s)^2)) tanh(w/eps), in another simulator: I w' = tau - c w - r by the classical
-/// Runge-Kutta method in steps of eps I/(C + D)/20, whose error is below 1e-9 rad/s (a twentieth of it with half the step).
+/// The friction law alone, r = (C + D exp(-(w/w_s)^2)) tanh(w/eps), in another simulator. I w' = tau - c w - r is
+/// integrated by classical Runge-Kutta in steps of eps I/(C + D)/20, whose error is below 1e-9 rad/s (a twentieth of it
+/// with half the step).
 #[test]
 fn a_platform_that_rubs_under_a_swinging_torque_follows_the_law_of_stribeck() {
     let (mut p, i_z, tau, w) = (platform(), 0.4, 0.12, 3.0);
