@@ -4,11 +4,11 @@
 //! zeta(A) = zeta + zeta_A A,   A^2 = |q|^2 + |q'|^2/W,   W = omega_n^2
 //! ```
 //!
-//! q: slosh angle in both directions, rad. Waves of finite height lose more of themselves in a period than
-//! the layer at the wall takes: the surface film stretches, the contact line runs, crests break up. No
-//! formula gives zeta_A; it is measured, or fitted (`hubslosh identify`). The drag on the bob is
-//! 2 zeta(A) m omega_n times its velocity, so that it never drives, and in a free oscillation
-//! A' = -omega_n (zeta + zeta_A A) A:
+//! q is the slosh angle in both directions, rad. Waves of finite height dissipate more energy per period
+//! than the laminar layer at the wall: the surface film stretches, the contact line moves, crests break up.
+//! There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The drag on the bob is 2
+//! zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation A' = -omega_n (zeta +
+//! zeta_A A) A:
 //!
 //! ```text
 //! c_A = 2 m zeta_A u^(1/2),   u = W (|q|^2 + A_0^2) + |q'|^2
@@ -21,7 +21,7 @@ use taylor::series::{Series, ZERO, mul_ramp};
 /// A_0, rad.
 const FLOOR: f64 = 1e-4;
 
-/// W is kept from 0 by this part of 1/l times 1 m/s2: drag without restoring force is none.
+/// Lower bound of W, as a part of 1/l times 1 m/s2: without restoring force there is no drag.
 const WEIGHTLESS: f64 = 1e-6;
 
 /// Growth of one mode's drag with amplitude.
@@ -37,9 +37,9 @@ pub struct Growth {
     q2: Series,
     u: Series,
     root: Series,
-    /// Viscous drag over its value at the start of the expansion.
+    /// Viscous drag relative to its value at the start of the expansion.
     pub viscous: Series,
-    /// The share of the other drag, viscous or a baffle's, in the whole at the start; 2 m zeta_A over the whole.
+    /// Share of the other drag, viscous or a baffle's, in the whole at the start; 2 m zeta_A over the whole.
     share: f64,
     gain: f64,
 }
@@ -61,13 +61,13 @@ impl Default for Growth {
 }
 
 impl Growth {
-    /// Growth for a mode of length `l`, m.
+    /// Creates the growth for a mode of length `l`, m.
     pub fn new(zeta: f64, l: f64) -> Growth {
         Growth { zeta, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
-    /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2] and the other drag coefficient `c`, of which the
-    /// viscous part runs along `viscous`; returns the coefficient of both.
+    /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2], with the other drag coefficient `c`, whose viscous
+    /// part runs along `viscous`. Returns the coefficient of both.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -78,8 +78,8 @@ impl Growth {
         both
     }
 
-    /// Coefficient n of the drag over its value at the start, from those of [|q|^2, |q'|^2] and of the other drag over
-    /// its own.
+    /// Returns coefficient n of the drag relative to its value at the start, from those of [|q|^2, |q'|^2] and of the
+    /// relative other drag.
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2], other: f64) -> f64 {
         self.q2[n] = q2 + if n == 0 { FLOOR * FLOOR } else { 0.0 };
         self.u[n] = mul_ramp(n, &self.w, &self.q2) + v2;

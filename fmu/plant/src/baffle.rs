@@ -1,4 +1,4 @@
-//! A flat ring at the wall below the surface: damping that grows with the wave.
+//! A flat ring at the wall below the surface, whose damping grows with the wave.
 //!
 //! Miles (1958), first mode of an upright cylinder, for a ring of the width w at the depth d below
 //! the surface, covering alpha = (w/R)(2 - w/R) of the section, and a wave of the amplitude eta at
@@ -8,9 +8,9 @@
 //! zeta = 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)
 //! ```
 //!
-//! The ring separates the flow: the drag is 2 zeta omega m times the bob's velocity, with the
-//! amplitude that q and q' of the moment make, eta = (wave per angle) A, A^2 = |q|^2 + |q'|^2/omega^2.
-//! So it never drives, and in a free oscillation a' = -zeta(a) omega a. With W = omega^2 the drag is
+//! The ring separates the flow. The drag is 2 zeta omega m times the bob's velocity, with the amplitude from the
+//! current q and q', eta = (wave per angle) A, A^2 = |q|^2 + |q'|^2/omega^2. It therefore always dissipates, and in a
+//! free oscillation a' = -zeta(a) omega a. With W = omega^2 the drag is
 //!
 //! ```text
 //! c_b = 2 m Z u^(1/4),   u = W [W (|q|^2 + A_0^2) + |q'|^2],   zeta = Z A^(1/2)
@@ -18,9 +18,9 @@
 //!
 //! A_0, far below the law's range, keeps u away from 0.
 //!
-//! The law is that of Keulegan and Carpenter's plates: it holds where the liquid's stroke at the ring
-//! is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. Smaller waves keep more
-//! damping than it says.
+//! The law is that of plates by Keulegan and Carpenter. It holds if the liquid's stroke at the ring
+//! is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. For smaller waves the
+//! damping is higher than the law.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -31,19 +31,19 @@ use taylor::series::{Series, ZERO, mul_ramp};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
 
-/// Bounds of the wave times exp(-1.84 d/R) over the ring's width, within which the law is known.
+/// Range of the wave times exp(-1.84 d/R) over the ring's width in which the law holds.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// A_0 over the amplitude at which the range begins: makes 2e-4 of the damping there.
+/// A_0 over the amplitude at which the range begins; it adds 2e-4 of the damping there.
 const FLOOR: f64 = 0.03;
 
-/// W is kept from 0 by this part of 1/l times 1 m/s2: drag without restoring force is none.
+/// Lower bound of W, as a part of 1/l times 1 m/s2: without restoring force there is no drag.
 const WEIGHTLESS: f64 = 1e-6;
 
-/// A ring baffle and one mode's drag by it.
+/// A ring baffle and its drag on one mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baffle {
-    /// Z, the damping ratio at a slosh angle of 1 rad; 0: there is none.
+    /// Z, the damping ratio at a slosh angle of 1 rad; 0 without a baffle.
     pub zeta: f64,
     /// A_0^2
     floor2: f64,
@@ -57,7 +57,8 @@ pub struct Baffle {
     sum: Series,
     u: Series,
     root: Series,
-    /// Viscous drag over its value at the start of the expansion, and its share of the whole then.
+    /// Viscous drag relative to its value at the start of the expansion, and its share of the whole
+    /// at the start.
     viscous: Series,
     share: f64,
     /// 2 m Z over the whole drag coefficient at the start.
@@ -90,13 +91,13 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     if width > 0.0 {
         if width >= p.tank.d / 2.0 {
             problems.push(format!(
-                "baffle.width = {width} (allowed: less than the radius tank.d/2 = {})",
+                "baffle.width = {width} m (allowed: less than the radius tank.d/2 = {} m)",
                 p.tank.d / 2.0
             ));
         }
         if p.slosh.source == SloshSource::Geometry && depth >= p.tank.h {
             problems.push(format!(
-                "baffle.depth = {depth} (allowed: less than tank.h = {}, depths count from the \
+                "baffle.depth = {depth} m (allowed: less than tank.h = {} m; depths count from the \
                  surface)",
                 p.tank.h
             ));
@@ -114,20 +115,20 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let alpha = covered(p.tank.d / 2.0, p.baffle.width);
     if alpha >= 0.25 {
         warnings.push(format!(
-            "baffle.width: the ring covers {alpha:.3} of the section; Miles's formula is for less \
+            "baffle.width: the ring covers {alpha:.3} of the section, but Miles's formula holds for less \
              than 0.25"
         ));
     }
     if p.slosh.source == SloshSource::Table {
         warnings.push(
-            "baffle: Miles's formula is for an upright cylinder, here of the diameter tank.d"
+            "baffle: Miles's formula holds for an upright cylinder. The model takes one of diameter tank.d"
                 .to_string(),
         );
     }
     warnings
 }
 
-/// Range of the ring's law.
+/// Range of the baffle's law.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
     /// Stroke over the ring's width per wave amplitude, 1/m.
@@ -137,7 +138,7 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    /// `None` without a ring.
+    /// Creates the range; `None` without a baffle.
     pub fn new(p: &Parameters) -> Option<Range> {
         let Ring { width, depth } = p.baffle;
         let radius = p.tank.d / 2.0;
@@ -152,15 +153,15 @@ impl Range {
     /// Returns true for a wave of this amplitude at the wall, m.
     pub fn contains(&self, amplitude: f64) -> bool {
         STROKE.contains(&(amplitude * self.stroke))
-            // The case of d = eta is inside, however it is rounded.
+            // d = eta is inside the range, independent of rounding.
             && amplitude <= self.depth * (1.0 + 1e-9)
             && self.covers_little
     }
 }
 
 impl Baffle {
-    /// The ring's action on the first mode, whose wave at the wall is `wave` per angle, m/rad, and
-    /// whose length is `l`, m.
+    /// Creates the baffle for the first mode, whose wave at the wall is `wave` per angle, m/rad,
+    /// and whose length is `l`, m.
     pub fn new(p: &Parameters, wave: f64, l: f64) -> Baffle {
         let (radius, Ring { width, depth }) = (p.tank.d / 2.0, p.baffle);
         let zeta = miles_ring(radius, depth, width, wave);
@@ -168,15 +169,16 @@ impl Baffle {
         Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
     }
 
-    /// Amplitude of the motion, rad, and its damping ratio, at W = `w` and [|q|^2, |q'|^2].
+    /// Returns the amplitude of the motion, rad, and its damping ratio, at W = `w` and [|q|^2,
+    /// |q'|^2].
     pub fn present<T: Number>(&self, w: T, [q2, v2]: [T; 2]) -> (T, T) {
         let w = w + T::constant(self.w_floor);
         let amplitude = (q2 + v2 / w).sqrt();
         (amplitude, amplitude.sqrt() * self.zeta)
     }
 
-    /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2] and the viscous drag coefficient `c`
-    /// that runs along `viscous`; returns the coefficient of both.
+    /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2], with the viscous drag coefficient
+    /// `c` that runs along `viscous`. Returns the coefficient of both.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -187,7 +189,8 @@ impl Baffle {
         both
     }
 
-    /// Coefficient n of the drag over its value at the start, from those of [|q|^2, |q'|^2].
+    /// Returns coefficient n of the drag relative to its value at the start, from those of [|q|^2,
+    /// |q'|^2].
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2]) -> f64 {
         self.q2[n] = q2 + if n == 0 { self.floor2 } else { 0.0 };
         self.v2[n] = v2;

@@ -1,8 +1,8 @@
-//! Slosh damping that follows the specific force g along the tank's axis.
+//! Slosh damping as a function of the specific force g along the tank's axis.
 //!
-//! The viscous coefficient of a mode is c = 2 zeta omega_n m with omega_n = sqrt(g/l). A constant
-//! damping ratio zeta makes c ~ g^(1/2); a laminar layer at the wall, zeta ~ omega_n^(-1/2)
-//! (`formulas::damping`), makes c ~ g^(1/4). A centring stiffness makes g larger by a_n (`tank.rs`). So
+//! The viscous coefficient of a mode is c = 2 zeta omega_n m with omega_n = sqrt(g/l). A constant damping ratio zeta
+//! gives c ~ g^(1/2). A laminar layer at the wall, zeta ~ omega_n^(-1/2) (`formulas::damping`), gives c ~ g^(1/4). A
+//! centring stiffness adds a_n to g (`tank.rs`), so
 //!
 //! ```text
 //! c(g) = c_0 [(g + a_n)/(g_0 + a_n)]^p,   p = 1/2 (constant_ratio) or 1/4 (laminar)
@@ -17,18 +17,18 @@ use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
-/// Below this share of the largest g on a ramp the factor is replaced by its mean: there its
-/// power series reach no further than g = 0. The time is so short that what the mean leaves
-/// out, of second order in it, is below rounding.
+/// Share of the largest g on a ramp below which the factor is replaced by its mean, because its
+/// power series converge only up to g = 0. The time below this share is so short that the error, of
+/// second order in the time, is below rounding.
 const NEAR_ZERO: f64 = 1e-6;
 
-/// Share of the series' radius of convergence, the time to g = 0, that one step takes.
+/// Largest step as a share of the series' radius of convergence, the time to g = 0.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// The highest order of an expansion along which the damping changes.
+/// Highest order of an expansion along which the damping changes.
 pub const RAMP_ORDER: usize = 10;
 
-/// c/c_0 of every mode as a function of g.
+/// Drag factor c/c_0 of every mode as a function of g.
 #[derive(Clone, Debug)]
 pub struct Damping {
     /// g_0, m/s2
@@ -42,8 +42,8 @@ pub struct Damping {
 }
 
 impl Damping {
-    /// `calculated` belongs to the specific force `reference`, at which every mode has a
-    /// restoring force.
+    /// Creates the damping. `calculated` belongs to the specific force `reference`, at which every
+    /// mode has a restoring force.
     pub fn new(p: &Parameters, calculated: &Calculated, reference: f64) -> Damping {
         let by_correlation =
             p.slosh.zeta_from_correlation && p.slosh.source == SloshSource::Geometry;
@@ -57,14 +57,14 @@ impl Damping {
         Damping { reference, exponent, zeta, centring }
     }
 
-    /// (g + a)/(g_0 + a) to the power p
+    /// Returns (g + a)/(g_0 + a) to the power p.
     fn power(&self, g: f64, a: f64) -> f64 {
         let root = libm::sqrt(f64::max(g + a, 0.0) / (self.reference + a));
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
     }
 
-    /// The damping ratio of mode `n` at g; 0 without restoring force and where it overflows next to
-    /// it: there it has no meaning.
+    /// Returns the damping ratio of mode `n` at g. Returns 0 without restoring force, and near that
+    /// point if the ratio overflows, because it has no meaning there.
     pub fn ratio(&self, n: usize, g: f64) -> f64 {
         let (zeta, a) = (self.zeta[n], self.centring[n]);
         match self.exponent == 0.25 {
@@ -74,16 +74,16 @@ impl Damping {
         }
     }
 
-    /// Its derivative by g, s2/m.
+    /// Returns the derivative of the damping ratio by g, s2/m.
     pub fn slope_of_ratio(&self, n: usize, g: f64) -> f64 {
         let x = g + self.centring[n];
         let changes = x > 0.0 && self.exponent == 0.25;
         if changes { finite_or_zero(-self.ratio(n, g) / (4.0 * x)) } else { 0.0 }
     }
 
-    /// Gives mode `n` its restoring specific force and the course of its damping from here on;
-    /// returns how long the latter holds, s. Where g + a is below `floor` the factor is its mean
-    /// until that has reached its end or twice `floor`.
+    /// Gives mode `n` its restoring specific force and the series of its damping from here on.
+    /// Returns the time, s, for which the series holds. If g + a is below `floor`, the factor is
+    /// its mean until the ramp ends or g + a reaches twice `floor`.
     pub fn expand(&self, n: usize, g: Ramp, floor: f64, pendulum: &mut Pendulum) -> f64 {
         let a = self.centring[n];
         let x = g.value + a;
@@ -104,20 +104,20 @@ impl Damping {
         reach
     }
 
-    /// The specific force below which a ramp's factor is held.
+    /// Returns the specific force below which a ramp's factor is held.
     pub fn floor(g: Ramp, h: f64) -> f64 {
         if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.at(h)) }
     }
 
-    /// Binomial series of the factor over its first value, along a ramp whose slope over its first
-    /// value is `relative`.
+    /// Writes the binomial series of the factor relative to its first value, along a ramp whose
+    /// slope over its first value is `relative`.
     fn series(&self, relative: f64, c: &mut Series) {
         for n in 0..RAMP_ORDER {
             c[n + 1] = c[n] * relative * (self.exponent - n as f64) / (n + 1) as f64;
         }
     }
 
-    /// Mean of the factor over g from `from` to `to`.
+    /// Returns the mean of the factor over g from `from` to `to`.
     fn mean(&self, from: f64, to: f64, a: f64) -> f64 {
         let integral = |g: f64| f64::max(g + a, 0.0) * self.power(g, a) / (1.0 + self.exponent);
         if from == to { self.power(from, a) } else { (integral(to) - integral(from)) / (to - from) }

@@ -1,8 +1,8 @@
-//! The plant as equations x' = f(x, u) with events, for hosts that integrate
-//! themselves, and their partial derivatives.
+//! The plant as equations x' = f(x, u) with events, for hosts that integrate themselves, and their
+//! partial derivatives.
 //!
-//! x is declared in `state.rs`. The friction's contact and the regime are discrete states:
-//! they change in [`Plant::take_event`] alone, when an indicator has crossed zero.
+//! x is declared in `state.rs`. The friction's contact and the regime are discrete states. They
+//! change only in [`Plant::take_event`], when an indicator has crossed zero.
 
 use alloc::format;
 use alloc::string::String;
@@ -20,36 +20,36 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Axial, INDICATORS, STATES, indicator, x};
 
-/// Largest number of gyro samples due at once: a host that has passed more of
-/// them ignores time events.
+/// Largest number of gyro samples due at once. A host that has passed more of them ignores time
+/// events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
 impl Plant {
-    /// The continuous states, by the places in [`x`].
+    /// Returns the continuous states, by the indices in [`x`].
     pub fn continuous_states(&self) -> &[f64; STATES] {
         &self.state.x
     }
 
-    /// Takes the continuous states from the host.
+    /// Sets the continuous states from the host.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.state.x = *x;
     }
 
-    /// Takes the time from the host, s.
+    /// Sets the time from the host, s.
     pub fn set_time(&mut self, time: f64) {
         self.state.time = time;
     }
 
-    /// x'.
+    /// Returns x'.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
         self.coefficients(0, -torque.value / self.wheel.inertia).map(unsigned_zero)
     }
 
-    /// The derivative of x' in the direction (dx, du), du = [tau_cmd, tau_ext, g_axial]:
-    /// coefficient 1 of x' along x + dx s, u + du s. The contact and the wheel's
-    /// state (blocked, at its torque limit or free) are held.
+    /// Returns the derivative of x' in the direction (dx, du), du = [tau_cmd, tau_ext, g_axial]:
+    /// coefficient 1 of x' along x + dx s, u + du s. The contact and the wheel's state (blocked, at
+    /// its torque limit or free) are held.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -78,7 +78,7 @@ impl Plant {
         self.coefficients(1, -torque.slope / self.wheel.inertia)
     }
 
-    /// Coefficient n of x' as the series have it.
+    /// Returns coefficient n of x' from the series.
     fn coefficients(&self, n: usize, wheel: f64) -> [f64; STATES] {
         let motion = &self.motion;
         let mut derivatives = [0.0; STATES];
@@ -100,15 +100,15 @@ impl Plant {
         derivatives
     }
 
-    /// The event indicators, by the places in [`indicator`]: functions that are positive
-    /// between events and cross zero at them; 1 where the event can't happen, and never 0, so
-    /// that a host's root finder sees no crossing right after an event.
+    /// Returns the event indicators, by the indices in [`indicator`]: functions that are positive
+    /// between events and cross zero at events. They are 1 where the event cannot happen, and never
+    /// 0, so that a host's root finder sees no crossing right after an event.
     pub fn event_indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
         let just_positive = |z: f64| if z == 0.0 { f64::MIN_POSITIVE } else { z };
         self.indicators(inputs).map(just_positive)
     }
 
-    /// The event indicators, exactly 0 at an event.
+    /// Returns the event indicators, exactly 0 at an event.
     fn indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
         let mut z = [1.0; INDICATORS];
         if self.motion.law.switches_at_rest() {
@@ -134,21 +134,21 @@ impl Plant {
         z
     }
 
-    /// Does what is due at the present instant: puts a hub that has just stopped
-    /// exactly at rest, finds its new contact, keeps the rotor within its speeds, takes
-    /// the gyro's samples, finds the regime. Returns whether continuous states have changed.
+    /// Performs everything that is due at the current instant. It puts a hub that has just stopped
+    /// exactly at rest, determines its new contact, keeps the rotor within its speeds, takes the
+    /// gyro's samples, and updates the regime. Returns true if continuous states have changed.
     ///
     /// # Errors
-    /// [`StepError::Model`], [`StepError::NotFinite`]; nothing has changed.
+    /// [`StepError::Model`], [`StepError::NotFinite`]; the plant is unchanged.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let (before, time) = (self.state, self.state.time);
         let period = 1.0 / self.imu.rate;
-        // Too many, or so far from zero that the clock can't tell one sample from the next.
+        // Too many samples, or a time so far from zero that the clock cannot separate two samples.
         let endless = |due| time - due > SAMPLES_AT_ONCE * period || time + period <= time;
         if self.next_time_event().is_some_and(endless) {
             return Err(StepError::Model(format!(
-                "more gyro samples are due at t = {time} s than can be taken at once; the host has \
-                 passed time events, or imu.rate is too high for times of this size"
+                "too many gyro samples are due at t = {time} s. The host has skipped time events, or imu.rate \
+                 is too high for the resolution of time there"
             )));
         }
         if self.wheel.enabled {
@@ -161,8 +161,8 @@ impl Plant {
             }
             self.find_contact(inputs);
         }
-        // A host's root finder may land on the very instant of the break-away, where the
-        // torque is still held; the next sign change would never come.
+        // A host's root finder may land exactly on the break-away, where the torque is still held.
+        // The next sign change would never come.
         if self.state.contact == Contact::Stuck {
             let z = self.indicators(inputs);
             if z[indicator::BREAK_AWAY_FORWARD] <= 0.0 {
@@ -171,7 +171,7 @@ impl Plant {
                 self.state.record_contact(Contact::Backward, time);
             }
         }
-        // Hosts land on a time event exactly, or on it but for rounding.
+        // Hosts land on a time event exactly or to rounding.
         let slack = SLACK / self.imu.rate;
         while self.next_time_event().is_some_and(|due| due <= time + slack) {
             let omega = self.omega();
@@ -190,9 +190,8 @@ impl Plant {
         self.state.record_contact(contact, time);
     }
 
-    /// Returns true if an event is overdue that no indicator showed in the host's last step: the
-    /// host has integrated past a change of the contact or past a speed limit of the rotor, or the wave has
-    /// reached another regime.
+    /// Returns true if an event is overdue that no indicator showed in the host's last step. The host has integrated
+    /// past a change of the contact or past a speed limit of the rotor, or the wave has reached another regime.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let z = self.indicators(inputs);
         let lasting = [
@@ -206,16 +205,16 @@ impl Plant {
             || self.present_ranges(inputs) != self.state.ranges
     }
 
-    /// Number of contact changes since the start, time of the last one (s), and the contact
-    /// (-1 slipping backwards, 0 stuck, 1 slipping forwards).
+    /// Returns the number of contact changes since the start, the time of the last one (s), and the
+    /// contact (-1 slipping backwards, 0 stuck, 1 slipping forwards).
     pub fn last_contact(&self) -> (i32, f64, i32) {
         (self.state.event_count, self.state.event_time, self.state.contact as i32)
     }
 
-    /// Takes another law of friction from here on.
+    /// Changes the friction law from here on.
     ///
     /// # Errors
-    /// All that is wrong with the parameters together; nothing has changed.
+    /// All problems of the parameters; the plant is unchanged.
     pub fn set_friction(&mut self, p: &Friction, inputs: &Inputs) -> Result<(), Vec<String>> {
         let problems = Law::problems(p);
         if !problems.is_empty() {
@@ -227,14 +226,14 @@ impl Plant {
         Ok(())
     }
 
-    /// Books the work that a changing g_axial has done since the last accepted step; to be
-    /// called when the host's integrator has accepted one.
+    /// Adds the work of a changing g_axial since the last accepted step. Call it when the host's
+    /// integrator has accepted a step.
     ///
-    /// The inputs' derivatives are not known here. The rule is exact to the fourth order of the
-    /// step where g_axial is linear in time, to the second where it is not.
+    /// The inputs' derivatives are unknown here. The rule is exact to fourth order in the step if
+    /// g_axial is linear in time, otherwise to second order.
     ///
     /// # Errors
-    /// [`StepError::NotFinite`]; then nothing has changed.
+    /// [`StepError::NotFinite`]; the plant is unchanged.
     pub fn accept_step(&mut self, inputs: &Inputs) -> Result<(), StepError> {
         let work = self.work_axial(inputs);
         self.evaluate(inputs);
@@ -248,7 +247,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Refuses states set by the host that are outside the models' range.
+    /// Refuses states from the host that are outside the models' range.
     ///
     /// # Errors
     /// [`StepError::Model`]
@@ -286,8 +285,8 @@ mod tests {
         plant_with(slosh, friction, |_| {})
     }
 
-    /// A bench that leans, a suspension line, a ring baffle, damping that grows with the amplitude, surface tension a hundred times
-    /// water's.
+    /// Sets a tilted bench, a suspension line, a ring baffle, amplitude damping, and a hundred times water's surface
+    /// tension.
     fn every_option(p: &mut Parameters) {
         (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
@@ -297,7 +296,7 @@ mod tests {
         p.slosh.zeta_amplitude = 0.05;
     }
 
-    /// Modes along any direction, where the model has such.
+    /// Sets modes in any direction, if the model allows it.
     fn every_direction(p: &mut Parameters) {
         every_option(p);
         (p.slosh.source, p.baffle.width) = (SloshSource::Table, 0.0);
@@ -360,7 +359,8 @@ mod tests {
         }
     }
 
-    /// A host whose step has passed a speed limit of the rotor has to handle an event, which brings the rotor back to it.
+    /// A host whose step has passed a speed limit of the rotor must handle an event, which returns the rotor to the
+    /// limit.
     #[test]
     fn a_rotor_beyond_its_speed_limits_is_an_overdue_event() {
         let mut p = Parameters::default();
@@ -403,8 +403,8 @@ mod tests {
                 };
                 for direction in 0..STATES + 3 {
                     let (dx, du) = unit(direction);
-                    // Coordinates are 0.01 to 1: central differences over 2e-5 of that
-                    // leave the square, 1e-10, times the third derivative.
+                    // Coordinates are 0.01 to 1. Central differences over 2e-5 of that have an
+                    // error of the square, 1e-10, times the third derivative.
                     let eps = 1e-5 * if is_a_length(slosh) { 0.05 } else { 1.0 };
                     let at = |sign: f64, plant: &mut Plant| {
                         let mut moved = x;
@@ -443,11 +443,11 @@ mod tests {
         compare_output_derivatives(every_direction);
     }
 
-    /// Every continuous output, with its name.
+    /// Lists every continuous output with its name.
     fn continuous(outputs: &Outputs) -> Vec<(&'static str, f64)> {
         macro_rules! all {
             ($($name:ident),*) => {{
-                // whoever adds an output adds it here
+                // fails to compile if an output is missing here
                 let Outputs { $($name,)* wave: [radial, tangential], discrete: _ } = *outputs;
                 vec![$((stringify!($name), $name),)* ("wave", radial), ("wave", tangential)]
             }};
@@ -495,12 +495,13 @@ mod tests {
                         plant.state.x[x::OMEGA] = 0.0;
                     }
                     let x = *plant.continuous_states();
-                    // Any direction at all; the models' own scatter of sizes is 0.01 to 1.
+                    // An arbitrary direction; the models' own sizes are 0.01 to 1.
                     let mut dx: [f64; STATES] = core::array::from_fn(|i| libm::sin(1.0 + i as f64));
                     dx[x::BRISTLE] *= 1e-4; // deflections are some µrad
                     let du = [0.3, -0.4, 0.7];
-                    // Central differences leave the square of this times the third
-                    // derivative, 1e-10 of what curves over 0.1, and round at 1e-16 / 1e-6.
+                    // Central differences have an error of the square of this step times the third
+                    // derivative, 1e-10 for a curvature over 0.1, and a rounding error of
+                    // 1e-16/1e-6.
                     let eps = 1e-6 * if is_a_length(slosh) { 0.1 } else { 1.0 };
                     let at = |sign: f64, plant: &mut Plant| {
                         let moved = core::array::from_fn(|i| x[i] + sign * eps * dx[i]);
@@ -547,7 +548,7 @@ mod tests {
             assert_eq!(indicators[forward].min(indicators[backward]), f64::MIN_POSITIVE);
             plant.take_event(&inputs).unwrap();
             assert_eq!(plant.last_contact().2, sign as i32);
-            // And again at the same instant.
+            // Again at the same instant.
             plant.take_event(&inputs).unwrap();
             assert_eq!(plant.last_contact(), (1, 0.0, sign as i32));
         }
@@ -559,7 +560,7 @@ mod tests {
         p.imu.enabled = true;
         p.imu.rate = 1e4;
         let inputs = Inputs::default();
-        // At 1e6 s, ten microseconds after which the clock shows 1e-10 s and no less.
+        // At 1e6 s, where ten microseconds later the clock resolves only 1e-10 s.
         let mut plant = Plant::new(&p, &inputs, 1e6, 1e-9).unwrap();
         for _ in 0..100 {
             let due = plant.next_time_event().unwrap();
@@ -572,7 +573,7 @@ mod tests {
         assert!(plant.take_event(&inputs).is_err());
         plant.set_time(before.time);
         assert_eq!(*plant.state(), before);
-        // Where seconds are the smallest difference there is.
+        // At a time whose resolution is seconds.
         let mut plant = Plant::new(&p, &inputs, 1e16, 1e-9).unwrap();
         assert!(plant.take_event(&inputs).is_err());
     }
@@ -585,7 +586,7 @@ mod tests {
         let inputs = Inputs::default();
         let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
         let before = *plant.state();
-        // Hub and liquid rest: one step of the integrator, and 5e13 samples.
+        // Hub and liquid at rest: one step of the integrator, and 5e13 samples.
         let refused = plant.step(&inputs, 1e12);
         assert!(matches!(refused, Err(StepError::TooManySteps { .. })), "{refused:?}");
         assert_eq!(*plant.state(), before);
@@ -595,7 +596,7 @@ mod tests {
     #[test]
     fn a_motion_whose_energy_overflows_is_refused() {
         for slosh in SloshModel::ALL {
-            // omega, and the tangential rate of the first mode
+            // indices of omega and the tangential rate of the first mode
             let places = if slosh == SloshModel::Frozen {
                 &[x::OMEGA][..]
             } else {
@@ -613,7 +614,7 @@ mod tests {
         }
     }
 
-    /// A damaged saved state may hold any work; what a step leaves can be saved again.
+    /// A damaged saved state may hold any work. The state after a step can be saved again.
     #[test]
     fn work_through_g_axial_beyond_all_magnitudes_is_refused() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Viscous);
@@ -647,7 +648,7 @@ mod tests {
 
     #[test]
     fn a_host_that_integrates_itself_meets_the_plants_own_steps() {
-        // Runge-Kutta 4 at 0.1 ms: (omega_2 h)^4 = 4e-11 a step's share; 1e-9 over 0.2 s.
+        // Runge-Kutta 4 at 0.1 ms: (omega_2 h)^4 = 4e-11 per step; 1e-9 over 0.2 s.
         for slosh in SloshModel::ALL {
             let (mut plant, inputs) = plant(slosh, FrictionModel::Viscous);
             let mut own = plant.clone();

@@ -1,9 +1,9 @@
-//! The hub's motion as power series, and gravity across the axis of a bench that leans.
+//! The hub's motion as power series, and gravity across the axis of a tilted bench.
 
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul_ramp, number};
 
-/// The hub's motion as liquid and bearing see it.
+/// Motion of the hub as input to liquid and bearing.
 #[derive(Clone, Debug)]
 pub struct HubMotion {
     /// theta, rad
@@ -21,15 +21,15 @@ pub struct HubMotion {
     pub tilt: Tilt,
 }
 
-/// Gravity across the axis of a bench that leans. In the hub's frame, with the tangent t of the
-/// tilt and the azimuth phi that the lateral part points to,
+/// Gravity across the axis of a tilted bench. In the hub's frame, with the tangent t of the tilt
+/// and the azimuth phi of the lateral component,
 ///
 /// ```text
 /// e = g d,   d = t (cos(phi - theta), sin(phi - theta))
 /// ```
 ///
-/// g the specific force along the axis: a mass M at the place X has the energy -M e.X, and
-/// d' = w (d_y, -d_x).
+/// where g is the specific force along the axis. A mass M at the position X has the energy -M e.X,
+/// and d' = w (d_y, -d_x).
 #[derive(Clone, Debug)]
 pub struct Tilt {
     /// t
@@ -45,7 +45,7 @@ impl Tilt {
     /// An upright bench.
     const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
 
-    /// Coefficient n of d and e, from coefficients up to n of theta.
+    /// Sets coefficient n of d and e, from coefficients up to n of theta.
     pub fn expand(&mut self, n: usize, theta: &Series, g: &[f64; 2]) {
         if self.tangent == 0.0 {
             return;
@@ -67,7 +67,7 @@ impl Tilt {
         }
     }
 
-    /// Coefficient n of -d.X, the height of a place X in the hub's frame, m.
+    /// Returns coefficient n of -d.X, the height of a position X in the hub's frame, m.
     pub fn height(&self, n: usize, x: impl Fn(usize) -> [f64; 2]) -> f64 {
         if self.tangent == 0.0 {
             return 0.0;
@@ -80,12 +80,12 @@ impl Tilt {
         -(0..=n).map(term).sum::<f64>()
     }
 
-    /// e at the start of an expansion, m/s2.
+    /// Returns e at the start of an expansion, m/s2.
     pub fn now<T: Number>(&self) -> [T; 2] {
         [number(&self.e[0]), number(&self.e[1])]
     }
 
-    /// -d.X and its rate for a place X with the rate X' in the frame of a hub that turns with `w`, m, m/s.
+    /// Returns -d.X and its rate, m, m/s, for a position X with the rate X' in the frame of a hub that turns with `w`.
     pub fn height_now<T: Number>(&self, [x, y]: [T; 2], [x_d, y_d]: [T; 2], w: T) -> [T; 2] {
         let [d_x, d_y]: [T; 2] = [number(&self.direction[0]), number(&self.direction[1])];
         [-(x * d_x + y * d_y), -(x_d * d_x + y_d * d_y + w * (x * d_y - y * d_x))]
@@ -93,7 +93,7 @@ impl Tilt {
 }
 
 impl HubMotion {
-    /// At rest, weightless.
+    /// A hub at rest, weightless.
     pub const REST: HubMotion = HubMotion {
         theta: ZERO,
         omega: ZERO,

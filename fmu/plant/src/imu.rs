@@ -1,38 +1,38 @@
-//! The rate gyro on the hub: samples the hub's rate, adds white noise and a
-//! Gauss-Markov bias, quantises, and holds the value until the next sample.
+//! The rate gyro on the hub: samples the hub's rate, adds white noise and a Gauss-Markov bias,
+//! quantises, and holds the value until the next sample.
 //!
-//! White noise per sample sigma = N sqrt(rate) (N as an Allan coefficient); the bias is of
-//! first order, with sigma_b = B/0.664 and correlation time
-//! `bias_time` (thesis 5.5; IEEE Std 952). The noise of sample k is a function of
-//! the seed and k alone, so a restored state continues with the same noise.
+//! White noise per sample sigma = N sqrt(rate) (N as an Allan coefficient). The bias is of first
+//! order, with sigma_b = B/0.664 and correlation time `bias_time` (thesis 5.5; IEEE Std 952). The
+//! noise of sample k is a function of only the seed and k, so a restored state continues with the
+//! same noise.
 
 use crate::parameters::Imu;
 
-/// Communication points and time events meet sampling instants only to the rounding of the host's
-/// clock: a sample is taken early by up to this part of its period.
+/// Part of a sampling period by which a sample may be early. Communication points and time events
+/// match sampling instants only to the rounding of the host's clock.
 pub(crate) const SLACK: f64 = 1e-6;
 
-/// The gyro's memory.
+/// State of the gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
     /// Index of the next sample; sample k is taken k / rate after the start.
     pub next: u64,
-    /// Bias that the next sample will have, rad/s.
+    /// Bias of the next sample, rad/s.
     pub bias: f64,
     /// The value held, rad/s.
     pub held: f64,
 }
 
 impl Imu {
-    /// The gyro before its first sample: the bias is drawn from its long-term spread.
+    /// Returns the gyro before its first sample, with a bias from its stationary distribution.
     pub(crate) fn start(&self) -> Gyro {
         let (spread, _) = normals(self.seed, u64::MAX);
         Gyro { next: 0, bias: self.bias_instability / 0.664 * spread, held: 0.0 }
     }
 
-    /// Takes the samples that fall due within `length` from `since_start` on, both s, but
-    /// one more than `allowed` at most; `omega` is the hub's rate as a function of the time
-    /// within. Returns their number.
+    /// Takes the samples that fall due within `length` from `since_start` on, both s, but at most
+    /// one more than `allowed`. `omega` is the hub's rate as a function of the time within
+    /// `length`. Returns the number of samples.
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
@@ -51,7 +51,7 @@ impl Imu {
         allowed + 1
     }
 
-    /// Delay until sample k, s, when `since_start` seconds have passed since the start.
+    /// Returns the delay until sample k, s, at `since_start` seconds after the start.
     #[inline(always)]
     pub(crate) fn due(&self, k: u64, since_start: f64) -> f64 {
         k as f64 / self.rate - since_start
@@ -67,7 +67,7 @@ impl Imu {
     pub(crate) fn sample(&self, gyro: &mut Gyro, omega: f64) {
         let (white, drift) = normals(self.seed, gyro.next);
         let reading = omega + gyro.bias + self.arw * libm::sqrt(self.rate) * white;
-        // Steps too small to be seen change nothing.
+        // Quantisation steps below rounding have no effect.
         let seen = reading.abs() < 1e16 * self.lsb;
         gyro.held = if seen { libm::rint(reading / self.lsb) * self.lsb } else { reading };
         let keep = libm::exp(-1.0 / (self.rate * self.bias_time));
@@ -77,8 +77,8 @@ impl Imu {
     }
 }
 
-/// Two independent standard normal numbers that belong to (seed, k), by Box and
-/// Muller's transform of two uniform numbers from the SplitMix64 mixer.
+/// Returns two independent standard normal numbers for (seed, k): the Box-Muller transform of two
+/// uniform numbers from the SplitMix64 mixer.
 fn normals(seed: i32, k: u64) -> (f64, f64) {
     let stream = mix(seed as u32 as u64);
     let uniform = |j: u64| {
@@ -90,7 +90,7 @@ fn normals(seed: i32, k: u64) -> (f64, f64) {
     (radius * cos, radius * sin)
 }
 
-/// The SplitMix64 generator's step and finaliser (Steele, Lea, Flood 2014).
+/// Step and finaliser of the SplitMix64 generator (Steele, Lea, Flood 2014).
 fn mix(x: u64) -> u64 {
     let mut z = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -107,8 +107,8 @@ mod tests {
         const COUNT: usize = 200_000;
         let all: Vec<(f64, f64)> = (0..COUNT as u64).map(|k| normals(7, k)).collect();
         let mean = |f: &dyn Fn(usize) -> f64| (0..COUNT).map(f).sum::<f64>() / COUNT as f64;
-        // Standard errors: 1/sqrt(COUNT) = 0.0022 for means and correlations,
-        // sqrt(2) times that for the variance; five of them never fail by chance.
+        // Standard errors: 1/sqrt(COUNT) = 0.0022 for means and correlations, sqrt(2) times that
+        // for the variance. Five standard errors do not fail by chance.
         assert!(mean(&|k| all[k].0).abs() < 0.012);
         assert!((mean(&|k| all[k].0 * all[k].0) - 1.0).abs() < 0.016);
         assert!((mean(&|k| all[k].1 * all[k].1) - 1.0).abs() < 0.016);
@@ -147,7 +147,7 @@ mod tests {
         }
     }
 
-    /// Without noise, bias and quantisation: it reads what it is given.
+    /// Returns a gyro without noise, bias and quantisation.
     fn clean(rate: f64) -> Imu {
         Imu { rate, arw: 0.0, bias_instability: 0.0, lsb: 0.0, ..Imu::default() }
     }
@@ -169,7 +169,8 @@ mod tests {
         }
     }
 
-    /// Noise belongs to (seed, k): rate, bias and a multiple of the normal number k. The bias goes on with the other one.
+    /// The reading is rate plus bias plus a multiple of the normal number of (seed, k). The bias continues with the
+    /// other normal number.
     #[test]
     fn a_reading_is_rate_bias_and_the_seed_s_own_noise() {
         let imu = Imu { arw: 1e-3, bias_instability: 0.664e-3, bias_time: 0.1, ..clean(25.0) };
@@ -179,7 +180,7 @@ mod tests {
             let ((white, drift), bias) = (normals(imu.seed, k), gyro.bias);
             imu.sample(&mut gyro, 0.5);
             assert!((gyro.held - 0.5 - bias - 5e-3 * white).abs() < 1e-16, "{k}");
-            // e^(-1/2.5) is left, the spread of 1 mrad/s kept
+            // e^(-1/2.5) of the bias remains, and its standard deviation of 1 mrad/s stays
             let keep = libm::exp(-0.4);
             let next = keep * bias + 1e-3 * libm::sqrt(1.0 - keep * keep) * drift;
             assert!((gyro.bias - next).abs() < 1e-17, "{k}");
@@ -189,7 +190,7 @@ mod tests {
     #[test]
     fn bias_is_drawn_from_its_spread_and_keeps_its_correlation_time() {
         const COUNT: i32 = 40_000;
-        // One period is one correlation time: exp(-1) of the bias is left.
+        // One period is one correlation time: exp(-1) of the bias remains.
         let imu = Imu { bias_instability: 1e-3, bias_time: 0.1, ..clean(10.0) };
         let (mut first, mut product) = (0.0, 0.0);
         for seed in 0..COUNT {
@@ -206,8 +207,8 @@ mod tests {
         assert!((product / first - (-1.0f64).exp()).abs() < 0.02, "{}", product / first);
     }
 
-    /// The generator's published first outputs for the states 0 and 1234567 (Vigna's splitmix64.c), and
-    /// the same noise for the same seed for good.
+    /// The generator's published first outputs for the states 0 and 1234567 (Vigna's splitmix64.c), and a fixed noise
+    /// for a seed.
     #[test]
     fn numbers_are_those_of_splitmix64_and_the_same_for_good() {
         assert_eq!(mix(0), 0xE220_A839_7B1D_CDAF);
@@ -229,10 +230,11 @@ mod tests {
         let imu = clean(50.0);
         let mut gyro = imu.start();
         imu.sample(&mut gyro, 0.0);
-        // From 13 ms on for 0.1 s: samples at 20, 40, ... 100 ms see the rate 7, 27, ... 87 ms later.
+        // From 13 ms on for 0.1 s: samples at 20, 40, ... 100 ms see the rate 7, 27, ... 87 ms
+        // after the beginning.
         assert_eq!(imu.follow(&mut gyro, 0.013, 0.1, |t| 2.0 + t, 9), 5);
         assert_eq!((gyro.next, gyro.held), (6, 2.0 + (0.1 - 0.013)));
-        // Up to a millionth of a period early, seen at the end; no earlier.
+        // At most a millionth of a period early, with the rate at the end.
         let early = |share: f64| {
             let mut gyro = gyro;
             let length = 0.02 * (1.0 - share);
@@ -241,7 +243,8 @@ mod tests {
         let (taken, held, length) = early(0.9e-6);
         assert_eq!((taken, held), (1, length));
         assert_eq!(early(1.1e-6).0, 0);
-        // One that is overdue sees the beginning; one more than allowed is all that is taken.
+        // An overdue sample uses the rate at the beginning. At most one sample more than allowed is
+        // taken.
         assert_eq!(imu.follow(&mut gyro.clone(), 0.121, 0.01, |t| 3.0 + t, 9), 1);
         let mut late = gyro;
         imu.follow(&mut late, 0.121, 0.01, |t| 3.0 + t, 9);
@@ -258,7 +261,7 @@ mod tests {
             imu.sample(&mut gyro, rate);
             assert_eq!(gyro.held, steps * 1e-3);
         }
-        // Beyond 2^53 steps there is nothing to round.
+        // Beyond 2^53 quantisation steps no rounding is possible.
         let mut gyro = imu.start();
         imu.sample(&mut gyro, 1.1e13);
         assert_eq!(gyro.held, 1.1e13);

@@ -8,7 +8,7 @@ pub type Ramp = taylor::ramp::Ramp;
 pub struct Inputs {
     /// Torque command to the actuator, N m.
     pub tau_cmd: Ramp,
-    /// Any other torque on the hub, N m.
+    /// External torque on the hub, N m.
     pub tau_ext: Ramp,
     /// Specific force along the tank's axis, m/s2, not negative.
     pub g_axial: Ramp,

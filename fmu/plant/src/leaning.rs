@@ -1,16 +1,17 @@
-//! The modes of an upright cylinder on a bench that leans: its free surface is tilted, which changes their frequencies
-//! (`formulas::tilt`), and pendulums hang obliquely, which would change theirs otherwise.
+//! Modes of an upright cylinder on a tilted bench. The free surface is tilted, which changes the frequencies
+//! (`formulas::tilt`). Pendulums hang obliquely, which also changes their frequencies.
 //!
-//! With the tangent s of the tilt and n = sin(beta), the tangential component of the direction that gravity across the axis points
-//! to at the hub's start angle (e = g s (cos beta, sin beta), `hub.rs`), the liquid's force on a hub that turns a little has
+//! The liquid's force on a hub that turns through small angles has the frequency below. s is the tangent of the tilt. n
+//! = sin(beta) is the tangential component of the direction of gravity across the axis at the hub's start angle (e = g
+//! s (cos beta, sin beta), `hub.rs`):
 //!
 //! ```text
 //! omega^2 = f g/l,   f = f_along n^2 + f_across (1 - n^2)
 //! ```
 //!
-//! l the upright tank's pendulum, and the sloshing mass m f: a mode's m/omega^2 is its share of the surface's static moment,
-//! rho pi R^4/4 g/omega^2 for all together, which no tilt changes. A pendulum of the mass m' and the length l' that swings about a rest u l' away from the hinge
-//! has
+//! where l is the upright tank's pendulum length, and the sloshing mass is m f. A mode's m/omega^2 is its share of the
+//! surface's static moment, rho pi R^4/4 g/omega^2 for all modes together, which does not depend on the tilt. A
+//! pendulum of mass m' and length l' that swings about an equilibrium at u l' from the hinge has
 //!
 //! ```text
 //! omega^2 = (g/l') F,   sloshing mass m' M
@@ -21,12 +22,14 @@
 //!                     F = M/[(1 - n^2)/(1 + H u^2) + n^2/(1 + 3 H u^2)]
 //! ```
 //!
-//! (H l'^-2 the coefficient of the quartic spring, sigma that of the vertical inertia: `paraboloid.rs`; M and F are e.(M^-1 e) and its ratio to
-//! e.(K^-1 e) of the two equations of small motions, e the tangent.) So l' = l F/f and m' = m f/M.
+//! H l'^-2 is the coefficient of the quartic spring, sigma that of the vertical inertia (`paraboloid.rs`). M is e.(M^-1
+//! e), and F is its ratio to e.(K^-1 e), for the two equations of small motions, with e the tangent. Hence l' = l F/f
+//! and m' = m f/M.
 //!
-//! f belongs to the tangent. Models with one pendulum for both directions have radially what F with n^2 and 1 - n^2 exchanged gives
-//! them, the liquid f with both exchanged. A spherical pendulum has the same frequency for both; `liquid` splits them by itself much as the liquid
-//! does (deep, c = -0.36 along the slope and 0.37 across it, against -0.42 and 0.23).
+//! f belongs to the tangential direction. In the radial direction, models with one pendulum for both directions have
+//! the F with n^2 and 1 - n^2 exchanged, the liquid has the f with both exchanged. A spherical pendulum has the same
+//! frequency in both directions. `liquid` separates them by itself, similar to the real liquid (deep: c = -0.36 along
+//! the slope and 0.37 across it, compared with -0.42 and 0.23).
 
 use alloc::format;
 use alloc::string::String;
@@ -47,14 +50,15 @@ pub(crate) struct Leaning {
     tangential: f64,
 }
 
-/// Dynamics of a pendulum that hangs obliquely: F and M above.
+/// F and M of a pendulum that hangs obliquely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Oblique {
     stiffness: f64,
     share: f64,
 }
 
-/// A mode: mass and length of its pendulum in the plant, and the length l/f of an upright one of its frequency.
+/// A mode: mass and length of its pendulum in the plant, and the length l/f of an upright pendulum with the same
+/// frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mode {
     pub mass: f64,
@@ -63,7 +67,8 @@ pub(crate) struct Mode {
 }
 
 impl Leaning {
-    /// Tilt of the bench at the start; `None` for an upright bench or a tank given by a table.
+    /// Returns the tilt of the bench at the start; `None` for an upright bench or a tank given by a
+    /// table.
     pub fn of(p: &Parameters) -> Option<Leaning> {
         let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
         leans.then(|| {
@@ -72,17 +77,17 @@ impl Leaning {
         })
     }
 
-    /// f of mode n from 0: along the tangent and across it.
+    /// Returns f of mode n, from 0, along the tangent and across it.
     fn factors(self, n: usize, fill: f64) -> [f64; 2] {
         let [along, across] = factors(n, fill, self.slope);
         let mixed = |part: f64| along * part + across * (1.0 - part);
         [mixed(self.tangential), mixed(1.0 - self.tangential)]
     }
 
-    /// Mode n from 0, of the upright tank's pendulum.
+    /// Returns mode n, from 0, for the upright tank's pendulum.
     pub fn mode(self, n: usize, p: &Parameters, upright: &cylinder::Pendulum) -> Mode {
         let [f, _] = self.factors(n, 2.0 * p.tank.h / p.tank.d);
-        // The paraboloid's quartic spring is in the length: F changes it by a share H s^2.
+        // The paraboloid's quartic spring depends on the length: F changes it by a share H s^2.
         let mut length = upright.length / f;
         let mut oblique = self.oblique(n, p, length);
         for _ in 0..LENGTHS {
@@ -96,7 +101,8 @@ impl Leaning {
         Mode { mass: upright.mass * f / oblique.share, length, upright: upright.length / f }
     }
 
-    /// The frequency of mode 1's pendulum across the tangent over the liquid's there.
+    /// Returns the frequency of mode 1's pendulum in the radial direction over the liquid's
+    /// frequency there.
     fn radial_frequency(self, p: &Parameters) -> f64 {
         let fill = 2.0 * p.tank.h / p.tank.d;
         let upright = cylinder::pendulum(0, p.tank.d, p.tank.h, 1.0);
@@ -107,7 +113,7 @@ impl Leaning {
         libm::sqrt(stiffness(turned) / stiffness(self) * tangential / radial)
     }
 
-    /// F and M of mode n from 0 as a pendulum of this length.
+    /// Returns F and M of mode n, from 0, as a pendulum of this length.
     fn oblique(self, n: usize, p: &Parameters, length: f64) -> Oblique {
         let (s2, n2) = (self.slope * self.slope, self.tangential);
         match p.slosh.model {
@@ -131,10 +137,12 @@ impl Leaning {
     }
 }
 
-/// Substitutions of the length at most: each leaves a share of about 2 H s^2 of the error, of the hardest spring 2/3.
+/// Largest number of substitutions of the length. Each leaves a share of about 2 H s^2 of the error, 2/3 for the
+/// hardest spring.
 const LENGTHS: usize = 100;
 
-/// Coefficients sigma of the vertical inertia and H of the quartic spring of mode n from 0.
+/// Returns the coefficients sigma of the vertical inertia and H of the quartic spring of mode n,
+/// from 0.
 fn quartic(n: usize, p: &Parameters, length: f64) -> (f64, f64) {
     let radius = p.tank.d / 2.0;
     match p.slosh.model {
@@ -147,7 +155,8 @@ fn quartic(n: usize, p: &Parameters, length: f64) -> (f64, f64) {
     }
 }
 
-/// u of u (1 + H u^2) = s by Newton's method, where the spring grows stiffer; where it grows softer the nearest to 0, if there is one.
+/// Returns u of u (1 + H u^2) = s by Newton's method. For a softening spring it is the solution nearest to 0, if one
+/// exists.
 fn rest(spring: f64, slope: f64) -> f64 {
     let mut u = if spring > 0.0 { slope } else { 0.0 };
     for _ in 0..60 {
@@ -156,7 +165,7 @@ fn rest(spring: f64, slope: f64) -> f64 {
     u
 }
 
-/// Lists errors in the parameters under this tilt.
+/// Lists problems of the parameters with this tilt.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let mut problems = Vec::new();
     let (Some(Leaning { slope, .. }), true) = (Leaning::of(p), p.slosh.model != SloshModel::Frozen)
@@ -167,21 +176,22 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let fill = p.tank.h / radius;
     if slope >= fill {
         problems.push(format!(
-            "bench.tilt = {tilt} rad: the liquid's surface, tank.h = {} m deep in the middle, reaches the bottom of the tank (allowed: less \
-             than atan(2 tank.h/tank.d) = {} rad; beyond, slosh.source = table with the modes of the tilted tank, or slosh.model = frozen)",
+            "bench.tilt = {tilt} rad: the surface of the liquid, tank.h = {} m deep in the middle, reaches the bottom of the tank \
+             (allowed: less than atan(2 tank.h/tank.d) = {} rad). For a larger tilt use slosh.source = table with the modes of \
+             the tilted tank, or slosh.model = frozen",
             p.tank.h,
             libm::atan(fill)
         ));
     } else if p.slosh.model == SloshModel::Liquid {
         let (s, spring) = quartic(0, p, 0.0);
-        // A spring that grows softer holds up to u = (3 |H|)^(-1/2), s = 2 u/3.
+        // A softening spring holds up to u = (3 |H|)^(-1/2), s = 2 u/3.
         let most =
             if spring < 0.0 { 2.0 / (3.0 * libm::sqrt(-3.0 * spring)) } else { f64::INFINITY };
         let u = if slope < most { rest(spring, slope) } else { slope };
         if slope >= most || 1.0 + s * u * u <= 0.0 {
             problems.push(format!(
-                "bench.tilt = {tilt} rad: to the third order in the amplitude liquid at h/R = {fill:.3} (s = {s:.3}, kappa = {:.3}) has no \
-                 rest under this tilt (allowed with slosh.model = liquid: a smaller bench.tilt)",
+                "bench.tilt = {tilt} rad: slosh.model = liquid at h/R = {fill:.3} (s = {s:.3}, kappa = {:.3}) has no position of \
+                 rest at this tilt. Use a smaller bench.tilt or another slosh.model",
                 2.0 * spring
             ));
         }
@@ -192,7 +202,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
 /// Relative error of a common frequency in the radial direction above which a warning follows.
 const APART: f64 = 0.01;
 
-/// Lists warnings about the modes under this tilt.
+/// Lists warnings about the modes with this tilt.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     let Some(leaning) = Leaning::of(p) else { return warnings };
@@ -200,8 +210,8 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let most = largest_slope(fill);
     if leaning.slope > most {
         warnings.push(format!(
-            "bench.tilt = {} rad: beyond {:.3} rad at h/R = {fill:.3} slosh frequencies are off by more than 1 % (slosh.source = table \
-             with the modes of the tilted tank has them)",
+            "bench.tilt = {} rad: above {:.3} rad at h/R = {fill:.3} the error of slosh frequencies exceeds 1 %. Use \
+             slosh.source = table with the modes of the tilted tank",
             p.bench.tilt,
             libm::atan(most)
         ));
@@ -215,8 +225,8 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let off = leaning.radial_frequency(p) - 1.0;
     if off.abs() > APART {
         warnings.push(format!(
-            "bench.tilt = {} rad: the tilted liquid has two frequencies, slosh.model = {name} one pendulum for both directions: tangentially \
-             it has the liquid's, radially one that is {:.1} % too {}",
+            "bench.tilt = {} rad: the tilted liquid has two frequencies, but slosh.model = {name} has one pendulum for both \
+             directions. Its tangential frequency is right, its radial frequency is {:.1} % too {}",
             p.bench.tilt,
             100.0 * off.abs(),
             if off > 0.0 { "high" } else { "low" }

@@ -1,16 +1,14 @@
-//! The physics of HubSlosh: a rigid hub turns about a vertical axis on a bearing
-//! with dry friction; a cylindrical tank sits off the axis; the liquid in it is a
-//! set of pendulums. No FMI, no I/O, no unsafe code, no allocation while stepping.
+//! The physics of HubSlosh: a rigid hub turns about a vertical axis on a bearing with dry friction,
+//! and a cylindrical tank sits off the axis. Pendulums represent the liquid. No FMI, no I/O, no
+//! unsafe code, no allocation while stepping.
 //!
-//! Frames and signs: z up along the bearing's axis; the hub's frame turns with
-//! theta about +z; x points from the axis to the tank's centre (radial), y along
-//! +theta (tangential). SI units.
+//! Frames and signs: z points up along the bearing axis. The hub's frame turns with theta about +z.
+//! x points from the axis to the tank's centre (radial), y along +theta (tangential). SI units.
 //!
-//! Where to look: `plant.rs` couples everything, `state.rs` declares the states, `outputs.rs`
-//! and `equations.rs` are what a host reads, `motion.rs` steps through time and finds stick
-//! and slip, `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `suspension.rs`, `wheel.rs`,
-//! `imu.rs` say what their names say,
-//! the arithmetic is the crate `taylor`.
+//! `plant.rs` couples all parts, `state.rs` declares the states, `outputs.rs` and `equations.rs`
+//! have the outputs and equations for a host. `motion.rs` integrates and locates stick and slip.
+//! `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `suspension.rs`, `wheel.rs` and `imu.rs` have
+//! the parts. The integrator and the power series are in the crate `taylor`.
 
 #![cfg_attr(not(test), no_std)]
 

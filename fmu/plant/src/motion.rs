@@ -1,6 +1,6 @@
-//! The hub's equation as power series, and the automaton for stick and slip: the instants at which the
-//! hub comes to rest or breaks away are roots of polynomials, found without stepping back. The steps are
-//! the core's (`taylor::integrator`).
+//! The hub's equation as power series, and the state machine for stick and slip. The instants at which the hub comes to
+//! rest or breaks away are roots of polynomials, found without stepping back. The steps are those of
+//! `taylor::integrator`.
 
 use alloc::format;
 use core::ops::ControlFlow;
@@ -21,22 +21,23 @@ use crate::slosh::SloshMode;
 use crate::state::{State, x};
 use crate::suspension::Suspension;
 
-/// Remedy if the internal steps of a call do not suffice.
+/// Advice if the internal steps of a call do not suffice.
 const ADVICE: &str = ", with stribeck_smooth a larger friction.eps, with the gyro (its samples count as \
                       steps) a lower imu.rate";
 
-/// Error for a mode that has left its range at `time`; `mode` counts from 0.
+/// Returns the error for a mode that has left its range at `time`; `mode` counts from 0.
 pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     let number = mode + 1;
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
 }
 
-/// At which events a step stops.
+/// Events at which a step stops.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
-    /// Part of the step before the present stretch, s.
+    /// Time from the start of the step to the current stretch, s.
     pub offset: f64,
-    /// Events are passed over up to here, s from the step's start; with infinity all are.
+    /// Time from the start of the step up to which events are passed over, s; infinity to pass over
+    /// all.
     pub passed: f64,
 }
 
@@ -47,9 +48,9 @@ impl Stop {
         self.offset + t > self.passed
     }
 
-    /// Time, at most `h` after `t` in the stretch, of the first gyro sample at which the step stops. The stretch is `since_start`
-    /// after the gyro's start; `allowed` samples from number `next` on may be passed.
-    // By value: an address of what a stretch keeps would keep all of it in memory.
+    /// Returns the time, at most `h` after `t` in the stretch, of the first gyro sample at which the step stops. The
+    /// stretch is `since_start` after the gyro's start. `allowed` samples from number `next` on may be passed.
+    // Arguments by value: a reference would force all data of a stretch into memory.
     #[cold]
     fn at_sample(
         self,
@@ -65,8 +66,8 @@ impl Stop {
     }
 }
 
-/// The hub's equation with the power series of its parts:
-/// J w' = tau + tau_f + T, J = I0 + sum of J_i, T = sum of T_i over the modes.
+/// The hub's equation with the power series of its terms: J w' = tau + tau_f + T, J = I0 + sum of
+/// J_i, T = sum of T_i over the modes.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     /// Inertia of hub and rigid liquid, kg m2.
@@ -74,15 +75,16 @@ pub(crate) struct Motion {
     pub law: Law,
     pub suspension: Suspension,
     pub damping: Damping,
-    /// True if drag or weight change along an expansion at constant g: drag that depends on amplitude, a
-    /// tilted bench, or modes along other directions than the tangent.
+    /// True if drag or weight change along an expansion at constant g: amplitude-dependent drag, a tilted bench, or
+    /// modes in other directions than the tangent.
     pub varies: bool,
     /// True if drag depends on amplitude: a baffle, or amplitude damping.
     with_amplitude: bool,
-    /// Mass moments of the dry hub, radially and tangentially, and of the rigid liquid, kg m.
+    /// Static moments of the dry hub, radial and tangential, and of the rigid liquid, kg m.
     imbalance: [f64; 2],
     rigid_moment: f64,
-    /// The g and its rate that the modes know; NaN: none yet, or none for longer than an instant.
+    /// The g and its rate set in the modes; NaN if none is set, or if it is valid only for an
+    /// instant.
     g: [f64; 2],
     /// The specific force below which damping is held, m/s2, see [`Damping::expand`].
     near_weightless: f64,
@@ -99,7 +101,8 @@ pub(crate) struct Motion {
     pub tau_f: Series,
     /// tau + T, the torque that the bearing must hold at rest.
     pub net: Series,
-    /// Power of the torques from outside, and dissipated in bearing, suspension line and liquid, W.
+    /// Power of the external torques, and power dissipated in bearing, suspension line and liquid,
+    /// W.
     pub power: Series,
     pub dissipation: Series,
 }
@@ -138,7 +141,7 @@ impl Motion {
         }
     }
 
-    /// Puts everything at the state, with the given torque and specific force.
+    /// Sets all quantities to the state, with the given torque and specific force.
     pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, (tau, g): (Ramp, Ramp)) {
         self.hub.theta[0] = state.x[x::THETA];
         self.hub.omega[0] = state.x[x::OMEGA];
@@ -152,11 +155,11 @@ impl Motion {
         }
     }
 
-    /// Tells the modes of the specific force, and of the drag that it and their motion make.
+    /// Sets the specific force in the modes, and the drag from it and their motion.
     #[cold]
     fn set_axial<M: SloshMode>(&mut self, modes: &mut [M], g: Ramp) {
         self.hub.g = [g.value, g.slope];
-        // Drag by amplitude belongs to the motion at this instant alone.
+        // Amplitude-dependent drag is valid only at this instant.
         self.g = if self.with_amplitude { [f64::NAN; 2] } else { self.hub.g };
         self.hub.damping_reach = f64::INFINITY;
         for (n, mode) in modes.iter_mut().enumerate() {
@@ -170,25 +173,25 @@ impl Motion {
         }
     }
 
-    /// Coefficient n of the torque of gravity on the dry hub of a bench that leans, N m.
+    /// Returns coefficient n of the gravity torque on the dry hub of a tilted bench, N m.
     fn gravity_torque(&self, n: usize) -> f64 {
         let ([x, y], [e_x, e_y]) = (self.imbalance, &self.hub.tilt.e);
         x * e_y[n] - y * e_x[n]
     }
 
-    /// Torque of gravity on the dry hub, N m, and on the rigid liquid.
+    /// Returns the gravity torque on the dry hub and on the rigid liquid, N m.
     pub fn gravity_torques<T: Number>(&self) -> [T; 2] {
         let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
         [e_y * x - e_x * y, e_y * self.rigid_moment]
     }
 
-    /// Potential energy of the dry hub and of the rigid liquid, J.
+    /// Returns the potential energy of the dry hub and of the rigid liquid, J.
     pub fn potential<T: Number>(&self) -> T {
         let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
         -(e_x * (x + self.rigid_moment) + e_y * y)
     }
 
-    /// Mass times height of hub and liquid above rest, kg m, the potential energy over g, and its rate.
+    /// Returns mass times height of hub and liquid above rest, kg m, the potential energy over g, and its rate.
     pub fn height<T: Number, M: SloshMode>(&self, modes: &[M]) -> [T; 2] {
         let ([x, y], still) = (self.imbalance, [T::constant(0.0); 2]);
         let moment = [x + self.rigid_moment, y].map(T::constant);
@@ -199,7 +202,7 @@ impl Motion {
             .fold(dry, |sum, mode: [T; 2]| [sum[0] + mode[0], sum[1] + mode[1]])
     }
 
-    /// Coefficient n of mass times height of hub and liquid above rest, kg m.
+    /// Returns coefficient n of mass times height of hub and liquid above rest, kg m.
     fn mass_height<M: SloshMode>(&self, n: usize, modes: &mut [M]) -> f64 {
         let [x, y] = self.imbalance;
         let moment = |j| [series::constant(j, x + self.rigid_moment), series::constant(j, y)];
@@ -207,9 +210,9 @@ impl Motion {
             + self.hub.tilt.height(n, moment)
     }
 
-    /// Coefficient n of every quantity from coefficients up to n of the state, and
-    /// coefficient n + 1 of the state; `ramp` says whether the specific force, the drag or the
-    /// weight changes, `hangs` whether there is a suspension line.
+    /// Computes coefficient n of every quantity from coefficients up to n of the state, and
+    /// coefficient n + 1 of the state. `ramp` is true if specific force, drag or weight changes,
+    /// `hangs` if there is a suspension line.
     #[inline(always)]
     pub fn derivatives<M: SloshMode>(
         &mut self,
@@ -265,15 +268,15 @@ impl Motion {
         }
     }
 
-    /// Order 0 of the derivatives where drag or weight vary.
+    /// Computes order 0 of the derivatives if drag or weight vary.
     #[cold]
     #[inline(never)]
     pub fn derivatives_varying<M: SloshMode>(&mut self, modes: &mut [M], contact: Contact) {
         self.derivatives(0, (true, self.suspension.exists), modes, contact);
     }
 
-    /// The sign that the hub's contact has by its rate or, at rest, by the torque
-    /// that the bearing would have to hold.
+    /// Returns the contact from the hub's rate or, at rest, from the torque that the bearing would
+    /// have to hold.
     pub fn contact<M: SloshMode>(&mut self, modes: &mut [M], state: &State) -> Contact {
         let omega = state.x[x::OMEGA];
         if !self.law.switches_at_rest() || omega > 0.0 {
@@ -284,7 +287,7 @@ impl Motion {
         }
         let forces = (self.varies, self.suspension.exists);
         self.derivatives(0, forces, modes, Contact::Stuck);
-        // A law that can't hold the hub needs to know where the torque goes from 0.
+        // A law that cannot hold the hub needs the direction in which the torque leaves 0.
         if !self.law.sticks() {
             self.derivatives(1, forces, modes, Contact::Stuck);
         }
@@ -292,12 +295,12 @@ impl Motion {
         self.law.contact_at_rest(net, state.x[x::THETA], state.contact)
     }
 
-    /// Internal steps that a new call may take.
+    /// Returns the internal steps that a new call may take.
     pub fn steps(&self) -> Steps {
         Steps::new(self.max_steps, ADVICE)
     }
 
-    /// Time within `h` at which the hub comes to rest, from the series of order n.
+    /// Returns the time within `h` at which the hub comes to rest, from the series of order n.
     fn time_of_rest(&self, n: usize, h: f64, contact: Contact) -> Option<f64> {
         let omega = &self.hub.omega;
         let change = omega[1..=n].iter().rev().fold(0.0, |sum, x| (sum + x.abs()) * h);
@@ -306,20 +309,21 @@ impl Motion {
         }
         let sign = contact as i8 as f64;
         let rate = omega.map(|x| sign * x);
-        // A hub that has just broken away starts with no rate, and with hardly any
-        // acceleration: these roots at t = 0 are behind it.
+        // A hub that has just broken away starts with zero rate and almost no acceleration. The
+        // roots at t = 0 are in the past.
         let first = rate[..n].iter().position(|&x| x > 0.0)?;
         let behind = if rate[0] > 0.0 { 0 } else { first };
         first_root(&rate[behind..=n], h)
     }
 
-    /// Time within `h` at which the torque exceeds the bearing's static friction, and the direction.
+    /// Returns the time within `h` at which the torque exceeds the bearing's static friction, and
+    /// the direction.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
         let (against_backward, against_forward) = self.law.holds(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
             let mut left = self.net.map(|x| -sign * x);
             left[0] += hold;
-            // At a torque that is just held and falls there is no break-away.
+            // A torque that is just held and falls causes no break-away.
             let behind = if left[0] > 0.0 { 0 } else { left[..n].iter().position(|&x| x > 0.0)? };
             first_root(&left[behind..n], h)
         };
@@ -331,9 +335,9 @@ impl Motion {
         }
     }
 
-    /// Moves the state on by `h`, during which torque and specific force run along
-    /// their ramps; the gyro takes the samples that fall due and count as steps. Returns how far it came where it
-    /// stops at an event. On an error the state is unusable.
+    /// Advances the state by `h`, during which torque and specific force run along their ramps. The gyro takes the
+    /// samples that fall due, which count as steps. If it stops at an event, returns the elapsed time. After an error
+    /// the state is unusable.
     pub fn advance<M: SloshMode>(
         &mut self,
         modes: &mut [M],
@@ -343,7 +347,7 @@ impl Motion {
         (imu, stop): (&Imu, Stop),
         steps: &mut Steps,
     ) -> Result<ControlFlow<f64>, StepError> {
-        // The usual case is compiled apart: one mode, no loops over modes and orders.
+        // The usual case is compiled separately: one mode, no loops over modes and orders.
         match modes {
             [one] if M::UNROLLED && acting.1.slope == 0.0 && self.is_plain() => {
                 let one = core::slice::from_mut(one);
@@ -353,7 +357,7 @@ impl Motion {
         }
     }
 
-    /// Returns true if drag and weight change with g alone, and there is no suspension line.
+    /// Returns true if drag and weight change only with g, and there is no suspension line.
     fn is_plain(&self) -> bool {
         !self.varies && !self.suspension.exists
     }
@@ -404,8 +408,8 @@ impl Motion {
         Ok(flow)
     }
 
-    /// Integral of the liquid's mass times height over `length`, kg m s, from the series of
-    /// order n: what the work through a ramp of g is made of.
+    /// Returns the integral of the liquid's mass times height over `length`, kg m s, from the
+    /// series of order n, for the work of a ramp of g.
     #[cold]
     fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
         let mut sum = ZERO;
@@ -431,9 +435,9 @@ struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
     /// Start of the stretch, and of the expansion after it, s.
     begin: f64,
     t: f64,
-    /// The contact that the event at the expansion's end makes.
+    /// New contact after the event at the expansion's end.
     event: Option<Contact>,
-    /// Errors allowed to the rates of hub and liquid, rad/s, and to the friction law's own state.
+    /// Allowed errors of the rates of hub and liquid, rad/s, and of the friction law's own state.
     allowed: [f64; 3],
 }
 
@@ -469,7 +473,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         let motion = &self.motion;
         let h = h.min(motion.law.convergence_radius(&motion.hub.omega));
         let h = if self.varies() { h.min(motion.hub.damping_reach) } else { h };
-        // The hub's rate passes zero many times; the scale of its error must not.
+        // The hub's rate passes zero many times; its error scale must not.
         let [w, w_d] = [motion.hub.omega[0], motion.hub.omega[1]].map(f64::abs);
         let hub = RATE_FLOOR + w + w_d * h.min(0.1);
         let slosh = hub + self.modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
@@ -591,7 +595,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     }
 }
 
-/// The larger of two sizes; unlike `f64::max` it minds no NaN, which ends the step elsewhere.
+/// Returns the larger of two magnitudes. A NaN may get lost; it ends the step elsewhere.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }

@@ -19,29 +19,29 @@ pub struct Outputs {
     pub omega: f64,
     /// Hub acceleration, rad/s2.
     pub omega_dot: f64,
-    /// Mode 1, tangential, + towards +theta, rad.
+    /// Tangential slosh angle of mode 1, positive towards +theta, rad.
     pub slosh_angle: f64,
-    /// Its rate, rad/s.
+    /// Rate of `slosh_angle`, rad/s.
     pub slosh_rate: f64,
-    /// Mode 1, radial, + outwards, rad.
+    /// Radial slosh angle of mode 1, positive outwards, rad.
     pub slosh_angle_radial: f64,
-    /// Its rate, rad/s.
+    /// Rate of `slosh_angle_radial`, rad/s.
     pub slosh_rate_radial: f64,
-    /// Torque of the bearing's friction on the hub, N m.
+    /// Friction torque of the bearing on the hub, N m.
     pub tau_friction: f64,
-    /// Torque of all liquid, its rigid part included, on the hub, N m.
+    /// Torque of the whole liquid (sloshing and rigid) on the hub, N m.
     pub tau_fluid: f64,
-    /// Torque of gravity on the dry hub, N m: only on a bench that leans.
+    /// Gravity torque on the dry hub of a tilted bench, N m.
     pub tau_gravity: f64,
     /// Torque of the suspension line on the hub, N m.
     pub tau_suspension: f64,
-    /// Force of all liquid on the tank along +theta, N.
+    /// Force of the whole liquid on the tank along +theta, N.
     pub f_tangential: f64,
-    /// Force of all liquid on the tank outwards, N.
+    /// Force of the whole liquid on the tank outwards, N.
     pub f_radial: f64,
-    /// Wave amplitude at the tank's wall by linear theory, m.
+    /// Wave height at the tank's wall by linear theory, m.
     pub wave_height: f64,
-    /// Its radial and tangential part, m.
+    /// Radial and tangential part of the wave, m.
     pub wave: [f64; 2],
     /// Amplitude at the wall of the first mode's oscillation, m; 0 without a baffle.
     pub baffle_wave: f64,
@@ -53,20 +53,20 @@ pub struct Outputs {
     pub momentum: f64,
     /// Power dissipated in bearing, suspension line and liquid, W.
     pub power_dissipated: f64,
-    /// Torque of the actuator on the hub, N m, after the wheel's limits.
+    /// Torque of the actuator on the hub within the wheel's limits, N m.
     pub tau_actuator: f64,
     /// Absolute rate of the wheel's rotor, rad/s.
     pub wheel_speed: f64,
     /// Work of tau_actuator and tau_ext on the hub since the start, J.
     pub work: f64,
-    /// Work through the changes of g_axial on the liquid since the start, J:
-    /// energy - energy(0) = work + work_axial - heat.
+    /// Work done on the liquid by changes of g_axial since the start, J: energy - energy(0) = work
+    /// + work_axial - heat.
     pub work_axial: f64,
     /// Energy dissipated in bearing, suspension line and liquid since the start, J.
     pub heat: f64,
     /// Time spent stuck since the start, s.
     pub stuck_time: f64,
-    /// Damping ratio of the first mode by the baffle, at the present motion.
+    /// Damping ratio of the first mode by the baffle, at the current motion.
     pub baffle_zeta: f64,
     /// Outputs that change only at events.
     pub discrete: Discrete,
@@ -75,13 +75,13 @@ pub struct Outputs {
 /// The outputs that are constant between events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Discrete {
-    /// Does dry friction hold the hub at rest?
+    /// True while dry friction holds the hub at rest.
     pub stuck: bool,
-    /// Range of sloshing by wave height.
+    /// Amplitude class of the wave.
     pub regime: Regime,
     /// True within the range of the baffle's drag law, and without a baffle.
     pub baffle_in_range: bool,
-    /// Set-valued friction: -1 turning backwards, 0 stuck, 1 forwards; else 1.
+    /// Set-valued friction: -1 slipping backwards, 0 stuck, 1 slipping forwards; other laws: 1.
     pub friction_mode: i32,
     /// Number of changes of `friction_mode` since the start.
     pub event_count: i32,
@@ -89,13 +89,13 @@ pub struct Discrete {
     pub event_time: f64,
 }
 
-/// +0 for either zero, everything else as it is: a plant at rest has no direction.
+/// Returns +0 for either zero and any other value unchanged: a plant at rest has no direction.
 pub(crate) fn unsigned_zero(x: f64) -> f64 {
     x + 0.0
 }
 
 impl Plant {
-    /// The outputs now, under the inputs' present values.
+    /// Returns the outputs under the inputs' current values.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.apply_present_contact(inputs);
         let mut outputs = self.outputs_held(inputs);
@@ -104,15 +104,15 @@ impl Plant {
         outputs
     }
 
-    /// [`Plant::outputs`] with contact and regime as the last event left them.
+    /// Returns [`Plant::outputs`] with contact and regime as of the last event.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);
         self.present(&self.state.x, inputs.tau_cmd, work_axial)
     }
 
-    /// The outputs, or their derivatives along a direction: `x` is the states or the direction, and where the
-    /// equations were evaluated last they were so along it, as `tau_cmd` is.
+    /// Returns the outputs, or their derivatives along a direction. `x` is the states or the direction, for which the
+    /// equations must have been evaluated last, with `tau_cmd`.
     fn present<T: Number>(&self, x: &[f64; STATES], tau_cmd: Ramp, work_axial: T) -> Outputs {
         let (state, motion) = (&self.state, &self.motion);
         let hub = &motion.hub;
@@ -198,15 +198,16 @@ impl Plant {
         }
     }
 
-    /// Viscous damping ratio of mode `n` at the present g_axial, and its rate along g_axial's slope,
-    /// 1/s; 0 for modes that are not used, and at g_axial = 0.
+    /// Returns the viscous damping ratio of mode `n` at the current g_axial, and its rate along
+    /// g_axial's slope, 1/s. Both are 0 for unused modes and at g_axial = 0.
     pub fn damping_ratio(&self, n: usize, inputs: &Inputs) -> [f64; 2] {
         let (damping, g) = (&self.motion.damping, inputs.g_axial);
         [damping.ratio(n, g.value), damping.slope_of_ratio(n, g.value) * g.slope]
     }
 
-    /// The derivative of the outputs in the direction (dx, du), exact; what is discrete in them
-    /// is as it is now. Contact and wheel are held. The amplitude of a wave has none at 0.
+    /// Returns the exact derivative of the outputs in the direction (dx, du). Discrete outputs keep
+    /// their current values; contact and wheel are held. The amplitude of a wave has no derivative
+    /// at 0.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,
@@ -220,14 +221,14 @@ impl Plant {
         self.present::<Dual>(dx, tau_cmd, work_axial)
     }
 
-    /// Brings the ranges among the outputs to what the outputs are now.
+    /// Updates the ranges among the outputs to the current outputs.
     pub fn update_ranges(&self, outputs: &mut Outputs) {
         let Ranges { regime, baffle } = self.ranges_of(outputs);
         outputs.discrete.regime = regime;
         outputs.discrete.baffle_in_range = baffle;
     }
 
-    /// The ranges that the outputs are in.
+    /// Returns the ranges for the outputs.
     pub(crate) fn ranges_of(&self, outputs: &Outputs) -> Ranges {
         let regime = Regime::of(outputs.wave_height / self.radius);
         let baffle = self.baffle.is_none_or(|range| range.contains(outputs.baffle_wave));

@@ -1,13 +1,13 @@
-//! Parameters whose value another parameter replaces.
+//! Finds parameters whose value another parameter replaces.
 
 use alloc::string::String;
 
 use crate::parameters::{Parameters, SloshModel, SloshSource};
 
 impl Parameters {
-    /// Returns why the value of a parameter is not used although the part of the model that it describes is; `None` if it is
-    /// used, or if that part is switched off. `name` is the FMU's, with `_kind` where a number stands for a Boolean. Enumerations
-    /// and Booleans have their `…kind` applied.
+    /// Returns why the value of a parameter is not used although its part of the model is in use; `None` if it is used,
+    /// or if that part is switched off. `name` is the FMU's, with `_kind` for the integer twin of a Boolean. The
+    /// integer twins must be applied already.
     pub fn overridden(&self, name: &str) -> Option<String> {
         let slosh = &self.slosh;
         if slosh.model == SloshModel::Frozen {
@@ -30,7 +30,7 @@ impl Parameters {
             | "slosh.capillarity"
                 if is_table =>
             {
-                Some("slosh.source = table, where slosh.table says what the liquid is".into())
+                Some("slosh.source = table; slosh.table describes the liquid".into())
             }
             "slosh.zeta" if slosh.zeta_from_correlation => Some(
                 "slosh.zeta_from_correlation is true; with false the damping ratio is slosh.zeta"

@@ -1,9 +1,9 @@
 //! Parameters of the plant with the bench's values, in SI units.
 //!
-//! `Parameters::default()` is the thesis's bench (TRACTOR, 24 degC, 10 cm of
-//! water). Fields are named like the FMU's parameters (`tank.d` is `tank.d` there, `hub.inertia`
-//! and `wheel.inertia` are `hub.I` and `wheel.I`, `own_inertia` is `I_own`); what each means,
-//! its unit and its range stand in the FMU's variable table.
+//! `Parameters::default()` is the thesis's bench (TRACTOR, 24 degC, 10 cm of water). Fields have
+//! the names of the FMU's parameters (`tank.d` is `tank.d` there), except `hub.inertia` and
+//! `wheel.inertia` (`hub.I`, `wheel.I`) and `own_inertia` (`I_own`). The FMU's variable table has
+//! their meanings, units and ranges.
 
 /// All parameters of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -34,7 +34,7 @@ pub struct Hub {
     pub c: f64,
 }
 
-/// An upright cylinder, its axis parallel to the bearing's.
+/// An upright cylindrical tank, its axis parallel to the bearing axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Tank {
@@ -57,7 +57,7 @@ pub struct Fluid {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SloshModel {
-    /// The liquid is a rigid body.
+    /// The whole liquid is rigid.
     Frozen = 1,
     /// Linear planar pendulums.
     Linear = 2,
@@ -72,7 +72,7 @@ pub enum SloshModel {
 }
 
 impl SloshModel {
-    /// All of them, in the order of their numbers.
+    /// All models in the order of their numbers.
     pub const ALL: [SloshModel; 6] = [
         SloshModel::Frozen,
         SloshModel::Linear,
@@ -87,34 +87,34 @@ impl SloshModel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SloshSource {
-    /// An upright cylinder by its dimensions.
+    /// Upright cylinder given by its dimensions.
     Geometry = 1,
     /// A table of modes.
     Table = 2,
 }
 
 impl SloshSource {
-    /// All of them, in the order of their numbers.
+    /// All sources in the order of their numbers.
     pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
 }
 
 /// The largest number of slosh modes.
 pub const MODES: usize = 10;
 
-/// Dependence of a mode's viscous coefficient c on its natural frequency omega_n.
+/// Dependence of a mode's drag coefficient c on its natural frequency omega_n.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum DampingLaw {
     /// c ~ omega_n^(1/2): a laminar layer at the wall, for bare tanks.
     Laminar = 1,
-    /// c ~ omega_n: the damping ratio stays, for one that was measured or prescribed.
+    /// c ~ omega_n: constant damping ratio, for a measured or specified ratio.
     ConstantRatio = 2,
-    /// Laminar where the damping ratio comes from the correlation, constant where it is given.
+    /// Laminar if the damping ratio comes from the correlation, constant ratio if it is given.
     BySource = 3,
 }
 
 impl DampingLaw {
-    /// All of them, in the order of their numbers.
+    /// All laws in the order of their numbers.
     pub const ALL: [DampingLaw; 3] =
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::BySource];
 }
@@ -135,11 +135,11 @@ pub struct Slosh {
     pub hardening: f64,
 }
 
-/// The modes of a tank of any shape; 0 for what is not given.
+/// Modes of a tank of any shape; 0 for values that are not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct ModeTable {
-    /// The modes are those along one axis of a tank that has others across it.
+    /// True if the table holds only the modes along one axis of a tank that has others across it.
     pub one_axis: bool,
     pub m_liq: f64,
     pub g_ref: f64,
@@ -150,19 +150,19 @@ pub struct ModeTable {
     pub k: [f64; MODES],
     pub zeta: [f64; MODES],
     pub wave: [f64; MODES],
-    /// Angle from the tangent, outwards positive, of the direction in which a mode moves its mass, rad.
+    /// Angle of the direction in which a mode moves its mass, from the tangent, positive outwards, rad.
     pub direction: [f64; MODES],
 }
 
 impl ModeTable {
-    /// Radial and tangential component of a mode's direction.
+    /// Returns radial and tangential component of a mode's direction.
     pub(crate) fn along(&self, n: usize) -> [f64; 2] {
         let (sin, cos) = libm::sincos(self.direction[n]);
         [sin, cos]
     }
 
-    /// Pendulum length, m: as given, or from the frequency f at g_ref and the centring stiffness,
-    /// (2 pi f)^2 = g_ref/l + k/m.
+    /// Returns the pendulum length, m: as given, or from the frequency f at g_ref and the centring
+    /// stiffness, (2 pi f)^2 = g_ref/l + k/m.
     pub(crate) fn length_of(&self, n: usize) -> f64 {
         if self.length[n] > 0.0 {
             return self.length[n];
@@ -172,7 +172,7 @@ impl ModeTable {
     }
 }
 
-/// A flat ring at the tank's wall, `depth` below the surface; width 0: none.
+/// A flat ring baffle at the tank's wall, `depth` below the surface; width 0 for no baffle.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Ring {
@@ -189,24 +189,24 @@ pub struct Bench {
     pub tilt_azimuth: f64,
 }
 
-/// The laws of the bearing's friction; when to choose which is said in their files.
+/// Friction laws of the bearing. Their files describe when to choose which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum FrictionModel {
-    /// A free bearing.
+    /// Bearing without friction.
     None = 1,
-    /// b omega.
+    /// Viscous friction b omega.
     Viscous = 2,
     /// Stribeck curve with sgn(omega) smoothed to tanh(omega / eps).
     StribeckSmooth = 3,
     /// Stribeck curve as a set-valued law: the hub can stick.
     Stribeck = 4,
-    /// Bristles that deflect before they slide (LuGre).
+    /// LuGre: bristles that deflect before they slide.
     Lugre = 5,
 }
 
 impl FrictionModel {
-    /// All of them, in the order of their numbers.
+    /// All laws in the order of their numbers.
     pub const ALL: [FrictionModel; 5] = [
         FrictionModel::None,
         FrictionModel::Viscous,
@@ -216,7 +216,7 @@ impl FrictionModel {
     ];
 }
 
-/// The bearing; `harmonics_forward` and `harmonics_backward` are the coefficients of
+/// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are the coefficients of
 /// cos theta, sin theta, cos 2 theta, sin 2 theta.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
@@ -234,7 +234,7 @@ pub struct Friction {
     pub harmonics_backward: [f64; 4],
 }
 
-/// Initial motion; the slosh quantities are mode 1's.
+/// Initial conditions; the slosh quantities are those of mode 1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Init {
@@ -271,7 +271,8 @@ pub struct Imu {
     pub seed: i32,
 }
 
-/// The integrator; `max_steps` is how many internal steps and gyro samples one call may take.
+/// Limits of the integrator. `max_steps` is the number of internal steps and gyro samples that one
+/// call may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Solver {
@@ -280,8 +281,8 @@ pub struct Solver {
 
 const RPM: f64 = core::f64::consts::PI / 30.0;
 
-// Sources: thesis Tables 5.1, 5.4, 5.5, 5.6; water at 24 degC; the wheel's
-// inertia is an inference (a steel disc of 125 mm diameter).
+// Sources: thesis Tables 5.1, 5.4, 5.5, 5.6; water at 24 degC. The wheel's inertia is an assumption
+// (a steel disc of 125 mm diameter).
 impl Default for Hub {
     fn default() -> Self {
         let (imbalance, imbalance_angle) = (0.0, 0.0);
@@ -347,7 +348,7 @@ impl Default for Friction {
             d: 0.002423,
             omega_s: 0.08581,
             eps: 1e-5,
-            // Not the thesis's: 6 µrad of deflection, and damping well within passivity.
+            // Not from the thesis: 6 µrad of deflection, and damping well within passivity.
             sigma0: 1000.0,
             sigma1: 0.01,
             asymmetry: 0.0,
@@ -385,7 +386,8 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// One mode needs a fraction of a second for them, ten spherical ones some six seconds.
+    /// With the default limit a step of one mode takes at most a fraction of a second, of ten
+    /// spherical modes about six seconds.
     fn default() -> Self {
         Solver { max_steps: 200_000 }
     }

@@ -10,23 +10,24 @@ use crate::amplitude::Growth;
 use crate::baffle::Baffle;
 use crate::parameters::Init;
 
-/// How far the start of mode 1 may be off its direction, rad: what decimals round.
+/// Largest angle between the start of mode 1 and its direction, rad, as rounding of decimals causes
+/// it.
 const ALONG: f64 = 1e-6;
 
-/// One slosh mode as a pendulum that hangs at the tank's axis.
+/// One slosh mode as a pendulum with its hinge on the tank's axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
     /// Mass of the bob, kg.
     pub m: f64,
     /// Length, m.
     pub l: f64,
-    /// Viscous coefficient of the bob against the tank, N s/m, now and at the reference g.
+    /// Viscous coefficient of the bob relative to the tank, N s/m, now and at the reference g.
     pub c: f64,
     pub c_0: f64,
-    /// Distance of the hinge from the bearing's axis, m.
+    /// Distance of the hinge from the bearing axis, m.
     pub r: f64,
-    /// Direction in which the bob moves, radially and tangentially, a unit vector, of models that move along one: (0, 1) is the
-    /// tangent. With it r_x = r n_x and r_t = r n_t.
+    /// Direction of the bob's motion, radial and tangential, a unit vector, for models that move along one direction;
+    /// (0, 1) is the tangent. r_x = r n_x and r_t = r n_t.
     pub along: [f64; 2],
     pub r_x: f64,
     pub r_t: f64,
@@ -38,14 +39,15 @@ pub struct Pendulum {
     pub wave: f64,
     /// Coefficient of the quartic spring over R^2, 1/m2 (paraboloid and liquid only).
     pub hardening: f64,
-    /// Coefficient of the inertia that grows with the amplitude, l/s and l^2/s (the same).
+    /// Coefficient of the inertia that grows with the amplitude, l/s and l^2/s (paraboloid and
+    /// liquid only).
     pub s: f64,
     pub l_s: f64,
     pub l2_s: f64,
     /// Restoring specific force g + a_n, m/s2, and its rate; sqrt((g + a_n)/l), rad/s.
     pub g: [f64; 2],
     pub omega_n: f64,
-    /// c over its value at the start of the expansion.
+    /// c relative to its value at the start of the expansion.
     pub course: Series,
     pub baffle: Baffle,
     pub growth: Growth,
@@ -86,7 +88,8 @@ impl Pendulum {
         self.omega_n = libm::sqrt(f64::max(g[0], 0.0) / self.l);
     }
 
-    /// Sets the viscous coefficient, `factor` times that at the reference g, and how it goes on.
+    /// Sets the viscous coefficient, `factor` times that at the reference g, and its further
+    /// course.
     pub fn set_damping(&mut self, factor: f64, course: Series) {
         self.c = factor * self.c_0;
         self.c_m = self.c / self.m;
@@ -99,8 +102,7 @@ impl Pendulum {
         self.baffle.zeta > 0.0 || self.growth.zeta > 0.0
     }
 
-    /// Adds the drag of the baffle, and what grows with the amplitude, at [|q|^2, |q'|^2], squares of angle
-    /// and rate.
+    /// Adds the drag of the baffle and the amplitude-dependent drag, at [|q|^2, |q'|^2], squares of angle and rate.
     pub fn add_amplitude_drag(&mut self, at: [f64; 2]) {
         let w = self.g.map(|g| g * self.inv_l);
         if self.baffle.zeta > 0.0 {
@@ -120,13 +122,13 @@ impl Pendulum {
         self.course[n] = if growth.zeta > 0.0 { growth.expand(n, at, other) } else { other };
     }
 
-    /// Returns true if the bob moves along another direction than the tangent.
+    /// Returns true if the bob moves in another direction than the tangent.
     #[inline(always)]
     pub fn is_askew(&self) -> bool {
         self.along[0] != 0.0
     }
 
-    /// Why mode 1 cannot start as `init` says: it moves along its direction, and the start is not along it.
+    /// Returns why mode 1 cannot start as `init` asks: it moves along its direction, and the start is not along it.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         let [x, t] = self.along;
         let starts = [
@@ -136,14 +138,13 @@ impl Pendulum {
         starts.into_iter().find_map(|(name, unit, radial, tangential)| {
             let size = libm::hypot(radial, tangential);
             let off = libm::fabs(radial * t - tangential * x) > ALONG * size;
-            // The same size along the direction.
+            // The same magnitude along the direction.
             let along = libm::copysign(size, radial * x + tangential * t);
             (self.is_askew() && off).then(|| {
                 format!(
                     "init.slosh_{name} = {tangential:?} {unit} and init.slosh_{name}_radial = {radial:?} {unit} are not along \
-                     slosh.table.direction[1] = {:?} rad, the only direction in which mode 1 moves (allowed: both 0, or \
-                     tan(slosh.table.direction[1]) = init.slosh_{name}_radial / init.slosh_{name}, for example \
-                     init.slosh_{name} = {:?} with init.slosh_{name}_radial = {:?})",
+                     slosh.table.direction[1] = {:?} rad, the only direction in which mode 1 moves. Set both to 0, or for example \
+                     init.slosh_{name} = {:?} and init.slosh_{name}_radial = {:?}",
                     libm::atan2(x, t),
                     along * t,
                     along * x
@@ -152,59 +153,59 @@ impl Pendulum {
         })
     }
 
-    /// Radial and tangential part of what is along the bob's direction.
+    /// Returns radial and tangential part of a quantity along the bob's direction.
     #[inline(always)]
     pub fn spread<T: Number>(&self, a: T) -> [T; 2] {
         let [x, t] = self.along;
         if self.is_askew() { [a * x, a * t] } else { [T::constant(0.0), a] }
     }
 
-    /// q_x, q_y, q_x', q_y' of an angle along the bob's direction and its rate.
+    /// Returns q_x, q_y, q_x', q_y' of an angle along the bob's direction and its rate.
     #[inline(always)]
     pub fn coordinates(&self, [al, al_d]: [f64; 2]) -> [f64; 4] {
         let [x, t] = self.along;
         if self.is_askew() { [al * x, al * t, al_d * x, al_d * t] } else { [0.0, al, 0.0, al_d] }
     }
 
-    /// The angle along the bob's direction and its rate, of q_x, q_y, q_x', q_y'.
+    /// Returns the angle along the bob's direction and its rate, from q_x, q_y, q_x', q_y'.
     #[inline(always)]
     pub fn angle_and_rate(&self, [q_x, q_y, x_d, y_d]: [f64; 4]) -> [f64; 2] {
         let [x, t] = self.along;
         if self.is_askew() { [x * q_x + t * q_y, x * x_d + t * y_d] } else { [q_y, y_d] }
     }
 
-    /// Coefficient n of a_x n_x + a_t n_t, of a vector a.
+    /// Returns coefficient n of a_x n_x + a_t n_t, for a vector a.
     #[inline(always)]
     pub fn component(&self, n: usize, [a_x, a_t]: &[Series; 2]) -> f64 {
         self.along[0] * a_x[n] + self.along[1] * a_t[n]
     }
 
-    /// Coefficient n of (a_x n_x + a_t n_t) b.
+    /// Returns coefficient n of (a_x n_x + a_t n_t) b.
     #[inline(always)]
     pub fn component_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let radial = if self.is_askew() { self.along[0] * mul(n, a_x, b) } else { 0.0 };
         radial + self.along[1] * mul(n, a_t, b)
     }
 
-    /// Coefficient n of (a_x n_t - a_t n_x) b.
+    /// Returns coefficient n of (a_x n_t - a_t n_x) b.
     #[inline(always)]
     pub fn across_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let tangential = if self.is_askew() { self.along[0] * mul(n, a_t, b) } else { 0.0 };
         self.along[1] * mul(n, a_x, b) - tangential
     }
 
-    /// Restoring specific force and viscous coefficient at the start of an expansion.
+    /// Returns restoring specific force and viscous coefficient at the start of an expansion.
     pub fn restoring_and_drag<T: Number>(&self) -> [T; 2] {
         [T::of(self.g[0], self.g[1]), T::of(self.c, self.c * self.course[1])]
     }
 
-    /// Coefficient n of g a; `varies` says whether g changes.
+    /// Returns coefficient n of g a; `varies` is true if g changes.
     #[inline(always)]
     pub fn weight(&self, n: usize, varies: bool, a: &Series) -> f64 {
         if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
     }
 
-    /// Coefficient n of a rate v of the liquid times the course of the drag.
+    /// Returns coefficient n of a rate v of the liquid times the course of the drag.
     #[inline(always)]
     pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
         if varies { mul(n, &self.course, v) } else { v[n] }

@@ -1,4 +1,4 @@
-//! The plant as a whole: hub, bearing, tank, wheel and gyro, and how it steps.
+//! The plant: hub, bearing, tank, wheel and gyro, and its steps.
 //!
 //! ```text
 //! I_hub w' = tau_actuator + tau_ext + tau_friction + tau_fluid
@@ -30,8 +30,7 @@ use crate::tank::{self, Calculated};
 pub struct Plant {
     calculated: Calculated,
     pub(crate) hub_inertia: f64,
-    /// Mass and inertia of the liquid that moves with the tank, kg, kg m2; distance of the
-    /// tank, m.
+    /// Mass and inertia of the rigid liquid, kg, kg m2; distance of the tank, m.
     pub(crate) m_0: f64,
     pub(crate) i_0: f64,
     pub(crate) r: f64,
@@ -44,7 +43,7 @@ pub struct Plant {
     pub(crate) motion: Box<Motion>,
     pub(crate) liquid: Liquid,
     pub(crate) state: State,
-    /// The step that has stopped at an event, until it is gone on with.
+    /// The step that has stopped at an event, until it is continued.
     pub(crate) stopped: Option<StoppedStep>,
 }
 
@@ -56,24 +55,24 @@ fn rounding(time: f64) -> f64 {
 /// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepEnd {
-    /// At its end.
+    /// The end of the step.
     End,
-    /// At its end, where there is an event.
+    /// The end of the step, with an event there.
     EventAtEnd,
-    /// At an event before, at this time, s.
+    /// An event before the end, at this time, s.
     Event(f64),
 }
 
-/// A step that has stopped at an event: going on is going through it again from its start, past that event. So the
-/// motion is the same, to the last bit, whether somebody looks at its events or not.
+/// A step that has stopped at an event. To continue it, the plant repeats it from its start and passes this event. The
+/// motion is thus bit-identical whether a host stops at events or not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoppedStep {
-    /// The state at its start.
+    /// State at the start of the step.
     start: State,
-    /// Its length, and how far it has come, s.
+    /// Length of the step, and elapsed time, s.
     h: f64,
     passed: f64,
-    /// The inputs along it: tau_cmd, tau_ext, g_axial.
+    /// Inputs during the step: tau_cmd, tau_ext, g_axial.
     inputs: [f64; 3],
     /// Time and states at the event.
     time: f64,
@@ -84,7 +83,7 @@ impl StoppedStep {
     /// Number of words of a saved state.
     pub const WORDS: usize = State::WORDS + 6 + STATES;
 
-    /// It as words, for saving.
+    /// Returns the stopped step as words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
         let (start, rest) = words.split_at_mut(State::WORDS);
@@ -97,7 +96,7 @@ impl StoppedStep {
         words
     }
 
-    /// The reverse; `None` when the words are none.
+    /// Reads a stopped step from words; `None` if they are not valid.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<StoppedStep> {
         let (start, rest) = words.split_first_chunk()?;
         let mut numbers = [0.0; 6 + STATES];
@@ -116,7 +115,7 @@ impl StoppedStep {
         })
     }
 
-    /// Returns true if a step of length `h` from the present state continues the stopped step: same end, same inputs.
+    /// Returns true if a step of length `h` from the current state continues the stopped step: same end, same inputs.
     fn goes_on(&self, state: &State, inputs: &Inputs, h: f64) -> bool {
         let ends = [state.time + h, self.start.time + self.h];
         let held = [inputs.tau_cmd, inputs.tau_ext, inputs.g_axial];
@@ -128,7 +127,7 @@ impl StoppedStep {
 }
 
 impl Plant {
-    /// Everything that is wrong with how the parameters go together, wherever the motion starts.
+    /// Returns all problems of the combined parameters that do not depend on the initial motion.
     pub fn problems(p: &Parameters) -> Vec<String> {
         let mut problems = Law::problems(&p.friction);
         problems.extend(p.wheel.problems());
@@ -136,12 +135,12 @@ impl Plant {
         problems
     }
 
-    /// A plant at the start of its motion, at `start_time` (s), with the inputs that
-    /// act then; `tolerance` is the relative error allowed in rates and angles.
+    /// Creates a plant at the start of its motion, at `start_time` (s), with the inputs that act
+    /// then. `tolerance` is the allowed relative error of rates and angles.
     ///
     /// # Errors
-    /// The ranges of single parameters are the caller's business; what parameters
-    /// mean together is checked here and all problems are returned.
+    /// The caller must check the ranges of single parameters. This function checks combinations and
+    /// returns all problems.
     pub fn new(
         p: &Parameters,
         inputs: &Inputs,
@@ -193,14 +192,14 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Lists where parameters and specific force leave the known range of the models, one
+    /// Lists where parameters and specific force are outside the known range of the models, one
     /// sentence each.
     pub fn warnings(p: &Parameters, inputs: &Inputs) -> Vec<String> {
         tank::warnings(p, inputs.g_axial.value)
     }
 
-    /// A plant that continues from a saved state of one with the same parameters, in which
-    /// [`Plant::problems`] finds nothing.
+    /// Creates a plant that continues from a saved state of one with the same parameters, which
+    /// pass [`Plant::problems`].
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Plant {
         Plant::of_parameters(p, *state, tolerance)
     }
@@ -238,45 +237,45 @@ impl Plant {
         }
     }
 
-    /// The present time, s.
+    /// Returns the current time, s.
     pub fn time(&self) -> f64 {
         self.state.time
     }
 
-    /// The hub's rate, rad/s.
+    /// Returns the hub's rate, rad/s.
     pub fn omega(&self) -> f64 {
         self.state.x[x::OMEGA]
     }
 
-    /// Values calculated from the parameters.
+    /// Returns the values calculated from the parameters.
     pub fn calculated(&self) -> &Calculated {
         &self.calculated
     }
 
-    /// The state, for saving.
+    /// Returns the state, for saving.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Goes back to a saved state of this plant or of one with the same parameters.
+    /// Restores a saved state of this plant or of one with the same parameters.
     pub fn set_state(&mut self, state: &State) {
         self.state = *state;
     }
 
-    /// The step that has stopped at an event, for saving.
+    /// Returns the step that has stopped at an event, for saving.
     pub fn stopped(&self) -> Option<&StoppedStep> {
         self.stopped.as_ref()
     }
 
-    /// Takes a saved one.
+    /// Restores a saved one.
     pub fn set_stopped(&mut self, stopped: Option<StoppedStep>) {
         self.stopped = stopped;
     }
 
-    /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps.
+    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps.
     ///
     /// # Errors
-    /// See [`StepError`]; the plant is as before.
+    /// See [`StepError`]; the plant is unchanged.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         let before = self.state;
         let done = self.advance(inputs, h, f64::INFINITY);
@@ -286,11 +285,12 @@ impl Plant {
         done.map(|_| ())
     }
 
-    /// Like [`Plant::step`], but stops at the first event: the hub sticks or slips, the wheel reaches a limit, the gyro
-    /// takes a sample. A step from there to the same end with the same inputs continues as if it had not stopped.
+    /// Works like [`Plant::step`], but stops at the first event: the hub sticks or slips, the wheel reaches a limit,
+    /// the gyro takes a sample. A step from there to the same end with the same inputs continues as if it had not
+    /// stopped.
     ///
     /// # Errors
-    /// As [`Plant::step`].
+    /// The same as for [`Plant::step`].
     pub fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepError> {
         let (before, stopped) = (self.state, self.stopped.take());
         let (mut length, mut passed) = (h, -1.0);
@@ -312,7 +312,7 @@ impl Plant {
             if passed >= length {
                 return Ok(StepEnd::EventAtEnd);
             }
-            // An event that is at the end but for rounding leaves nothing to step through.
+            // No step remains if the event is at the end to rounding.
             if length - passed > rounding(start.time + length) {
                 break;
             }
@@ -324,8 +324,8 @@ impl Plant {
         Ok(StepEnd::Event(time))
     }
 
-    /// Like [`Plant::step`], but an error leaves the state unusable, and the step stops at the first event later than
-    /// `passed` seconds after its start. Returns the time of that event after the start, s.
+    /// Works like [`Plant::step`], but an error leaves the state unusable, and the step stops at the first event later
+    /// than `passed` seconds after its start. Returns the time of that event after the start, s.
     #[inline(always)]
     fn advance(
         &mut self,
@@ -340,7 +340,7 @@ impl Plant {
         let begin = state.time;
         let (mut t, mut steps, mut stopped) = (0.0, self.motion.steps(), None);
         while t < h {
-            // A piece of no length takes no step of the integrator; it counts as one.
+            // A piece of zero length takes no step of the integrator but counts as one.
             steps.count(1, begin + t)?;
             let speed = state.x[x::WHEEL_SPEED];
             let (length, torque, speed) = self.wheel.next(speed, inputs.tau_cmd.after(t), h - t);
@@ -361,7 +361,7 @@ impl Plant {
             }
             state.x[x::WHEEL_SPEED] = speed;
             t = if length == h - t { h } else { t + length };
-            // Where the wheel's torque changes.
+            // The wheel's torque changes here.
             if stopped.is_some() || t < h && t > passed {
                 stopped = Some(t);
                 break;
@@ -379,10 +379,10 @@ impl Plant {
         Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
-    /// Work through the changes of g_axial since the start, J, the present one included: of a
-    /// jump at an instant, g_axial's change times the liquid's mass times height; since the
-    /// last accepted step of a host that integrates itself by Hermite's rule, as if g_axial
-    /// had run along a line.
+    /// Returns the work of changes of g_axial since the start, J, including the current one. A jump
+    /// does the work of g_axial's change times the liquid's mass times height. For a host that
+    /// integrates itself, the work since its last accepted step comes from Hermite's rule, with
+    /// g_axial linear in time.
     pub(crate) fn work_axial(&mut self, inputs: &Inputs) -> f64 {
         let last = self.state.axial;
         let change = inputs.g_axial.value - last.g;
@@ -393,7 +393,7 @@ impl Plant {
         self.work_axial_at(change, self.height())
     }
 
-    /// The same from g_axial's change since the last accepted step and from the liquid's mass times height.
+    /// Returns the same from g_axial's change since the last accepted step and from the liquid's mass times height.
     pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
         let last = self.state.axial;
         let h = self.state.time - last.time;
@@ -406,12 +406,13 @@ impl Plant {
         c(last.work) + change * mean
     }
 
-    /// Mass times height of hub and liquid above rest, kg m, and its rate, where the equations were evaluated last.
+    /// Returns mass times height of hub and liquid above rest, kg m, and its rate, at the last evaluation of the
+    /// equations.
     pub(crate) fn height<T: Number>(&self) -> [T; 2] {
         with_modes!(&self.liquid, modes => self.motion.height(modes))
     }
 
-    /// Evaluates the equations at the present instant.
+    /// Evaluates the equations at the current instant.
     pub(crate) fn evaluate(&mut self, inputs: &Inputs) {
         let tau_actuator = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
         let tau = Ramp::held(tau_actuator.value + inputs.tau_ext.value);
@@ -427,21 +428,21 @@ impl Plant {
         });
     }
 
-    /// The contact that the hub's rate or, at rest, the torques make.
+    /// Returns the contact from the hub's rate or, at rest, from the torques.
     pub(crate) fn present_contact(&mut self, inputs: &Inputs) -> Contact {
         self.evaluate(inputs);
         with_modes!(&mut self.liquid, modes => self.motion.contact(modes, &self.state))
     }
 
-    /// The ranges that the present motion is in.
+    /// Returns the ranges of the current motion.
     pub(crate) fn present_ranges(&mut self, inputs: &Inputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
         self.ranges_of(&outputs)
     }
 
-    /// Gives the hub the contact that the present inputs make, and returns the one before, for
-    /// [`Plant::revert_contact`]: torque that was changed since the last step may already have
-    /// broken the hub away, or a break-away an instant ago may be undone.
+    /// Gives the hub the contact for the current inputs, and returns the previous one for
+    /// [`Plant::revert_contact`]. Torque that has changed since the last step may already have
+    /// broken the hub away, or may undo a break-away of this instant.
     pub fn apply_present_contact(&mut self, inputs: &Inputs) -> Contact {
         let before = self.state.contact;
         if self.omega() == 0.0 {
@@ -450,7 +451,7 @@ impl Plant {
         before
     }
 
-    /// Like [`Plant::apply_present_contact`], but permanent: the contact with which the next step begins.
+    /// Works like [`Plant::apply_present_contact`], but permanently: the next step begins with this contact.
     pub fn take_present_contact(&mut self, inputs: &Inputs) {
         if self.omega() == 0.0 {
             let (contact, time) = (self.present_contact(inputs), self.state.time);

@@ -1,5 +1,5 @@
-//! The plant's state, and the names of its parts: the continuous states and the event
-//! indicators are declared here and nowhere else.
+//! The plant's state and the indices of its parts. Only this file declares continuous states and
+//! event indicators.
 
 use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
@@ -7,7 +7,7 @@ use taylor::integrator::MAX_MAGNITUDE;
 use crate::contact::Contact;
 use crate::imu::Gyro;
 
-/// Places of the continuous states in x. A new one is a new constant before [`x::SLOSH`].
+/// Indices of the continuous states in x. A new one is a new constant before [`x::SLOSH`].
 pub mod x {
     use crate::parameters::MODES;
 
@@ -25,8 +25,8 @@ pub mod x {
     pub const WHEEL_SPEED: usize = 5;
     /// Deflection of the bearing's bristles (LuGre friction), rad.
     pub const BRISTLE: usize = 6;
-    /// The first of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, …
-    /// Their unit is the slosh model's; modes that are not used stay at 0.
+    /// First of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, … Their unit
+    /// depends on the slosh model. Unused modes stay at 0.
     pub const SLOSH: usize = 7;
     /// Number of continuous states.
     pub const COUNT: usize = SLOSH + 4 * MODES;
@@ -35,8 +35,8 @@ pub mod x {
 /// Number of continuous states.
 pub const STATES: usize = x::COUNT;
 
-/// Places of the event indicators: functions that are positive between events and cross
-/// zero at them.
+/// Indices of the event indicators: functions that are positive between events and cross zero at
+/// them.
 pub mod indicator {
     /// The hub comes to rest.
     pub const REST: usize = 0;
@@ -61,18 +61,18 @@ pub mod indicator {
 /// Number of event indicators.
 pub const INDICATORS: usize = indicator::COUNT;
 
-/// The ranges of validity that the motion is in.
+/// Validity ranges of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Ranges {
     pub regime: Regime,
     pub baffle: bool,
 }
 
-/// The plant's memory: all that a saved state needs besides parameters and inputs.
+/// Everything that a saved state of the plant needs besides parameters and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,
-    /// The continuous states, by the places in [`x`].
+    /// The continuous states, by the indices in [`x`].
     pub(crate) x: [f64; STATES],
     pub(crate) contact: Contact,
     /// Ranges of the motion since the last event, for hosts that integrate themselves.
@@ -80,21 +80,21 @@ pub struct State {
     pub(crate) event_count: i32,
     pub(crate) event_time: f64,
     pub(crate) start_time: f64,
-    /// g_axial at the start: the slosh damping belongs to it.
+    /// g_axial at the start, to which the slosh damping belongs.
     pub(crate) start_g: f64,
     pub(crate) axial: Axial,
     pub(crate) gyro: Gyro,
 }
 
-/// Work done through a changing g_axial.
+/// Work done by a changing g_axial.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
-    /// The work up to `time`, since the start, J, and the g_axial of that instant, m/s2.
+    /// Work from the start to `time`, J, and the g_axial of that instant, m/s2.
     pub work: f64,
     pub time: f64,
     pub g: f64,
-    /// The liquid's mass times height at that instant, kg m, and its rate: known after an
-    /// accepted step of a host that integrates itself.
+    /// The liquid's mass times height at that instant, kg m, and its rate. Known after an accepted
+    /// step of a host that integrates itself.
     pub mass_height: f64,
     pub rate: f64,
 }
@@ -108,13 +108,13 @@ impl Axial {
 }
 
 impl State {
-    /// Length of the flat form.
+    /// Number of words of a saved state.
     pub const WORDS: usize = 2 + Self::REALS;
 
     /// Number of words that are real numbers; the last of them are x.
     const REALS: usize = 11 + STATES;
 
-    /// The state as plain words, for saving.
+    /// Returns the state as words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
         let discrete =
@@ -143,7 +143,7 @@ impl State {
         words
     }
 
-    /// The reverse; `None` when the words are not a state.
+    /// Reads a state from words; `None` if they are not a valid state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
         let contact = match (words[0] >> 32) as u8 as i8 {
             -1 => Contact::Backward,
@@ -176,7 +176,7 @@ impl State {
             held,
         ] = *head;
         let finite = reals.iter().all(|real| real.is_finite());
-        // Beyond this the samples' instants can't be told apart.
+        // Beyond this number the instants of the samples cannot be separated.
         let countable = words[1] <= 1 << f64::MANTISSA_DIGITS;
         (finite && countable).then_some(State {
             time,
@@ -192,17 +192,17 @@ impl State {
         })
     }
 
-    /// The coordinates of each slosh mode, see `slosh`.
+    /// Returns the coordinates of each slosh mode, see `slosh`.
     pub(crate) fn slosh(&self) -> &[[f64; 4]] {
         self.x[x::SLOSH..].as_chunks().0
     }
 
-    /// The same, to change.
+    /// Returns [`State::slosh`], mutable.
     pub(crate) fn slosh_mut(&mut self) -> &mut [[f64; 4]] {
         self.x[x::SLOSH..].as_chunks_mut().0
     }
 
-    /// Notes a new contact at `time`. Returns whether it is another than before.
+    /// Records a new contact at `time`. Returns true if it differs from the previous one.
     pub(crate) fn record_contact(&mut self, contact: Contact, time: f64) -> bool {
         let changes = contact != self.contact;
         if changes {

@@ -1,10 +1,10 @@
-//! The line that the hub hangs from, a torsion spring with damping about the bearing's axis:
+//! The suspension line of the hub, a torsion spring with damping about the bearing axis:
 //!
 //! ```text
 //! tau_s = -k (theta - theta_0) - c w,      energy k (theta - theta_0)^2/2,   dissipation c w^2
 //! ```
 //!
-//! A stuck hub stays where it is: the bearing holds the spring's torque, too.
+//! A stuck hub does not move: the bearing holds the spring's torque, too.
 //!
 //! Source: thesis 8.4.4 names the line; the law is that of a linear torsion spring.
 
@@ -29,19 +29,19 @@ impl Suspension {
         Suspension { k, theta_0, c, exists: k > 0.0 || c > 0.0 }
     }
 
-    /// Coefficient n of tau_s.
+    /// Returns coefficient n of tau_s.
     #[inline(always)]
     pub fn torque(&self, n: usize, hub: &HubMotion) -> f64 {
         -self.k * (hub.theta[n] - constant(n, self.theta_0)) - self.c * hub.omega[n]
     }
 
-    /// Coefficient n of c w^2.
+    /// Returns coefficient n of c w^2.
     #[inline(always)]
     pub fn dissipation(&self, n: usize, hub: &HubMotion) -> f64 {
         self.c * hub.omega2[n]
     }
 
-    /// tau_s, N m, and the energy in the spring, J, at the start of an expansion.
+    /// Returns tau_s, N m, and the energy of the spring, J, at the start of an expansion.
     pub fn present<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let [turned, w]: [T; 2] = [number(&hub.theta), number(&hub.omega)];
         let turned = turned - T::constant(self.theta_0);

@@ -1,16 +1,16 @@
-//! The liquid as pendulums: of an upright cylinder by its dimensions, of any tank by a table.
+//! Pendulums that represent the liquid: of an upright cylinder from its dimensions, of any tank
+//! from a table.
 //!
-//! Modal masses and lengths (`formulas::cylinder`): thesis Table 4.1, the same as Abramson NASA SP-106
-//! and Dodge (2000), with the exact zeros of J1'. Damping: `formulas::damping`.
-//! Capillarity with a flat surface and a free contact line, exact in the cylinder: omega_n^2 =
-//! g/l_n + sigma xi_n^3 tanh(xi_n h/R)/(rho R^3). The lengths are geometry; capillarity acts as a
-//! centring stiffness k_n, and that as if g were larger by
+//! Modal masses and lengths (`formulas::cylinder`): thesis Table 4.1, the same as Abramson NASA SP-106 and Dodge
+//! (2000), with the exact zeros of J1'. Damping: `formulas::damping`. Capillarity with a flat surface and a free
+//! contact line, exact in the cylinder: omega_n^2 = g/l_n + sigma xi_n^3 tanh(xi_n h/R)/(rho R^3). The lengths are
+//! geometry. Capillarity acts as a centring stiffness k_n, which is equivalent to a g larger by
 //!
 //! ```text
 //! a_n = k_n l_n/m_n = sigma xi_n^2/(rho R^2)
 //! ```
 //!
-//! On a bench that leans the cylinder's surface is tilted: `leaning.rs`. A table is taken as given.
+//! On a tilted bench the cylinder's surface is tilted: `leaning.rs`. A table is used as given.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -29,25 +29,25 @@ use crate::pendulum::Pendulum;
 /// Values calculated from the parameters; 0 for unused modes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Calculated {
-    /// Mass of the liquid, kg.
+    /// Mass of the whole liquid, kg.
     pub m_liq: f64,
-    /// Mass of the liquid that moves with the tank, kg.
+    /// Mass of the rigid liquid, kg.
     pub m_0: f64,
     /// Bond number rho g R^2 / sigma.
     pub bond: f64,
     /// Pendulum masses, kg.
     pub mass: [f64; MODES],
-    /// Pendulum lengths, m; on a bench that leans of those that, hanging obliquely, have the frequencies.
+    /// Pendulum lengths, m; on a tilted bench those of oblique pendulums with the frequencies.
     pub length: [f64; MODES],
     /// Natural frequencies, Hz; on an upright bench sqrt((g + a)/l) / 2 pi.
     pub frequency: [f64; MODES],
     /// Damping ratios.
     pub damping: [f64; MODES],
-    /// Apparent increase of g by the centring stiffness, a_n, m/s2.
+    /// Increase of g equivalent to the centring stiffness, a_n, m/s2.
     pub centring: [f64; MODES],
 }
 
-/// Lists errors in a table of modes.
+/// Lists problems of a table of modes.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (slosh, table) = (&p.slosh, &p.slosh.table);
     let mut problems = baffle::problems(p);
@@ -58,16 +58,16 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     }
     if slosh.model == SloshModel::Liquid {
         problems.push(
-            "slosh.model = liquid needs slosh.source = geometry: how the frequency depends on the \
-             amplitude is known for the upright cylinder alone"
+            "slosh.model = liquid with slosh.source = table (allowed: slosh.source = geometry, because the \
+             dependence of frequency on amplitude is known only for the upright cylinder)"
                 .to_string(),
         );
     }
     let both = matches!(slosh.model, SloshModel::Spherical | SloshModel::Paraboloid);
     if table.one_axis && both {
         problems.push(
-            "slosh.table.one_axis: the modes are those along one axis of the tank, which has others across it; slosh.model \
-             = spherical and paraboloid move along both with the same (allowed: frozen, linear, planar)"
+            "slosh.table.one_axis with slosh.model = spherical or paraboloid, which move along both axes with the same \
+             modes (allowed: slosh.model = frozen, linear or planar)"
                 .to_string(),
         );
     }
@@ -77,8 +77,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
         matches!(slosh.model, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar);
     if let (Some(n), false) = (askew, along_one) {
         problems.push(format!(
-            "slosh.table.direction[{}] = {} rad: slosh.model = spherical, paraboloid and liquid move along all directions with the \
-             same frequency (allowed: frozen, linear, planar)",
+            "slosh.table.direction[{}] = {} rad with slosh.model = spherical, paraboloid or liquid, which move along all \
+             directions with the same frequency (allowed: slosh.model = frozen, linear or planar)",
             n + 1,
             table.direction[n]
         ));
@@ -104,7 +104,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let length = |n: usize| table.length_of(n);
     for n in (0..modes).filter(|n| length(*n).is_nan() || length(*n) <= 0.0) {
         problems.push(format!(
-            "slosh.table.frequency[{0}] = {1} is not above that of slosh.table.k[{0}] = {2} alone",
+            "slosh.table.frequency[{0}] = {1} Hz (allowed: above the frequency of slosh.table.k[{0}] = {2} N/m alone)",
             n + 1,
             table.frequency[n],
             table.k[n]
@@ -112,32 +112,31 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     }
     let omega2 = |n: usize| table.g_ref / length(n) + table.k[n] / table.mass[n];
     for n in 1..modes {
-        // The modes of each direction are in an order of their own.
+        // The modes of each direction have their own order.
         let same = |m: &usize| table.direction[*m] == table.direction[n];
         let Some(before) = (0..n).rev().find(same).filter(|m| omega2(n) < omega2(*m)) else {
             continue;
         };
         problems.push(format!(
-            "the modes of slosh.table must stand in the order of their frequencies: mode {} has a \
-             lower one than mode {}",
+            "the modes of slosh.table are not in the order of their frequencies: mode {} has a lower \
+             frequency than mode {} (allowed: ascending frequencies in each direction)",
             n + 1,
             before + 1
         ));
     }
     let sum = table.most_along_one(modes);
-    // A table written in decimals may leave the fixed mass below 0 by its last digit.
+    // In a table written in decimals the fixed mass may be below 0 by its last digit.
     if sum > table.m_liq * (1.0 + 1e-9) {
         problems.push(format!(
-            "the masses of slosh.table add up to {sum} kg along one direction, more than the liquid's slosh.table.m_liq = \
-             {} kg",
+            "the masses of slosh.table add up to {sum} kg along one direction (allowed: up to slosh.table.m_liq = {} kg)",
             table.m_liq
         ));
     }
     let least = p.hub.inertia + p.tank.own_inertia + table.least_inertia(modes, p.tank.r);
     if askew.is_some() && slosh.model == SloshModel::Planar && least <= 0.0 {
         problems.push(format!(
-            "slosh.table.direction: with the bobs where they make hub and liquid least inert, both together have {least} kg m2 \
-             (allowed: greater than 0; hub.I = {} kg m2)",
+            "slosh.table.direction: hub and liquid have the inertia {least} kg.m2 with the bobs where they are least inert \
+             (allowed: greater than 0; hub.I = {} kg.m2)",
             p.hub.inertia
         ));
     }
@@ -145,12 +144,12 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
 }
 
 impl ModeTable {
-    /// Returns true if a mode moves along another direction than the tangent.
+    /// Returns true if a mode moves in another direction than the tangent.
     pub(crate) fn is_askew(&self, modes: usize) -> bool {
         self.direction[..modes].iter().any(|direction| *direction != 0.0)
     }
 
-    /// The most mass that the modes have along one direction, kg: the larger eigenvalue of the sum of m n n^T.
+    /// Returns the largest modal mass along one direction, kg: the larger eigenvalue of the sum of m n n^T.
     fn most_along_one(&self, modes: usize) -> f64 {
         if self.direction[..modes].iter().all(|direction| *direction == self.direction[0]) {
             return self.mass[..modes].iter().sum();
@@ -163,8 +162,8 @@ impl ModeTable {
         sum / 2.0 + libm::hypot(half, cross)
     }
 
-    /// The least inertia that the liquid at the distance r can have in the model `planar`, kg m2: m_0 r^2 and of each mode the least
-    /// J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
+    /// Returns the smallest inertia of the liquid at the distance r in the model `planar`, kg m2: m_0 r^2 and of each
+    /// mode the smallest J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
     fn least_inertia(&self, modes: usize, r: f64) -> f64 {
         let of_mode = |n: usize| {
             let ([n_x, n_t], l) = (self.along(n), self.length_of(n));
@@ -189,8 +188,8 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     warnings.extend(leaning::warnings(p));
     if !geometry && slosh.model == SloshModel::Linear && slosh.table.is_askew(slosh.modes) {
         warnings.push(
-            "slosh.table.direction with slosh.model = linear: to first order a hub that only turns moves a mode by its part along the \
-             tangent alone; slosh.model = planar has the centrifugal and Coriolis forces"
+            "slosh.table.direction with slosh.model = linear: rotation of the hub excites only the tangential part of a mode. \
+             Use slosh.model = planar for centrifugal and Coriolis forces"
                 .to_string(),
         );
     }
@@ -202,71 +201,71 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     let mut used = mass.iter().zip(centring).take_while(|(mass, _)| **mass > 0.0);
     if let Some(n) = used.position(|(_, a)| g + a <= 0.0) {
         warnings.push(format!(
-            "g_axial = 0 at the start: the tank is weightless, nothing restores or damps slosh mode {} \
-             (set the input g_axial, or slosh.capillarity or slosh.table.k)",
+            "g_axial = 0 at the start: the tank is weightless, and nothing restores or damps slosh mode {}. \
+             Set the input g_axial, slosh.capillarity or slosh.table.k",
             n + 1
         ));
     } else if centring[0] == 0.0 && bond < LOW_BOND {
         warnings.push(format!(
-            "the Bond number is {bond:.3}: capillarity counts and is not in the model (set \
-             slosh.capillarity, or slosh.table.k)"
+            "the Bond number is {bond:.3}: capillarity matters, but the model does not include it. Set \
+             slosh.capillarity or slosh.table.k"
         ));
     }
     if geometry && slosh.capillarity && bond < LOW_BOND {
         warnings.push(format!(
-            "slosh.capillarity at the Bond number {bond:.3}: for a flat surface and a free contact \
-             line. For other contact angles give slosh.table.k; masses under a curved meniscus are \
-             not known"
+            "slosh.capillarity at the Bond number {bond:.3} holds for a flat surface and a free contact \
+             line. For other contact angles set slosh.table.k. Modal masses under a curved meniscus are \
+             unknown"
         ));
     }
     warnings
 }
 
-/// Refuses the model `liquid` where its inertia falls with the amplitude: the kinetic energy of hub and liquid is then
-/// indefinite at amplitudes that depend on the hub.
+/// Refuses the model `liquid` if its inertia falls with the amplitude. The kinetic energy of hub and liquid would then
+/// be indefinite at amplitudes that depend on the hub.
 fn inertia_problem(p: &Parameters) -> Option<String> {
     let fill = 2.0 * p.tank.h / p.tank.d;
     let (s, _) = coefficients(fill);
     let used = p.slosh.model == SloshModel::Liquid && p.slosh.source == SloshSource::Geometry;
     (used && s <= 0.0).then(|| {
         format!(
-            "slosh.model = liquid at tank.h / (tank.d/2) = {fill:.4}: the third order's inertia coefficient s = {s:.3} is not \
-             above 0, and the kinetic energy would be indefinite (allowed: a fill with s above 0, such as 0.35 to 0.82 and \
-             above 1.02; or slosh.model = spherical or paraboloid)"
+            "slosh.model = liquid at tank.h / (tank.d/2) = {fill:.4}: the inertia coefficient s = {s:.3} is not above 0, so \
+             the kinetic energy would be indefinite. Use a fill with s above 0, such as 0.35 to 0.82 or above 1.02, or \
+             slosh.model = spherical or paraboloid"
         )
     })
 }
 
-/// Below this h/R waves are shallow: s turns negative and both coefficients grow without bound.
+/// h/R below which waves are shallow: s turns negative and both coefficients grow without bound.
 const SHALLOW: f64 = 0.4;
 
-/// Warning if the third-order coefficients at h/R = `fill` are not valid.
+/// Returns a warning if the third-order coefficients at h/R = `fill` are not valid.
 fn third_order_warning(fill: f64) -> Option<String> {
     let (s, kappa) = coefficients(fill);
     if fill < SHALLOW {
         return Some(format!(
-            "slosh.model = liquid at h/R = {fill:.3}: below {SHALLOW} waves are shallow and the third \
-             order in the amplitude (s = {s:.3}, kappa = {kappa:.3}) holds for the smallest ones alone"
+            "slosh.model = liquid at h/R = {fill:.3}: below {SHALLOW} waves are shallow, and the third \
+             order in the amplitude (s = {s:.3}, kappa = {kappa:.3}) holds only for very small waves"
         ));
     }
     secondary_resonance(fill).map(|(azimuth, n)| {
         format!(
             "slosh.model = liquid at h/R = {fill:.3}: twice the frequency of mode 1 is within 1 % \
-             of that of mode ({azimuth},{n}), a secondary resonance, next to which the dependence \
-             on amplitude (s = {s:.3}, kappa = {kappa:.3}) is not known"
+             of that of mode ({azimuth},{n}). Near this secondary resonance the dependence \
+             on amplitude (s = {s:.3}, kappa = {kappa:.3}) is unknown"
         )
     })
 }
 
-/// Below this Bond number capillarity adds more than 3 % to omega_1^2.
+/// Bond number below which capillarity adds more than 3 % to omega_1^2.
 const LOW_BOND: f64 = 100.0;
 
 impl Calculated {
-    /// Modal parameters at the specific force `g` along the tank's axis, m/s2.
+    /// Calculates the modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
-    /// The correlation covers the first mode; each higher mode has as many laminar layers of its own
-    /// (`formulas::damping`). Without restoring force (g = 0, no centring stiffness) there is no frequency; the damping
-    /// ratio, which has no meaning there, is reported as 0.
+    /// The correlation covers the first mode. Each higher mode has the same multiple of its own laminar layer
+    /// (`formulas::damping`). Without restoring force (g = 0, no centring stiffness) there is no frequency. The damping
+    /// ratio has no meaning there and is reported as 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
         let radius = tank.d / 2.0;
@@ -280,7 +279,7 @@ impl Calculated {
         let modes = if slosh.model == SloshModel::Frozen { 0 } else { slosh.modes.min(MODES) };
         let leaning = Leaning::of(p);
         for n in 0..modes {
-            // Of an upright pendulum of the mode's frequency; one that hangs obliquely has another.
+            // Of an upright pendulum of the mode's frequency; an oblique one has another length.
             let upright;
             match slosh.source {
                 SloshSource::Geometry => {
@@ -309,7 +308,7 @@ impl Calculated {
                 _ if restoring <= 0.0 => 0.0,
                 (SloshSource::Table, _) => slosh.table.zeta[n],
                 (_, true) if n == 0 => damping::cylinder(radius, tank.h, fluid.nu, restoring),
-                // As many laminar layers of its own as the first mode.
+                // The same multiple of its own laminar layer as the first mode.
                 (_, true) => {
                     let mode = |n: usize| {
                         let g = g + all.centring[n];
@@ -321,15 +320,15 @@ impl Calculated {
             };
             all.m_0 -= all.mass[n];
         }
-        // Along one direction alone it is below 0 by the last digit of a table at most.
+        // Along one direction it is below 0 at most by the last digit of a table.
         if slosh.source == SloshSource::Table && !slosh.table.is_askew(modes) {
             all.m_0 = f64::max(all.m_0, 0.0);
         }
         all
     }
 
-    /// The pendulums in use. Their viscous coefficients c = 2 zeta omega_n m
-    /// belong to the `g` of [`Calculated::new`]; `damping.rs` has them at another.
+    /// Returns the pendulums in use. Their viscous coefficients c = 2 zeta omega_n m belong to the
+    /// `g` of [`Calculated::new`]; `damping.rs` has them at another.
     pub fn pendulums(&self, p: &Parameters) -> impl Iterator<Item = Pendulum> {
         let radius = p.tank.d / 2.0;
         let (r, slosh, p) = (p.tank.r, p.slosh, *p);

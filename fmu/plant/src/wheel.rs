@@ -1,9 +1,9 @@
 //! The reaction wheel that turns a torque command into torque on the hub.
 //!
-//! The rotor takes the reaction, I_w W' = -tau, W its absolute rate. The torque is
-//! limited to tau_max; at a speed limit only torque that brings W back is given
-//! (thesis Table 5.4). W follows from the command alone, so a step with a linear
-//! command is cut into pieces with linear torque before the hub's motion is known.
+//! The rotor takes the reaction, I_w W' = -tau, with W its absolute rate. The torque is limited to
+//! tau_max. At a speed limit the wheel gives only torque that brings W back (thesis Table 5.4). W
+//! follows from the command alone, so a step with a linear command is cut into pieces with linear
+//! torque before the hub's motion is known.
 
 use alloc::format;
 use alloc::string::String;
@@ -14,20 +14,20 @@ use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 
 impl Wheel {
-    /// Lists errors in the parameters together.
+    /// Lists problems of the combined parameters.
     pub(crate) fn problems(&self) -> Vec<String> {
         if self.speed_min <= self.speed_0 && self.speed_0 <= self.speed_max {
             return Vec::new();
         }
         vec![format!(
-            "wheel.speed_0 = {} rad/s does not lie between wheel.speed_min = {} rad/s and \
-             wheel.speed_max = {} rad/s",
+            "wheel.speed_0 = {} rad/s (allowed: wheel.speed_min = {} rad/s to \
+             wheel.speed_max = {} rad/s)",
             self.speed_0, self.speed_min, self.speed_max
         )]
     }
 
-    /// The torque on the hub, N m, at a command and rotor speed, and its slope from now
-    /// on. A command at a limit is within it or beyond it by where it goes.
+    /// Returns the torque on the hub, N m, at a command and rotor speed, and its slope from now on.
+    /// The slope of a command at a limit decides whether it is within or beyond the limit.
     pub(crate) fn torque(&self, speed: f64, command: Ramp) -> Ramp {
         let Ramp { value, slope } = command;
         if !self.enabled {
@@ -47,8 +47,8 @@ impl Wheel {
         }
     }
 
-    /// The next piece, at most `h` long: its length, the torque on it and the
-    /// rotor's speed after it. The command has fallen on `command.at(length)` then.
+    /// Returns the next piece, at most `h` long: its length, its torque, and the rotor's speed
+    /// after it. The command is then `command.at(length)`.
     pub(crate) fn next(&self, speed: f64, command: Ramp, h: f64) -> (f64, Ramp, f64) {
         let torque = self.torque(speed, command);
         if !self.enabled {
@@ -64,8 +64,8 @@ impl Wheel {
                 }
             }
         }
-        // The rotor reaches a speed limit. Within a piece the torque keeps its sign,
-        // so this is the only root of a t + b t^2/2 = (speed - limit) I_w ahead.
+        // The rotor reaches a speed limit. Within a piece the torque keeps its sign, so this is the
+        // only root of a t + b t^2/2 = (speed - limit) I_w ahead.
         let end = speed - torque.integral(length) / self.inertia;
         let limit = end.max(self.speed_min).min(self.speed_max);
         if limit != end {
@@ -99,7 +99,8 @@ mod tests {
         Wheel { enabled: true, ..Wheel::default() }
     }
 
-    /// A command that is at a limit, or at 0, is within or beyond by where it goes: at the ends of the speed, of the torque.
+    /// The slope of a command at a limit, or at 0, decides whether it is within or beyond: at the ends of the speed and
+    /// torque ranges.
     #[test]
     fn a_command_at_a_limit_is_judged_by_where_it_goes() {
         let w = wheel();
@@ -121,7 +122,7 @@ mod tests {
 
     #[test]
     fn torque_is_clipped_at_the_limit() {
-        // A ramp through 0 from -1 to 1 N m in 2 s keeps zero impulse; both ends are clipped.
+        // A ramp through 0 from -1 to 1 N m in 2 s has zero impulse; both ends are clipped.
         let (impulse, speed, _) = run(&wheel(), Ramp { value: -0.5, slope: 0.5 }, 2.0);
         assert!(impulse.abs() < 1e-15);
         assert!((speed - wheel().speed_0).abs() < 1e-10);
@@ -132,7 +133,7 @@ mod tests {
     #[test]
     fn momentum_on_the_hub_is_what_the_rotor_lost_until_it_saturates() {
         let w = wheel();
-        // 0.1 N m brakes the rotor from 1600 to 200 rpm in 3.3 s; after that nothing.
+        // 0.1 N m brakes the rotor from 1600 to 200 rpm in 3.3 s; after that the torque is 0.
         let (impulse, speed, _) = run(&w, Ramp { value: 0.1, slope: 0.0 }, 10.0);
         assert!((impulse - w.inertia * (w.speed_0 - w.speed_min)).abs() < 1e-15);
         assert_eq!(speed, w.speed_min);
@@ -156,7 +157,8 @@ mod tests {
         assert_eq!([low, high, low - 1e-6, high + 1e-6].map(wrong), [false, false, true, true]);
     }
 
-    /// A command at a limit, or at zero with the rotor at its speed limit, counts by where it goes.
+    /// The slope of a command at a limit, or at zero with the rotor at its speed limit, decides
+    /// whether it is beyond the limit.
     #[test]
     fn a_command_at_a_limit_is_within_or_beyond_it_by_its_slope() {
         let w = wheel();
@@ -171,7 +173,7 @@ mod tests {
             let within = ramp(sign * 0.5 * limit, sign);
             assert_eq!(w.torque(middle, within), within);
         }
-        // Torque on the hub forwards brakes the rotor, backwards speeds it up.
+        // Positive torque on the hub brakes the rotor, negative torque accelerates it.
         for (speed, away) in [(w.speed_max, -1.0), (w.speed_min, 1.0)] {
             let nothing = ramp(0.0, 0.0);
             for command in [ramp(away * 0.1, 0.0), ramp(away * 0.1, -away), ramp(0.0, away)] {
@@ -195,7 +197,8 @@ mod tests {
         assert_eq!(next(ramp(0.0, 0.0)), 10.0);
     }
 
-    /// I_w (W_0 - W) = a t + b t^2/2: the rotor meets its limit on time, on a ramp and on a held torque.
+    /// I_w (W_0 - W) = a t + b t^2/2: the rotor meets its limit at the right time, on a ramp and with a constant
+    /// torque.
     #[test]
     fn the_rotor_reaches_its_speed_limit_when_the_impulse_has_done_it() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };
@@ -211,7 +214,7 @@ mod tests {
             assert_eq!((torque, speed), (command, limit));
             let turned = command.integral(length) / w.inertia;
             assert!((w.speed_0 - turned - limit).abs() < 1e-12, "{command:?} {length}");
-            // Short of it the torque alone says where the rotor is.
+            // Before the limit the torque alone determines the rotor's speed.
             let (all, _, before) = w.next(w.speed_0, command, length / 2.0);
             assert_eq!(all, length / 2.0);
             let turned = command.integral(length / 2.0) / w.inertia;

@@ -402,8 +402,7 @@ fn principal_moments_that_no_body_has_are_refused() {
     let message = |[small, middle, large, sum]: [&str; 4]| {
         format!(
             "craft.Jxx, craft.Jyy, craft.Jzz, with craft.Jxy, craft.Jxz, craft.Jyz, have the principal moments {small}, \
-             {middle} and {large} kg.m2: the largest exceeds {sum}, the sum of the others (allowed: up to that sum, as no \
-             body has more)"
+             {middle} and {large} kg.m2: the largest exceeds {sum}, the sum of the others (allowed: up to that sum)"
         )
     };
     let wanted = message(["100.0", "200.0", "400.0", "300.0"]);

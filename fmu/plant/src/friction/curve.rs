@@ -1,4 +1,4 @@
-//! Stribeck's curve, the size of dry friction at a rate (thesis eq. 5.1):
+//! Stribeck's curve, the magnitude of dry friction at a rate (thesis eq. 5.1):
 //!
 //! ```text
 //! T_C(w) = c + d exp(-(w/w_s)^2)
@@ -8,10 +8,11 @@ use taylor::series::{self, Series, ZERO};
 
 use crate::parameters::Friction;
 
-/// Up to this rate over w_s the excess is above 1e-4 of d: every tolerance in use sees its terms.
+/// Rate over w_s up to which the excess is above 1e-4 of d, so that every usual tolerance sees its
+/// terms.
 const VISIBLE: f64 = 3.0;
 
-/// Beyond this rate over w_s it is below 1e-12 of d.
+/// Rate over w_s beyond which the excess is below 1e-12 of d.
 const FLAT: f64 = 5.3;
 
 #[derive(Clone, Debug)]
@@ -33,11 +34,11 @@ impl StribeckCurve {
         StribeckCurve { c: p.c, d: p.d, inv_omega_s2, u_d: ZERO, e: ZERO, torque: ZERO }
     }
 
-    /// Time over which a series of T_C in w shows all its terms, s, from w, w' and w''.
+    /// Returns the time over which a series of T_C in w converges reliably, s, from w, w' and w''.
     ///
-    /// Far from rest exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, which grow before they decay:
-    /// over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve is still flat at the
-    /// end, or the terms decay from order 5 on.
+    /// Far from rest, exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, but they grow before they
+    /// decay. Over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve is still flat
+    /// at the end, or the terms decay from order 5 on.
     pub fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] =
             [omega[0], omega[1], omega[2]].map(|w| w.abs() * libm::sqrt(self.inv_omega_s2));
@@ -49,12 +50,12 @@ impl StribeckCurve {
         if speed > 0.0 { 2.0 * dv / speed } else { f64::INFINITY }
     }
 
-    /// T_C(0), N m.
+    /// Returns T_C(0), N m.
     pub fn at_rest(&self) -> f64 {
         self.c + self.d
     }
 
-    /// Coefficient n of T_C from that of w^2.
+    /// Sets coefficient n of T_C from that of w^2.
     #[inline(always)]
     pub fn expand(&mut self, n: usize, omega2: &Series) {
         let u = -omega2[n] * self.inv_omega_s2;

@@ -15,7 +15,7 @@ use taylor::series::{self, Series, ZERO};
 use crate::contact::Contact;
 use crate::parameters::Friction;
 
-/// B+-(theta) of one direction.
+/// B+-(theta) in one direction.
 #[derive(Clone, Copy, Debug)]
 struct OneWay {
     mean: f64,
@@ -34,7 +34,7 @@ impl OneWay {
         self.mean + a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
     }
 
-    /// A lower bound of B over all angles, exact to 2e-6 of the harmonics' size.
+    /// Returns a lower bound of B over all angles, exact to 2e-6 of the harmonics' size.
     fn lowest(&self) -> f64 {
         if self.harmonics == [0.0; 4] {
             return self.mean;
@@ -48,7 +48,7 @@ impl OneWay {
         lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
     }
 
-    /// Coefficient n of B.
+    /// Returns coefficient n of B.
     #[inline(always)]
     fn coefficient(&self, n: usize, trig: &[Series; 4]) -> f64 {
         let mean = series::constant(n, self.mean);
@@ -62,7 +62,7 @@ impl OneWay {
 pub struct DirectionalFactor {
     forward: OneWay,
     backward: OneWay,
-    /// cos and sin of theta and 2 theta in turn, as in `OneWay::harmonics`; there only if B
+    /// cos and sin of theta and 2 theta in turn, as in `OneWay::harmonics`. Present only if B
     /// depends on the angle.
     trig: Option<Box<[Series; 4]>>,
     /// theta' and 2 theta'
@@ -78,7 +78,7 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// Lists errors in the parameters together: dry friction must not drive the hub.
+    /// Lists problems of the combined parameters: dry friction must not drive the hub.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];
@@ -86,16 +86,16 @@ impl DirectionalFactor {
         wrong
             .map(|(one_way, name, sign)| {
                 format!(
-                    "friction.asymmetry and friction.{name}_* make the dry friction's factor \
-                     1 {sign} asymmetry + harmonics as low as {:.6}, so the bearing would drive \
-                     the hub; it must stay above 0 at every angle",
+                    "friction.asymmetry and friction.{name}_*: the factor of dry friction, \
+                     1 {sign} asymmetry + harmonics, falls to {:.6}, so the bearing would drive \
+                     the hub (allowed: above 0 at every angle)",
                     one_way.lowest()
                 )
             })
             .collect()
     }
 
-    /// Bounds of B over both directions and all angles.
+    /// Returns the bounds of B over both directions and all angles.
     pub fn bounds(&self) -> (f64, f64) {
         let both = [self.forward, self.backward];
         let mirrored = both.map(|b| OneWay { mean: -b.mean, harmonics: b.harmonics.map(|h| -h) });
@@ -103,7 +103,7 @@ impl DirectionalFactor {
         (lowest(both), -lowest(mirrored))
     }
 
-    /// B- and B+ at an angle.
+    /// Returns B- and B+ at an angle.
     pub fn at(&self, theta: f64) -> (f64, f64) {
         (self.backward.at(theta), self.forward.at(theta))
     }
@@ -112,12 +112,12 @@ impl DirectionalFactor {
         self.trig.is_some()
     }
 
-    /// B of the direction in which the hub turns, without its harmonics.
+    /// Returns B of the hub's direction of rotation, without its harmonics.
     pub fn mean(&self, contact: Contact) -> f64 {
         self.one_way(contact).mean
     }
 
-    /// Coefficient n of cos and sin; comes before the coefficients of B.
+    /// Sets coefficient n of cos and sin. Call it before reading coefficients of B.
     pub fn expand(&mut self, n: usize, theta: &Series) {
         let Some(trig) = &mut self.trig else { return };
         let [c1, s1, c2, s2] = &mut **trig;
@@ -126,12 +126,12 @@ impl DirectionalFactor {
         (s2[n], c2[n]) = series::sin_cos(n, 2.0 * theta[n], twice_d, s2, c2);
     }
 
-    /// Coefficient n of B in the direction in which the hub turns.
+    /// Returns coefficient n of B in the hub's direction of rotation.
     pub fn coefficient(&self, n: usize, contact: Contact) -> f64 {
         self.of(n, self.one_way(contact))
     }
 
-    /// Coefficient n of (B+ + B-)/2 and (B+ - B-)/2.
+    /// Returns coefficient n of (B+ + B-)/2 and (B+ - B-)/2.
     pub fn even_odd(&self, n: usize) -> (f64, f64) {
         let (forward, backward) = (self.of(n, &self.forward), self.of(n, &self.backward));
         ((forward + backward) / 2.0, (forward - backward) / 2.0)
@@ -156,7 +156,7 @@ mod tests {
 
     use super::*;
 
-    /// At 45 degrees cos 2 theta is 0 and sin 2 theta 1, at 90 cos 2 theta is -1.
+    /// At 45 degrees cos 2 theta is 0 and sin 2 theta 1; at 90 degrees cos 2 theta is -1.
     #[test]
     fn each_harmonic_has_its_sign_where_the_hub_rests_and_where_it_turns() {
         let one = OneWay { mean: 1.1, harmonics: [0.04, -0.03, 0.02, 0.01] };
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// One harmonic of size 1 with its lowest angle on a sample and halfway between two: there B falls below both.
+    /// One harmonic of size 1 has its minimum on a sample or halfway between two, where B is below both.
     #[test]
     fn the_lower_bound_is_below_the_lowest_factor_by_no_more_than_2e_6_of_its_harmonics() {
         let half = core::f64::consts::PI / 4096.0;

@@ -7,8 +7,8 @@
 //! tau_f = -(sigma_0 z + sigma_1 z' + b w)
 //! ```
 //!
-//! with Stribeck's curve T_C and the directional factor B of the present sense of rotation. The
-//! bearing stores sigma_0 z^2/2 and dissipates the rest: with u = sigma_0 z/g and s = sgn w
+//! with Stribeck's curve T_C and the directional factor B of the current direction of rotation. The
+//! bearing stores sigma_0 z^2/2 and dissipates the rest. With u = sigma_0 z/g and s = sgn w
 //!
 //! ```text
 //! D = -tau_f w - sigma_0 z z' = |w| [ g u^2 + |w| (b + sigma_1 (1 - s u)) ]
@@ -20,16 +20,16 @@
 //! sigma_1 (g_max - g_min) <= b g_min,     g_min = c B_min, g_max = (c + d) B_max
 //! ```
 //!
-//! (the condition of passivity of Barabanov and Ortega, IEEE Transactions on Automatic Control
-//! 45 (2000) 830-832). Larger sigma_1 are refused.
+//! (the passivity condition of Barabanov and Ortega, IEEE Transactions on Automatic Control 45
+//! (2000) 830-832). Larger sigma_1 are refused.
 //!
-//! |w| is not smooth: the contact says its sign, and w = 0 is located as an event. Nothing
-//! sticks: a hub under torque below g_max creeps to a deflection and stays.
+//! |w| is not smooth. The contact gives its sign, and w = 0 is located as an event. The law does
+//! not stick: a hub under a torque below g_max creeps to a deflection and stays there.
 //!
-//! When to choose it: where motion before sliding, the frictional lag or a break-away that
-//! depends on the rate of the torque matter. While sliding, z follows w within
-//! g/(sigma_0 |w|) seconds; the integrator resolves that, so its steps are of that length. As
-//! sigma_0 grows the law approaches the set-valued one, at a rising price.
+//! Choose this law if presliding motion, frictional lag, or a break-away torque that depends on the
+//! torque rate matters. While sliding, z follows w within g/(sigma_0 |w|) seconds. The integrator
+//! resolves this time, so its steps have this length. For large sigma_0 the law approaches the
+//! set-valued one, at increasing cost.
 
 use alloc::format;
 use alloc::string::String;
@@ -51,7 +51,7 @@ pub struct Lugre {
     sigma1: f64,
     curve: StribeckCurve,
     factor: DirectionalFactor,
-    /// sigma_0/g_min: what makes a deflection relative
+    /// sigma_0/g_min, the inverse scale of the deflection
     inv_deflection: f64,
     /// B, g, w/g, w z/g
     present: Series,
@@ -86,20 +86,20 @@ impl FrictionLaw for Lugre {
     fn problems(p: &Friction) -> Vec<String> {
         if p.c <= 0.0 {
             return vec![format!(
-                "friction.c = {} N.m: lugre needs dry friction at every rate, above 0",
+                "friction.c = {} N.m with friction.model = lugre (allowed: above 0)",
                 p.c
             )];
         }
         let (g_min, g_max) = bounds(p);
-        // A factor B <= 0 has been reported on its own.
+        // A factor B <= 0 is reported separately.
         let gives_energy = p.sigma1 * (g_max - g_min) > p.b * g_min * (1.0 + 1e-12);
         if g_min <= 0.0 || !gives_energy {
             return Vec::new();
         }
         vec![format!(
-            "friction.sigma1 = {} N.m.s/rad makes the lugre bearing give off energy at high \
-             rates; it must not exceed friction.b g_min/(g_max - g_min) = {:.6} N.m.s/rad, where \
-             dry friction lies between g_min = {:.6} N.m and g_max = {:.6} N.m",
+            "friction.sigma1 = {} N.m.s/rad: the lugre bearing would generate energy at high rates (allowed: \
+             up to friction.b g_min/(g_max - g_min) = {:.6} N.m.s/rad, with dry friction between g_min = {:.6} N.m \
+             and g_max = {:.6} N.m)",
             p.sigma1,
             p.b * g_min / (g_max - g_min),
             g_min,
@@ -111,7 +111,7 @@ impl FrictionLaw for Lugre {
         self.z[n] = z;
     }
 
-    // Once for all slosh models.
+    // One copy for all slosh models.
     #[inline(never)]
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64 {
         self.curve.expand(n, &hub.omega2);
@@ -144,12 +144,12 @@ impl FrictionLaw for Lugre {
         [*z] = series::values([&self.z], n, t);
     }
 
-    /// Torques within the tolerance of the dry friction.
+    /// Scale: torques within the tolerance of the dry friction.
     fn coefficient_norm(&self, n: usize) -> f64 {
         self.z[n].abs() * self.inv_deflection
     }
 
-    /// The bristle's torque -sigma_0 z is there at rest too.
+    /// The bristle's torque -sigma_0 z also acts at rest.
     fn contact_at_rest(&self, [net, slope]: [f64; 2], _: f64, before: Contact) -> Contact {
         let torque = net - self.sigma0 * self.z[0];
         match if torque != 0.0 { torque } else { slope } {
@@ -161,7 +161,7 @@ impl FrictionLaw for Lugre {
     }
 }
 
-/// The least and the largest g at any rate and angle, N m.
+/// Returns the smallest and largest g at any rate and angle, N m.
 fn bounds(p: &Friction) -> (f64, f64) {
     let (lowest, highest) = DirectionalFactor::new(p).bounds();
     (p.c * lowest, (p.c + p.d) * highest)

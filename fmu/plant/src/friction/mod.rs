@@ -1,4 +1,4 @@
-//! The bearing's friction: one law a file, each with the power series of its parts.
+//! Friction of the bearing: one law per file, each with the power series of its terms.
 //!
 //! The directional factor B of dry friction is in `directional.rs`, Stribeck's curve in
 //! `curve.rs`.
@@ -19,24 +19,23 @@ use crate::hub::HubMotion;
 use crate::parameters::{Friction, FrictionModel};
 use directional::DirectionalFactor;
 
-/// A law of friction as a set of power series in time. It may have one state of its own; w = 0 may be a
-/// place where it switches.
+/// A friction law as a set of power series in time. It may have one state of its own and may switch at w = 0.
 pub trait FrictionLaw {
-    /// True if the law switches at w = 0, so that this instant has to be located; otherwise
-    /// the contact is always [`Contact::Forward`].
+    /// True if the law switches at w = 0, so that this instant must be located. Otherwise the
+    /// contact is always [`Contact::Forward`].
     const SWITCHES_AT_REST: bool = false;
 
     /// True if the law can hold the hub exactly at rest.
     const STICKS: bool = false;
 
-    /// Number of negligible terms in succession that show convergence. One term
-    /// may vanish by symmetry.
+    /// Number of negligible terms in succession that show convergence. One term may vanish by
+    /// symmetry.
     const NEGLIGIBLE_TERMS: usize = 2;
 
-    /// The law that the parameters describe.
+    /// Creates the law from its parameters.
     fn new(p: &Friction) -> Self;
 
-    /// Lists errors in the law's parameters together.
+    /// Lists problems of the law's combined parameters.
     fn problems(_p: &Friction) -> Vec<String> {
         Vec::new()
     }
@@ -45,58 +44,58 @@ pub trait FrictionLaw {
     /// derivative.
     fn set_state(&mut self, _n: usize, _z: f64) {}
 
-    /// Coefficient n of tau_f while the hub is not stuck, from coefficients up to n of theta,
-    /// w, w^2 and the law's own state; and coefficient n + 1 of the latter.
+    /// Returns coefficient n of tau_f while the hub is not stuck, from coefficients up to n of
+    /// theta, w, w^2 and the law's own state. Sets coefficient n + 1 of that state.
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
-    /// Coefficient n of the power that the bearing dissipates, W, after `torque`.
+    /// Returns coefficient n of the bearing's dissipated power, W, after `torque`.
     #[inline(always)]
     fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
         -series::mul(n, tau_f, omega)
     }
 
-    /// Coefficient n, 0 or 1, of the energy stored in the bearing, J.
+    /// Returns coefficient n, 0 or 1, of the energy stored in the bearing, J.
     fn energy(&self, _n: usize) -> f64 {
         0.0
     }
 
-    /// Coefficient n, 0 or 1, of the derivative of the law's own state.
+    /// Returns coefficient n, 0 or 1, of the derivative of the law's own state.
     fn derivative(&self, _n: usize) -> f64 {
         0.0
     }
 
-    /// Moves the law's own state z on by `t`, from the series cut after order n.
+    /// Advances the law's own state z by `t`, from the series up to order n.
     fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
-    /// Size of coefficient n of the law's own state; the scale of its errors is 1.
+    /// Magnitude of coefficient n of the law's own state, relative to its allowed error.
     #[inline(always)]
     fn coefficient_norm(&self, _n: usize) -> f64 {
         0.0
     }
 
-    /// Time over which the series of tau_f can converge, s, from w, w' and w'', for laws whose
-    /// coefficients do not show it.
+    /// Returns the time over which the series of tau_f can converge, s, from w, w' and w'', for
+    /// laws whose coefficients do not show it.
     fn convergence_radius(&self, _omega: &Series) -> f64 {
         f64::INFINITY
     }
 
-    /// The largest torques that the bearing holds at rest against a push backwards and
-    /// forwards, N m (both >= 0).
+    /// Returns the largest torques that the bearing holds at rest against a backward and a forward
+    /// torque, N m (both >= 0).
     fn holds(&self, _theta: f64) -> (f64, f64) {
         (0.0, 0.0)
     }
 
-    /// The contact of a hub with w = 0 that had the contact `before`; `net` is the torque
-    /// besides friction and, unless the law sticks, its rate, with the hub held.
+    /// Returns the contact of a hub at w = 0 that had the contact `before`. `net` is the torque
+    /// without friction and, unless the law sticks, its rate, with the hub held.
     fn contact_at_rest(&self, _net: [f64; 2], _theta: f64, _before: Contact) -> Contact {
         Contact::Forward
     }
 }
 
-/// The law of every [`FrictionModel`]; the compiler misses one that is left out.
+/// Dispatches over the law of every [`FrictionModel`]. The compiler reports a missing law.
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
-        /// The law in use; the plant has one, in a box with all other series.
+        /// The law in use. The plant has one, in a box with all other series.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant)]
         pub enum Law {
@@ -104,14 +103,14 @@ macro_rules! laws {
         }
 
         impl Law {
-            /// The law that the parameters describe.
+            /// Creates the law from its parameters.
             pub fn new(p: &Friction) -> Law {
                 match p.model {
                     $(FrictionModel::$name => Law::$name(<$law>::new(p)),)*
                 }
             }
 
-            /// Lists errors in the parameters together.
+            /// Lists problems of the combined parameters.
             pub fn problems(p: &Friction) -> Vec<String> {
                 let mut problems = DirectionalFactor::problems(p);
                 problems.extend(match p.model {

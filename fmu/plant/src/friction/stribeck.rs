@@ -5,11 +5,11 @@
 //! -(c + d) B+ <= tau_f <= (c + d) B-            w = 0
 //! ```
 //!
-//! At rest the bearing holds whatever torque it can: the hub is stuck, exactly.
+//! At rest the bearing holds any torque within these limits, and the hub is exactly stuck.
 //!
-//! When to choose it: a bearing with dry friction, whenever the hub may come to rest or
-//! reverse. Stick and slip are located as events, so it is exact and fast. Its hub does not
-//! move at all while stuck; for motion before sliding a law with a bristle is needed.
+//! Choose this law for a bearing with dry friction if the hub may come to rest or reverse. Stick
+//! and slip are located as events, which is exact and fast. The hub does not move at all while
+//! stuck. For presliding motion use a law with bristles.
 
 use taylor::series::{self, Series, ZERO};
 
@@ -25,13 +25,13 @@ pub struct Stribeck {
     b: f64,
     curve: StribeckCurve,
     factor: DirectionalFactor,
-    /// sgn(w) B of the present direction; order 0 alone where it does not depend on the angle
+    /// sgn(w) B of the current direction; only order 0 if it does not depend on the angle
     present: Series,
 }
 
 impl Stribeck {
-    /// Coefficient n of sgn(w) T_C B where B depends on the angle.
-    // Once for all slosh models.
+    /// Returns coefficient n of sgn(w) T_C B if B depends on the angle.
+    // One copy for all slosh models.
     #[inline(never)]
     fn dry_by_angle(&mut self, n: usize, contact: Contact, theta: &Series) -> f64 {
         self.factor.expand(n, theta);
@@ -74,7 +74,7 @@ impl FrictionLaw for Stribeck {
 
     fn contact_at_rest(&self, [net, _]: [f64; 2], theta: f64, before: Contact) -> Contact {
         let (against_backward, against_forward) = self.holds(theta);
-        // A hub that has just broken away is at the limit, give or take rounding.
+        // A hub that has just broken away is at the limit, to rounding.
         let limit = |hold: f64, from: Contact| {
             if before == from { hold * (1.0 - 1e-12) } else { hold }
         };

@@ -6,9 +6,9 @@
 //!
 //! The blend of the two directions never drives the hub.
 //!
-//! When to choose it: only to repeat results of others who smoothed the sign. The hub creeps
-//! where it should be at rest, and each reversal within eps takes steps of about
-//! eps/|w'| seconds: it costs far more than the set-valued law that it approximates.
+//! Choose this law only to reproduce results with a smoothed sign. The hub creeps where it should
+//! be at rest, and each reversal within eps takes steps of about eps/|w'| seconds. It takes far
+//! more steps than the set-valued law that it approximates.
 
 use taylor::series::{self, Series, ZERO};
 
@@ -38,8 +38,8 @@ pub struct StribeckSmooth {
 }
 
 impl FrictionLaw for StribeckSmooth {
-    /// One term may vanish by symmetry; of tanh(w/eps) from w = w' = 0 on, three in
-    /// succession do.
+    /// One term may vanish by symmetry. For tanh(w/eps) starting at w = w' = 0, three in succession
+    /// vanish.
     const NEGLIGIBLE_TERMS: usize = 4;
 
     fn new(p: &Friction) -> StribeckSmooth {
@@ -58,7 +58,7 @@ impl FrictionLaw for StribeckSmooth {
         }
     }
 
-    // Once for all slosh models.
+    // One copy for all slosh models.
     #[inline(never)]
     fn torque(&mut self, n: usize, _: Contact, hub: &HubMotion) -> f64 {
         self.curve.expand(n, &hub.omega2);
@@ -76,13 +76,13 @@ impl FrictionLaw for StribeckSmooth {
         -self.b * hub.omega[n] - series::mul(n, &self.curve.torque, &self.sign)
     }
 
-    /// tanh has its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and it is
-    /// so flat away from 0 that its coefficients there do not tell; half the way is safe. T_C has a reach of its own.
+    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so flat that
+    /// its coefficients do not show the poles, so the method uses half of this distance. T_C has its own limit.
     fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
         let half = libm::sqrt(v * v + 2.4674) / 2.0;
         let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * half);
-        // A hub at rest without torque stays.
+        // A hub at rest without torque does not move.
         let sign = if speed > 0.0 { 2.0 * half / speed } else { f64::INFINITY };
         sign.min(self.curve.convergence_radius(omega))
     }

@@ -1,14 +1,14 @@
-//! Viscous friction, tau_f = -b w, and none at all.
+//! Viscous friction, tau_f = -b w, and a bearing without friction.
 //!
-//! When to choose them: an air or magnetic bearing, or a comparison with linear theory; the
-//! plant with the linear slosh model is then linear in everything but the wheel.
+//! Choose them for an air or magnetic bearing, or for a comparison with linear theory. With the
+//! linear slosh model everything in the plant is then linear except the wheel.
 
 use super::FrictionLaw;
 use crate::contact::Contact;
 use crate::hub::HubMotion;
 use crate::parameters::Friction;
 
-/// A free bearing.
+/// A bearing without friction.
 #[derive(Clone, Debug)]
 pub struct Free;
 

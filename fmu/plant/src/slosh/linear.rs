@@ -1,30 +1,31 @@
-//! Linear planar pendulum. al in rad is the angle along the direction n = (n_x, n_t), radially and tangentially, in which the
-//! bob moves, q = al n. By default that is the tangent, q_x = 0.
+//! Linear planar pendulum. al in rad is the angle along the direction n = (n_x, n_t), radial and tangential, in which
+//! the bob moves, q = al n. By default the direction is the tangent, q_x = 0.
 //!
 //! ```text
 //! T   = r (m g al + c l al'),   no share of J beyond the hub's I0
 //! al'' = -(c/m) al' - (g/l) al - (r/l) w'
 //! ```
 //!
-//! (thesis 4.27, 4.29 with the sign of the slosh torque corrected: with the
-//! printed one the plant makes energy from nothing.)
+//! Thesis 4.27, 4.29 with the sign of the slosh torque corrected. With the printed sign the plant
+//! would generate energy.
 //! ```text
 //! E = m (r w + l al')^2/2 + m g l al^2/2,  H = m r (r w + l al')
 //! ```
-//! On a bench that leans, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and
-//! -m (e_x r + e_y l al) to E.
+//! On a tilted bench, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and -m (e_x
+//! r + e_y l al) to E.
 //!
-//! Along another direction than the tangent (a box with modes along both axes), u = l al, r_x = r n_x, r_t = r n_t, the bob at
-//! (r + u n_x, u n_t): its kinetic energy to second order is m [(r_t w + u')^2 + (r_x w)^2]/2, and Lagrange's equations are
-//!
+//! For another direction than the tangent (a box with modes along both axes), u = l al, r_x = r n_x, r_t = r n_t, and
+//! the bob is at (r + u n_x, u n_t). Its kinetic energy to second order is m [(r_t w + u')^2 + (r_x w)^2]/2. Lagrange's
+//! equations are
 //! ```text
 //! J   = m r_x^2,   T = r_t (m g al + c l al') - m (r_x + u)(e_x n_t - e_y n_x)
 //! al'' = -(c/m) al' - (g/l) al - (r_t/l) w' + (e_x n_x + e_y n_t)/l
 //! H = m (r^2 w + r_t u')
 //! ```
 //!
-//! A hub that only turns moves a mode along the radius (n_t = 0) by terms of second order alone, r w^2 and 2 w u': they
-//! are in `planar.rs`. Here such a mode is moved by a lean of the bench, and its mass is carried on the circle of radius r.
+//! A hub that only turns moves a radial mode (n_t = 0) only by terms of second order, r w^2 and 2 w u', which are in
+//! `planar.rs`. In the linear model the tilt of the bench moves such a mode, and its mass moves on the circle of radius
+//! r.
 
 use alloc::string::String;
 
@@ -103,7 +104,7 @@ impl SloshMode for Linear {
         }
         self.g_al[n] = self.p.weight(n, ramp, &self.al);
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);
-        // what varies nowhere is along the tangent
+        // without variation the mode moves along the tangent
         let arm = if ramp { r_t } else { r };
         let mut t = arm * (m * self.g_al[n] + c * l * self.drag[n]);
         let mut j = 0.0;
@@ -170,8 +171,8 @@ impl SloshMode for Linear {
         [al * al * (m * l) * 0.5 + tilted[0] * m, al * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Tangential -m (r w' + l al'' n_t); radial from the bob's place (r + l al n_x, l al n_t): -m l al'' n_x and, of second order in
-    /// the motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
+    /// Tangential: -m (r w' + l al'' n_t). Radial, from the bob's position (r + l al n_x, l al n_t): -m l al'' n_x and,
+    /// of second order in the motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
@@ -182,7 +183,8 @@ impl SloshMode for Linear {
         [radial + e_x * m - al_dd * (m * l * n_x), e_y * m - (wd * r + al_dd * l * n_t) * m]
     }
 
-    /// r F_y: in the linear model the force acts at the hinge; gravity of a leaning bench at the bob.
+    /// r F_y. In the linear model the force acts at the hinge, gravity of a tilted bench at the
+    /// bob.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
         let ([_, f_y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());

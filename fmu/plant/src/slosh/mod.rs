@@ -1,10 +1,9 @@
-//! The liquid's mechanical models: what a slosh mode must tell the hub and the
-//! integrator, and the models that do. All models are listed here, each is in a file of
-//! its own.
+//! Mechanical models of the liquid: the interface of a slosh mode to hub and integrator, and the
+//! models that implement it. This file lists all models; each has its own file.
 //!
-//! A mode's coordinates are `q = [q_x, q_y, q_x', q_y']`, x radial (outwards), y
-//! tangential (towards +theta), measured in the hub's frame; each model says in
-//! its own file what q is. All modes act on the hub through
+//! A mode's coordinates are `q = [q_x, q_y, q_x', q_y']`, x radial (outwards), y tangential
+//! (towards +theta), measured in the hub's frame. Each model defines q in its own file. All modes
+//! act on the hub through
 //!
 //! ```text
 //! J w' = tau + tau_f + T,      q'' = B + A w'
@@ -31,7 +30,7 @@ use paraboloid::Paraboloid;
 use planar::Planar;
 use spherical::Spherical;
 
-/// The slosh modes in use, as the chosen model has them.
+/// The slosh modes in use, for the chosen model.
 #[derive(Clone, Debug)]
 pub(crate) enum Liquid {
     Linear(Vec<Linear>),
@@ -40,7 +39,7 @@ pub(crate) enum Liquid {
     Paraboloid(Vec<Paraboloid>),
 }
 
-/// Does the same with the modes of whatever model is in use.
+/// Evaluates an expression with the modes of the model in use.
 macro_rules! with_modes {
     ($liquid:expr, $modes:ident => $do:expr) => {{
         use $crate::slosh::Liquid;
@@ -55,7 +54,7 @@ macro_rules! with_modes {
 pub(crate) use with_modes;
 
 impl Liquid {
-    /// The modes at rest.
+    /// Creates the modes at rest.
     pub fn new(p: &Parameters, calculated: &Calculated) -> Liquid {
         fn modes<M: SloshMode>(p: &Parameters, calculated: &Calculated) -> Vec<M> {
             calculated.pendulums(p).map(|pendulum| M::new(&pendulum)).collect()
@@ -69,13 +68,13 @@ impl Liquid {
         }
     }
 
-    /// Reason why the motion cannot start with these parameters, if there is one.
+    /// Returns why the motion cannot start with these parameters, if it cannot.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         with_modes!(self, modes => modes.first().and_then(|mode| mode.start_problem(init)))
     }
 }
 
-/// A mode's share of the hub's equation.
+/// Contribution of a mode to the hub's equation.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct HubReaction {
     /// Inertia J, kg m2.
@@ -89,7 +88,7 @@ pub struct HubReaction {
 pub struct Angles<T = f64> {
     /// Radial and tangential angle, rad.
     pub angle: [T; 2],
-    /// Their rates, rad/s.
+    /// Rates of the angles, rad/s.
     pub rate: [T; 2],
 }
 
@@ -103,65 +102,66 @@ impl<T: Number> Angles<T> {
 
 /// One slosh mode as a set of power series in time.
 ///
-/// What is given over [`Number`] holds at the start of an expansion: the value, or the derivative along the
-/// direction that was seeded.
+/// Functions over [`Number`] hold at the start of an expansion: they return the value, or the derivative along the
+/// seeded direction.
 pub trait SloshMode {
-    /// Compiles steps with a single mode and constant g with the sums of every order
-    /// written out: twice as fast, 40 to 100 KB of code.
+    /// Compiles steps with a single mode and constant g with the sums of every order written out:
+    /// twice as fast, 40 to 100 KB of code.
     const UNROLLED: bool = false;
     /// True if J has coefficients beyond order 0.
     const MOVES_INERTIA: bool = true;
-    /// The mode at rest; `start` puts it somewhere.
+    /// Creates the mode at rest; `start` sets its motion.
     fn new(pendulum: &Pendulum) -> Self;
-    /// Reason why the motion cannot start with these parameters, if there is one.
+    /// Returns why the motion cannot start with these parameters, if it cannot.
     fn start_problem(&self, _init: &Init) -> Option<String> {
         None
     }
-    /// The pendulum that it is made of.
+    /// Returns the pendulum of the mode.
     fn pendulum(&self) -> &Pendulum;
-    /// Mutable [`SloshMode::pendulum`].
+    /// Returns [`SloshMode::pendulum`], mutable.
     fn pendulum_mut(&mut self) -> &mut Pendulum;
-    /// Squares of the angle and of its rate, after `start`, rad2, rad2/s2; of a paraboloid those of displacement over length.
+    /// Returns the squares of angle and angular rate after `start`, rad2, rad2/s2; for a paraboloid those of
+    /// displacement over length.
     fn amplitude2<T: Number>(&self) -> [T; 2];
-    /// Coordinates from angles with sin(angle) = displacement/l and their rates.
+    /// Returns coordinates from angles with sin(angle) = displacement/l and their rates.
     fn coordinates(&self, at: &Angles) -> [f64; 4];
-    /// The reverse.
+    /// Returns the angles from the coordinates.
     fn angles<T: Number>(&self) -> Angles<T>;
-    /// Sets the coordinates at the start of the expansion; w is known to order 0.
+    /// Sets the coordinates at the start of the expansion; w must be known to order 0.
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
-    /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative; w is
+    /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative; w must be
     /// known to order 1.
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
-    /// Coefficient n, 0 or 1, of q_x', q_y', q_x'', q_y''.
+    /// Returns coefficient n, 0 or 1, of q_x', q_y', q_x'', q_y''.
     fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4];
-    /// Coefficient n of J and T, from coefficients up to n of q, q' and w; `ramp` says whether
-    /// g changes along the expansion.
+    /// Returns coefficient n of J and T, from coefficients up to n of q, q' and w. `ramp` is true
+    /// if g changes along the expansion.
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction;
-    /// Coefficient n of q'' and with it n + 1 of q and q', after `hub_reaction`, when w' is
-    /// known up to n.
+    /// Computes coefficient n of q'' and n + 1 of q and q', after `hub_reaction`, with w' known up
+    /// to n.
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
-    /// Size of the motion, rad/s: what the tolerance is relative to.
+    /// Scale of the motion for the tolerance, rad/s.
     fn error_scale(&self) -> f64;
-    /// Size of coefficient `n` of the rates, rad/s.
+    /// Magnitude of coefficient `n` of the rates, rad/s.
     fn coefficient_norm(&self, n: usize) -> f64;
-    /// Coefficient n of the power that the mode dissipates, W, after `hub_reaction`.
+    /// Returns coefficient n of the mode's dissipated power, W, after `hub_reaction`.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
-    /// Coefficient n of mass times height above rest, kg m: the potential energy over g.
+    /// Returns coefficient n of mass times height above rest, kg m: the potential energy over g.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
-    /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n; `varies` as `ramp` above: where nothing does,
-    /// modes move along the tangent.
+    /// Returns the coordinates at t, at the hub's rate `omega`, from the series up to order n. `varies` has the meaning
+    /// of `ramp` above; without variation modes move along the tangent.
     fn at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
-    /// Mass times height above rest, kg m, and its rate.
+    /// Returns mass times height above rest, kg m, and its rate.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
-    /// Force of the bob on the tank, N, radial and tangential.
+    /// Returns the force of the bob on the tank, N, radial and tangential.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2];
-    /// Torque of the bob on the hub, N m.
+    /// Returns the torque of the bob on the hub, N m.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Kinetic and potential energy, J.
+    /// Returns kinetic and potential energy, J.
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Angular momentum about the bearing's axis, kg m2/s.
+    /// Returns the angular momentum about the bearing axis, kg m2/s.
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Reason why the coordinates are outside the model's range, if they are.
+    /// Returns why the coordinates are outside the model's range, if they are.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None
     }

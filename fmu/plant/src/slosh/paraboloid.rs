@@ -1,7 +1,7 @@
-//! A mass on the paraboloid z = |q|^2/(2 l) with a quartic spring: rotary motion
-//! hardens less than a pendulum's. q = (x, y) is the bob minus the hinge, m, in the
-//! hub's frame. With N = l^2/s + |q|^2, h = hardening/R^2 and the hub's Coriolis and
-//! centrifugal forces a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
+//! A mass on the paraboloid z = |q|^2/(2 l) with a quartic spring. Its rotary motion hardens less
+//! than that of a pendulum. q = (x, y) is the position of the bob relative to the hinge, m, in the
+//! hub's frame. With N = l^2/s + |q|^2, h = hardening/R^2 and the hub's Coriolis and centrifugal
+//! accelerations a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
 //!
 //! ```text
 //! mu   = [ q.a + |q'|^2 + g (l/s) (1 + h |q|^2) ] / N
@@ -12,10 +12,10 @@
 //! dissipated power c (|q'|^2 + s z'^2),  z' = q.q'/l
 //! ```
 //!
-//! Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + s z'^2)/2.
-//! On a bench that leans, gravity across the axis, e, is added to a, and -m e.(r + x, y) to E.
-//! s = 1 on the paraboloid; the model `liquid` (`liquid.rs`) has another s and h = kappa/(2 l^2).
-//! For small q a pendulum is the case s = 1, h = 1/(2 l^2).
+//! These are Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + s z'^2)/2. On a
+//! tilted bench, gravity across the axis, e, adds to a, and -m e.(r + x, y) adds to E. The
+//! paraboloid has s = 1; the model `liquid` (`liquid.rs`) has another s and h = kappa/(2 l^2). For
+//! small q a pendulum is the case s = 1, h = 1/(2 l^2).
 
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
@@ -39,18 +39,18 @@ pub struct Paraboloid {
     a: [Series; 2],
     mu: Series,
     spring: Series,
-    /// r y / N and w' times it
+    /// r y/N, and w' times r y/N
     lever: Series,
     push: Series,
     /// -(c/m) q' + a - mu q
     b: [Series; 2],
-    /// q.q' and that times the course of the damping (dissipation); |q|^2 (height)
+    /// q.q', and q.q' times the course of the damping (dissipation); |q|^2 (height)
     rise: Series,
     drag_rise: Series,
     q2: Series,
 }
 
-/// Both components as numbers.
+/// Returns both components as numbers.
 fn pair<T: Number>(a: &[Series; 2]) -> [T; 2] {
     [number(&a[0]), number(&a[1])]
 }
@@ -236,7 +236,7 @@ impl SloshMode for Paraboloid {
         [height * (m / l) + tilted[0] * m, height_d * (m / l) + tilted[1] * m]
     }
 
-    /// Minus the bob's mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
+    /// Returns minus the bob's mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let (wd, y, arm) =
             (number::<T>(&hub.omega_dot), number::<T>(&self.q[1]), number::<T>(&self.arm));
@@ -273,9 +273,9 @@ impl SloshMode for Paraboloid {
         let q2 = q[0] * q[0] + q[1] * q[1];
         let Pendulum { l, hardening, .. } = self.p;
         if q2 >= l * l {
-            Some("its mass has moved by its length l, where the surface stands at 45 degrees")
+            Some("its mass has moved by its length l, where the surface is at 45 degrees")
         } else if hardening * q2 < -0.9 {
-            Some("its wave is too high for a spring that falls with the amplitude")
+            Some("its wave is too high for a softening spring")
         } else {
             None
         }
@@ -286,7 +286,7 @@ impl SloshMode for Paraboloid {
 mod tests {
     use super::*;
 
-    /// Displacement 1 is the length; a spring that falls with the amplitude ends at a tenth of its stiffness.
+    /// The range ends at a displacement of one length. A softening spring ends at a tenth of its stiffness.
     #[test]
     fn a_mass_leaves_its_range_at_its_length_or_where_the_spring_is_nearly_gone() {
         let outside = |hardening: f64, q: [f64; 2]| {

@@ -1,14 +1,14 @@
-//! Spherical (conical) pendulum. Its coordinates are stereographic: the bob's direction
-//! from the hinge, a unit vector in the hub's frame, is
+//! Spherical (conical) pendulum with stereographic coordinates. The bob's direction from the hinge,
+//! a unit vector in the hub's frame, is
 //!
 //! ```text
 //! p = (k xi_1, k xi_2, 1 - k),   k = 2/(1 + |xi|^2),   q = xi
 //! ```
 //!
-//! (rest is xi = 0; only the bob straight up is singular). The motion is expanded in p
-//! and in v, the bob's velocity from the hinge as seen from outside the hub, over l: in
-//! these Newton's law has few products and no quotient. With R the quarter turn
-//! (a, b) -> (-b, a) of the horizontal part, e_x outwards, e_y along +theta, e_z up:
+//! Rest is xi = 0; only the bob straight up is singular. The motion is expanded in p and in v, the
+//! bob's velocity relative to the hinge over l in inertial axes. In these variables Newton's law
+//! has few products and no quotient. With R the quarter turn (a, b) -> (-b, a) of the horizontal
+//! part, e_x outwards, e_y along +theta, e_z up:
 //!
 //! ```text
 //! p' = v - w R p
@@ -21,7 +21,7 @@
 //! L = L_0 - (r/l) w' p_y,   L_0 = |v|^2 - (g/l) p_z + (r/l) w^2 p_x
 //! ```
 //!
-//! The rod pulls at the hinge; the drag c l p' acts on the tank at the bob. So
+//! The rod pulls at the hinge, and the drag c l p' acts on the tank at the bob, so
 //!
 //! ```text
 //! J = m r^2 p_y^2     (beyond the hub's I0)
@@ -30,7 +30,7 @@
 //! H = m [ (r + l p_x) (l v_y + r w) - l p_y l v_x ]
 //! ```
 //!
-//! Checked against Lagrange's equations for xi (below), against another way to the hub's
+//! Checked against Lagrange's equations for xi (below), against another formulation of the hub's
 //! acceleration (tests/plant/rotary.rs) and against a pendulum in angles (Basilisk).
 
 use alloc::format;
@@ -51,20 +51,19 @@ use crate::pendulum::Pendulum;
 #[derive(Clone, Debug)]
 pub struct Spherical {
     p: Pendulum,
-    /// Coordinates, 1 + |xi|^2, k, xi.xi' and k xi.xi': orders 0 and 1 alone.
+    /// Coordinates, 1 + |xi|^2, k, xi.xi' and k xi.xi': orders 0 and 1 only.
     xi: Vector2,
     xi_d: Vector2,
     sum: Series,
     k: Series,
     rho: Series,
     k_rho: Series,
-    /// The bob's direction, horizontally and upwards.
+    /// Direction of the bob, horizontal and upwards.
     dir: Vector2,
     dir_z: Series,
-    /// p' horizontally; upwards it is v_z.
+    /// p' horizontal; the upward component is v_z.
     dir_d: Vector2,
-    /// p' times the course of the damping: horizontally with its components exchanged, and
-    /// upwards.
+    /// p' times the course of the damping: horizontal with exchanged components, and upwards.
     drag_swapped: Vector2,
     drag_z: Series,
     v: Vector2,
@@ -83,8 +82,8 @@ pub struct Spherical {
 }
 
 impl Spherical {
-    /// Coefficient n of direction and velocity from those of the coordinates:
-    /// p' = k xi' - v_z xi, v_z = k^2 xi.xi'.
+    /// Sets coefficient n of direction and velocity from those of the coordinates: p' = k xi' - v_z
+    /// xi, v_z = k^2 xi.xi'.
     #[inline(always)]
     fn place(&mut self, n: usize, hub: &HubMotion) {
         let one = constant(n, 1.0);
@@ -101,7 +100,7 @@ impl Spherical {
         self.v[n] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Coefficient n of k xi'' = p'' + 2 v_z xi' + v_z' xi, p'' = v' - w' R p - w R p'.
+    /// Returns coefficient n of k xi'' = p'' + 2 v_z xi' + v_z' xi, p'' = v' - w' R p - w R p'.
     fn k_xi_dd(&self, n: usize, hub: &HubMotion) -> [f64; 2] {
         let [x, y] = scale(n, &hub.omega_dot, &self.dir);
         let [x_d, y_d] = scale(n, &hub.omega, &self.dir_d);
@@ -111,7 +110,7 @@ impl Spherical {
         [0, 1].map(|i| dir_dd[i] + 2.0 * twice[i] + once[i])
     }
 
-    /// Coefficient n of |p'|^2 times the course of the damping.
+    /// Returns coefficient n of |p'|^2 times the course of the damping.
     fn drag_power(&self, n: usize) -> f64 {
         let horizontal = |i: usize| {
             (0..=n).map(|j| self.dir_d[j][i] * self.drag_swapped[n - j][1 - i]).sum::<f64>()
@@ -119,21 +118,21 @@ impl Spherical {
         horizontal(0) + horizontal(1) + mul(n, &self.v_z, &self.drag_z)
     }
 
-    /// Bob in the hub's frame, horizontally, m: X, Y.
+    /// Returns the bob's horizontal position in the hub's frame, m: X, Y.
     fn bob<T: Number>(&self) -> [T; 2] {
         let Pendulum { l, r, .. } = self.p;
         let [x, y]: [T; 2] = numbers(&self.dir);
         [T::constant(r) + x * l, y * l]
     }
 
-    /// Its velocity as seen from outside, in the hub's frame, m/s: X, Y, Z.
+    /// Returns the bob's inertial velocity in the hub's frame, m/s: X, Y, Z.
     fn velocity<T: Number>(&self, hub: &HubMotion) -> [T; 3] {
         let Pendulum { l, r, .. } = self.p;
         let [v_x, v_y]: [T; 2] = numbers(&self.v);
         [v_x * l, v_y * l + number::<T>(&hub.omega) * r, number::<T>(&self.v_z) * l]
     }
 
-    /// 1 + p_z = |xi|^2 k, without cancellation near rest.
+    /// Returns 1 + p_z = |xi|^2 k, without cancellation near rest.
     fn above_rest<T: Number>(&self) -> T {
         let [xi_1, xi_2]: [T; 2] = numbers(&self.xi);
         number::<T>(&self.k) * (xi_1 * xi_1 + xi_2 * xi_2)
@@ -142,7 +141,7 @@ impl Spherical {
 
 impl SloshMode for Spherical {
     const UNROLLED: bool = true;
-    // J is that at the start of the expansion; how it moves is in T.
+    // J is that at the start of the expansion; T includes its change.
     const MOVES_INERTIA: bool = false;
 
     fn new(p: &Pendulum) -> Self {
@@ -265,7 +264,7 @@ impl SloshMode for Spherical {
                 inv_l * (mul_part(n, e_x, &self.dir, 0) + mul_part(n, e_y, &self.dir, 1));
         }
         let [plus, minus] = each(n, &self.dir, &self.drag_swapped);
-        // L and L p without their share of the newest w', which J stands for.
+        // L and L p without the terms in the newest w', which J represents.
         let y_0 = self.dir[0][1];
         self.tension[n] = self.tension_0[n] - r_l * mul_part_head(n, &hub.omega_dot, &self.dir, 1);
         self.pulled = scale_head(n, &self.tension, &self.dir);
@@ -353,7 +352,7 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| above[i] * (m * l) + tilted[i] * m)
     }
 
-    /// The rod's tension along p and the drag.
+    /// Returns the rod's tension along p and the drag.
     fn force<T: Number>(&self, _: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, .. } = self.p;
         let (tension, [_, c]) = (number::<T>(&self.tension), self.p.restoring_and_drag::<T>());
@@ -385,7 +384,7 @@ impl SloshMode for Spherical {
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
         // |xi| = 1e3 is a bob within 0.12 degrees of straight up.
         let up = q[0] * q[0] + q[1] * q[1] > 1e6;
-        up.then_some("its bob stands straight up, where a pendulum says nothing about a liquid")
+        up.then_some("its bob stands straight up, where no pendulum represents a liquid")
     }
 }
 
@@ -398,7 +397,7 @@ mod tests {
     use super::*;
     use taylor::series::ORDER;
 
-    /// Lagrange's equations of the bob in xi, with v = xi' + w R xi and rho = xi.xi':
+    /// Returns Lagrange's equations of the bob in xi, with v = xi' + w R xi and rho = xi.xi':
     ///
     /// ```text
     /// xi'' = B + A w'
@@ -433,7 +432,8 @@ mod tests {
         }
     }
 
-    /// From hanging to 20 degrees from straight up, and what p and v say is the same motion.
+    /// From hanging to 20 degrees from straight up, p and v describe the same motion as the
+    /// coordinates.
     #[test]
     fn direction_and_velocity_move_as_lagrange_has_the_coordinates() {
         let mut rng = fastrand::Rng::with_seed(3);
@@ -453,12 +453,12 @@ mod tests {
             mode.accelerate(0, false, &hub);
             let expected = lagrange(&p, q, w, w_d, g);
             let [.., x_dd, y_dd] = mode.derivatives(0, &hub);
-            // The terms are up to k |v|^2 |xi|, 1e4, and half of them are taken as 1/k, 20, of
-            // smaller ones.
+            // The terms are up to k |v|^2 |xi|, 1e4, and half of them are computed as 1/k, 20,
+            // times smaller ones.
             let size = 1.0 + expected[0].abs().max(expected[1].abs()) + 1e3;
             assert!((x_dd - expected[0]).abs() < 1e-13 * size, "{x_dd} {}", expected[0]);
             assert!((y_dd - expected[1]).abs() < 1e-13 * size, "{y_dd} {}", expected[1]);
-            // The way back.
+            // Back to the coordinates.
             let back = mode.at(ORDER, 0.0, w, false);
             for (a, b) in back.iter().zip(q) {
                 assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{a} {b}");

@@ -3,9 +3,8 @@
 use super::common::{FRICTION, SLOSH, anywhere, bench, has_rim};
 use plant::{FrictionModel, Inputs, Outputs, Plant, Ramp, SloshModel};
 
-/// Tolerance of all runs here. The plant's errors come out two to three decades
-/// below the tolerance, so the bounds of 1e-8 below leave it room without hiding
-/// a wrong term, which shows as a part of the energy throughput.
+/// Tolerance of all runs here. The plant's errors are two to three decades below the tolerance, so
+/// bounds of 1e-8 leave a margin. A wrong term would still show as a part of the energy throughput.
 const TOLERANCE: f64 = 1e-9;
 
 fn plant(p: &plant::Parameters, inputs: &Inputs) -> Plant {

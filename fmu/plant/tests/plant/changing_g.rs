@@ -86,8 +86,8 @@ fn energy_balances_with_the_work_of_a_changing_g() {
     }
 }
 
-/// A jump of g works on the mass times height of hub and liquid, as the energy has them, whose potential part is written
-/// in gravity's components across the axis; so do the derivatives of both.
+/// A jump of g does the work of mass times height of hub and liquid. The energy uses gravity's components across the
+/// axis, and both give the same result, also for the derivatives.
 #[test]
 fn a_jump_of_g_on_a_leaning_bench_works_on_the_height_that_the_energy_has() {
     for slosh in SloshModel::ALL {

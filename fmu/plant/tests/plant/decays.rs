@@ -18,8 +18,8 @@ fn held(model: SloshModel) -> Parameters {
     p
 }
 
-/// Damping ratio of a small free oscillation at `g` after a start at `g_start`: the logarithmic decrement over ten
-/// periods of omega = sqrt((g + a)/l), from states that go from zero to zero of the angle.
+/// Returns the damping ratio of a small free oscillation at `g` after a start at `g_start`. It is the logarithmic decrement
+/// over ten periods of omega = sqrt((g + a)/l), between zeros of the angle.
 fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     let mut plant = Plant::new(p, &at(g_start), 0.0, TOLERANCE).unwrap();
     let amplitude2 = |plant: &Plant| {
@@ -35,8 +35,8 @@ fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     -(amplitude2(&plant) / before).ln() / (2.0 * TAU * 10.0)
 }
 
-/// From the ground to a millionth of a m/s2: with capillarity the frequency, and with it a laminar layer's damping, end
-/// at a finite value; without, they go on as g^(1/2) and g^(-1/4).
+/// From 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency, and with it the damping of a laminar layer,
+/// reach a finite limit. Without it they continue as g^(1/2) and g^(-1/4).
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {
     for capillarity in [true, false] {

@@ -70,9 +70,10 @@ fn momentum_is_constant_however_modes_along_any_direction_damp() {
     }
 }
 
-/// Newton's equations of hub and bobs with the guides' forces as unknowns, by Runge-Kutta: x = theta, w, then al and al' of each mode.
-/// A bob at P = (r + l s n_x, l s n_t, -l c) in the hub's frame has a = P'' + 2 w x P' + w' x P + w x (w x P); gravity, drag along its path
-/// and the guide's force N across it move it, -N and minus the drag the hub.
+/// Newton's equations of hub and bobs with the guides' forces as unknowns, by Runge-Kutta: x = theta, w, then al and
+/// al' of each mode. A bob at P = (r + l s n_x, l s n_t, -l c) in the hub's frame has a = P'' + 2 w x P' + w' x P + w x
+/// (w x P). Gravity, drag along its path and the guide's force N across the path act on it; -N and minus the drag act
+/// on the hub.
 struct Newton<'a> {
     p: &'a Parameters,
     drag: Vec<f64>,
@@ -201,8 +202,9 @@ fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     [value, 2.0 * m * x * l * c, 2.0 * m * l * (l * c * c - x * s)]
 }
 
-/// On a hub that turns, g tan(be) = w^2 (r + l sin be); about it, with H = J w constant, V = H^2/(2 J) + m g l (1 - cos be) and
-/// Omega^2 = V''/(m l^2): under a hub so heavy that w stays, g/(l cos be) - w^2 cos^2 be.
+/// On a rotating hub, g tan(be) = w^2 (r + l sin be) at equilibrium. About it, with H = J w constant, V = H^2/(2 J) + m
+/// g l (1 - cos be) and Omega^2 = V''/(m l^2). For a hub so heavy that w is constant this is g/(l cos be) - w^2 cos^2
+/// be.
 #[test]
 fn a_radial_mode_stands_where_thrown_and_swings_there_at_the_frequency_in_closed_form() {
     for (hub, shift) in [(0.1, 1.0), (1e6, -1.0)] {

@@ -114,8 +114,8 @@ fn the_gyros_samples_are_time_events() {
     assert_eq!(plant.next_time_event(), Some(3.1), "all that are overdue");
 }
 
-/// Along each state alone, also one along which the outputs curve at once: a hundred times the direction
-/// has a hundred times the derivative, and it is that of a small step.
+/// Seeds each state alone, also where the outputs are strongly nonlinear. A hundred times the direction gives a hundred
+/// times the derivative, and the derivative is that of a small step.
 #[test]
 fn output_derivatives_are_linear_in_each_direction() {
     for slosh in SloshModel::ALL {

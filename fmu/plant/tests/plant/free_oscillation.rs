@@ -14,9 +14,9 @@ fn held(model: SloshModel, depth: f64) -> Parameters {
     p
 }
 
-/// The mean angular frequency, rad/s, of the slosh angle or, in a circular motion, of its direction: from
-/// the instants at which the tangential angle rises through 0, each found by a straight line between
-/// samples `h` apart: 1e-6 of a period for 1 ms, 4e-7 for 0.1 ms.
+/// Returns the mean angular frequency, rad/s, of the slosh angle or, in a circular motion, of its direction. It comes
+/// from the instants at which the tangential angle rises through 0. Linear interpolation between samples `h` apart
+/// finds each instant to 1e-6 of a period for 1 ms, 4e-7 for 0.1 ms.
 fn frequency(p: &Parameters, h: f64) -> f64 {
     let inputs = Inputs::default();
     let mut plant = Plant::new(p, &inputs, 0.0, 1e-11).unwrap();

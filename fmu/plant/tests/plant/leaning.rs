@@ -64,8 +64,8 @@ fn hang(p: &mut Parameters, aside: f64) {
     (p.init.slosh_angle, p.init.slosh_angle_radial) = (angle(along + aside), angle(radial));
 }
 
-/// The frequency of a free oscillation of 1e-4 rad, Hz: over ten periods between zeros of the rate, interpolated between 400
-/// samples a period (the sine's third power: 1e-7 of a period).
+/// Returns the frequency of a free oscillation of 1e-4 rad, Hz, from ten periods between zeros of the rate,
+/// interpolated between 400 samples per period (error by the sine's third power: 1e-7 of a period).
 fn measured(p: &Parameters) -> f64 {
     let mut p = *p;
     hang(&mut p, 1e-4);
@@ -131,8 +131,8 @@ fn the_stated_frequency_is_that_of_a_free_decay() {
     }
 }
 
-/// A torque moves at once the hub and what does not slosh: I + r^2 (m_liq - sum of m f), whichever the model; the bob of the
-/// plane, which can't move radially, in addition by its distance from the axis.
+/// A torque immediately accelerates the hub and the mass that does not slosh: I + r^2 (m_liq - sum of m f), in every
+/// model. A planar bob, which cannot move radially, adds its distance from the axis.
 #[test]
 fn the_mass_that_does_not_slosh_at_once_follows_the_hub() {
     for model in SLOSHING {

@@ -15,8 +15,8 @@ fn a_pendulum_has_the_shifts_of_a_pendulum() {
     assert!((found[1] / 0.5 - 1.0).abs() < 0.01, "{found:?}");
 }
 
-/// With the inertia s and the spring kappa of the third order: planar 3 kappa/8 - s/2, circular kappa/2; what
-/// potential flow says of the two depths is in `tests/physics/liquid.rs`.
+/// With the inertia s and the spring kappa of the third order: planar 3 kappa/8 - s/2, circular kappa/2.
+/// `tests/physics/liquid.rs` compares with potential flow at the two depths.
 #[test]
 fn a_liquid_has_the_shifts_of_the_third_order() {
     for (depth, potential_flow) in [(0.10, [-0.4285, 0.3671]), (0.05, [-0.2566, 0.4208])] {

@@ -272,8 +272,8 @@ fn a_hub_under_less_torque_than_break_away_stays_at_a_deflection() {
 
 #[test]
 fn steps_are_as_short_as_the_bristles_are_stiff_and_no_shorter() {
-    // Sliding at 0.05 rad/s for 1 s with a relaxation time of 0.1 s .. 0.1 ms: the number of
-    // internal steps grows with the stiffness, at about one per ten relaxation times or less.
+    // Sliding at 0.05 rad/s for 1 s with a relaxation time from 0.1 s to 0.1 ms. The number of
+    // internal steps grows with the stiffness, by at most about one per ten relaxation times.
     for sigma0 in [1.0, 100.0, 10_000.0] {
         let mut p = bench(SloshModel::Frozen);
         p.friction.sigma0 = sigma0;

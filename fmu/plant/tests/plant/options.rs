@@ -1,5 +1,5 @@
-//! A bench that leans, a ring baffle, damping that grows with the amplitude, capillarity: with each of them energy, momentum, derivatives
-//! and the independence of the communication step hold for every model.
+//! Tests of a tilted bench, a ring baffle, amplitude damping and capillarity. With each option, energy, momentum,
+//! derivatives and the independence of the communication step hold for every model.
 
 use std::f64::consts::TAU;
 
@@ -373,8 +373,8 @@ fn low_bond_numbers_are_warned_of() {
     assert!(Plant::warnings(&with, &at(9.81)).is_empty());
 }
 
-/// -b w -+ (C + D exp(-(w/w_s)^2)) (1 +- A + harmonics of the angle), where tanh(w/eps) is 1: of both laws of Stribeck, on the
-/// way there and back.
+/// Expected torque, with tanh(w/eps) = 1: -b w -+ (C + D exp(-(w/w_s)^2)) (1 +- A + harmonics of the angle), for both
+/// Stribeck laws and both directions.
 #[test]
 fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
     for model in [FrictionModel::Stribeck, FrictionModel::StribeckSmooth] {

@@ -1,4 +1,4 @@
-//! Ranges of validity, what is refused, and what is said of it.
+//! Ranges of validity, refusals, and their messages.
 
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, Regime, SloshModel, SloshSource};

@@ -1,6 +1,6 @@
-//! Rotary sloshing of the spherical model against outside anchors: an independent
-//! unit-vector model, the analytic stability boundaries of the forced spherical
-//! pendulum, and the onset that the thesis's author saw on the bench.
+//! Rotary sloshing of the spherical model compared with external references: an independent
+//! unit-vector model, the analytic stability boundaries of the forced spherical pendulum, and the
+//! onset that Rubaga observed on the bench.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel};
 
 /// Hub and one spherical pendulum by its unit vector p: theta, w, p, p'. Newton's law
 /// of the bob in the hub's frame with the rod's pull eliminated by p.p'' = -|p'|^2. The
-/// plant keeps the bob's velocity as seen from outside in place of p', and the
+/// plant keeps the bob's inertial velocity in place of p', and the
 /// rod's pull acts on the hub, where this takes w' from the whole angular momentum.
 struct UnitVector {
     i0: f64,
@@ -109,8 +109,9 @@ fn leaves_the_plane(eps: f64, mu: f64) -> bool {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.tank.r = 1000.0;
     p.hub.inertia = 1e12;
-    // Enough to end what is left of the start, too little to move the boundaries: the
-    // growth it needs, zeta w, shifts mu by some (2 zeta / eps^(2/3))^2 = 4e-4.
+    // This damping is large enough to end the initial transient and too small to move the
+    // boundaries. The growth that overcomes it, zeta w, shifts mu by about (2 zeta / eps^(2/3))^2 =
+    // 4e-4.
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 1e-4;
     let l = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap().calculated().length[0];

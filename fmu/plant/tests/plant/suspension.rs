@@ -42,7 +42,7 @@ fn a_line_without_stiffness_and_damping_changes_no_bit() {
     }
 }
 
-/// k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J beside I w^2/2, and -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
+/// k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J plus I w^2/2, and -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
 #[test]
 fn the_line_s_torque_and_energy_are_those_of_its_twist() {
     let mut p = frozen(FrictionModel::None);

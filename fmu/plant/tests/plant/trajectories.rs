@@ -1,10 +1,9 @@
-//! The plant against trajectories of known accuracy.
+//! Compares the plant with trajectories of known accuracy.
 //!
-//! `trajectories.json`: 20 s runs by two independent high-order integrators
-//! (the linear model by a 60-digit matrix exponential), sampled every second here.
-//! Each record says how many of its digits are good (`digits`, relative to the
-//! signal's largest value, `largest`); `events` are [time, contact] of the set-valued
-//! friction law, the first one the contact at the start.
+//! `trajectories.json` has 20 s runs by two independent high-order integrators (the linear model by
+//! a 60-digit matrix exponential), sampled every second. Each record has its number of valid digits
+//! (`digits`, relative to the signal's largest value, `largest`). `events` are [time, contact] of
+//! the set-valued friction law, beginning with the contact at the start.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -149,8 +148,8 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
             inputs.tau_cmd = Ramp::held(b);
         }
     }
-    // 1e-8 is what is claimed; the sine's chords lose up to (w H)^2/12 = 1.8e-5 at
-    // 1 ms before the knots are raised and leave higher harmonics of that size / 1e3.
+    // The claimed accuracy is 1e-8. The sine's chords lose up to (w H)^2/12 = 1.8e-5 at 1 ms before
+    // the knots are raised, and leave higher harmonics of that size / 1e3.
     let allowed = f64::max(1e-8, 10f64.powf(-run.digits));
     let mut wrong: Vec<String> = largest_error
         .iter()
