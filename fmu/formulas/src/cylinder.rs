@@ -1,4 +1,5 @@
-//! Liquid in an upright cylinder of diameter d, filled to the depth h, as pendulums and a rigid rest.
+//! Liquid in an upright cylinder of diameter d, filled to the depth h, as pendulums and rigid
+//! liquid.
 //!
 //! ```text
 //! m_n = m_liq d tanh(2 xi_n h/d) / (xi_n (xi_n^2 - 1) h)        l_n = d/(2 xi_n tanh(2 xi_n h/d))
@@ -7,11 +8,11 @@
 //! ```
 //!
 //! xi_n: zeros of J1'. I: transverse inertia of the liquid under a lid, about its centre. With all
-//! modes force and moment are those of linear potential flow in a cylinder that moves and pitches.
+//! modes, force and moment are those of linear potential flow in a cylinder that moves and pitches.
 //!
 //! Source: Abramson, NASA SP-106 (1966), chapters 2 and 6; Dodge (2000).
 
-/// Modes whose zeros are tabulated.
+/// Number of modes with tabulated zeros.
 pub const MODES: usize = 10;
 
 /// Zeros xi_n of J1', the derivative of the Bessel function (17 digits).
@@ -28,7 +29,7 @@ pub const XI: [f64; MODES] = [
     30.601_922_972_669_094,
 ];
 
-/// One slosh mode as a pendulum that hangs at the tank's axis.
+/// One slosh mode as a pendulum with its hinge on the tank's axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
     /// Mass of the bob, kg.
@@ -41,11 +42,11 @@ pub struct Pendulum {
     pub wave: f64,
 }
 
-/// Mode n, from 0 and below [`MODES`], of the mass `m_liq` of liquid.
+/// Returns mode n, from 0 and below [`MODES`], of the mass `m_liq` of liquid.
 pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     let (xi, radius) = (XI[n], d / 2.0);
     let tanh = libm::tanh(2.0 * xi * h / d);
-    // Deeper, the bottom is out of reach: beyond 700 sinh overflows.
+    // In deep liquid the bottom has no effect, and sinh overflows above 700.
     let u = f64::min(xi * h / radius, 700.0);
     Pendulum {
         mass: m_liq * d * tanh / (xi * (xi * xi - 1.0) * h),
@@ -55,9 +56,9 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     }
 }
 
-/// The tank (d, h) whose first mode has this length and mass, with liquid of `density`: from l and m above,
-/// d^4 = 8 xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). A deep tank's length says little of
-/// its fill: tanh is taken as 0.995 at most.
+/// Returns the tank (d, h) with liquid of `density` whose first mode has this length and mass. From l and m above, d^4
+/// = 8 xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
+/// fill, so tanh is limited to 0.995.
 pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     let xi = XI[0];
     let d4 = 8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (density * core::f64::consts::PI);
@@ -66,21 +67,21 @@ pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     (d, h)
 }
 
-/// Transverse inertia of the liquid under a lid about its centre, over its mass, m2.
+/// Returns the transverse inertia of the liquid under a lid about its centre, over its mass, m2.
 pub fn capped_inertia(d: f64, h: f64) -> f64 {
-    /// Zeros that are summed; the rest is an integral.
+    /// Number of zeros in the sum; an integral replaces the rest.
     const ZEROS: usize = 400;
     let radius = d / 2.0;
     let term = |xi: f64| libm::tanh(xi * h / d) / (xi * xi * xi * (xi * xi - 1.0));
     let sum: f64 = (1..=ZEROS).rev().map(|n| term(zero(n))).sum();
-    // Zeros are pi apart: sum of xi^-5 from there on.
+    // Zeros are pi apart, which gives the sum of xi^-5 from here on.
     let end = zero(ZEROS) + core::f64::consts::FRAC_PI_2;
     let rest = 1.0 / (4.0 * core::f64::consts::PI * end * end * end * end);
     let rest = rest * libm::tanh(end * h / d);
     h * h / 12.0 - 0.75 * radius * radius + 16.0 * radius * radius * radius / h * (sum + rest)
 }
 
-/// Zero n of J1', from 1: beyond the table McMahon's expansion (DLMF 10.21.20).
+/// Returns zero n of J1', from 1; beyond the table by McMahon's expansion (DLMF 10.21.20).
 fn zero(n: usize) -> f64 {
     if n <= MODES { XI[n - 1] } else { mcmahon(n) }
 }
@@ -92,9 +93,9 @@ fn mcmahon(n: usize) -> f64 {
     b - 7.0 / x - 4.0 * (7.0 * 16.0 + 82.0 * 4.0 - 9.0) / (3.0 * x * x * x)
 }
 
-/// The rigid rest when some modes are kept: mass, height of its centre of mass above the bottom,
-/// transverse inertia about it. Mass, centre of mass and inertia of the whole come out right, each
-/// bob where it hangs.
+/// Returns the rigid liquid for the modes in `kept`: mass, height of its centre of mass above the
+/// bottom, and transverse inertia about it. With each bob at its position of rest, mass, centre of
+/// mass and inertia of the whole liquid are exact.
 pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
     let z_liq = h / 2.0;
     let sum = |f: &dyn Fn(&Pendulum) -> f64| kept.iter().map(f).sum::<f64>();
@@ -111,8 +112,8 @@ pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// R = 0.45 m, 0.6 m deep, 1000 kg/m3: numbers of ../../craft/tests/six.json, six digits; I_0,
-    /// a small difference of large numbers, is there from a shorter sum.
+    /// R = 0.45 m, 0.6 m deep, 1000 kg/m3: values of ../../craft/tests/six.json, six digits. I_0, a
+    /// small difference of large numbers, comes from a shorter sum there.
     #[test]
     fn a_cylinder_is_that_of_the_reference_records() {
         let m_liq = 1000.0 * core::f64::consts::PI * 0.45 * 0.45 * 0.6;
@@ -130,7 +131,8 @@ mod tests {
         }
     }
 
-    /// The fourth root of a product of order 1 loses some ulp, atanh near 1 some 1/(1 - tanh^2) = 20 more.
+    /// The fourth root of a product of order 1 has an error of some ulp, atanh near 1 of about 1/(1 - tanh^2) = 20
+    /// more.
     #[test]
     fn a_tank_is_found_again_from_its_first_mode() {
         for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
@@ -141,13 +143,13 @@ mod tests {
         }
     }
 
-    /// The wave at the wall, R = 0.0815 m: 2 R/(xi^2 - 1) = 0.163/2.38996.
+    /// The wave at the wall for R = 0.0815 m: 2 R/(xi^2 - 1) = 0.163/2.38996.
     #[test]
     fn the_wave_of_the_first_mode_is_two_thirds_of_the_diameter_an_angle() {
         assert!((pendulum(0, 0.163, 0.1, 1.0).wave / 0.068202 - 1.0).abs() < 1e-5);
     }
 
-    /// J1' = J0 - J1/x, between last digits of xi of opposite signs.
+    /// J1' = J0 - J1/x changes its sign at the last digit of xi.
     #[test]
     fn the_table_holds_the_zeros_of_the_bessel_function_s_slope() {
         for xi in XI {
@@ -156,7 +158,7 @@ mod tests {
         }
     }
 
-    /// Values of mode 2 for R = 1 m, h = 1 m by hand, with tanh(xi_2) = 0.99995313 and its half 0.99037.
+    /// Values of mode 2 for R = 1 m, h = 1 m by hand, with tanh(xi_2) = 0.99995313 and tanh(xi_2/2) = 0.99037.
     #[test]
     fn the_second_mode_has_its_mass_length_and_hinge() {
         let second = pendulum(1, 2.0, 1.0, 3.0);
@@ -167,7 +169,7 @@ mod tests {
         near(second.wave, 2.0 / 27.424_282);
     }
 
-    /// The centre of mass of the whole, by every mode: bobs and rest.
+    /// The centre of mass of the whole liquid, from all modes: bobs and rigid liquid.
     #[test]
     fn bobs_and_rest_have_the_liquid_s_mass_and_centre() {
         let (d, h, m_liq) = (0.9, 0.6, 380.0);
@@ -179,8 +181,7 @@ mod tests {
         assert!((moment / (m_liq * h / 2.0) - 1.0).abs() < 1e-14);
     }
 
-    /// Only the uppermost few radii of liquid matter: below, nothing changes, and nothing
-    /// overflows.
+    /// Only the uppermost few radii of liquid matter. Below, nothing changes and nothing overflows.
     #[test]
     fn a_deep_tank_s_pendulum_hangs_below_the_surface_as_in_any_deep_tank() {
         let [deep, deeper] = [20.0, 1e6].map(|h| (h, pendulum(0, 2.0, h, h)));
@@ -190,7 +191,8 @@ mod tests {
         assert!((below[0] - 1.0 / XI[0]).abs() < 1e-14 && (below[1] - 1.0 / XI[0]).abs() < 1e-9);
     }
 
-    /// From a length of which no fill is told the tank is 0.995 of the deepest: tanh(2 xi h/d) = 0.995.
+    /// From the length at which it no longer depends on the fill, the tank has 0.995 of the deepest tanh: tanh(2 xi
+    /// h/d) = 0.995.
     #[test]
     fn a_tank_too_deep_to_tell_is_taken_as_nearly_deep() {
         let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);
@@ -199,8 +201,8 @@ mod tests {
         assert!((libm::tanh(2.0 * XI[0] * h / d) - 0.995).abs() < 1e-15);
     }
 
-    /// A film has no height: the liquid turns like a disk, R^2/4; for a film the
-    /// integral in place of the last zeros lacks 8/(12 pi end^3), end = 400 pi + 1.6. A column is one: h^2/12 - 3 R^2/4 remain.
+    /// A film has no height: the liquid turns like a disk, R^2/4. For a film the integral in place of the last zeros is
+    /// too small by 8/(12 pi end^3), end = 400 pi + 1.6. For a column h^2/12 - 3 R^2/4 remains.
     #[test]
     fn the_capped_inertia_has_its_limits() {
         let film = capped_inertia(2.0, 1e-12);
@@ -215,13 +217,13 @@ mod tests {
         assert!((column / (1e8 / 12.0) - 1.0).abs() < 1e-7, "{column}");
     }
 
-    /// The expansion's next term is of the order of 1e4/(8 b)^5: 1e-8 at the tenth zero.
+    /// The next term of the expansion is of the order of 1e4/(8 b)^5: 1e-8 at the tenth zero.
     #[test]
     fn mcmahon_s_zeros_continue_the_table() {
         let tenth = mcmahon(10);
         assert!((tenth - XI[9]).abs() < 1e-7, "{tenth} {}", XI[9]);
         assert_eq!((zero(1), zero(10)), (XI[0], XI[9]));
-        // as libm's J1' has it: the 11th is 1e-8 of the expansion's next term
+        // from libm's J1'; the next term of the expansion is 1e-8 at the 11th zero
         let eleventh = zero(11);
         assert!((libm::j0(eleventh) - libm::j1(eleventh) / eleventh).abs() < 1e-8, "{eleventh}");
     }

@@ -1,16 +1,17 @@
-//! Damping ratios: one law for every tank ([`estimate`]), made of the laminar layer at the wall and of published
+//! Damping ratios: one law for every tank ([`estimate`]), from the laminar layer at the wall and published
 //! correlations; ring baffles.
 //!
 //! ```text
 //! zeta_n = f beta_n sqrt(nu/(8 omega_n)),   omega_n^2 = g lambda_n + k_n/m_n
 //! ```
 //!
-//! beta_n, 1/m, is the mode's share of rubbing at the wall, int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV; omega_n the
-//! true natural frequency, capillarity included, so that zeta stays finite where g vanishes. f is what surface film
-//! and contact line add: that of a measured shape, [`UNMEASURED`] for any other.
+//! beta_n, 1/m, is the mode's ratio of wall shear to volume, int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV. omega_n is
+//! the true natural frequency with capillarity, so that zeta stays finite if g vanishes. f accounts for surface film
+//! and contact line: the value of a measured shape, or [`UNMEASURED`] for any other.
 //!
-//! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R the fill; zeta is the
-//! logarithmic decrement over 2 pi. Measured tanks scatter by some 30 % around any correlation.
+//! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
+//! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any
+//! correlation.
 
 use core::f64::consts::TAU;
 
@@ -18,39 +19,39 @@ use libm::{cosh, exp, pow, sinh, sqrt, tanh};
 
 use crate::cylinder::XI;
 
-/// f of a shape without measurements: that of measured cylinders, 1.49 (Stephens) and 1.39 to 1.54
+/// f of a shape without measurements, from measured cylinders: 1.49 (Stephens) and 1.39 to 1.54
 /// (Mikishev and Dorozhkin).
 pub const UNMEASURED: f64 = 1.45;
 
 /// Relative scatter of measured tanks around a correlation.
 pub const SCATTER: f64 = 0.3;
 
-/// One mode of a liquid, as its damping sees it.
+/// Parameters of a slosh mode for its damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
-    /// Rubbing at the wall, 1/m.
+    /// Ratio of wall shear to volume, 1/m.
     pub beta: f64,
-    /// 1/l, 1/m: what gravity alone makes of the frequency is sqrt(g lambda).
+    /// 1/l, 1/m; the frequency from gravity alone is sqrt(g lambda).
     pub lambda: f64,
-    /// Natural frequency, capillarity included, rad/s.
+    /// Natural frequency with capillarity, rad/s.
     pub omega: f64,
 }
 
 impl Mode {
-    /// Mode `n` (from 0) of an upright cylinder under the specific force `g`, which counts what a centring stiffness
-    /// adds, k l/m.
+    /// Returns mode `n` (from 0) of an upright cylinder at the specific force `g`, which includes the equivalent of a
+    /// centring stiffness, k l/m.
     pub fn of_cylinder(n: usize, radius: f64, depth: f64, g: f64) -> Mode {
         let lambda = XI[n] / radius * tanh(XI[n] * depth / radius);
         Mode { beta: cylinder_beta(n, radius, depth), lambda, omega: sqrt(g * lambda) }
     }
 
-    /// The laminar layer alone, f = 1.
+    /// Returns the damping ratio of the laminar layer alone, f = 1.
     pub fn laminar(&self, nu: f64) -> f64 {
         laminar(self.beta, nu, self.omega)
     }
 }
 
-/// Shapes of which the damping of the first mode has been measured; lengths in m.
+/// Shapes with measurements of the first mode's damping; lengths in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Shape {
@@ -73,7 +74,7 @@ pub enum Shape {
         tube_radius: f64,
         depth: f64,
     },
-    /// None of these.
+    /// Any other shape.
     Other,
 }
 
@@ -87,10 +88,11 @@ pub struct Correlation {
 }
 
 impl Shape {
-    /// The published correlation of the first mode's damping ratio, `g` with what a centring stiffness adds.
+    /// Returns the published correlation of the first mode's damping ratio. `g` includes the equivalent of a centring
+    /// stiffness.
     ///
-    /// Cylinder: Mikishev and Dorozhkin from h/R = 0.5 on; below, where that falls under the laminar layer,
-    /// Stephens, Leonard and Perry.
+    /// Cylinder: Mikishev and Dorozhkin from h/R = 0.5 on. Below, where that falls under the laminar layer, Stephens,
+    /// Leonard and Perry.
     pub fn correlation(&self, nu: f64, g: f64) -> Option<Correlation> {
         let (zeta, in_range) = match *self {
             Shape::Cylinder { radius, depth } => (cylinder(radius, depth, nu, g), true),
@@ -116,24 +118,25 @@ impl Shape {
 /// Basis of the damping estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
-    /// The shape's correlation: it was measured there.
+    /// The shape's correlation, within the range of its measurements.
     Correlation,
     /// [`UNMEASURED`] laminar layers: there is no correlation for the shape.
     Unmeasured,
-    /// The same: the correlation was not measured there.
+    /// [`UNMEASURED`] laminar layers: the correlation was not measured there.
     OutOfRange,
-    /// The same: the correlation is below the laminar layer, and no wall takes less than that.
+    /// [`UNMEASURED`] laminar layers: the correlation is below the laminar layer, the minimum of
+    /// any wall.
     BelowLayer,
 }
 
-/// A damping ratio, and between what it is to be expected.
+/// A damping ratio and its expected interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Damping ratio.
     pub zeta: f64,
-    /// Its interval.
+    /// Expected interval of the damping ratio.
     pub interval: [f64; 2],
-    /// The laminar layer alone.
+    /// Damping ratio of the laminar layer alone.
     pub laminar: f64,
     /// Estimate from the correlation of the first mode, if there is one.
     pub correlation: Option<f64>,
@@ -143,12 +146,12 @@ pub struct Estimate {
     pub disagree: bool,
 }
 
-/// The damping ratio of `mode` of a tank whose first mode is `first`.
+/// Estimates the damping ratio of `mode` of a tank whose first mode is `first`.
 ///
-/// The first mode has its shape's correlation where that was measured, and [`UNMEASURED`] laminar layers elsewhere. The
-/// others have as many layers of their own as the first. The interval is the scatter of measured tanks around a
-/// correlation that agrees with the layers; otherwise, for other modes and for other shapes it runs from the layer
-/// alone to 1.3 of the larger of both.
+/// The first mode has its shape's correlation within the range of measurements, otherwise [`UNMEASURED`] laminar
+/// layers. Each other mode has the same multiple of its own layer as the first mode. If the correlation agrees with the
+/// layers, the interval is the scatter of measured tanks around it. For other modes and other shapes it runs from the
+/// layer alone to 1.3 of the larger of both.
 pub fn estimate(shape: Shape, nu: f64, first: Mode, mode: Mode) -> Estimate {
     let layers = UNMEASURED * first.laminar(nu);
     let correlation = shape.correlation(nu, first.omega * first.omega / first.lambda);
@@ -182,18 +185,18 @@ pub fn estimate(shape: Shape, nu: f64, first: Mode, mode: Mode) -> Estimate {
     }
 }
 
-/// Re = nu/sqrt(g R^3).
+/// Returns Re = nu/sqrt(g R^3).
 pub fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
     nu / sqrt(g * radius * radius * radius)
 }
 
-/// Laminar layer at the wetted wall of any tank: beta sqrt(nu/(8 omega)), with `beta`, 1/m, by the mode's
-/// shape (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the box).
+/// Returns the damping ratio of the laminar layer at the wetted wall of any tank: beta sqrt(nu/(8 omega)). `beta`, 1/m,
+/// depends on the mode's shape (cylinder: Case and Parkinson 1957, box: Keulegan 1959).
 pub fn laminar(beta: f64, nu: f64, omega: f64) -> f64 {
     beta * sqrt(nu / (8.0 * omega))
 }
 
-/// beta of mode `n` (from 0) of an upright cylinder, 1/m (Case and Parkinson, J. Fluid Mech. 2 (1957) 172):
+/// Returns beta of mode `n` (from 0) of an upright cylinder, 1/m (Case and Parkinson, J. Fluid Mech. 2 (1957) 172):
 /// beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - x)/sinh(2 xi x).
 pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
     let (xi, x) = (XI[n], depth / radius);
@@ -202,7 +205,8 @@ pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
     ((xi * xi + 1.0) / (xi * xi - 1.0) + shallow) / radius
 }
 
-/// First mode of an upright cylinder at any depth: [`mikishev_dorozhkin`] from h/R = 0.5 on, [`stephens`] below.
+/// Damping ratio of the first mode of an upright cylinder at any depth: [`mikishev_dorozhkin`] from h/R = 0.5 on,
+/// [`stephens`] below.
 pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     if depth >= 0.5 * radius {
         mikishev_dorozhkin(radius, depth, nu, g)
@@ -211,9 +215,9 @@ pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     }
 }
 
-/// First mode of an upright cylinder at 10 < Bo < 100, where the contact line takes more than at large Bond numbers:
-/// 0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5)), as it is quoted for drop-tower tests (Salzman, Labus and Masica,
-/// NASA TN D-4132). The report was not seen: an upper bound here.
+/// Damping ratio of the first mode of an upright cylinder at 10 < Bo < 100, where the contact line dissipates more than
+/// at large Bond numbers. 0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5)) is quoted for drop-tower tests (Salzman, Labus
+/// and Masica, NASA TN D-4132). We could not obtain the report, so the value serves as an upper bound only.
 pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
     0.83 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + 8.2 * pow(bond, -0.6))
 }
@@ -223,14 +227,14 @@ pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
 #[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
 pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
-    // Where sinh would overflow the bottom is out of reach anyway.
+    // sinh would overflow, and the bottom has no effect there.
     let u = f64::min(1.84 * x, 300.0);
     let bottom = 0.318 / sinh(u) * (1.0 + (1.0 - x) / cosh(u));
     0.79 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + bottom)
 }
 
-/// Upright cylinder, Stephens, Leonard and Perry (NASA TN D-1367): (5.23/2 pi) sqrt(Re)
-/// tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]; 1.493 times the laminar layer at every depth.
+/// Upright cylinder, Stephens, Leonard and Perry (NASA TN D-1367). (5.23/2 pi) sqrt(Re) tanh(1.84
+/// x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x], which is 1.493 times the laminar layer at every depth.
 pub fn stephens(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
     let bracket = 1.0 + if x > 100.0 { 0.0 } else { 2.0 * (1.0 - x) / sinh(3.68 * x) };
@@ -238,59 +242,61 @@ pub fn stephens(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     zeta / pow(tanh(1.84 * x), 0.25)
 }
 
-/// B = 1e4 nu/sqrt(g D^3) of a sphere.
+/// Returns B = 1e4 nu/sqrt(g D^3) of a sphere.
 pub fn sphere_number(radius: f64, nu: f64, g: f64) -> f64 {
     1e4 * inverse_reynolds(2.0 * radius, nu, g)
 }
 
-/// Sphere (after Mikishev and Dorozhkin, power of Sumner and Stofan, NASA TN D-1991):
-/// (0.131/2 pi) B^0.359/x up to half full, times x (1 + 0.46 (2 - x))/(1.46 (2 - x)) above.
-/// Without bound at both ends: x is kept within 0.1 and 1.9.
+/// Sphere (after Mikishev and Dorozhkin, exponent of Sumner and Stofan, NASA TN D-1991). Up to half
+/// full (0.131/2 pi) B^0.359/x, above times x (1 + 0.46 (2 - x))/(1.46 (2 - x)). The formula is
+/// unbounded at both ends, so x is limited to 0.1 to 1.9.
 pub fn sphere(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = (depth / radius).clamp(0.1, 1.9);
     let by_fill = if x <= 1.0 { 1.0 / x } else { (1.0 + 0.46 * (2.0 - x)) / (1.46 * (2.0 - x)) };
     0.131 / TAU * pow(sphere_number(radius, nu, g), 0.359) * by_fill
 }
 
-/// Cone with its apex down, `radius` of the free surface, `half_angle` b in degrees:
-/// (4.964/2 pi) C5 C4^(-1/2) sqrt(Re), C5 = 1.0037 + 0.0126 b, C4 = 1.001 - 0.0031 b - 0.0003 b^2
-/// (fit of a figure by SLOSH-ML). C4 falls to 0 at 53 degrees: b is kept within 0 and 45.
+/// Cone with its apex down, `radius` of the free surface, `half_angle` b in degrees (fit of a
+/// figure by SLOSH-ML). (4.964/2 pi) C5 C4^(-1/2) sqrt(Re), C5 = 1.0037 + 0.0126 b, C4 = 1.001 -
+/// 0.0031 b - 0.0003 b^2. C4 falls to 0 at 53 degrees, so b is limited to 0 to 45.
 pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     let b = half_angle.clamp(0.0, 45.0);
     let (c5, c4) = (1.0037 + 0.0126 * b, 1.001 - 0.0031 * b - 0.0003 * b * b);
     4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
 }
 
-/// Re of a torus over that of the one tank that was measured.
+/// Returns Re of a torus over that of the one tank that was measured.
 pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
     inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
 }
 
-/// Torus, `tube_radius` a of its section (SLOSH-ML; one tank size was measured): sqrt(Re/Re_0) times
-/// (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi, with y = h/2a and
-/// Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
+/// Torus, `tube_radius` a of its section (SLOSH-ML; one tank size was measured). sqrt(Re/Re_0)
+/// times (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi, with y = h/2a. Re_0 =
+/// 3.3e-6/sqrt(9.81 0.0635^3).
 pub fn torus(tube_radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let y = 0.5 * depth / tube_radius;
     let fit = (((1.6629 * y - 3.7955) * y + 3.5583) * y - 1.6759) * y + 0.3865;
     sqrt(torus_number(tube_radius, nu, g)) * fit / TAU
 }
 
-/// Part of an upright cylinder's section that a flat ring of `width` at the wall covers.
+/// Returns the part of an upright cylinder's section that a flat ring of `width` at the wall
+/// covers.
 pub fn covered(radius: f64, width: f64) -> f64 {
     let w = width / radius;
     w * (2.0 - w)
 }
 
-/// Share of the surface's motion that remains at a ring `depth` below it in an upright cylinder.
+/// Returns the share of the surface's motion at a ring `depth` below it in an upright cylinder.
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
-    // Deeper there is none; what is divided by it stays finite.
+    // The limit keeps divisions by this share finite.
     exp(-f64::min(1.84 * depth / radius, 100.0))
 }
 
-/// Ring baffle in an upright cylinder (Miles 1958): 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2), alpha
-/// the covered area, `amplitude` eta of the wave at the wall.
+/// Ring baffle in an upright cylinder (Miles 1958): 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2). alpha is the covered
+/// area, eta the `amplitude` of the wave at the wall.
 ///
-/// It grows as the root of the amplitude; a constant damping ratio holds at one amplitude only.
+/// The ratio grows with the root of the amplitude, so a constant damping ratio holds only at one
+/// amplitude.
 pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
     let alpha = covered(radius, width);
     2.83 * exp(-4.60 * depth / radius) * alpha * sqrt(alpha) * sqrt(amplitude / radius)
@@ -306,12 +312,12 @@ mod tests {
         let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
         near(inverse_reynolds(r, nu, g), 1.2530e-5);
-        // Deep: no bottom.
+        // Deep liquid: the bottom has no effect.
         near(mikishev_dorozhkin(r, 5.0 * r, nu, g), 0.79 * 3.5398e-3);
         // x = 1/2: 0.318/sinh 0.92 (1 + 0.5/cosh 0.92) = 0.3018 (1 + 0.3444)
         near(mikishev_dorozhkin(r, 0.5 * r, nu, g), 0.79 * 3.5398e-3 * 1.4057);
         near(stephens(r, 5.0 * r, nu, g), 5.23 / TAU * 3.5398e-3);
-        // x = 1: nothing of the bracket, tanh(1.84) = 0.95080
+        // x = 1: the bracket is 1, tanh(1.84) = 0.95080
         near(stephens(r, r, nu, g), 5.23 / TAU * 3.5398e-3 * 1.01269);
         // Half full, B = 1e4 Re/8^(1/2)
         near(sphere_number(r, nu, g), 4.4300e-2);
@@ -324,8 +330,8 @@ mod tests {
         );
     }
 
-    /// Shallow, where sign and size of every term count: x = 0.2, 1 and 2; twelve digits of the published
-    /// formula, evaluated elsewhere.
+    /// Shallow liquid, where sign and magnitude of every term matter: x = 0.2, 1 and 2. Twelve digits of the published
+    /// formula, evaluated by another program.
     #[test]
     fn mikishev_and_dorozhkin_s_bottom_counts_in_shallow_liquid_and_changes_sign_above_the_radius()
     {
@@ -338,11 +344,11 @@ mod tests {
         ] {
             assert!((mikishev_dorozhkin(r, x * r, nu, g) / zeta - 1.0).abs() < 1e-12, "{x}");
         }
-        // So deep that sinh would overflow, nothing of it is left.
+        // At depths where sinh would overflow, the term vanishes.
         assert_eq!(mikishev_dorozhkin(r, 1e4 * r, nu, g), 0.79 * sqrt(inverse_reynolds(r, nu, g)));
     }
 
-    /// The bottom contributes twice its share for small x: 2 (1 - x)/sinh 3.68 x.
+    /// For small x the bottom contributes twice its share: 2 (1 - x)/sinh 3.68 x.
     #[test]
     fn stephens_s_bottom_counts_in_shallow_liquid() {
         let deep = stephens(1.0, 5.0, 1e-6, 9.81);
@@ -354,7 +360,8 @@ mod tests {
         near(stephens(1.0, 1e4, 1e-6, 9.81) / deep, 1.0);
     }
 
-    /// A correlation without a stated end is constant beyond its data: a sphere at 0.1 and 1.9 radii, a cone at 0 and 45 degrees.
+    /// A correlation without a stated end is constant beyond its data: for a sphere at 0.1 and 1.9 radii, for a cone at
+    /// 0 and 45 degrees.
     #[test]
     fn correlations_without_bound_are_held_at_their_ends() {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
@@ -369,7 +376,8 @@ mod tests {
         assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
     }
 
-    /// y = 1, full: the sum of the coefficients; the measured tank's Re in another tank by its root.
+    /// y = 1, full: the sum of the coefficients. Another tank follows from the measured tank's Re
+    /// by its root.
     #[test]
     fn the_torus_has_its_fit_and_grows_with_the_root_of_its_number() {
         let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
@@ -387,7 +395,7 @@ mod tests {
         let zeta = miles_ring(1.0, 0.1, 0.1, 0.04);
         assert!((zeta / (2.83 * 0.63128 * 0.082819 * 0.2) - 1.0).abs() < 1e-4, "{zeta}");
         assert!((motion_at_ring(2.0, 0.2) / 0.83194 - 1.0).abs() < 1e-4);
-        // Four times the wave has twice the damping; all lengths twice, the same.
+        // Four times the wave has twice the damping. Doubling all lengths changes nothing.
         assert!((miles_ring(1.0, 0.1, 0.1, 0.16) / zeta - 2.0).abs() < 1e-14);
         assert!((miles_ring(2.0, 0.2, 0.2, 0.08) / zeta - 1.0).abs() < 1e-14);
         assert!((covered(2.0, 0.2) - 0.19).abs() < 1e-15);
@@ -401,8 +409,8 @@ mod tests {
         assert!((laminar(10.0, 8e-6, 4.0) - 5e-3).abs() < 1e-17);
     }
 
-    /// Waves as deep as the radius know nothing of the bottom's bracket; at half of it xi/sinh xi counts, and the next mode has
-    /// its own zero.
+    /// In waves as deep as the radius the bottom's bracket vanishes. At half the radius xi/sinh xi matters, and the
+    /// next mode has its own zero.
     #[test]
     fn a_cylinder_s_modes_rub_at_their_own_rate() {
         for n in [0, 1] {
@@ -440,7 +448,7 @@ mod tests {
         );
     }
 
-    /// Depth, angle and the number of viscosity, each just inside and just outside of what was measured.
+    /// Depth, angle and viscosity number, each just inside and just outside the measured range.
     #[test]
     fn a_correlation_says_where_it_was_measured() {
         let (r, g) = (2.0, 9.81);
@@ -466,7 +474,7 @@ mod tests {
         assert_eq!(numbers, [false, true, true, false]);
         assert!(in_range(Shape::Cylinder { radius: r, depth: 0.01 }, 1.0));
         assert_eq!(Shape::Other.correlation(nu, g), None);
-        // and what it says is the shape's formula
+        // the value is the shape's formula
         let zeta = |shape: Shape| shape.correlation(nu, g).unwrap().zeta;
         assert_eq!(zeta(sphere(0.7)), super::sphere(r, 0.7 * r, nu, g));
         assert_eq!(zeta(cone(20.0)), super::cone(r, 20.0, nu, g));
@@ -474,7 +482,8 @@ mod tests {
         assert_eq!(zeta(Shape::Cylinder { radius: r, depth: r }), cylinder(r, r, nu, g));
     }
 
-    /// A mode whose layer alone makes `zeta`, of the length of a half full sphere's of 1 m.
+    /// Returns a mode with the damping ratio `zeta` of its layer alone and the length of a half
+    /// full sphere of 1 m.
     fn with_layer(zeta: f64, nu: f64, omega: f64) -> Mode {
         Mode { beta: zeta / sqrt(nu / (8.0 * omega)), lambda: 1.56, omega }
     }
@@ -489,7 +498,8 @@ mod tests {
         [estimate.zeta, estimate.interval[0], estimate.interval[1]]
     }
 
-    /// A measured shape's first mode: the correlation and its scatter; the second as many of its own layers.
+    /// The first mode of a measured shape has the correlation and its scatter; the second has the same multiple of its
+    /// own layer.
     #[test]
     fn a_measured_shape_has_its_correlation_and_other_modes_as_many_layers() {
         let (nu, shape) = (1e-6, Shape::Cylinder { radius: 1.0, depth: 1.0 });
@@ -501,15 +511,15 @@ mod tests {
         assert_eq!(found.laminar, first.laminar(nu));
         let layers = second.laminar(nu) / first.laminar(nu);
         let found = estimate(shape, nu, first, second);
-        // of layers and correlation the larger one: 1.45 layers of the first mode, or 1.39
+        // the larger of layers and correlation: 1.45 layers of the first mode, or 1.39
         let high = correlation.max(1.45 * first.laminar(nu));
         is_near(numbers(found), [correlation * layers, second.laminar(nu), 1.3 * high * layers]);
         assert!((found.laminar / second.laminar(nu) - 1.0).abs() < 1e-14);
-        // without viscosity there is no damping, in no mode
+        // without viscosity no mode has damping
         assert_eq!(numbers(estimate(shape, 0.0, first, second)), [0.0; 3]);
     }
 
-    /// The specific force of the correlation is the one that makes the frequency, omega^2/lambda: capillarity's share, too.
+    /// The correlation uses the specific force with the same frequency, omega^2/lambda, which includes capillarity.
     #[test]
     fn a_correlation_holds_at_the_force_that_makes_the_frequency() {
         let shape = Shape::Cylinder { radius: 1.0, depth: 1.0 };
@@ -518,8 +528,8 @@ mod tests {
         assert_eq!(estimate(shape, 1e-6, first, first).correlation, Some(correlation));
     }
 
-    /// No correlation, one that was not measured there, one below the layer: 1.45 layers each time, up to 1.3 of the larger
-    /// of both.
+    /// Without a correlation, outside its measurements, and if it is below the layer, the estimate is 1.45 layers, up
+    /// to 1.3 of the larger of both.
     #[test]
     fn what_was_not_measured_has_1_45_layers() {
         let (nu, omega) = (1e-6, 4.0);
@@ -538,7 +548,7 @@ mod tests {
             assert_eq!((found.basis, found.disagree), (Basis::OutOfRange, disagree));
             is_near(numbers(found), [1.45 * layer, layer, 1.3 * high]);
         }
-        // measured, but no wall takes less than its layer
+        // measured, but below the minimum of one layer
         let nu = 0.1 / sphere_number(1.0, 1.0, g);
         let zeta = sphere(1.0, 1.0, nu, g);
         for (share, basis) in [(1.01, Basis::BelowLayer), (0.99, Basis::Correlation)] {

@@ -1,17 +1,18 @@
-//! Interpolation with two continuous derivatives that is monotone where the data are.
+//! Interpolation with two continuous derivatives that is monotone wherever the data are.
 //!
-//! A quintic between two points has value, slope and second derivative given at both. Slopes and second
-//! derivatives at the points come from the polynomial through the five nearest points, so smooth
-//! data are met to the fifth order. Between two points they are limited until the quintic's Bernstein
-//! coefficients rise (or fall), which is enough for the curve to do so.
+//! A quintic between two points has given values, slopes and second derivatives at both. Slopes and second derivatives
+//! come from the polynomial through the five nearest points, which is exact to fifth order for smooth data. Between two
+//! points they are limited so that the quintic's Bernstein coefficients are monotone. This is sufficient for a monotone
+//! curve.
 
-/// Slopes and second derivatives at points with ascending `x`, into `slope` and `curvature`.
+/// Writes slopes and second derivatives at points with ascending `x` into `slope` and `curvature`.
 ///
-/// A turning point of the data is the curve's, too, if `within`, and the curve is then between its two
-/// points everywhere; otherwise nothing is limited beside it: the true maximum lies between points.
+/// With `within`, a turning point of the data is one of the curve, and the curve stays between its two points
+/// everywhere. Otherwise the intervals at a turning point are not limited, because the true maximum lies between
+/// points.
 ///
 /// # Panics
-/// If the slices are not of one length.
+/// If the lengths of the slices differ.
 pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvature: &mut [f64]) {
     let count = x.len();
     assert!([y.len(), slope.len(), curvature.len()] == [count; 3]);
@@ -25,7 +26,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     let turning = |j: usize| j > 0 && j + 1 < count && secant(j - 1) * secant(j) < 0.0;
     let limited = |j: usize| j + 1 < count && (within || !turning(j) && !turning(j + 1));
     let sign = |j: usize| if secant(j) < 0.0 { -1.0 } else { 1.0 };
-    // In the direction of the rise 0 <= d, and 2 (d_0 + d_1)/5 < secant on every interval.
+    // In the direction of the rise: 0 <= d, and 2 (d_0 + d_1)/5 < secant on every interval.
     for j in (0..count).filter(|j| limited(*j)) {
         for slope in &mut slope[j..j + 2] {
             *slope = sign(j) * (sign(j) * *slope).clamp(0.0, 2.4 * secant(j).abs());
@@ -49,7 +50,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
             let h = x[j + 1] - x[j];
             let room = (20.0 / h) * (secant(j) - 0.4 * (slope[j] + slope[j + 1])).abs();
             let own = 4.0 * slope[i].abs() / h;
-            // s at the left end: s >= -own, s <= room/2; at the right end the other way round
+            // s at the left end: s >= -own, s <= room/2; at the right end with opposite signs
             let (low, high) = if at_left { (-own, 0.5 * room) } else { (-0.5 * room, own) };
             let (low, high) = if sign(j) > 0.0 { (low, high) } else { (-high, -low) };
             limit = [limit[0].max(low), limit[1].min(high)];
@@ -58,7 +59,8 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     }
 }
 
-/// First and second derivative at `x0` of the polynomial through up to five points (Fornberg 1988).
+/// Returns first and second derivative at `x0` of the polynomial through up to five points
+/// (Fornberg 1988).
 fn of_polynomial(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     let mut weights = [[0.0; 5]; 3];
     weights[0][0] = 1.0;
@@ -86,7 +88,7 @@ fn of_polynomial(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     (sum(1), sum(2))
 }
 
-/// Coefficients of the quintic between two points a distance `h` apart, in powers of t from 0 to 1, with
+/// Returns the coefficients of the quintic between two points a distance `h` apart, in powers of t from 0 to 1, with
 /// `[value, slope, second derivative]` at both.
 pub fn quintic(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 6] {
     let (rise, d_0, d_1) = (y_1 - y_0, d_0 * h, d_1 * h);
@@ -107,14 +109,14 @@ mod tests {
 
     const X: [f64; 9] = [0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.7, 3.5];
 
-    /// At the points `x`: slopes and second derivatives.
+    /// Returns slopes and second derivatives at the points `x`.
     fn found<const N: usize>(x: [f64; N], y: [f64; N], within: bool) -> ([f64; N], [f64; N]) {
         let (mut slope, mut curvature) = ([0.0; N], [0.0; N]);
         derivatives(&x, &y, within, &mut slope, &mut curvature);
         (slope, curvature)
     }
 
-    /// Powers of x - 0.7, at any place and between points that are not evenly apart, up to as many as there are points.
+    /// Powers of x - 0.7, at any position and between points at unequal distances, up to the number of points.
     #[test]
     fn the_polynomial_through_the_points_has_their_derivatives() {
         let power = |x: f64, n: i32| {
@@ -135,8 +137,8 @@ mod tests {
         }
     }
 
-    /// Each point has two neighbours on either side, or the five at an end; what is farther away does not count. Smooth data
-    /// are not limited.
+    /// Each point uses two neighbours on either side, or the five at an end, and no others. Smooth data are not
+    /// limited.
     #[test]
     fn derivatives_of_smooth_data_are_those_through_the_five_nearest_points() {
         let y = X.map(libm::exp);
@@ -151,7 +153,7 @@ mod tests {
                 }
             }
         }
-        // with fewer points all of them
+        // with fewer points all of them are used
         let parabola = [0.0, 1.0, 3.0].map(|x| x + x * x);
         let (slope, curvature) = found([0.0, 1.0, 3.0], parabola, true);
         for i in 0..3 {
@@ -160,8 +162,8 @@ mod tests {
         }
     }
 
-    /// The data's maximum lies between points: beside it the parabola is met, unless the curve has to stay within its points,
-    /// which then turns at one.
+    /// The data's maximum lies between points. Near it the curve follows the parabola, unless it must stay within its
+    /// points and therefore turns at one.
     #[test]
     fn beside_a_turning_point_nothing_is_limited_unless_the_curve_is_to_stay_within_its_points() {
         let x = [0.0, 1.0, 2.0, 3.0, 4.0];
@@ -176,8 +178,8 @@ mod tests {
         }
     }
 
-    /// In the direction of the rise the differences of the quintic's Bernstein coefficients between two points, over h:
-    /// d/5, d/5 + h s/20, what is left between, and the same from the right end.
+    /// Returns the differences of the quintic's Bernstein coefficients between two points, over h, in the direction of
+    /// the rise: d/5, d/5 + h s/20, the remainder, and the same from the right end.
     fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
         let secant = (y_1 - y_0) / h;
         let sign = if secant < 0.0 { -1.0 } else { 1.0 };
@@ -191,8 +193,9 @@ mod tests {
         .map(|step| sign * step)
     }
 
-    /// Data that jump by factors up to 1e4 and smoother ones, rising and falling, and data that turn: every coefficient between two points rises
-    /// as they do. Rounding is of the order of the largest value's last digit over the smallest distance, 1e-11.
+    /// Data that jump by factors up to 1e4 and smoother data, rising and falling, and data that turn. Every coefficient
+    /// between two points rises with the data. Rounding is of the order of the largest value's last digit over the
+    /// smallest distance, 1e-11.
     #[test]
     fn the_curve_rises_where_the_data_rise() {
         let mut seed = 1_u64;
@@ -220,7 +223,7 @@ mod tests {
                     assert!(step > -1e-11, "{round} {j}: {step}");
                 }
             }
-            // What obeys the limits beforehand, each end taking half of what is left between, stays as it is.
+            // Slopes that already satisfy the limits, with each end taking half of the remaining range, do not change.
             let (mut own, mut bent) = ([0.0; 8], [0.0; 8]);
             for i in 0..8 {
                 let first = [0, 0, 0, 1, 2, 3, 3, 3][i];
@@ -249,7 +252,7 @@ mod tests {
         assert!(free > 20 && limited > 1000, "{free} {limited}");
     }
 
-    /// A corner after a level stretch: in the rise both slopes are scaled to 0.95 of what two and a half secants allow.
+    /// A corner after a constant stretch: in the rise both slopes are scaled to 0.95 of two and a half secants.
     #[test]
     fn steep_slopes_are_held_at_their_limits() {
         // secants 1 and 10 alternate; each slope at most 2.4 of the smaller one
@@ -259,18 +262,18 @@ mod tests {
         for i in 1..4 {
             assert!(slope[i] <= 2.4 + 1e-15, "{slope:?}");
         }
-        // and together at most 2.375 of it
+        // and the sum at most 2.375 times it
         for j in [1, 3] {
             assert!((slope[j] + slope[j + 1]) <= 2.375 + 1e-14, "{slope:?}");
         }
         assert!((slope[1] + slope[2] - 2.375).abs() < 1e-14, "{slope:?}");
-        // level stretches stay level
+        // constant stretches stay constant
         let (slope, curvature) = found([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0, 3.0], true);
         assert_eq!((slope[0], slope[1], slope[2]), (0.0, 0.0, 0.0));
         assert_eq!((curvature[0], curvature[1]), (0.0, 0.0));
     }
 
-    /// Value, slope and second derivative at t = 0 and 1, by x = h t: h = 1/2 and numbers without a pattern.
+    /// Value, slope and second derivative at t = 0 and 1, by x = h t: h = 1/2 and arbitrary numbers.
     #[test]
     fn a_quintic_has_what_is_given_at_its_ends() {
         let (left, right) = ([1.25, -0.5, 3.0], [2.0, 0.75, -1.5]);

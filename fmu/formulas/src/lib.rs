@@ -1,7 +1,7 @@
-//! Closed formulas of slosh, for the models and for the harness alike: liquid in an upright cylinder
-//! (`cylinder.rs`, to third order in the amplitude `third_order.rs`, under gravity that leans `tilt.rs`), damping by published correlations
-//! (`damping.rs`), where linear theory ends (`regime.rs`), similarity numbers (`similarity.rs`), and the interpolation of tables over a tank's fill
-//! (`interpolation.rs`). SI units. No model is in here.
+//! Closed formulas of slosh for models and harness. Liquid in an upright cylinder (`cylinder.rs`), to third order in
+//! the amplitude (`third_order.rs`), and with a tilted surface (`tilt.rs`). Damping by published correlations
+//! (`damping.rs`), the range of linear theory (`regime.rs`), similarity numbers (`similarity.rs`), and interpolation of
+//! fill tables (`interpolation.rs`). SI units.
 
 #![no_std]
 

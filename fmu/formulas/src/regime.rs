@@ -1,7 +1,7 @@
-//! Range of linear slosh theory, by the height of the wave at the wall over the radius R of
-//! the free surface (Rubaga's thesis, 2.3.5, after Dodge).
+//! Range of linear slosh theory, by the wave height at the wall over the radius R of the free
+//! surface (Rubaga's thesis, 2.3.5, after Dodge).
 
-/// A range of wave heights.
+/// Amplitude class of a wave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Regime {
@@ -9,12 +9,12 @@ pub enum Regime {
     Linear = 1,
     /// From 0.15 R to 0.25 R.
     Transitional = 2,
-    /// Above 0.25 R: heights and forces are indications.
+    /// Above 0.25 R: heights and forces are only indications.
     Nonlinear = 3,
 }
 
 impl Regime {
-    /// Regime of a ratio of wave height to R; NaN counts as nonlinear.
+    /// Returns the class for a ratio of wave height to R; NaN counts as nonlinear.
     pub fn of(ratio: f64) -> Regime {
         match ratio {
             ratio if ratio < 0.15 => Regime::Linear,
@@ -23,7 +23,7 @@ impl Regime {
         }
     }
 
-    /// The one with this number.
+    /// Returns the class with this number.
     pub fn from_number(number: u8) -> Option<Regime> {
         [Regime::Linear, Regime::Transitional, Regime::Nonlinear]
             .into_iter()

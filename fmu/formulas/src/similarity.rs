@@ -21,49 +21,49 @@ pub struct Liquid {
 }
 
 impl Liquid {
-    /// Bo of an acceleration `a`, m/s2, in a tank of radius `radius`, m.
+    /// Returns Bo of an acceleration `a`, m/s2, in a tank of radius `radius`, m.
     pub fn bond(&self, a: f64, radius: f64) -> f64 {
         self.density * a * radius * radius / self.tension
     }
 
-    /// Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from the
-    /// axis; with the square of an angular rate instead, Bo_c; with the radius as arm, Bo_r.
+    /// Returns Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from
+    /// the axis. With the square of an angular rate it is Bo_c, with the radius as arm Bo_r.
     pub fn rotational_bond(&self, alpha: f64, radius: f64, arm: f64) -> f64 {
         self.bond(alpha * arm, radius)
     }
 
-    /// We of a velocity, m/s, over a length, m.
+    /// Returns We of a velocity, m/s, over a length, m.
     pub fn weber(&self, velocity: f64, length: f64) -> f64 {
         self.density * velocity * velocity * length / self.tension
     }
 
-    /// Time scale of surface tension over a length (m), s (2.29); not a period.
+    /// Returns the time scale of surface tension over a length (m), s (2.29); not a period.
     pub fn capillary_time(&self, length: f64) -> f64 {
         sqrt(self.density * length * length * length / self.tension)
     }
 
-    /// The acceleration, m/s2, that has this Bond number in a tank of this radius, m.
+    /// Returns the acceleration, m/s2, with this Bond number in a tank of this radius, m.
     pub fn acceleration(&self, bond: f64, radius: f64) -> f64 {
         bond * self.tension / (self.density * radius * radius)
     }
 
-    /// The radius, m, that has this Bond number at this acceleration, m/s2 (7.2).
+    /// Returns the radius, m, with this Bond number at this acceleration, m/s2 (7.2).
     pub fn radius(&self, bond: f64, a: f64) -> f64 {
         sqrt(bond * self.tension / (self.density * a))
     }
 
-    /// The radius, m, that has this Bo_r at this angular acceleration, rad/s2.
+    /// Returns the radius, m, with this Bo_r at this angular acceleration, rad/s2.
     pub fn radius_by_cube(&self, bond: f64, alpha: f64) -> f64 {
         cbrt(bond * self.tension / (self.density * alpha))
     }
 }
 
-/// Fr of a velocity, m/s, over a length, m, at an acceleration, m/s2.
+/// Returns Fr of a velocity, m/s, over a length, m, at an acceleration, m/s2.
 pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
     velocity * velocity / (acceleration * length)
 }
 
-/// Time scale of gravity over a length (m), s (2.28).
+/// Returns the time scale of gravity over a length (m), s (2.28).
 pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
     sqrt(length / acceleration)
 }
@@ -73,10 +73,10 @@ pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
 pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     match (bond > 1.0, weber > 1.0) {
         (_, true) if weber > bond => {
-            "inertia: the liquid crosses the tank as a body; no pendulum stands for it"
+            "inertia: the liquid crosses the tank, and no pendulum represents it"
         }
         (true, _) => "gravity: waves and pendulums",
-        _ => "surface tension: the liquid's shape, not a wave, decides",
+        _ => "surface tension: capillarity shapes the liquid, and there are no gravity waves",
     }
 }
 
@@ -90,7 +90,8 @@ pub fn regime(bond: f64) -> &'static str {
     }
 }
 
-/// Agility of a spacecraft by its angular acceleration, rad/s2 (the thesis's Table 2.2).
+/// Describes the agility of a spacecraft with this angular acceleration, rad/s2 (the thesis's Table
+/// 2.2).
 pub fn agility(alpha: f64) -> &'static str {
     match alpha {
         a if a < 5e-5 => "low agility",
@@ -99,9 +100,8 @@ pub fn agility(alpha: f64) -> &'static str {
     }
 }
 
-/// Scale factors from model to full size: name, unit, factor. `lambda` is
-/// the ratio of lengths, `density` of densities, `gravity` of accelerations, each full size over model. The thesis's
-/// Table 2.3 has gravity = 1.
+/// Returns scale factors from model to full size: name, unit, factor. `lambda` is the ratio of lengths, `density` of
+/// densities, `gravity` of accelerations, each full size over model. The thesis's Table 2.3 has gravity = 1.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'static str, f64); 10] {
     let volume = lambda * lambda * lambda;
     let force = volume * density * gravity;
@@ -120,8 +120,8 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'stat
     ]
 }
 
-/// The viscosity nu, m2/s, that the full size's liquid must have for the same Reynolds number, over
-/// the model's: what Froude's scaling alone does not keep.
+/// Returns the ratio of the viscosities nu of full size and model for the same Reynolds number,
+/// which Froude scaling alone does not preserve.
 pub fn froude_viscosity(lambda: f64, gravity: f64) -> f64 {
     lambda * sqrt(lambda * gravity)
 }
@@ -130,7 +130,7 @@ pub fn froude_viscosity(lambda: f64, gravity: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// rho a R^2/sigma of numbers whose quotient is exact.
+    /// rho a R^2/sigma for numbers with an exact quotient.
     #[test]
     fn bond_numbers_and_what_has_them_are_inverse_to_each_other() {
         let liquid = Liquid { density: 1000.0, tension: 0.0625 };
@@ -143,7 +143,7 @@ mod tests {
         assert!((liquid.radius_by_cube(bond, 2.0) - 0.25).abs() < 1e-16);
     }
 
-    /// We/Fr = Bo, the ratio of the times is the root of Bo; of numbers whose roots are exact.
+    /// We/Fr = Bo, and the ratio of the times is the root of Bo; for numbers with exact roots.
     #[test]
     fn weber_froude_and_the_times_are_what_bond_s_number_says() {
         let liquid = Liquid { density: 1000.0, tension: 0.0625 };
@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(rules, ["inertia", "gravity", "surface", "inertia"]);
     }
 
-    /// The thesis's limits, each within its lower or upper range.
+    /// The thesis's limits, each included in its lower or upper range.
     #[test]
     fn regimes_and_agilities_change_at_their_limits() {
         let regimes = [1001.0, 1000.0, 31.0, 30.0, 1.1, 1.0].map(|bond| &regime(bond)[..5]);
@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(agilities, ["low agility", "medium agility", "medium agility", "high agility"]);
     }
 
-    /// Powers of two keep the roots exact: lambda 4, densities 2, gravity 1/4.
+    /// Powers of two give exact roots: lambda 4, densities 2, gravity 1/4.
     #[test]
     fn froude_s_factors_are_those_of_the_table() {
         let factors = froude(4.0, 2.0, 0.25).map(|(name, _, factor)| (name, factor));

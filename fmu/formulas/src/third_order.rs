@@ -1,18 +1,17 @@
-//! The first mode in an upright cylinder to third order in its amplitude, without tuned numbers:
-//! a mass m on a paraboloid with a quartic spring, both from the fill,
+//! The first mode in an upright cylinder to third order in its amplitude, without fitted numbers: a
+//! mass m on a paraboloid with a quartic spring, both functions of the fill,
 //!
 //! ```text
 //! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + s (q.q')^2/l^2]/2
 //!     + m (g/l) [|q|^2/2 + kappa |q|^4/(8 l^2)]
 //! ```
 //!
-//! omega^2 of a planar motion of the amplitude a l is changed by the factor 1 + (3 kappa/8 - s/2) a^2,
-//! of a circular one by 1 + (kappa/2) a^2. A pendulum is s = kappa = 1; here s and kappa are those
-//! for which both are the shifts of potential flow. `harness/tank/src/third_order.rs` derives them
-//! and computes them in another way; tests/physics/liquid.rs compares. In closed form, with
-//! R = g = 1, T = xi_1 tanh(xi_1 h) = omega_1^2, for the modes of the azimuthal numbers 0 and 2 that
-//! the first one's square excites (zero xi, overlap e, t = xi tanh(xi h)):
-//!
+//! The amplitude a l changes omega^2 of a planar motion by the factor 1 + (3 kappa/8 - s/2) a^2, and of a circular
+//! motion by 1 + (kappa/2) a^2. A pendulum has s = kappa = 1. Here s and kappa are chosen so that both shifts are those
+//! of potential flow. `harness/tank/src/third_order.rs` derives them and computes them by another method;
+//! tests/physics/liquid.rs compares. The closed form below has R = g = 1, T = xi_1 tanh(xi_1 h) = omega_1^2. It sums
+//! over the modes with azimuthal numbers 0 and 2 that the square of the first mode excites (zero xi, overlap e, t = xi
+//! tanh(xi h)):
 //! ```text
 //! A = xi_1^2 - xi^2/2 - T^2,   F = xi^2/2 - T t
 //! static  = e A^2/(16 T^2),    carried = e T t/8
@@ -21,8 +20,8 @@
 //! circular = -4 B { xi_1^2 M/8 + sum_0 static + sum_2 (driven/2 - carried) }
 //! ```
 //!
-//! At t = 4 T an excited mode has twice the frequency: a secondary resonance, where this order says
-//! nothing.
+//! At t = 4 T an excited mode has twice the frequency. Near this secondary resonance the third
+//! order is not valid.
 
 use crate::cylinder::XI;
 
@@ -32,8 +31,9 @@ const M: f64 = 0.278_821_981_660_245_8;
 /// B = (2/((xi_1^2 - 1) J1(xi_1)))^2: squared amplitude of the wave per squared slosh angle.
 const B: f64 = 2.068_401_064_148_324;
 
-/// xi and e = c^2/(n n_1) of the azimuthal numbers 0 and 2: c = int J1^2 J r dr, n = int J^2 r dr,
-/// n_1 = int J1^2 r dr. What is left out changes s and kappa by less than 1e-4 from h/R 0.2 on.
+/// xi and e = c^2/(n n_1) of the azimuthal numbers 0 and 2. The integrals are c = int J1^2 J r dr,
+/// n = int J^2 r dr, n_1 = int J1^2 r dr. The truncation changes s and kappa by less than 1e-4 from
+/// h/R 0.2 on.
 const EXCITED: [[(f64, f64); 8]; 2] = [
     [
         (3.831_705_970_207_513, 4.011_801_530_216_258e-2),
@@ -57,11 +57,11 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
     ],
 ];
 
-/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third
-/// order is not valid.
+/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third order
+/// is not valid.
 const DETUNING: f64 = 0.01;
 
-/// s and kappa at h/R = `fill`.
+/// Returns s and kappa at h/R = `fill`.
 pub fn coefficients(fill: f64) -> (f64, f64) {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     let k2 = XI[0] * XI[0];
@@ -83,8 +83,8 @@ pub fn coefficients(fill: f64) -> (f64, f64) {
     (1.5 * circular - 2.0 * planar, 2.0 * circular)
 }
 
-/// Azimuthal number and number of the excited mode, from 1, whose frequency is twice the first mode's
-/// within [`DETUNING`] at h/R = `fill`, if there is one.
+/// Returns azimuthal number and number, from 1, of the excited mode whose frequency is twice that
+/// of the first mode within [`DETUNING`] at h/R = `fill`, if there is one.
 pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {
@@ -100,7 +100,7 @@ pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
 mod tests {
     use super::*;
 
-    /// The bench; the figures' last digit.
+    /// The bench, to the last digit of the figures.
     #[test]
     fn shifts_of_the_bench_are_those_of_potential_flow() {
         for (fill, planar, circular) in [(0.10, -0.429, 0.367), (0.05, -0.257, 0.421)] {
@@ -111,9 +111,9 @@ mod tests {
         }
     }
 
-    /// Twelve digits of the same shifts by Lagrange's averaged function: its stationary values by solving for
-    /// the excited modes, integrals by Gauss's rule, Bessel functions by their integral. Signs and sizes of every
-    /// term, close to the resonance at 0.15 as well.
+    /// Twelve digits of the same shifts by Lagrange's averaged function. Its stationary values come from solving for
+    /// the excited modes, with integrals by Gauss's rule and Bessel functions by their integral. The test covers signs
+    /// and magnitudes of every term, also close to the resonance at 0.15.
     #[test]
     fn coefficients_are_those_of_the_averaged_lagrangian() {
         for (fill, s, kappa) in [
@@ -129,7 +129,7 @@ mod tests {
         }
     }
 
-    /// Fills where twice the first mode's frequency is 0.95 % off that of (0, 1), (2, 2), (0, 2); and 1.05 %.
+    /// Fills at which twice the first mode's frequency is 0.95 % from that of (0, 1), (2, 2), (0, 2), and 1.05 %.
     #[test]
     fn a_secondary_resonance_ends_one_per_cent_off() {
         for (near, beyond, mode) in [
@@ -146,7 +146,7 @@ mod tests {
     fn secondary_resonances_are_known_by_their_mode() {
         assert_eq!(secondary_resonance(0.831), Some((2, 2)));
         assert_eq!(secondary_resonance(1.01), Some((0, 2)));
-        // Without bottom 2 omega_1 is 2.5 % above that of (0,2).
+        // In deep liquid 2 omega_1 is 2.5 % above the frequency of (0,2).
         assert!([5.0, 1.3, 0.6].iter().all(|fill| secondary_resonance(*fill).is_none()));
     }
 }

@@ -1,17 +1,18 @@
-//! Slosh modes of an upright cylinder under gravity that leans from its axis: how their frequencies change.
+//! Frequencies of an upright cylinder's slosh modes under gravity that is tilted from its axis.
 //!
-//! Gravity has the component g along the axis and g s across it, s the tangent of the tilt. At rest the surface is the plane
-//! z = s x, x towards where gravity's component across the axis points to, as deep in the middle as upright. With
-//! Lambda = omega^2/g
+//! Gravity has the component g along the axis and g s across it, with s the tangent of the tilt. At rest the surface is
+//! the plane z = s x, with x in the direction of gravity's component across the axis, and the depth in the middle is
+//! that of the upright tank. With Lambda = omega^2/g
 //!
 //! ```text
 //! Laplace(phi) = 0,   dphi/dn = 0 on the wetted wall,   dphi/dz - s dphi/dx = Lambda phi at z = s x
 //! ```
 //!
-//! so that Lambda makes K - Lambda M singular, over the section D of the tank, x and y, with K_ij = int_D phi_i (phi_j,z - s phi_j,x)
-//! and M_ij = int_D phi_i phi_j, both at z = s x (Green; g times the surface's element is that of gravity along the normal). The modes of
-//! the upright tank, phi = J_m(xi r) cos(m theta) cosh(xi (z + h))/cosh(xi h), xi the zeros of J_m', meet the wall for every s.
-//! Expanded to s^2, Rayleigh and Schroedinger's perturbation of the mode a = xi_n of m = 1 gives
+//! so that Lambda makes K - Lambda M singular. K_ij = int_D phi_i (phi_j,z - s phi_j,x) and M_ij = int_D phi_i phi_j,
+//! over the section D of the tank, both at z = s x (by Green's identity; g times the surface element equals that of
+//! gravity along the normal). The modes of the upright tank satisfy the wall condition for every s: phi = J_m(xi r)
+//! cos(m theta) cosh(xi (z + h))/cosh(xi h), xi the zeros of J_m'. Expansion to s^2 and Rayleigh-Schroedinger
+//! perturbation of the mode a = xi_n of m = 1 give
 //!
 //! ```text
 //! Lambda = lambda (1 + c s^2),    lambda = a tanh(a h),  mu = b tanh(b h)   (R = 1)
@@ -23,13 +24,14 @@
 //! N_2 = 2 (a^2 b^2 - a^2 - b^2) - lambda^2 (a^2 + b^2 - 4)
 //! ```
 //!
-//! the integrals of products of Bessel functions being Lommel's. Derived here; the method is that of Kato, Perturbation Theory for
-//! Linear Operators (1966), chapter II. The tests compare with finite elements in three dimensions.
+//! Integrals of products of Bessel functions are Lommel's. We derived the formulas with the method of Kato,
+//! Perturbation Theory for Linear Operators (1966), chapter II. The tests compare with finite elements in three
+//! dimensions.
 
 use crate::cylinder::XI;
 
-/// Number of modes of either azimuthal number in the sums: the truncation error of mode 1 is below 1e-6 of c, that of mode 10
-/// 0.003 (from h/R 0.2 on).
+/// Number of modes of each azimuthal number in the sums. The truncation error relative to c is below 1e-6 for mode 1
+/// and 0.003 for mode 10 (from h/R 0.2 on).
 const ZEROS: usize = 16;
 
 /// Zeros of J0' after 0, and of J2'.
@@ -70,13 +72,13 @@ const XI_2: [f64; ZEROS] = [
     51.004_297_672_458_87,
 ];
 
-/// The surface's slope s up to which [`factors`] gives the frequency of the first mode within 1 % at h/R = `fill`; half
-/// of it keeps 0.15 %. Where the slope reaches h/R the bottom falls dry.
+/// Returns the slope s of the surface up to which [`factors`] gives the frequency of the first mode within 1 % at h/R =
+/// `fill`; half of this slope gives 0.15 %. If the slope reaches h/R, the bottom falls dry.
 pub fn largest_slope(fill: f64) -> f64 {
     0.7 * f64::min(fill, 1.0)
 }
 
-/// c of mode n, from 0 and below [`crate::cylinder::MODES`], at h/R = `fill`: along the slope and across it.
+/// Returns c of mode n, from 0 and below [`crate::cylinder::MODES`], at h/R = `fill`: along the slope and across it.
 pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     let a2 = XI[n] * XI[n];
     let lambda = XI[n] * libm::tanh(XI[n] * fill);
@@ -104,10 +106,11 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     ]
 }
 
-/// Factors on omega^2 of mode n at h/R = `fill` for a surface of slope s with unchanged g along the axis: along the slope and
-/// across it.
+/// Returns the factors on omega^2 of mode n at h/R = `fill` for a surface of slope s with unchanged g along the axis:
+/// along the slope and across it.
 ///
-/// 1 + c s^2, of a negative c 1/(1 - c s^2): the same to the second order, nearer beyond it, and never negative.
+/// The factor is 1 + c s^2. For negative c it is 1/(1 - c s^2), which is equal to second order, more accurate beyond,
+/// and never negative.
 pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
     coefficients(n, fill).map(|c| {
         let x = c * slope * slope;
@@ -119,9 +122,10 @@ pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Fill h/R, slope, and Lambda over that of the upright tank, less 1, of the first mode along the slope and across it, by finite elements:
-    /// `hubslosh.liquid_modes` (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14) of a cylinder of R = 1 at the fill h cos + sin of the tilt.
-    /// Its two meshes differ by up to 4e-4; upright they are 1.4e-4 off tanh.
+    /// Fill h/R, slope, and the change of Lambda relative to the upright tank, of the first mode along the slope and
+    /// across it. The values come from finite elements, `hubslosh.liquid_modes` (scikit-fem 12.0.2, gmsh 4.15.2,
+    /// resolution 14), for a cylinder of R = 1 with the fill h cos + sin of the tilt. Two meshes differ by up to 4e-4;
+    /// upright they are within 1.4e-4 of tanh.
     const FINITE_ELEMENTS: [(f64, f64, [f64; 2]); 12] = [
         (0.35, 0.0525, [-0.00382, -0.00129]),
         (0.35, 0.1225, [-0.02139, -0.00764]),
@@ -137,7 +141,8 @@ mod tests {
         (3.0, 0.7, [-0.15777, 0.10438]),
     ];
 
-    /// To what the meshes differ by at small tilts, then within the stated errors of the frequency, half those of Lambda.
+    /// At small tilts the limit is the difference of the meshes, otherwise the stated errors of the frequency, half
+    /// those of Lambda.
     #[test]
     fn frequencies_are_those_of_finite_elements_within_the_stated_errors() {
         for (fill, slope, change) in FINITE_ELEMENTS {
@@ -154,8 +159,8 @@ mod tests {
         }
     }
 
-    /// Differences of the same meshes to the upright tank's, of the second mode at the slope 0.2; its meshes differ by 0.009 of
-    /// Lambda, but alike upright and tilted.
+    /// Changes relative to the upright tank of the second mode at the slope 0.2, with the same meshes. The meshes
+    /// differ by 0.009 of Lambda, equally upright and tilted.
     #[test]
     fn the_second_mode_changes_as_by_finite_elements() {
         for (fill, change) in [
@@ -168,8 +173,8 @@ mod tests {
         }
     }
 
-    /// The sums again, without a closed form: the integrals by Simpson's rule, from the expansion of K and M. Their
-    /// error is (b/2000)^4/180.
+    /// The same sums without a closed form: Simpson integrals from the expansion of K and M. Their error is
+    /// (b/2000)^4/180.
     #[test]
     fn coefficients_are_those_of_the_perturbation_by_quadrature() {
         const N: usize = 2000;
@@ -183,7 +188,8 @@ mod tests {
             let u = |r: f64| libm::j1(a * r);
             let d = |r: f64| a * (libm::jn(0, a * r) - libm::jn(2, a * r)) / 2.0;
             let u_r = |r: f64| a * (libm::jn(0, a * r) + libm::jn(2, a * r)) / 2.0; // u/r
-            // by pi: norm; x^2 psi^2 and x psi psi_x with the angle's 3/4 and 1/4 or 1/4 and -1/4
+            // divided by pi: norm; x^2 psi^2 and x psi psi_x with the angle's 3/4 and 1/4 or 1/4
+            // and -1/4
             let norm = integral(&|r| r * u(r) * u(r));
             let (u2, ud, uu) = (
                 integral(&|r| r * r * r * u(r) * u(r)),
@@ -213,8 +219,9 @@ mod tests {
         }
     }
 
-    /// Short waves feel no bottom, and a surface that is longer by the root of 1 + s^2 along the slope under a g that is larger by the same: of a
-    /// wave whose direction is spread as cos^2 of the angle, c = 1/2 - 3/8 and 1/2 - 1/8, to the order of 1/xi; mode 10 lacks 0.003 beyond the zeros.
+    /// Short waves do not reach the bottom. The surface is longer by the root of 1 + s^2 along the slope, and g is
+    /// larger by the same factor. For a wave with directions distributed as cos^2 of the angle, c = 1/2 - 3/8 and 1/2 -
+    /// 1/8, to the order of 1/xi. The truncation error of mode 10 is 0.003.
     #[test]
     fn high_modes_are_waves_on_a_longer_surface() {
         let [along, across] = coefficients(9, 2.0);

@@ -10,7 +10,7 @@ pub enum StepError {
         /// The length, s.
         h: f64,
     },
-    /// The motion grew beyond all numbers, or the inputs are not finite.
+    /// The motion is no longer finite, or the inputs are not finite.
     NotFinite {
         /// Time of the failure, s.
         time: f64,
@@ -24,7 +24,7 @@ pub enum StepError {
         /// Remedy in this model, other than shorter steps and a larger `solver.max_steps`.
         advice: &'static str,
     },
-    /// The motion left the range of the model; the text is the model's.
+    /// The motion left the range of the model; the text comes from the model.
     Model(String),
 }
 
@@ -39,17 +39,17 @@ impl core::fmt::Display for StepError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             StepError::Length { h } => {
-                write!(f, "a step of {h} s (allowed: a finite length above 0)")
+                write!(f, "the step has the length {h} s (allowed: a finite length above 0)")
             }
             StepError::NotFinite { time } => write!(
                 f,
-                "the motion is no longer finite at t = {time} s; check that inputs and their \
-                 derivatives are finite and of sensible size"
+                "the motion is no longer finite at t = {time} s: check that inputs and their \
+                 derivatives are finite and not too large"
             ),
             StepError::TooManySteps { time, max_steps, advice } => write!(
                 f,
-                "the step was stopped at t = {time} s after solver.max_steps = {max_steps} internal \
-                 steps; use shorter communication steps, a looser tolerance or a larger \
+                "the step stopped at t = {time} s after solver.max_steps = {max_steps} internal \
+                 steps: use shorter communication steps, a looser tolerance or a larger \
                  solver.max_steps{advice}"
             ),
             StepError::Model(why) => f.write_str(why),
@@ -60,7 +60,7 @@ impl core::fmt::Display for StepError {
 impl core::error::Error for StepError {}
 
 impl StepError {
-    /// The same with its time counted from `begin` instead of from there.
+    /// Returns the same error with its time shifted by `begin`.
     pub fn after(mut self, begin: f64) -> StepError {
         if let StepError::NotFinite { time } | StepError::TooManySteps { time, .. } = &mut self {
             *time += begin;

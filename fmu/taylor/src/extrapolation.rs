@@ -1,50 +1,50 @@
-//! Steps through time by extrapolation, for rates that are too many to be expanded in power series by hand: craft with
-//! tanks that drain. A step that misses the tolerance is rejected.
+//! Integration by extrapolation, for rates that are too many to expand in power series by hand: craft with tanks that
+//! drain. A step that misses the tolerance is rejected.
 //!
 //! Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.9.
 
 use crate::error::StepError;
 use crate::integrator::{MAX_MAGNITUDE, STEP_SHARE, Steps};
 
-/// A system of first order, x' = rates(t, x), that [`advance`] moves on.
+/// A first-order system, x' = rates(t, x), that [`advance`] integrates.
 pub trait System<const D: usize> {
-    /// The rates of the states, `t` after the start of the call.
+    /// Returns the rates of the states, `t` after the start of the call.
     fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
 
-    /// Scale of the errors of a step, from states and rates at its start t; `h` is the rest of the stretch.
+    /// Returns the scale of a step's errors, from states and rates at its start t; `h` is the rest of the stretch.
     fn error_scale(&self, t: f64, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
 }
 
-/// Columns of an extrapolation.
+/// Largest number of columns of an extrapolation.
 const COLUMNS: usize = 8;
 
-/// Rounding of a step, of its scale and of 1 rad, rad/s, m, m/s: no smaller error is asked for. Below these terms may
-/// cancel in the rates that are not small themselves.
+/// Smallest error that a step is controlled to, relative to its scale and to 1 rad, rad/s, m, m/s. Below it,
+/// cancellation of large terms in the rates may dominate.
 const ROUNDING: f64 = 2e-14;
 
 /// Largest ratio of a step to the step before.
 const LONGER: f64 = 4.0;
 const SHORTER: f64 = 0.1;
 
-/// Errors below this, which make no step longer than [`LONGER`] allows, count as this: 1/0 and powers of numbers near
-/// the largest end the process of a host that traps them.
+/// Errors below this value count as this value, without effect because of [`LONGER`]. It avoids 1/0 and powers of
+/// numbers near the largest, which end the process of a host that traps them.
 const LEAST_ERROR: f64 = 1e-30;
 
-/// Evaluations of the rates up to column k (from 0).
+/// Returns the number of evaluations of the rates up to column k (from 0).
 fn work(k: usize) -> f64 {
     (1 + (k + 1) * (k + 2)) as f64
 }
 
-/// One step of an extrapolation.
+/// Result of one step of an extrapolation.
 struct Trial<const D: usize> {
-    /// The states at its end, where two columns agree.
+    /// The states at the end of the step, if two columns agree.
     end: Option<[f64; D]>,
     /// The length, s, with the least work per second.
     best: f64,
 }
 
-/// Moves x, whose rates at t are `first`, on by `h` with Gragg's midpoint rule of 2, 4, ... 16 steps, extrapolated to
-/// steps of length 0 until two columns agree to `allowed`. Gives up where the columns hardly come nearer to each other.
+/// Advances x, whose rates at t are `first`, by `h`. Gragg's midpoint rule with 2, 4, ... 16 steps is extrapolated to
+/// zero step length until two columns agree to `allowed`. Gives up if the columns hardly converge.
 fn extrapolate<const D: usize>(
     system: &impl System<D>,
     x: &[f64; D],
@@ -83,7 +83,7 @@ fn extrapolate<const D: usize>(
         if k >= 2 {
             let error = (0..D).fold(0.0, |largest, i| {
                 let error = (row[k][i] - row[k - 1][i]).abs() / allowed[i];
-                // NaN is an error without bounds.
+                // NaN counts as an unbounded error.
                 if error <= largest { largest } else { f64::min(error, f64::MAX) }
             });
             // Error of column k - 1: h^(2k + 1).
@@ -95,7 +95,7 @@ fn extrapolate<const D: usize>(
                 (least, best) = (work(k) / length, length);
             }
             if error <= 1.0 {
-                // One column more would be better still.
+                // One more column would be better still.
                 if is_best && k + 1 < COLUMNS {
                     best = f64::min(best * work(k + 1) / work(k), LONGER * h);
                 }
@@ -120,18 +120,19 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// At the start of a call over `h`: the first step tries the whole.
+    /// Starts a call over `h`. The first step tries the whole length.
     pub fn new(h: f64, steps: Steps) -> Pace {
         Pace { steps, h }
     }
 }
 
-/// Moves x from `begin` to `end` by extrapolation, in as many steps as the tolerance needs. A step's length follows
-/// from the errors of the columns before, what they are compared with from the states at its start: after a rejection
+/// Advances x from `begin` to `end` by extrapolation, in as many steps as the tolerance needs. The errors of the
+/// previous columns determine the length of a step, and the states at its start determine the scale. After a rejection
 /// steps grow again.
 ///
 /// # Errors
-/// [`StepError::NotFinite`], [`StepError::TooManySteps`]; x is unusable then. Their time counts as `begin` does.
+/// [`StepError::NotFinite`], [`StepError::TooManySteps`]; x is then unusable. Their time has the same origin as
+/// `begin`.
 pub fn advance<const D: usize>(
     system: &impl System<D>,
     x: &mut [f64; D],
@@ -162,7 +163,8 @@ pub fn advance<const D: usize>(
             }
             *x = moved;
             t = if is_last { end } else { t + h };
-            // A step that a stretch's end has cut short says less of the next than the one before.
+            // A step cut short by the end of a stretch tells less about the next step than the step
+            // before.
             pace.h = if is_last { f64::max(best, pace.h) } else { best };
             break;
         }
@@ -202,7 +204,8 @@ mod tests {
 
     const STEPS: Steps = Steps::new(100_000, "");
 
-    /// At the far end of an ellipse with eccentricity 0.6, semi-axis 1: a revolution takes 2 pi.
+    /// State at the far end of an ellipse with eccentricity 0.6 and semi-axis 1. One revolution
+    /// takes 2 pi.
     const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
 
     #[test]
@@ -212,12 +215,12 @@ mod tests {
             let (orbit, mut x) = (Orbit::new(), START);
             let end = core::f64::consts::TAU;
             advance(&orbit, &mut x, (0.0, end), tolerance, &mut Pace::new(end, STEPS)).unwrap();
-            // A step may be off by a hundredth of the tolerance; errors along the orbit grow tenfold and more.
+            // A step may have an error of a hundredth of the tolerance. Errors grow tenfold and more along the orbit.
             let off = (0..4).map(|i| (x[i] - START[i]).abs()).fold(0.0, f64::max);
             assert!(off < 3.0 * tolerance, "{tolerance}: {off}");
             works[k] = orbit.evaluations.get();
         }
-        // What step control makes of it: a change is one of every run's cost.
+        // Number of evaluations by the step control. A change here changes the cost of every run.
         assert_eq!(works, [500, 541, 920, 1226]);
     }
 
@@ -234,7 +237,7 @@ mod tests {
         }
     }
 
-    /// A polynomial of the rule's own degree comes out but for rounding, in three columns: 1 + 2 + 4 + 6 evaluations.
+    /// A polynomial of the rule's own degree is exact to rounding, in three columns: 1 + 2 + 4 + 6 evaluations.
     #[test]
     fn three_columns_are_enough_for_a_quartic() {
         struct Quartic(Cell<usize>);
@@ -245,7 +248,7 @@ mod tests {
             }
 
             fn error_scale(&self, t: f64, _: &[f64; 1], _: &[f64; 1], h: f64) -> [f64; 1] {
-                // How far there is to go.
+                // The remaining length.
                 assert_eq!(t + h, 2.0);
                 [1.0]
             }
@@ -260,7 +263,7 @@ mod tests {
         assert!((x[0] - 32.0).abs() < 1e-12, "{}", x[0]);
     }
 
-    /// x' = x, errors over `scale`; how often a step began.
+    /// x' = x with errors relative to `scale`; counts the steps begun.
     struct Growth {
         scale: f64,
         starts: Cell<usize>,
@@ -277,7 +280,8 @@ mod tests {
         }
     }
 
-    /// Without a tolerance what is asked for is rounding's share, of a large scale as of 1.
+    /// With zero tolerance the allowed error is that of rounding, both for a large scale and for a
+    /// scale of 1.
     #[test]
     fn no_more_is_asked_for_than_rounding_allows() {
         for scale in [1e6, 1.0, 1e-6] {
@@ -290,7 +294,7 @@ mod tests {
         }
     }
 
-    /// With hardly any error the steps are 1, 4, 16, ... milliseconds long: the sixth reaches the end.
+    /// With negligible error the steps are 1, 4, 16, ... milliseconds long, and the sixth reaches the end.
     #[test]
     fn a_step_is_at_most_four_times_as_long_as_the_one_before() {
         let system = Growth { scale: 1e6, starts: Cell::new(0) };

@@ -1,10 +1,10 @@
-//! Steps through time: a Taylor-series integrator with events.
+//! Taylor-series integrator with events.
 //!
-//! Over one step the whole motion is a power series in time (`series.rs`). The order grows
-//! until terms in a row, at the step's end, are below what the tolerance allows; where the highest
-//! order does not get there, the step is cut to the length at which it does. So short steps are cheap,
-//! nothing is ever rejected, and the series between the ends is as exact as at the ends: a step ends
-//! exactly where it should, and events are roots of polynomials (`root.rs`), found without stepping back.
+//! Over one step the whole motion is a power series in time (`series.rs`). The order grows until successive terms at
+//! the step's end are below the tolerance. If the highest order is not enough, the step is cut to the length at which
+//! it is. Short steps are therefore cheap, and no step is rejected. The series is as exact within the step as at its
+//! end. A step ends exactly where it should, and events are roots of polynomials (`root.rs`), found without stepping
+//! back.
 //!
 //! Source: Jorba & Zou, Experimental Mathematics 14 (2005).
 
@@ -14,29 +14,30 @@ use crate::error::StepError;
 use crate::for_each_order;
 use crate::series::ORDER;
 
-/// Error of one step against the tolerance. A step's error decays with the liquid's motion,
+/// Error of one step relative to the tolerance. The motion of the liquid damps a step's error
 /// within some thousand steps.
 pub const STEP_SHARE: f64 = 1e-2;
 
-/// Rates below this are nothing, rad/s: the floor of the error's scale.
+/// Floor of the error scale, rad/s. Smaller rates are negligible.
 pub const RATE_FLOOR: f64 = 1e-6;
 
-/// From here on energies and forces may not be finite, though the states still are.
+/// Largest magnitude of a state. Above it energies and forces may overflow although the states do
+/// not.
 pub const MAX_MAGNITUDE: f64 = 1e100;
 
-/// The longest expansion, s: its powers up to the highest order do not overflow.
+/// Longest expansion, s, so that its powers up to the highest order do not overflow.
 const LONGEST: f64 = 1e9;
 
-/// The lowest order that is trusted to show that a series has converged.
+/// Lowest order that can show that a series has converged.
 const MIN_ORDER: usize = 5;
 
-/// Two orders must reduce a term to this share before its decay is relied on.
+/// Required reduction of a term over two orders before its decay is extrapolated.
 const DECAY: f64 = 0.1;
 
 /// Tolerance of a predicted term over that of a computed term.
-const FORETOLD: f64 = 0.25;
+const PREDICTED_SHARE: f64 = 0.25;
 
-/// The integrator's steps that one call may take, and those that it has taken.
+/// Number of internal steps that one call may take, and number taken.
 #[derive(Clone, Copy, Debug)]
 pub struct Steps {
     taken: usize,
@@ -45,15 +46,15 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// None taken yet of `max`; `advice` is what to do where they do not suffice.
+    /// Creates a counter for `max` steps. `advice` is the remedy if they do not suffice.
     pub const fn new(max: usize, advice: &'static str) -> Steps {
         Steps { taken: 0, max, advice }
     }
 
-    /// Counts steps or what costs as much, at `time`.
+    /// Counts `number` steps, or work of the same cost, at `time`.
     ///
     /// # Errors
-    /// There have been too many.
+    /// The limit is exceeded.
     #[inline(always)]
     pub fn count(&mut self, number: usize, time: f64) -> Result<(), StepError> {
         self.taken += number;
@@ -81,37 +82,37 @@ pub enum Convergence {
     Decay,
 }
 
-/// Returns true if terms n + 1 and n are negligible, the former as predicted; arguments are the ratios of terms n, n - 1, n - 2,
-/// n - 3 to their tolerance.
+/// Returns true if terms n + 1 and n are negligible, term n + 1 as predicted. The arguments are the ratios of terms n,
+/// n - 1, n - 2, n - 3 to their tolerance.
 ///
-/// t_(n+1) is foretold from n - 1 by what two orders have taken off n - 2 and n - 3:
-/// t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)).
+/// The prediction takes the smaller of two reductions over two orders: t_(n+1) = t_(n-1)
+/// max(t_n/t_(n-2), t_(n-1)/t_(n-3)).
 #[inline(always)]
 fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
     let decays = now <= DECAY * two && one <= DECAY * three;
-    let foretold = one * now <= FORETOLD * two && one * one <= FORETOLD * three;
-    // NaN is not negligible; the states that come of it end the step.
-    now <= 1.0 && (one <= 1.0 || decays && foretold)
+    let predicted = one * now <= PREDICTED_SHARE * two && one * one <= PREDICTED_SHARE * three;
+    // NaN is not negligible; non-finite states end the step.
+    now <= 1.0 && (one <= 1.0 || decays && predicted)
 }
 
 /// A motion that can be expanded in a power series.
 pub trait Motion {
-    /// Compiles expansions with the sums of every order written out: about twice as fast,
-    /// more code.
+    /// Compiles expansions with the sums of every order written out: about twice as fast, larger
+    /// code.
     const UNROLLED: bool = true;
 
-    /// Starts the expansion at the present states, `t` after the start of the call.
+    /// Starts the expansion at the current states, `t` after the start of the call.
     fn start(&mut self, t: f64);
 
-    /// Coefficient n of every quantity from coefficients up to n of the states, and coefficient
-    /// n + 1 of the states.
+    /// Computes coefficient n of every quantity from coefficients up to n of the states, and
+    /// coefficient n + 1 of the states.
     fn rates(&mut self, n: usize);
 
-    /// Sets what the terms of a step of length `h` are compared with, from coefficients 0 and
-    /// 1: what is `allowed` of 1. Returns how far the series reach: `h`, or less.
+    /// Sets the error scale of a step of length `h` from coefficients 0 and 1, with the relative
+    /// error `allowed`. Returns the time over which the series is valid, at most `h`.
     fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64;
 
-    /// The largest of the states' coefficients n over what is allowed of it.
+    /// Returns the largest of the states' coefficients n relative to its allowed error.
     fn coefficient_norm(&self, n: usize) -> f64;
 
     /// Returns true if coefficient n times `power` is within its tolerance.
@@ -120,31 +121,31 @@ pub trait Motion {
         self.coefficient_norm(n) * power <= 1.0
     }
 
-    /// Convergence criterion of the series.
+    /// Returns the convergence criterion of the series.
     #[inline(always)]
     fn convergence(&self) -> Convergence {
         Convergence::Decay
     }
 
-    /// The highest order of an expansion.
+    /// Returns the highest order of an expansion.
     #[inline(always)]
     fn highest_order(&self) -> usize {
         ORDER
     }
 
-    /// Time of the first event within `h` after the start of the expansion, from the series cut after
-    /// order n.
+    /// Returns the time of the first event within `h` after the start of the expansion, from the
+    /// series up to order n.
     #[inline(always)]
     fn event(&mut self, _n: usize, _h: f64) -> Option<f64> {
         None
     }
 
-    /// Moves the states by the series cut after order n to `h` after the start of the expansion, which
-    /// is `t` after the start of the call; there is the event that was found last, if there was one. Returns
-    /// whether the call goes on; if not, the length that it has come.
+    /// Advances the states by the series up to order n to `h` after the start of the expansion, which is `t` after the
+    /// start of the call. If an event was found last, it is there. Returns `Continue` if the call continues, otherwise
+    /// the elapsed length.
     ///
     /// # Errors
-    /// The states are not finite, or the model does not hold there.
+    /// The states are not finite, or the model is not valid there.
     fn take(
         &mut self,
         n: usize,
@@ -155,68 +156,76 @@ pub trait Motion {
 }
 
 /// Progress of an expansion.
-struct Reach {
-    /// Its length, s.
+struct Progress {
+    /// Length of the expansion, s.
     h: f64,
     /// h^(n + 1) after order n.
     power: f64,
-    /// The last terms over what is allowed of them, the newest first.
+    /// The last terms relative to their allowed errors, the newest first.
     terms: [f64; 4],
-    /// Number of negligible terms in succession at the end.
+    /// Number of successive negligible terms at the end.
     negligible: usize,
 }
 
-/// Order n of an expansion. Returns whether it is enough.
+/// Computes order n of an expansion. Returns true if it is enough.
 #[inline(always)]
-fn expand_order<M: Motion>(motion: &mut M, n: usize, tolerance: f64, reach: &mut Reach) -> bool {
+fn expand_order<M: Motion>(
+    motion: &mut M,
+    n: usize,
+    tolerance: f64,
+    progress: &mut Progress,
+) -> bool {
     motion.rates(n);
     if n == 1 {
-        reach.h = motion.set_error_scale(reach.h, STEP_SHARE * tolerance);
-        reach.power = reach.h;
+        progress.h = motion.set_error_scale(progress.h, STEP_SHARE * tolerance);
+        progress.power = progress.h;
     }
-    reach.power *= reach.h;
+    progress.power *= progress.h;
     match motion.convergence() {
         Convergence::Terms(count) => {
             if n + 2 < MIN_ORDER {
                 return false;
             }
-            reach.negligible =
-                if motion.is_negligible(n + 1, reach.power) { reach.negligible + 1 } else { 0 };
-            reach.negligible >= count
+            progress.negligible = if motion.is_negligible(n + 1, progress.power) {
+                progress.negligible + 1
+            } else {
+                0
+            };
+            progress.negligible >= count
         }
         Convergence::Decay => {
             if n + 4 < MIN_ORDER {
                 return false;
             }
-            let [now, one, two, _] = reach.terms;
-            reach.terms = [motion.coefficient_norm(n + 1) * reach.power, now, one, two];
-            n + 1 >= MIN_ORDER && are_negligible(reach.terms)
+            let [now, one, two, _] = progress.terms;
+            progress.terms = [motion.coefficient_norm(n + 1) * progress.power, now, one, two];
+            n + 1 >= MIN_ORDER && are_negligible(progress.terms)
         }
     }
 }
 
-/// Expands the motion up to `h` ahead. Returns the order and the length, at most `h`, at
-/// which the terms left out are below the tolerance.
+/// Expands the motion up to `h` ahead. Returns the order and the length, at most `h`, at which the
+/// omitted terms are below the tolerance.
 #[inline(always)]
 fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
-    let mut reach =
-        Reach { h: h.min(LONGEST), power: 1.0, terms: [f64::INFINITY; 4], negligible: 0 };
+    let mut progress =
+        Progress { h: h.min(LONGEST), power: 1.0, terms: [f64::INFINITY; 4], negligible: 0 };
     let highest = motion.highest_order();
     if M::UNROLLED {
         for_each_order!(N => {
-            if expand_order(motion, N, tolerance, &mut reach) {
-                return (N + 1, reach.h);
+            if expand_order(motion, N, tolerance, &mut progress) {
+                return (N + 1, progress.h);
             }
         });
     } else {
         for n in 0..highest {
-            if expand_order(motion, n, tolerance, &mut reach) {
-                return (n + 1, reach.h);
+            if expand_order(motion, n, tolerance, &mut progress) {
+                return (n + 1, progress.h);
             }
         }
     }
-    // The last two terms reach the tolerance at this length.
-    let h = reach.h;
+    // The last two terms meet the tolerance at this length.
+    let h = progress.h;
     let length = |n: usize| {
         let term = motion.coefficient_norm(n);
         if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
@@ -224,8 +233,8 @@ fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     (highest, h.min(length(highest)).min(length(highest - 1)))
 }
 
-/// Moves the motion on by exactly `h` > 0 from the time `begin`, unless it ends the call itself: then it returns the
-/// length that it has come. On an error its states are unusable.
+/// Advances the motion by exactly `h` > 0 from the time `begin`, unless the motion ends the call itself. In that case
+/// it returns the elapsed length. After an error the states are unusable.
 ///
 /// # Errors
 /// See [`StepError`].
@@ -243,7 +252,7 @@ pub fn advance<M: Motion>(
         motion.start(t);
         let left = h - t;
         let (n, length) = expand(motion, left, tolerance);
-        // An event may be due at once.
+        // An event may be due immediately.
         let (length, moves) = match motion.event(n, length) {
             Some(event) => (event, event.is_finite()),
             None => (length, length > 0.0 && length.is_finite()),
@@ -265,7 +274,7 @@ mod tests {
     use crate::root::first_root;
     use crate::series::{self, Series, ZERO};
 
-    /// x' = v, v' = -x between walls: at x = `wall`, if there is one, v changes its sign.
+    /// x' = v, v' = -x between walls. At x = `wall`, if it is set, v changes its sign.
     struct Oscillator {
         now: [f64; 2],
         x: Series,
@@ -297,7 +306,7 @@ mod tests {
             advance(self, 7.0, h, tolerance, &mut Steps::new(100_000, "")).map(|_| ())
         }
 
-        /// Largest difference from x = cos t, v = -sin t.
+        /// Returns the largest difference from x = cos t, v = -sin t.
         fn error(&self, t: f64) -> f64 {
             f64::max((self.now[0] - t.cos()).abs(), (self.now[1] + t.sin()).abs())
         }
@@ -336,7 +345,7 @@ mod tests {
         fn event(&mut self, n: usize, h: f64) -> Option<f64> {
             let mut above = self.x;
             above[0] -= self.wall?;
-            // On the wall the root at 0 is behind.
+            // On the wall the root at 0 is in the past.
             let behind = usize::from(above[0] <= 1e-15);
             first_root(&above[behind..=n], h)
         }
@@ -360,7 +369,7 @@ mod tests {
         }
     }
 
-    /// The same, compiled with every order apart.
+    /// The same oscillator, compiled with the sums of every order written out.
     struct Unrolled(Oscillator);
 
     impl Motion for Unrolled {
@@ -398,7 +407,8 @@ mod tests {
                 for h in [1e-3, 0.1, 2.0, 50.0] {
                     let mut motion = Oscillator::new(convergence);
                     motion.advance(h, tolerance).unwrap();
-                    // An error of one step is a hundredth; 50 s take up to thirty. 1e-14: rounding.
+                    // The error of one step is a hundredth; 50 s take up to thirty steps. 1e-14:
+                    // rounding.
                     let error = motion.error(h);
                     assert!(error < tolerance + 1e-14, "{convergence:?} {tolerance} {h}: {error}");
                 }
@@ -406,7 +416,7 @@ mod tests {
         }
     }
 
-    /// The test reads the end of an expansion after n = 4, 5, ... from the terms 0.1^n/n!.
+    /// Reads the order at which an expansion ends from n = 4, 5, ... with the terms 0.1^n/n!.
     #[test]
     fn an_expansion_ends_when_its_terms_say_so() {
         let order = |convergence, tolerance: f64| {
@@ -416,13 +426,13 @@ mod tests {
             assert_eq!((h, motion.rates), (0.1, n));
             n
         };
-        // Terms from 4 on: 4.2e-6, 8.3e-8, 1.4e-9, 2.0e-11, 2.5e-13; allowed is a hundredth of the tolerance.
+        // Terms from 4 on: 4.2e-6, 8.3e-8, 1.4e-9, 2.0e-11, 2.5e-13. The allowed error is a hundredth of the tolerance.
         assert_eq!(order(Convergence::Terms(2), 1e-3), 5);
         assert_eq!(order(Convergence::Terms(3), 1e-3), 6);
         assert_eq!(order(Convergence::Terms(4), 1e-3), 7);
         assert_eq!(order(Convergence::Terms(2), 1e-4), 6);
         assert_eq!(order(Convergence::Terms(2), 1e-6), 7);
-        // Term 5 is allowed, term 6 foretold by two orders' decay to be below a quarter.
+        // Term 5 is negligible, and term 6 is predicted by two orders' decay to be below a quarter.
         assert_eq!(order(Convergence::Decay, 1e-3), 5);
         assert_eq!(order(Convergence::Decay, 1e-5), 5);
         assert_eq!(order(Convergence::Decay, 1e-6), 6);
@@ -430,23 +440,23 @@ mod tests {
 
     #[test]
     fn two_terms_are_negligible_or_the_second_is_foretold() {
-        // Known to be.
+        // Both are computed.
         assert!(are_negligible([1.0, 1.0, 9.0, 9.0]));
         assert!(!are_negligible([1.1, 0.1, 9.0, 9.0]));
         // 2 x 0.5/20 = 0.05 and 2 x 2/30 are below a quarter, after decays of ten and more.
         assert!(are_negligible([0.5, 2.0, 20.0, 30.0]));
         assert!(are_negligible([0.5, 2.0, 9.0, 30.0]));
-        // No decay from two orders before, of the one and of the other.
+        // No decay over two orders, of one term and of the other.
         assert!(!are_negligible([0.5, 2.0, 4.0, 30.0]));
         assert!(!are_negligible([0.05, 2.0, 20.0, 19.0]));
-        // Decay enough, but from too far: 4 x 1/12 and 8 x 8/81.
+        // Sufficient decay, but from too large a term: 4 x 1/12 and 8 x 8/81.
         assert!(!are_negligible([1.0, 4.0, 12.0, 400.0]));
         assert!(!are_negligible([0.1, 8.0, 20.0, 81.0]));
         assert!(!are_negligible([f64::NAN, 0.0, 0.0, 0.0]));
         assert!(!are_negligible([0.0, f64::NAN, 0.0, 0.0]));
     }
 
-    /// An expansion whose terms are given.
+    /// An expansion with given terms.
     struct Given([f64; ORDER + 1]);
 
     impl Motion for Given {
@@ -480,7 +490,7 @@ mod tests {
     #[test]
     fn terms_count_from_the_second_on_and_an_end_at_no_time_is_refused() {
         let mut terms = [0.0; ORDER + 1];
-        // Of term 2 the decay to term 4 is seen, at order 5.
+        // The decay from term 2 to term 4 is known at order 5.
         terms[2..6].copy_from_slice(&[60.0, 30.0, 3.0, 0.1]);
         assert_eq!(expand(&mut Given(terms), 1.0, 1e-8), (5, 1.0));
         terms[2] = 29.0;
@@ -515,7 +525,7 @@ mod tests {
         }
     }
 
-    /// From x = 1 the wall at 1/2 is met every 2 pi/3.
+    /// Starting at x = 1, the wall at 1/2 is reached every 2 pi/3.
     #[test]
     fn an_event_ends_the_expansion_and_the_step_goes_on_from_there() {
         let mut motion = Oscillator { wall: Some(0.5), ..Oscillator::new(Convergence::Decay) };
@@ -533,7 +543,7 @@ mod tests {
         let StepError::TooManySteps { time, max_steps: 3, advice: "; rest" } = error else {
             panic!("{error}");
         };
-        // Three steps of some 2 s.
+        // Three steps of about 2 s.
         assert!(time > 9.0 && time < 20.0, "{time}");
         let mut steps = Steps::new(5, "");
         steps.count(3, 0.0).unwrap();
@@ -548,7 +558,7 @@ mod tests {
         assert_eq!(motion.advance(1.0, 1e-8), Err(StepError::NotFinite { time: 0.5 }));
         let mut motion = Oscillator::new(Convergence::Decay);
         assert_eq!(motion.advance(f64::INFINITY, 1e-8).map_err(|_| ()), Err(()));
-        // Where no error is allowed no step has a length.
+        // With zero allowed error no step has a length.
         let mut motion = Oscillator::new(Convergence::Decay);
         assert_eq!(motion.advance(1.0, 0.0), Err(StepError::NotFinite { time: 7.0 }));
     }

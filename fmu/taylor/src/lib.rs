@@ -1,12 +1,12 @@
-//! The core of the models: what the equations of motion of any of them need, and no physics.
+//! Numerical core of the models: power series, integrators and event times, without physics.
 //!
 //! A model writes its right-hand side once, as rules for power series ([`series`], [`plane`], [`space`]), and
-//! implements [`integrator::Motion`]; [`integrator::advance`] steps it through time. What follows from the states at
-//! an instant it writes over [`number::Number`]: the same formula gives value and derivative along a direction.
-//! Rates that are not expanded are stepped by [`extrapolation`].
+//! implements [`integrator::Motion`]. [`integrator::advance`] integrates it. Functions of the states at an instant are
+//! written over [`number::Number`]: the same formula gives value and derivative along a direction. [`extrapolation`]
+//! integrates rates that are not expanded.
 //!
-//! Where to look: why a step was refused, `error.rs`; when a series has converged, how long a step is and how many
-//! there may be, `integrator.rs`; when an event falls due, `root.rs`.
+//! `error.rs` has the reasons for a refused step. `integrator.rs` decides when a series has converged, how long a step
+//! is, and how many steps are allowed. `root.rs` finds the time of an event.
 
 #![cfg_attr(not(test), no_std)]
 

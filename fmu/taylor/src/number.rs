@@ -1,4 +1,5 @@
-//! Numbers that a formula is written once for: the value, or the derivative along a direction.
+//! Number types for formulas that are written once, for values and for derivatives along a
+//! direction.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -13,25 +14,25 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// A quantity that depends on nothing.
+    /// Returns a constant.
     fn constant(value: f64) -> Self;
-    /// A quantity from coefficients 0 and 1 of its series.
+    /// Returns a quantity from coefficients 0 and 1 of its series.
     fn of(value: f64, slope: f64) -> Self;
-    /// The value, or the derivative.
+    /// Returns the value, or the derivative.
     fn result(self) -> f64;
-    /// The value.
+    /// Returns the value.
     fn value(self) -> f64;
-    /// The larger of itself and a constant.
+    /// Returns the larger of itself and a constant.
     fn at_least(self, floor: f64) -> Self {
         if self.value() < floor { Self::constant(floor) } else { self }
     }
-    /// Itself between two constants, which do not depend on anything.
+    /// Returns itself limited to two constant bounds.
     fn clamp(self, low: f64, high: f64) -> Self {
         if self.value() > high { Self::constant(high) } else { self.at_least(low) }
     }
     /// 1/self
     fn recip(self) -> Self;
-    /// The root, its derivative 0 at 0, where it has none.
+    /// Square root. The derivative is 0 at 0, where it does not exist.
     fn sqrt(self) -> Self;
     /// sin
     fn sin(self) -> Self;
@@ -39,9 +40,9 @@ pub trait Number:
     fn exp(self) -> Self;
     /// tanh
     fn tanh(self) -> Self;
-    /// asin, its derivative 0 at +-1, where it has none.
+    /// asin. The derivative is 0 at +-1, where it does not exist.
     fn asin(self) -> Self;
-    /// sqrt(self^2 + b^2), its derivative 0 at 0, where it has none.
+    /// sqrt(self^2 + b^2). The derivative is 0 at 0, where it does not exist.
     fn hypot(self, b: Self) -> Self;
 }
 
@@ -207,7 +208,7 @@ impl Number for Dual {
 mod tests {
     use super::*;
 
-    /// Uses everything that a number can do, each with an argument of its own.
+    /// Uses every operation of a number, each with its own argument.
     fn formulas<T: Number>(x: T) -> [T; 16] {
         let c = T::constant;
         [

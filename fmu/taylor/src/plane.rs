@@ -1,10 +1,10 @@
-//! Power series of vectors in the plane. Most rules treat both components alike, so that a
-//! processor does both at once.
+//! Power series of vectors in the plane. Most rules treat both components equally, so that a
+//! processor computes both at once.
 
 use crate::number::Number;
 use crate::series::{self, EMPTY, ORDER, Series};
 
-/// Sum of `term(j)` over 0 <= j <= n, ends last; see `series.rs`.
+/// Returns the sum of `term(j)` over 0 <= j <= n, with the ends last; see `series.rs`.
 #[inline(always)]
 fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
@@ -20,7 +20,7 @@ pub struct Vector2([[f64; 2]; ORDER + 1]);
 /// All coefficients zero.
 pub const ZERO_VECTOR2: Vector2 = Vector2([[0.0; 2]; ORDER + 1]);
 
-/// Both components, as [`series::number`].
+/// Returns both components, like [`series::number`].
 pub fn numbers<T: Number>(a: &Vector2) -> [T; 2] {
     [0, 1].map(|i| T::of(a[0][i], a[1][i]))
 }
@@ -41,21 +41,21 @@ impl core::ops::IndexMut<usize> for Vector2 {
     }
 }
 
-/// Coefficient n of a b, b a vector.
+/// Returns coefficient n of a b, with b a vector.
 #[inline(always)]
 pub fn scale(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     let (a, b) = (&a[..=n], &b.0[..=n]);
     sum_both(n, |j| [a[j] * b[n - j][0], a[j] * b[n - j][1]])
 }
 
-/// Coefficient n of a b_i, b a vector.
+/// Returns coefficient n of a b_i, with b a vector.
 #[inline(always)]
 pub fn mul_part(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     let (a, b) = (&a[..=n], &b.0[..=n]);
     series::sum(n, |j| a[j] * b[n - j][i])
 }
 
-/// Coefficient n of a b, b a vector, without its term a_n b_0.
+/// Returns coefficient n of a b, with b a vector, without its term a_n b_0.
 #[inline(always)]
 pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     let mut sum = [EMPTY; 2];
@@ -65,7 +65,7 @@ pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     sum
 }
 
-/// Coefficient n of a b_i, b a vector, without its term a_n b_0.
+/// Returns coefficient n of a b_i, with b a vector, without its term a_n b_0.
 #[inline(always)]
 pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     let mut sum = EMPTY;
@@ -75,14 +75,14 @@ pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     sum
 }
 
-/// Coefficient n of (a_1 b_1, a_2 b_2).
+/// Returns coefficient n of (a_1 b_1, a_2 b_2).
 #[inline(always)]
 pub fn each(n: usize, a: &Vector2, b: &Vector2) -> [f64; 2] {
     let (a, b) = (&a.0[..=n], &b.0[..=n]);
     sum_both(n, |j| [a[j][0] * b[n - j][0], a[j][1] * b[n - j][1]])
 }
 
-/// Coefficient n of (a_1^2, a_2^2).
+/// Returns coefficient n of (a_1^2, a_2^2).
 #[inline(always)]
 pub fn squares(n: usize, a: &Vector2) -> [f64; 2] {
     let mut half = [EMPTY; 2];
@@ -93,14 +93,14 @@ pub fn squares(n: usize, a: &Vector2) -> [f64; 2] {
     [2.0 * half[0] + middle[0], 2.0 * half[1] + middle[1]]
 }
 
-/// Coefficient n of a.b.
+/// Returns coefficient n of a.b.
 #[inline(always)]
 pub fn dot(n: usize, a: &Vector2, b: &Vector2) -> f64 {
     let [x, y] = each(n, a, b);
     x + y
 }
 
-/// The values at t of several vectors cut after order n.
+/// Returns the values at t of several vectors up to order n.
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Vector2; K], n: usize, t: f64) -> [[f64; 2]; K] {
     let n = n.min(ORDER);
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
     use crate::series::{Series, ZERO};
 
-    /// Products of two cubics, whose coefficients are small integers and hence exact.
+    /// Products of two cubics with small integer coefficients, which are exact.
     #[test]
     fn the_rules_are_the_product_rule() {
         let (mut a, mut b, mut s) = (ZERO_VECTOR2, ZERO_VECTOR2, ZERO);

@@ -1,22 +1,23 @@
-//! The first root of a polynomial: when, within a step, an event falls due.
+//! First root of a polynomial, the time of an event within a step.
 
 use crate::series::ORDER;
 
-/// Steps with one bound over the whole interval before [`first_root`] takes bounds over parts of it.
+/// Number of steps with one bound over the whole interval, before [`first_root`] uses bounds over
+/// parts of it.
 const COARSE_STEPS: usize = 200;
 
 /// Returns the first t in (0, h] at which the polynomial `a`, positive at t = 0, has
 /// fallen to zero, and `None` if it stays positive. `a` has at most [`ORDER`] + 1 coefficients.
 ///
-/// From a point where the value is f > 0 and the slope f', a bound M on |f''|
-/// over [0, h] gives f(t + s) >= f + f' s - M s^2 / 2. The root of that parabola
-/// is a step that cannot pass the first zero, and it converges to it
-/// quadratically, as Newton's method does.
+/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t + s)
+/// >= f + f' s - M s^2 / 2. The root of that parabola is a step that cannot pass the first zero.
+/// The steps converge to it quadratically, like Newton's method.
 ///
-/// M is close enough if the terms a_n h^n decay, as those of a converged series do. If they grow, these steps become too
-/// short. Then the polynomial is expanded about t, and M is a bound over a part of the interval that is about as long as the step.
-/// Such a step is a fixed share of the distance to the nearest complex root or more, so the number of steps grows with
-/// the logarithm of the accuracy. The search ends only at a proof: a root to rounding, or none up to h.
+/// M is tight enough if the terms a_n h^n decay, like those of a converged series. If they grow, these steps become too
+/// short. Then the polynomial is expanded about t, and M is a bound over a part of the interval about as long as the
+/// step. Such a step is at least a fixed share of the distance to the nearest complex root, so the number of steps
+/// grows with the logarithm of the accuracy. The search ends only with a root, to rounding, or with the proof that
+/// there is none up to h.
 pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     let (mut power, mut lowest) = (1.0, a[0]);
     for x in &a[1..] {
@@ -32,7 +33,7 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
         power *= h;
     }
     let mut t = 0.0;
-    // Far from a tangency some five steps do.
+    // Far from a tangency about five steps are enough.
     for _ in 0..COARSE_STEPS {
         let (mut f, mut slope) = (0.0, 0.0);
         for x in a.iter().rev() {
@@ -43,7 +44,7 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
             return Some(t);
         }
         let fall = libm::sqrt(slope * slope + 2.0 * bend * f) - slope;
-        // Straight and not falling.
+        // Linear and not falling.
         if fall <= 0.0 {
             return None;
         }
@@ -59,7 +60,8 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     first_root_from(t, a, h)
 }
 
-/// As [`first_root`], for a polynomial without a zero before `t`, with bounds over parts of the interval.
+/// Returns the same as [`first_root`] for a polynomial without a zero before `t`, with bounds over parts of the
+/// interval.
 #[cold]
 fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     if a.iter().any(|x| !x.is_finite()) {
@@ -69,7 +71,7 @@ fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
         let mut about = [0.0; ORDER + 1];
         let about = &mut about[..a.len()];
         about.copy_from_slice(a);
-        // Coefficients of the powers of s in f(t + s).
+        // Coefficients of f(t + s) in powers of s.
         for first in 0..a.len() {
             for k in (first..a.len() - 1).rev() {
                 about[k] += about[k + 1] * t;
@@ -89,13 +91,13 @@ fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     }
 }
 
-/// Returns a length, at least a share of the longest, up to which the polynomial `a` with a[0] > 0 has no zero; more than
-/// `left` if it has none up to there.
+/// Returns a length up to which the polynomial `a` with a[0] > 0 has no zero, at least a fixed share of the longest
+/// such length. Returns more than `left` if there is no zero up to `left`.
 fn step_before_zero(a: &[f64], left: f64) -> f64 {
     let slope = a.get(1).copied().unwrap_or(0.0);
     let (mut length, mut longest): (f64, f64) = (left, 0.0);
     loop {
-        // What -f'' is at most over the length.
+        // Upper bound of -f'' over the length.
         let (mut power, mut bend) = (1.0, 0.0);
         for (j, x) in a.iter().enumerate().skip(2) {
             bend -= (j * (j - 1)) as f64 * x.min(0.0) * power;
@@ -120,7 +122,7 @@ mod tests {
         // (t - 0.5)(t - 0.5001)(t - 0.9), negated to start positive
         let (a, b, c) = (0.5, 0.5001, 0.9);
         let p = [a * b * c, -(a * b + b * c + c * a), a + b + c, -1.0];
-        // The root's condition: rounding 1e-16 over the slope 4e-5.
+        // Condition of the root: rounding 1e-16 over the slope 4e-5.
         assert!((first_root(&p, 1.0).unwrap() - 0.5).abs() < 1e-11);
         assert_eq!(first_root(&p, 0.4999), None);
     }
@@ -138,7 +140,7 @@ mod tests {
         assert_eq!(first_root(&[2.0, -1.0], 2.0), Some(2.0));
         assert_eq!(first_root(&[2.0, -1.0], 1.9), None);
         assert_eq!(first_root(&[2.0, 1.0], 9.0), None);
-        // 1 - t^2, and what falls after it has risen: 1 + t - t^2
+        // 1 - t^2, and 1 + t - t^2, which rises before it falls
         assert!((first_root(&[1.0, 0.0, -1.0], 9.0).unwrap() - 1.0).abs() < 1e-15);
         let golden = 0.5 + 1.25f64.sqrt();
         assert!((first_root(&[1.0, 1.0, -1.0], 9.0).unwrap() - golden).abs() < 1e-15);
@@ -147,23 +149,23 @@ mod tests {
         assert_eq!(first_root(&[f64::NAN, 1.0], 1.0), None);
     }
 
-    /// Up to 3 the last term of 1 - t^18 is 4e8 times the first, up to 1e9 it is 1e162 times the first.
+    /// For h = 3 the last term of 1 - t^18 is 4e8 times the first, for h = 1e9 1e162 times.
     #[test]
     fn where_terms_grow_the_first_root_is_found_as_well() {
         let mut a = [0.0; 19];
         (a[0], a[18]) = (1.0, -1.0);
         for h in [1.2, 3.0, 10.0, 1e9] {
             let root = first_root(&a, h).unwrap();
-            // A rounding of 1e-16 over the slope 18.
+            // Rounding of 1e-16 over the slope 18.
             assert!((root - 1.0).abs() < 1e-15, "{h}: {root:e}");
         }
-        // A lump next to a wall that it leaves: 1e-10 - 1e-9 t + 1e-2 t^2 has no root. With - t^3 it has one after 10 ms.
+        // A lump that leaves a nearby wall: 1e-10 - 1e-9 t + 1e-2 t^2 has no root. With - t^3 it has one after 10 ms.
         assert_eq!(first_root(&[1e-10, -1e-9, 1e-2], 10.0), None);
         let root = first_root(&[1e-10, -1e-9, 1e-2, -1.0], 10.0).unwrap();
         assert!((root - 1e-2).abs() < 2e-6, "{root}");
     }
 
-    /// Between a tangency from above and one root more there is the rounding of the value, 1e-16.
+    /// The rounding of the value, 1e-16, separates a tangency from above and one additional root.
     #[test]
     fn a_minimum_just_above_zero_is_no_root_and_one_just_below_is() {
         for h in [1.0, 10.0, 1e3] {
@@ -172,7 +174,7 @@ mod tests {
                 assert_eq!(first_root(&parabola(above), h), None, "{h} {above}");
                 let root = first_root(&parabola(-above), h).unwrap();
                 let want = 0.5 - above.sqrt();
-                // The value's rounding over the slope 2 sqrt(above).
+                // Rounding of the value over the slope 2 sqrt(above).
                 assert!((root - want).abs() < 1e-15 / above.sqrt(), "{h} {above}: {root}");
             }
         }
@@ -186,8 +188,8 @@ mod tests {
         }
     }
 
-    /// Polynomials of degree 8 against samples of them: no root is passed over, and every answer is a root. The terms decay, as
-    /// those of a series do, or grow up to 8^8.
+    /// Compares polynomials of degree 8 with samples: no root is missed, and every result is a root. The terms decay,
+    /// like those of a series, or grow up to 8^8.
     #[test]
     fn no_sample_before_the_first_root_is_below_zero() {
         let mut seed = 1u64;
@@ -202,7 +204,7 @@ mod tests {
             for k in 0..4500 {
                 let growth = [0.8, 0.8, 0.8, 3.0, 8.0][k % 5];
                 let mut a: [f64; 9] = core::array::from_fn(|_| between_ones());
-                // Near 0, so that roots are close to each other.
+                // Near 0, so that roots are close together.
                 a[0] = 0.03 * (1.0 + a[0]);
                 for (n, x) in a.iter_mut().enumerate() {
                     *x *= libm::pow(growth / h, n as f64);

@@ -1,16 +1,16 @@
 //! Power series in time: x(t) = x_0 + x_1 t + x_2 t^2 + ...
 //!
 //! Equations of motion are written once, as rules for coefficient n of each quantity from the
-//! coefficients up to n of the quantities it depends on. Order 0 of such a rule is the quantity
-//! itself at an instant; all orders together are the Taylor expansion that the integrator steps
-//! with; order 1 along a direction is the directional derivative.
+//! coefficients up to n of the quantities on which it depends. Order 0 of a rule is the quantity
+//! itself at an instant. All orders together are the Taylor expansion for the integrator. Order 1
+//! along a direction is the directional derivative.
 //!
-//! Source of the rules: the product (Cauchy) rule, and for f(u) the differential
-//! equation that f satisfies; see Jorba & Zou, Experimental Mathematics 14 (2005).
+//! Source of the rules: the product (Cauchy) rule, and for f(u) the differential equation that f
+//! satisfies. See Jorba & Zou, Experimental Mathematics 14 (2005).
 
 use crate::number::Number;
 
-/// The highest order kept.
+/// Highest order in use.
 pub const ORDER: usize = 18;
 
 /// Coefficients 0 to [`ORDER`].
@@ -19,8 +19,8 @@ pub type Series = [f64; ORDER + 1];
 /// All coefficients zero.
 pub const ZERO: Series = [0.0; ORDER + 1];
 
-/// The quantity at the start of an expansion; of a number that carries a derivative, the one along the
-/// direction that is coefficient 1.
+/// Returns the quantity at the start of an expansion. A number with a derivative takes coefficient 1 as the derivative
+/// along the direction.
 pub fn number<T: Number>(a: &Series) -> T {
     T::of(a[0], a[1])
 }
@@ -35,44 +35,44 @@ pub(crate) const RECIPROCAL: [f64; ORDER + 2] = {
     table
 };
 
-// The rules are always inlined: where the order n is a constant the compiler writes every sum
-// out (see `integrator.rs`), elsewhere they are loops.
+// The rules are always inlined. If the order n is a constant, the compiler writes every sum out
+// (see `integrator.rs`), otherwise they are loops.
 
-/// Coefficient n of a constant: the constant itself at order 0, then nothing.
+/// Returns coefficient n of a constant: the constant at order 0, otherwise 0.
 #[inline(always)]
 pub fn constant(n: usize, a: f64) -> f64 {
     if n == 0 { a } else { 0.0 }
 }
 
-/// Coefficient n + 1 of x from coefficient n of x'.
+/// Returns coefficient n + 1 of x from coefficient n of x'.
 #[inline(always)]
 pub fn next(n: usize, rate: f64) -> f64 {
     rate * RECIPROCAL[n + 1]
 }
 
-// Each sum has its newest coefficients, number n, last: they come out of other sums of this
-// order, and a processor adds up the rest while it waits for them. Where a rule is a loop, its
-// slices spare the processor a check of every index.
+// Each sum ends with its newest coefficients, number n. They come from other sums of this order,
+// and a processor adds up the rest while it waits for them. In rules that are loops, slices avoid a
+// bounds check of every index.
 
-/// Start value of a sum: adding -0 never changes a value, so the compiler can drop the addition. Adding +0 turns -0
+/// Start value of a sum. Adding -0 never changes a value, so the compiler can drop the addition. Adding +0 turns -0
 /// into +0.
 pub(crate) const EMPTY: f64 = -0.0;
 
-/// Sum of `term(j)` over 0 <= j <= n, ends last.
+/// Returns the sum of `term(j)` over 0 <= j <= n, with the ends last.
 #[inline(always)]
 pub(crate) fn sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
     let sum = (1..n).fold(EMPTY, |sum, j| sum + term(j)) + term(0);
     if n == 0 { sum } else { sum + term(n) }
 }
 
-/// Coefficient n of a b: sum of a_j b_(n-j).
+/// Returns coefficient n of a b: sum of a_j b_(n-j).
 #[inline(always)]
 pub fn mul(n: usize, a: &Series, b: &Series) -> f64 {
     let (a, b) = (&a[..=n], &b[..=n]);
     sum(n, |j| a[j] * b[n - j])
 }
 
-/// Coefficient n of a b without its term a_0 b_n.
+/// Returns coefficient n of a b without its term a_0 b_n.
 #[inline(always)]
 pub fn mul_tail(n: usize, a: &Series, b: &Series) -> f64 {
     let mut sum = EMPTY;
@@ -82,7 +82,7 @@ pub fn mul_tail(n: usize, a: &Series, b: &Series) -> f64 {
     sum
 }
 
-/// Coefficient n of a^2.
+/// Returns coefficient n of a^2.
 #[inline(always)]
 pub fn square(n: usize, a: &Series) -> f64 {
     if n == 0 {
@@ -96,14 +96,14 @@ pub fn square(n: usize, a: &Series) -> f64 {
     2.0 * (half + a[0] * a[n]) + middle
 }
 
-/// Coefficient n of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.
+/// Returns coefficient n of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.
 #[inline(always)]
 pub fn mul_ramp(n: usize, ramp: &[f64; 2], a: &Series) -> f64 {
     if n == 0 { ramp[0] * a[0] } else { ramp[0] * a[n] + ramp[1] * a[n - 1] }
 }
 
-/// Coefficient n >= 1 of f where f' = g u', from u's coefficient n and g's below n;
-/// `u_d` keeps the coefficients of u'.
+/// Returns coefficient n >= 1 of f, where f' = g u', from u's coefficient n and g's below n; `u_d`
+/// stores the coefficients of u'.
 #[inline(always)]
 pub fn chain(n: usize, u: f64, u_d: &mut Series, g: &Series) -> f64 {
     u_d[n - 1] = n as f64 * u;
@@ -114,14 +114,14 @@ pub fn chain(n: usize, u: f64, u_d: &mut Series, g: &Series) -> f64 {
     before * RECIPROCAL[n] + u * g[0]
 }
 
-/// Coefficient n of (sin a, cos a), from a's coefficient n and theirs below n; `a_d` keeps
+/// Returns coefficient n of (sin a, cos a), from a's coefficient n and theirs below n; `a_d` stores
 /// the coefficients of a'.
 #[inline(always)]
 pub fn sin_cos(n: usize, a: f64, a_d: &mut Series, s: &Series, c: &Series) -> (f64, f64) {
     if n == 0 { libm::sincos(a) } else { (chain(n, a, a_d, c), -chain(n, a, a_d, s)) }
 }
 
-/// Does something with `$N` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
+/// Evaluates an expression with `$N` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
 #[macro_export]
 macro_rules! for_each_order {
     ($N:ident => $do:block) => {
@@ -146,7 +146,7 @@ macro_rules! at_each_order {
     };
 }
 
-/// The values at t of several series cut after order n.
+/// Returns the values at t of several series up to order n.
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     let n = n.min(ORDER);
@@ -159,7 +159,7 @@ pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     sums
 }
 
-/// The integrals from 0 to t of several series cut after order n.
+/// Returns the integrals from 0 to t of several series up to order n.
 #[inline(always)]
 pub fn integrals<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     let n = n.min(ORDER);
@@ -181,7 +181,7 @@ mod tests {
         [0.3, 1.0, -0.5].get(n).copied().unwrap_or(0.0)
     }
 
-    // At t = 0.1 what is cut off is below rounding; a few ulp remain.
+    // At t = 0.1 the truncation error is below rounding; a few ulp remain.
     const ULPS: f64 = 4e-16;
 
     #[test]
@@ -205,7 +205,7 @@ mod tests {
         assert!((values([&c], ORDER, 0.1)[0] - f64::cos(0.395)).abs() < ULPS);
     }
 
-    /// Products of two cubics, whose coefficients are small integers and hence exact.
+    /// Products of two cubics with small integer coefficients, which are exact.
     #[test]
     fn the_rules_are_the_product_rule() {
         let (mut a, mut b) = (ZERO, ZERO);

@@ -1,8 +1,8 @@
 //! Power series of vectors in space and of quaternions.
 //!
-//! The rules are the product (Cauchy) rule. Each sum has its newest coefficients last, as in
-//! `series.rs`. The order N is a constant of a rule: that the compiler writes sums of vectors out before it
-//! puts them where they are used spares a seventieth of the instructions of a step.
+//! The rules are the product (Cauchy) rule. Each sum has its newest coefficients last, as in `series.rs`. The order N
+//! is a constant parameter of a rule. The compiler then writes sums of vectors out before it inlines them, which saves
+//! a seventieth of the instructions of a step.
 
 use crate::series::{EMPTY, ORDER, RECIPROCAL, Series};
 use crate::vector::{self, Vec3};
@@ -13,14 +13,14 @@ pub type Vector = [Vec3; ORDER + 1];
 /// All coefficients zero.
 pub const ZERO_VECTOR: Vector = [[0.0; 3]; ORDER + 1];
 
-/// Coefficient N + 1 of x from coefficient N of x'.
+/// Returns coefficient N + 1 of x from coefficient N of x'.
 #[inline(always)]
 pub fn next<const N: usize>(rate: Vec3) -> Vec3 {
     vector::scale(RECIPROCAL[N + 1], rate)
 }
 
-/// Coefficients of two vectors that most rules treat alike: `[n][i]` is component i of both,
-/// so that a processor does both at once, from memory aligned for it.
+/// Coefficients of two vectors that most rules treat equally: `[n][i]` is component i of both, so
+/// that a processor computes both at once, from aligned memory.
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Pair([[[f64; 2]; 3]; ORDER + 1]);
@@ -35,7 +35,7 @@ impl Pair {
         self.0[n] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
     }
 
-    /// Coefficient n of the one and of the other.
+    /// Returns coefficient n of both.
     #[inline(always)]
     pub fn get(&self, n: usize) -> [Vec3; 2] {
         let [x, y, z] = self.0[n];
@@ -48,7 +48,7 @@ impl Pair {
         self.0[n + 1] = rates.map(|pair| pair.map(|rate| rate * RECIPROCAL[n + 1]));
     }
 
-    /// The values at t of both series cut after order n.
+    /// Returns the values at t of both series up to order n.
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [Vec3; 2] {
         let mut sum = self.0[n];
@@ -62,7 +62,7 @@ impl Pair {
     }
 }
 
-/// Coefficient N of a.a.
+/// Returns coefficient N of a.a.
 #[inline(always)]
 pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
     let mut half = [EMPTY; 3];
@@ -75,10 +75,11 @@ pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
     2.0 * (half[0] + half[1] + half[2]) + middle
 }
 
-/// Coefficient N of the six different products of components: xx, yy, zz, xy, xz, yz.
+/// Returns coefficient N of the six different products of components: xx, yy, zz, xy, xz, yz.
 #[inline(always)]
 pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
-    // Terms j and N - j together: 2 a_j b_(N-j) of a square, a_j b_(N-j) + a_(N-j) b_j of the rest.
+    // Terms j and N - j together: 2 a_j b_(N-j) for a square, a_j b_(N-j) + a_(N-j) b_j for the
+    // other products.
     let mut sum = [EMPTY; 6];
     for j in (0..N.div_ceil(2)).rev() {
         let (a, b) = (a[j], a[N - j]);
@@ -102,7 +103,7 @@ pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     sum
 }
 
-/// Coefficient N of a b, b a vector.
+/// Returns coefficient N of a b, with b a vector.
 #[inline(always)]
 pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     let mut sum = scale_head::<N>(a, b);
@@ -112,7 +113,7 @@ pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Coefficient N of a b, b a vector, without its term a_N b_0.
+/// Returns coefficient N of a b, with b a vector, without its term a_N b_0.
 #[inline(always)]
 pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     let mut sum = [EMPTY; 3];
@@ -124,7 +125,7 @@ pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Coefficient N of a.b without its term a_0.b_N.
+/// Returns coefficient N of a.b without its term a_0.b_N.
 #[inline(always)]
 pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
     let mut sum = [EMPTY; 3];
@@ -136,7 +137,7 @@ pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
     sum[0] + sum[1] + sum[2]
 }
 
-/// Coefficient N of a x b.
+/// Returns coefficient N of a x b.
 #[inline(always)]
 pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
     let mut sum = [EMPTY; 3];
@@ -149,10 +150,10 @@ pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Coefficient N of a x b and of c x d as a pair, for the pairs (a, c) and (b, d). It stays a
-/// pair: taken apart at once, a compiler would rather vectorise across the components.
-// A function of its own: inlined, its lanes are regrouped with the code around it and a
-// tenth more instructions result.
+/// Returns coefficient N of a x b and of c x d as a pair, for the pairs (a, c) and (b, d). The
+/// result stays a pair, because a compiler would otherwise vectorise across the components. The
+/// function is not inlined: its lanes would be regrouped with the surrounding code, which takes a
+/// tenth more instructions.
 #[inline(never)]
 pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     let mut sum = [[EMPTY; 2]; 3];
@@ -167,28 +168,28 @@ pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     sum
 }
 
-/// Coefficient N of a + a' t.
+/// Returns coefficient N of a + a' t.
 #[inline(always)]
 pub fn ramp<const N: usize>(a: &[Vec3; 2]) -> Vec3 {
     if N < 2 { a[N] } else { [0.0; 3] }
 }
 
-/// Coefficient N of a.b, where a is `ramp[0] + ramp[1] t`.
+/// Returns coefficient N of a.b, where a is `ramp[0] + ramp[1] t`.
 #[inline(always)]
 pub fn dot_ramp<const N: usize>(ramp: &[Vec3; 2], b: &Vector) -> f64 {
     let first = vector::dot(ramp[0], b[N]);
     if N == 0 { first } else { first + vector::dot(ramp[1], b[N - 1]) }
 }
 
-/// Coefficient N of a x b, where b is `ramp[0] + ramp[1] t`.
+/// Returns coefficient N of a x b, where b is `ramp[0] + ramp[1] t`.
 #[inline(always)]
 pub fn cross_ramp<const N: usize>(a: &Vector, ramp: &[Vec3; 2]) -> Vec3 {
     let first = vector::cross(a[N], ramp[0]);
     if N == 0 { first } else { vector::add(first, vector::cross(a[N - 1], ramp[1])) }
 }
 
-/// Coefficients of a quaternion (a, b, c, d), as the pairs whose multiples by the components of
-/// w make its rate: (-b, a), (c, d), (-d, c), (a, b).
+/// Coefficients of a quaternion (a, b, c, d), stored as the pairs whose multiples by the components
+/// of w give its rate: (-b, a), (c, d), (-d, c), (a, b).
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Attitude([[[f64; 2]; 4]; ORDER + 1]);
@@ -209,14 +210,14 @@ impl Attitude {
         self.set(n + 1, rate.map(|rate| rate * RECIPROCAL[n + 1]));
     }
 
-    /// Coefficient n.
+    /// Returns coefficient n.
     #[inline(always)]
     pub fn get(&self, n: usize) -> [f64; 4] {
         let [_, [c, d], _, [a, b]] = self.0[n];
         [a, b, c, d]
     }
 
-    /// The value at t of the series cut after order n.
+    /// Returns the value at t of the series up to order n.
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [f64; 4] {
         let mut sum = self.get(n);
@@ -230,11 +231,11 @@ impl Attitude {
     }
 }
 
-/// Coefficient N of q' = q o (0, w)/2 (Hamilton's product), where `w` is the pair (w, w).
-// A function of its own, as `cross_pair`.
+/// Returns coefficient N of q' = q o (0, w)/2 (Hamilton's product), where `w` is the pair (w, w).
+/// The function is not inlined, for the same reason as `cross_pair`.
 #[inline(never)]
 pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
-    // Not `EMPTY`: who rests turns at 0, not at -0.
+    // Not `EMPTY`: a body at rest has the rate 0, not -0.
     let (mut ab, mut cd) = ([0.0; 2], [0.0; 2]);
     for j in 0..N + 1 {
         let (q, [x, y, z]) = (&q.0[N - j], &w.0[j]);
@@ -246,7 +247,7 @@ pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
     [0.5 * ab[0], 0.5 * ab[1], 0.5 * cd[0], 0.5 * cd[1]]
 }
 
-/// The value at t of the series cut after order n.
+/// Returns the value at t of the series up to order n.
 #[inline(always)]
 pub fn value<const D: usize>(a: &[[f64; D]; ORDER + 1], n: usize, t: f64) -> [f64; D] {
     a[..=n].iter().rev().fold([0.0; D], |mut sum, x| {
@@ -263,7 +264,7 @@ mod tests {
     use crate::for_each_order;
     use crate::series::ZERO;
 
-    /// Turning at a constant rate: q' = q o (0, w)/2 and y' = -w x y have closed forms.
+    /// At a constant rate, q' = q o (0, w)/2 and y' = -w x y have closed forms.
     #[test]
     fn a_constant_rate_turns_attitude_and_components_by_rodrigues_formula() {
         let rate = [0.3, -0.8, 0.5];
@@ -282,7 +283,7 @@ mod tests {
         let (q, y_t) = (q.value(ORDER, t), value(&y, ORDER, t));
         let (sin, cos) = (f64::sin(size * t / 2.0), f64::cos(size * t / 2.0));
         let exact = [cos, rate[0] / size * sin, rate[1] / size * sin, rate[2] / size * sin];
-        // |w| t = 0.4: what is cut off is below rounding, a few ulp remain.
+        // |w| t = 0.4: the truncation error is below rounding, a few ulp remain.
         for (got, exact) in q.iter().zip(exact) {
             assert!((got - exact).abs() < 4e-16, "{got} {exact}");
         }
@@ -332,7 +333,7 @@ mod tests {
         assert_eq!(cross_ramp::<2>(&b, &line), second);
     }
 
-    /// Products of two cubics, whose coefficients are small integers and hence exact.
+    /// Products of two cubics with small integer coefficients, which are exact.
     #[test]
     fn the_rules_are_the_product_rule() {
         let a: [Vec3; 4] = [[1.0, 2.0, -1.0], [3.0, 0.0, 2.0], [0.0, -2.0, 5.0], [4.0, 1.0, 1.0]];

@@ -1,8 +1,8 @@
-//! Vectors of three components, matrices and rotations, of values or of what carries a derivative.
+//! Vectors of three components, matrices and rotations, over values or derivatives.
 
 use crate::number::Number;
 
-/// A column of three components.
+/// A column vector of three components.
 pub type Vec3<T = f64> = [T; 3];
 
 /// A matrix by rows.
@@ -11,7 +11,7 @@ pub type Mat3<T = f64> = [[T; 3]; 3];
 /// A unit quaternion, scalar first.
 pub type Quaternion<T = f64> = [T; 4];
 
-/// Three components of an array from `at` on.
+/// Returns three components of an array from index `at` on.
 #[inline(always)]
 pub fn part(x: &[f64], at: usize) -> Vec3 {
     [x[at], x[at + 1], x[at + 2]]
@@ -59,27 +59,27 @@ pub fn transposed_times<T: Number>(a: &Mat3<T>, b: Vec3<T>) -> Vec3<T> {
     [0, 1, 2].map(|i| a[0][i] * b[0] + a[1][i] * b[1] + a[2][i] * b[2])
 }
 
-/// A vector that depends on nothing.
+/// Returns a constant vector.
 pub fn constant<T: Number>(a: Vec3) -> Vec3<T> {
     a.map(T::constant)
 }
 
-/// The largest component's size; unlike `f64::max` it lets a NaN by only to where it ends the
-/// step.
+/// Returns the magnitude of the largest component. Unlike `f64::max` it does not lose a NaN, which
+/// ends the step.
 #[inline(always)]
 pub fn largest(a: Vec3) -> f64 {
     let larger = |a: f64, b: f64| if b > a { b } else { a };
     larger(larger(a[0].abs(), a[1].abs()), a[2].abs())
 }
 
-/// Length of a vector.
+/// Returns the length of a vector.
 #[inline(always)]
 pub fn norm<T: Number>(a: Vec3<T>) -> T {
     dot(a, a).sqrt()
 }
 
-/// A rotation's matrix: with q from frame B to frame A, columns of B components become
-/// columns of A components.
+/// Returns the matrix of a rotation. With q from frame B to frame A, it maps components in B to
+/// components in A.
 #[inline(always)]
 pub fn rotation<T: Number>(q: &Quaternion<T>) -> Mat3<T> {
     let [w, x, y, z] = *q;
@@ -101,21 +101,21 @@ pub fn unit_quaternion<T: Number>(q: Quaternion<T>) -> Quaternion<T> {
     q.map(|x| x * share)
 }
 
-/// Derivative of q/|q| in the direction dq, for the unit quaternion `unit` = q/|q|.
+/// Returns the derivative of q/|q| in the direction dq, for the unit quaternion `unit` = q/|q|.
 pub fn unit_quaternion_slope(unit: &Quaternion, q: &Quaternion, dq: &Quaternion) -> Quaternion {
     let dot = |a: &Quaternion, b: &Quaternion| (0..4).map(|i| a[i] * b[i]).sum::<f64>();
     let (along, size) = (dot(unit, dq), libm::sqrt(dot(q, q)));
     core::array::from_fn(|i| (dq[i] - unit[i] * along) / size)
 }
 
-/// A direction p and its rate p', with |p| = 1 and p.p' = 0 made so.
+/// Returns the direction p and its rate p', corrected to |p| = 1 and p.p' = 0.
 #[inline(always)]
 pub fn on_sphere<T: Number>(p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
     let unit = scale(norm(p).recip(), p);
     [unit, sub(p_d, scale(dot(unit, p_d), unit))]
 }
 
-/// Derivative of [`on_sphere`] in the direction (dp, dp').
+/// Returns the derivative of [`on_sphere`] in the direction (dp, dp').
 pub fn on_sphere_slope(p: Vec3, p_d: Vec3, dp: Vec3, dp_d: Vec3) -> [Vec3; 2] {
     let [unit, _] = on_sphere(p, p_d);
     let d_unit = scale(1.0 / norm(p), sub(dp, scale(dot(unit, dp), unit)));
@@ -148,7 +148,7 @@ mod tests {
         assert_eq!(constant::<f64>(A), A);
     }
 
-    /// A quarter turn about each axis, and about a slanted one Rodrigues' formula.
+    /// Quarter turns about each axis, and Rodrigues' formula about an oblique one.
     #[test]
     fn a_quaternion_turns_by_its_angle_about_its_axis() {
         let turned = |axis: Vec3, angle: f64, x: Vec3| {
@@ -175,11 +175,11 @@ mod tests {
         let [p, p_d] = on_sphere(A, B);
         assert!((norm(p) - 1.0).abs() < 1e-15 && dot(p, p_d).abs() < 1e-15);
         assert!(norm(cross(p, A)) < 1e-15 && dot(p, A) > 0.0);
-        // What is along p has gone from the rate, nothing else.
+        // Only the component along p is removed from the rate.
         assert!(norm(sub(sub(B, p_d), scale(dot(p, B), p))) < 1e-15);
     }
 
-    /// The derivatives by hand against those of the formula over dual numbers.
+    /// Compares the derivatives by hand with those of the formula over dual numbers.
     #[test]
     fn slopes_are_the_derivatives_of_what_they_belong_to() {
         let (q, dq) = ([0.9, -0.1, 0.5, 0.3], [0.2, 0.7, -0.4, 0.1]);
