@@ -1,5 +1,5 @@
-//! Accuracy and time of every tank of `tests/tanks.json`: deviation from the reference over five modes
-//! beside the error that is stated, and the least time of some repetitions on one core.
+//! Measures accuracy and time for every tank of `tests/tanks.json`: deviation from the reference over five modes,
+//! stated error, and the shortest time of several repetitions on one core.
 //!
 //! `cargo run --release -p hubslosh-tank --example accuracy [REPETITIONS [NAME]]`
 

@@ -1,4 +1,4 @@
-//! Tanks whose modes are known in closed form: upright circular and annular cylinders, boxes.
+//! Tanks with modes in closed form: upright circular and annular cylinders, boxes.
 //!
 //! Heights in the formulas are above the flat bottom. Separation of variables; the cylinder as in
 //! Abramson, NASA SP-106, and Dodge (2000).
@@ -10,14 +10,14 @@ use crate::curve::Segment;
 use crate::gauss::Gauss;
 use crate::modal::{Axes, Axis, ModalData, Mode, Surface, WallSpeed, rest};
 
-/// Terms of the sums over all modes; [`tail`] has the others.
+/// Number of terms in the sums over all modes; [`tail`] estimates the remaining terms.
 const TERMS: usize = 400;
 /// Error of the closed forms: the tails of the sums and rounding.
 const ERROR: f64 = 1e-11;
 
-/// Sum of tanh(k h/2)/k^5 over the wave numbers beyond `last`, `step` apart: the midpoint rule read from right to left,
-/// (1/step) int dk, with u = 1/k. The terms fall as k^-5 where k h is large, and as k^-4 only where it is small: in
-/// shallow liquid what follows 400 terms is 4e-10 m R^2.
+/// Returns the sum of tanh(k h/2)/k^5 over the wave numbers beyond `last`, `step` apart, by the midpoint rule in
+/// reverse, (1/step) int dk, with u = 1/k. The terms fall as k^-5 for large k h and as k^-4 for small k h. In shallow
+/// liquid the terms after 400 add 4e-10 m R^2.
 fn tail(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);
@@ -33,7 +33,8 @@ fn y1_slope(x: f64) -> f64 {
     libm::y0(x) - libm::y1(x) / x
 }
 
-/// The first `count` zeros xi_n of J1', by Newton's method (J1'' = -J1'/x - (1 - 1/x^2) J1).
+/// Returns the first `count` zeros xi_n of J1', by Newton's method (J1'' = -J1'/x - (1 - 1/x^2)
+/// J1).
 pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     let zero = |n: usize| {
         // McMahon: b - 7/(8 b), b = (n - 1/4) pi (DLMF 10.21.20)
@@ -48,8 +49,8 @@ pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     (1..=count).map(zero).collect()
 }
 
-/// lambda = k tanh(k h), bob at h - (2/k) tanh(k h/2): every tank with vertical walls and a flat
-/// bottom, k the wave number of its mode.
+/// Returns a mode of a tank with vertical walls and a flat bottom: lambda = k tanh(k h), bob at h -
+/// (2/k) tanh(k h/2), with the wave number k.
 fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
     let lambda = k * (k * h).tanh();
     let height = h - 2.0 / k * (0.5 * k * h).tanh();
@@ -64,8 +65,8 @@ fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, 
     )
 }
 
-/// Shape of a mode of wave number k, sampled over the surface, and its speed along the outer wall:
-/// sinh(k z)/sinh(k h).
+/// Returns the shape of a mode of wave number k, sampled over the surface, and its speed along the
+/// outer wall: sinh(k z)/sinh(k h).
 fn sampled([inner, outer]: [f64; 2], k: f64, h: f64, elevation: impl Fn(f64) -> f64) -> Surface {
     let count = 200;
     let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
@@ -84,7 +85,7 @@ fn sampled([inner, outer]: [f64; 2], k: f64, h: f64, elevation: impl Fn(f64) -> 
     }
 }
 
-/// sinh(x)/cosh(y) for 0 <= x <= 2 y without overflow, and the like: values over cosh(kh)^2.
+/// Ratios such as sinh(x)/cosh(y) for 0 <= x <= 2 y without overflow: values over cosh(kh)^2.
 struct Hyperbolic {
     /// 1/cosh(kh)^2
     floor: f64,
@@ -102,7 +103,7 @@ impl Hyperbolic {
     }
 }
 
-/// Upright circular cylinder of radius `radius` filled to `h`, m; `rho` in kg/m³.
+/// Solves an upright circular cylinder of radius `radius` filled to `h`, m; `rho` in kg/m³.
 ///
 ///   m_n/m_liq = 2 R tanh(kh)/(xi (xi^2 - 1) h),  k = xi/R,  wave 2 R/(xi^2 - 1)
 ///   I_eff/m_liq = h^2/12 - 3 R^2/4 + (16 R^3/h) sum tanh(k h/2)/(xi^3 (xi^2 - 1))
@@ -133,12 +134,13 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     upright([0.0, r], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Zeros k of C'(R_i), C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R), 1/m.
+/// Returns the zeros k of C'(R_i), C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R), 1/m.
 pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     let slope = |k: f64| {
         j1_slope(k * inner) * y1_slope(k * outer) - y1_slope(k * inner) * j1_slope(k * outer)
     };
-    // Zeros are 1/(mean radius) and pi/(outer - inner) from each other and from 0, or farther.
+    // The distances of the zeros from each other and from 0 are at least 1/(mean radius) and
+    // pi/(outer - inner).
     let step = 0.1 / outer;
     let mut found = Vec::with_capacity(count);
     let mut k = 0.5 / outer;
@@ -163,7 +165,7 @@ pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     found
 }
 
-/// Upright annular cylinder between the radii `inner` and `outer`, filled to `h`, m.
+/// Solves an upright annular cylinder between the radii `inner` and `outer`, filled to `h`, m.
 ///
 ///   A = [r C]/k^2,  N = [(r^2 - 1/k^2) C^2]/2  (from R_i to R),  m_n = rho pi lambda A^2/N
 ///   I_eff = rho pi {(R^2 - R_i^2) h^3/12 - (3/4) h (R^4 - R_i^4) + sum (8 A^2/(N k)) tanh(k h/2)}
@@ -197,7 +199,7 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
                 surface.shape.iter().copied().max_by(|x, y| x[1].abs().total_cmp(&y[1].abs()));
             surface.peak = peak;
         }
-        // floor: k^2 N/cosh^2; a wall at R: R C^2 int (k^2 sinh^2 + cosh^2/R^2) dz/cosh^2
+        // floor: k^2 N/cosh^2; wall at R: R C^2 int (k^2 sinh^2 + cosh^2/R^2) dz/cosh^2
         let t = Hyperbolic::new(k, h);
         let at_wall = |r: f64, c: f64| {
             r * c
@@ -211,7 +213,7 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
         mode.lambda_r = Some(mode.lambda * ro);
         mode
     };
-    // tanh(k h/2)/k^5 times what tends to a constant, odd and even terms each to their own
+    // tanh(k h/2)/k^5 times a factor with a constant limit, separately for odd and even terms
     let weight = |x: &Radial| 8.0 * x.a * x.a / x.n * x.k.powi(4);
     let terms = all.iter().map(|x| weight(x) * (0.5 * x.k * h).tanh() / x.k.powi(5));
     let apart = 2.0 * PI / (ro - ri);
@@ -228,8 +230,8 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
     upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Result for a tank of revolution with vertical walls; `inertias` rigid across and about the axis,
-/// effective.
+/// Returns the result for a tank of revolution with vertical walls; `inertias` are rigid across and
+/// about the axis, and effective.
 fn upright(
     [r_inner, r_outer]: [f64; 2],
     h: f64,
@@ -248,7 +250,7 @@ fn upright(
     data
 }
 
-/// Box, `length` along the motion and `width` across it, filled to `h`, m: one axis.
+/// Solves a box, `length` along the motion and `width` across it, filled to `h`, m, along one axis.
 ///
 ///   k = (2 n - 1) pi/a,  m_n/m_liq = 8 tanh(kh)/(a^2 h k^3),  wave 4/(a k^2)
 ///   I_eff/m_liq = h^2/12 - a^2/4 + (64/(a^2 h)) sum tanh(k h/2)/k^5
@@ -279,8 +281,9 @@ pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis
     }
 }
 
-/// Effective inertia per mass of a full rectangle a x b that turns in its plane about its centre:
-/// b^2/12 - a^2/4 + (64/(a^2 b)) sum tanh(k b/2)/k^5, k = (2 n - 1) pi/a. Symmetric in a and b.
+/// Returns the effective inertia per mass of a full rectangle a x b that rotates in its plane about
+/// its centre: b^2/12 - a^2/4 + (64/(a^2 b)) sum tanh(k b/2)/k^5, k = (2 n - 1) pi/a. It is
+/// symmetric in a and b.
 fn effective(a: f64, b: f64) -> f64 {
     let sum: f64 = (0..TERMS)
         .map(|n| {
@@ -292,14 +295,14 @@ fn effective(a: f64, b: f64) -> f64 {
     b * b / 12.0 - 0.25 * a * a + 64.0 / (a * a * b) * sum
 }
 
-/// Inertia of the liquid that a box of `length_x` x `length_y` drags along when it turns about its
-/// vertical axis, filled to `h`, kg·m²: `tank.I_own` of a hub that turns. The twisting modes of the
-/// surface are counted as rigid.
+/// Returns the inertia of the liquid that rotates with a box of `length_x` x `length_y` about its
+/// vertical axis, filled to `h`, kg·m²: `tank.I_own` in HubSlosh. The twisting modes of the surface
+/// count as rigid.
 pub fn box_yaw_inertia(length_x: f64, length_y: f64, h: f64, rho: f64) -> f64 {
     rho * length_x * length_y * h * effective(length_x, length_y)
 }
 
-/// Box of `length_x` x `length_y`, filled to `h`, m.
+/// Solves a box of `length_x` x `length_y`, filled to `h`, m.
 pub fn rectangular(length_x: f64, length_y: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     let x = box_axis(length_x, length_y, h, rho, modes);
     let y = box_axis(length_y, length_x, h, rho, modes);

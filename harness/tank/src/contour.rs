@@ -1,4 +1,4 @@
-//! The generating curve of a tank: checks, and the part that the liquid wets.
+//! The generating curve of a tank: its checks and its wetted part.
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use core::fmt;
 use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
 use crate::gauss::Gauss;
 
-/// Everything that is wrong with an input, one sentence each.
+/// All problems of an input, one sentence each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problems(pub Vec<String>);
 
 /// Largest file of a tank or of a drawing, bytes.
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// The text of a regular file: a named pipe would be waited for, a device may never end.
+/// Reads the text of a regular file. A named pipe could block, and a device may never end.
 pub(crate) fn read_text(path: &Path) -> Result<String, Problems> {
     let problem =
         |why: String| Problems::from(format!("Could not read {}: {why}.", path.display()));
@@ -42,16 +42,16 @@ impl From<String> for Problems {
     }
 }
 
-/// Larger tanks are taken for a drawing in millimetres, m.
+/// Largest size, m. Larger tanks are probably drawn in millimetres.
 pub(crate) const LARGEST: f64 = 100.0;
-/// Ends of segments are joined if they are closer than this, over the tank's size.
+/// Largest distance of the ends of two segments that are joined, over the tank's size.
 const JOINED: f64 = 1e-6;
-/// Heights this close, over the tank's size, are the same.
+/// Largest difference of equal heights, over the tank's size.
 const LEVEL: f64 = 1e-9;
 
-/// The generating curve of a whole tank in the half plane (r, z), lengths in m: from the axis, or
-/// from the top of an inner wall, along the bottom and up the outer wall to its top; with r to the
-/// right and z up, counter-clockwise around the liquid.
+/// The generating curve of a whole tank in the half plane (r, z), lengths in m. It runs from the
+/// axis, or from the top of an inner wall, along the bottom and up the outer wall to its top, with
+/// r to the right and z up, counter-clockwise around the liquid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
     segments: Vec<Segment>,
@@ -73,9 +73,10 @@ pub struct Wall {
     pub z_surface: f64,
 }
 
-/// A horizontal part of the wall this close to the free surface, over the tank's size, is refused.
+/// Distance from the free surface, over the tank's size, within which a horizontal part of the wall
+/// is refused.
 const SHOULDER: f64 = 1e-6;
-/// Least sine of the wall's angle with the free surface.
+/// Smallest allowed sine of the wall's angle with the free surface.
 const STEEP: f64 = 1e-3;
 
 /// Crossing of a contour with a height.
@@ -90,8 +91,8 @@ impl Contour {
     /// Checks the segments.
     ///
     /// # Errors
-    /// Every defect: values that are not finite, radii below 0, segments without length, gaps,
-    /// self-crossing, clockwise order, a size beyond 100 m.
+    /// All defects: values that are not finite, radii below 0, segments without length, gaps,
+    /// self-crossing, clockwise order, a size above 100 m.
     pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
         let mut problems = Vec::new();
         if segments.is_empty() {
@@ -176,20 +177,20 @@ impl Contour {
         self.bottom
     }
 
-    /// The largest fill, m above the lowest point: the end of the outer wall.
+    /// Returns the largest fill, m above the lowest point: the end of the outer wall.
     pub fn depth(&self) -> f64 {
         let end = self.segments[self.segments.len() - 1].end();
         let start = self.segments[0].start();
         let brim = if start[0] > 0.0 { end[1].min(start[1]) } else { end[1] };
-        // A torus ends where it begins; a closed tank on the axis.
+        // A torus ends at its start, a closed tank on the axis.
         (if start == end { self.top } else { brim }) - self.bottom
     }
 
-    /// Volume below `fill`, m above the lowest point, m3, all pools together: pi int r^2 dz along the wall,
-    /// up the outer and down the inner one.
+    /// Returns the volume below `fill`, m above the lowest point, m3, of all pools together: pi int r^2 dz along the
+    /// wall, up the outer and down the inner one.
     fn volume_below(&self, fill: f64) -> f64 {
         let z = self.bottom + fill;
-        // exact for r^2 dz of lines and cubics; 128 pieces of an arc leave 1e-15
+        // exact for r^2 dz of lines and cubics; for an arc in 128 pieces the error is 1e-15
         let rule = Gauss::new(5);
         let mut volume = 0.0;
         for segment in &self.segments {
@@ -229,13 +230,13 @@ impl Contour {
         volume
     }
 
-    /// Volume of the whole tank, m3: up to the largest fill.
+    /// Returns the volume of the whole tank up to the largest fill, m3.
     pub fn capacity(&self) -> f64 {
         self.volume_below(self.depth())
     }
 
-    /// The fill, m above the lowest point, below which the tank has this volume, m3; 0 for none, the largest
-    /// fill for all that the tank holds, and for more.
+    /// Returns the fill, m above the lowest point, below which the tank has this volume, m3. Returns 0 for no volume,
+    /// and the largest fill for the tank's whole volume and more.
     pub(crate) fn fill_of(&self, volume: f64) -> f64 {
         let depth = self.depth();
         if volume <= 0.0 {
@@ -256,7 +257,7 @@ impl Contour {
         0.5 * (low + high)
     }
 
-    /// The whole wall, if it ends at the axis or where it began: the tank can be full.
+    /// Returns the whole wall if the tank can be full: the wall ends at the axis or at its start.
     pub(crate) fn closed(&self) -> Option<Wall> {
         let (start, end) = (self.segments[0].start(), self.segments[self.segments.len() - 1].end());
         let on_axis = start[0] <= LEVEL * self.size && end[0] <= LEVEL * self.size;
@@ -269,11 +270,11 @@ impl Contour {
         })
     }
 
-    /// The wetted wall at `fill`, m above the lowest point.
+    /// Returns the wetted wall at `fill`, m above the lowest point.
     ///
     /// # Errors
-    /// A fill that is not positive or above the top, separate pools, a free surface at a
-    /// horizontal part of the wall or of no width.
+    /// A fill that is not positive or above the top, separate pools, a free surface at a horizontal
+    /// part of the wall or of zero width.
     pub fn cut(&self, fill: f64) -> Result<Wall, Problems> {
         if !fill.is_finite() {
             return Err(format!("The fill is {fill}; it must be a height in metres.").into());
@@ -292,7 +293,7 @@ impl Contour {
             .into());
         }
         let mut z = self.bottom + fill;
-        // A contact line at a joint is at the joint.
+        // A contact line near a joint is moved to the joint.
         for segment in &self.segments {
             for end in [segment.start(), segment.end()] {
                 if (end[1] - z).abs() < LEVEL * self.size {
@@ -301,7 +302,7 @@ impl Contour {
             }
         }
         let (down, up) = self.contact_lines(z, fill)?;
-        // Next to a shoulder a little more liquid has another free surface.
+        // Near a shoulder a small change of the fill changes the free surface.
         let radius = |c: Crossing| self.segments[c.segment].curve.at(c.t)[0];
         let radii =
             |(down, up): (Option<Crossing>, Crossing)| [down.map_or(-1.0, radius), radius(up)];
@@ -346,10 +347,10 @@ impl Contour {
         Ok(Wall { segments: wall, r_outer: end[0], r_inner, z_surface: z })
     }
 
-    /// The inner and the outer contact line at height z.
+    /// Returns the inner and the outer contact line at height z.
     fn contact_lines(&self, z: f64, fill: f64) -> Result<(Option<Crossing>, Crossing), Problems> {
         let crossings = self.crossings(z);
-        // Above the brim of an inner wall, where only a shoulder is looked for.
+        // Above the brim of an inner wall only a shoulder matters.
         let start = self.segments[0].start();
         let level = LEVEL * self.size;
         if start[1] < z - level && start[0] > level {
@@ -361,15 +362,15 @@ impl Contour {
             [] => Err(shoulder(fill)),
             _ => Err(format!(
                 "At a fill of {fill} m the height of the free surface passes through the contour {} times: \
-                 separate pools or trapped gas, which one set of modes does not describe.",
+                 separate pools or trapped gas, which one set of modes cannot represent.",
                 crossings.len()
             )
             .into()),
         }
     }
 
-    /// All places where the contour passes through the height z, in its order. A point exactly at z
-    /// counts as above.
+    /// Returns all positions where the contour passes through the height z, in its order. A point
+    /// exactly at z counts as above.
     fn crossings(&self, z: f64) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();
         let level = LEVEL * self.size;
@@ -418,7 +419,7 @@ fn shoulder(fill: f64) -> Problems {
     .into()
 }
 
-/// Error in one segment by itself.
+/// Returns the defect of a single segment.
 fn defect(segment: &Segment) -> Option<String> {
     let numbers: Vec<f64> = match segment.curve {
         Curve::Line { from, to } => vec![from[0], from[1], to[0], to[1]],
@@ -451,7 +452,7 @@ fn defect(segment: &Segment) -> Option<String> {
     None
 }
 
-/// A closed curve away from the axis (a torus) may begin anywhere; it is made to begin at its top.
+/// Makes a closed curve away from the axis (a torus), which may begin anywhere, begin at its top.
 fn from_the_top(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
     let (start, end) = (segments[0].start(), segments[segments.len() - 1].end());
     if norm(sub(start, end)) > JOINED * size || start[0] <= JOINED * size {
@@ -470,7 +471,7 @@ fn from_the_top(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
     turned
 }
 
-/// Number of intervals that a segment is sampled with.
+/// Returns the number of intervals for sampling a segment.
 fn samples(segment: &Segment) -> usize {
     match segment.curve {
         Curve::Line { .. } => 1,
@@ -479,8 +480,8 @@ fn samples(segment: &Segment) -> usize {
     }
 }
 
-/// Minimum of `sign` z on a segment and its position as a fraction of the parameter, by golden section around the lowest
-/// sample.
+/// Returns the minimum of `sign` z on a segment and its position as a fraction of the parameter, by golden section
+/// around the lowest sample.
 fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let count = samples(segment);
     let height = |s: f64| sign * segment.at(s.clamp(0.0, 1.0))[1];
@@ -502,7 +503,7 @@ fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     places.into_iter().fold((at, f64::MAX), |low, x| if x.1 < low.1 { x } else { low })
 }
 
-/// The contour as short straight lines, to find what does not depend on their bulge.
+/// The contour as short straight lines, for checks that do not depend on their curvature.
 struct Outline {
     points: Vec<Vec<Point>>,
 }
@@ -525,13 +526,14 @@ impl Outline {
         r.1.max(z.1 - z.0)
     }
 
-    /// Area to the left of the contour, closed along the axis or straight from end to start.
+    /// Returns the area to the left of the contour, closed along the axis or straight from end to
+    /// start.
     fn area(&self) -> f64 {
         let all: Vec<Point> = self.points.iter().flatten().copied().collect();
         let (first, last) = (all[0], all[all.len() - 1]);
         let mut sum: f64 = all.windows(2).map(|p| cross(p[0], p[1])).sum();
         if first[0] <= 1e-9 * self.size() {
-            // up the outer wall's end, to the axis and down
+            // from the end of the outer wall to the axis and down
             let corner = [0.0, last[1]];
             sum += cross(last, corner) + cross(corner, first);
         } else {
@@ -540,7 +542,7 @@ impl Outline {
         0.5 * sum
     }
 
-    /// A crossing of two parts: segments and place.
+    /// Returns a crossing of two parts: their segments and the point.
     fn crossing(&self) -> Option<(usize, usize, Point)> {
         let lines: Vec<(usize, Point, Point)> = self
             .points
@@ -591,8 +593,8 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Volume integrals of the liquid below the free surface, by Gauss' theorem along the wall: the volume is
-    /// pi int r^2 dz, and so on.
+    /// Computes the volume integrals of the liquid below the free surface, by Gauss's theorem along the wall. The
+    /// volume is pi int r^2 dz; the others are similar.
     pub fn of(wall: &Wall) -> Volume {
         let rule = Gauss::new(20);
         let base = wall.z_surface;
@@ -626,13 +628,13 @@ impl Volume {
 mod tests {
     use super::*;
 
-    /// -R at -90 degrees, between two of an arc's samples, and at the ends of others.
+    /// The minimum -R at -90 degrees is between two samples of one arc, and at the ends of others.
     #[test]
     fn the_lowest_and_the_highest_point_of_a_curve_are_between_its_samples() {
         for (from, to) in [(-100.0, 63.0), (-123.4, 120.0), (-90.0, 90.0)] {
             let arc = Segment::arc([0.4, 0.2], 0.1, from, to);
             let (place, low) = extreme(&arc, 1.0);
-            // The square of 60 cuts by the golden section, which end at rounding's root.
+            // The square of 60 golden-section steps, which end at the root of rounding.
             assert!((low - 0.1).abs() < 1e-16 * 8.0, "{from} {low}");
             assert!((place - (-90.0 - from) / (to - from)).abs() < 1e-7, "{from} {place}");
             let top = 0.2 + 0.1 * f64::min(to, 90.0).to_radians().sin();
@@ -640,8 +642,8 @@ mod tests {
         }
     }
 
-    /// Two walls that lean towards each other, a micrometre apart at the brim, and a cone's tip: of a tank of 1.5 m from
-    /// 1.5 micrometres on a free surface has a width.
+    /// Two walls that lean towards each other, a micrometre apart at the brim, and the tip of a cone. In a tank of 1.5
+    /// m a free surface has a width from 1.5 micrometres on.
     #[test]
     fn a_free_surface_without_width_is_refused_with_its_width() {
         let gap = |width: f64| {
@@ -662,8 +664,8 @@ mod tests {
         assert!((tip(2e-6).unwrap().r_outer - 2e-6).abs() < 1e-15);
     }
 
-    /// A ring's ends are one to 1e-6 of its size, in a model's tank and in a large one; then it begins at its top. The axis is
-    /// met to 1e-9.
+    /// A ring is closed if its ends agree to 1e-6 of its size, for a model's tank and a large one. It then begins at
+    /// its top. The axis counts as reached to 1e-9.
     #[test]
     fn a_tank_is_closed_to_a_share_of_its_size() {
         for size in [1.0 / 64.0, 1.0, 16.0] {
@@ -677,7 +679,7 @@ mod tests {
                 let begins = if is_closed { to(1.0, 0.6) } else { to(0.5, 0.5) };
                 assert_eq!(contour.segments()[0].start(), begins, "{size} {gap}");
             }
-            // a bowl and its lid, the axis missed by a billionth at one end or the other
+            // a bowl and its lid, with one end a billionth away from the axis
             for (off, is_closed) in [(0.9e-9, true), (1.1e-9, false)] {
                 for ends in [[off, 0.0], [0.0, off]] {
                     let corners = [[ends[0], 0.0], [1.0, 0.5], [ends[1], 1.0]];

@@ -1,4 +1,4 @@
-//! One smooth piece of a tank's generating curve in the half plane (r, z).
+//! A smooth segment of a tank's generating curve in the half plane (r, z).
 
 use core::f64::consts::TAU;
 
@@ -25,7 +25,7 @@ pub(crate) fn cross(a: Point, b: Point) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// The shapes of a piece. Each has a parameter t of its own.
+/// Shapes of a segment. Each has its own parameter t.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Curve {
     /// Straight from one point to the other, t = 0..1.
@@ -125,8 +125,8 @@ impl Curve {
         }
     }
 
-    /// at(t + dt) - at(t), to full relative accuracy however small dt is. Both kernels of the
-    /// integral equation need it: differences of coordinates lose all digits near a corner.
+    /// Returns at(t + dt) - at(t), to full relative accuracy for any dt. Both kernels of the
+    /// integral equation need it, because differences of coordinates lose all digits near a corner.
     pub fn chord(&self, t: f64, dt: f64) -> Point {
         match *self {
             Curve::Line { from, to } => [dt * (to[0] - from[0]), dt * (to[1] - from[1])],
@@ -158,7 +158,7 @@ impl Curve {
     }
 }
 
-/// Radius of the oval of Cassini and its derivative by the polar angle.
+/// Returns the radius of the oval of Cassini and its derivative by the polar angle.
 fn cassini(a: f64, c: f64, t: f64) -> (f64, f64) {
     let (sin, cos) = (2.0 * t).sin_cos();
     let root = (a.powi(4) - c.powi(4) * sin * sin).sqrt();
@@ -184,18 +184,20 @@ impl Segment {
         Segment { curve: Curve::Line { from, to }, from: 0.0, to: 1.0 }
     }
 
-    /// Arc of an ellipse between two eccentric angles in degrees; a_r = a_z is a circle.
+    /// Creates the arc of an ellipse between two eccentric angles in degrees; a_r = a_z is a
+    /// circle.
     pub fn ellipse(center: Point, a_r: f64, a_z: f64, deg0: f64, deg1: f64) -> Segment {
         let (from, to) = (deg0.to_radians(), deg1.to_radians());
         Segment { curve: Curve::Ellipse { center, a_r, a_z }, from, to }
     }
 
-    /// Arc of a circle between two angles in degrees.
+    /// Creates the arc of a circle between two angles in degrees.
     pub fn arc(center: Point, radius: f64, deg0: f64, deg1: f64) -> Segment {
         Segment::ellipse(center, radius, radius, deg0, deg1)
     }
 
-    /// First point. Exactly on the axis where it is meant to be: cos(pi/2) is not 0 in a computer.
+    /// Returns the first point, exactly on the axis if it is within rounding of it: cos(pi/2) is
+    /// not 0 in floating point.
     pub fn start(&self) -> Point {
         self.settle(self.curve.at(self.from))
     }
@@ -210,7 +212,7 @@ impl Segment {
         [if p[0].abs() < 1e-14 * size { 0.0 } else { p[0] }, p[1]]
     }
 
-    /// A length of the order of the segment's, m.
+    /// Returns a length of the order of the segment's, m.
     pub fn size(&self) -> f64 {
         match self.curve {
             Curve::Line { from, to } => norm(sub(to, from)),
@@ -234,7 +236,7 @@ impl Segment {
         self.curve.at(self.from + s * (self.to - self.from))
     }
 
-    /// Angle through which the tangent turns, rad (bound on it for ellipses).
+    /// Returns the angle through which the tangent turns, rad (an upper bound for ellipses).
     pub(crate) fn turn(&self) -> f64 {
         let count = 32;
         let mut total = 0.0;
@@ -248,7 +250,7 @@ impl Segment {
         total.min(TAU)
     }
 
-    /// The part between two values of the curve's parameter.
+    /// Returns the part between two values of the curve's parameter.
     pub(crate) fn part(&self, from: f64, to: f64) -> Segment {
         Segment { curve: self.curve, from, to }
     }
@@ -268,7 +270,7 @@ mod tests {
             Curve::Cubic { c: [[0.1, 0.0], [1.0, 0.2], [-0.3, 0.5], [0.2, -0.1]] },
         ];
         for curve in curves {
-            // an eighth of the interval's square times the third derivative, up to 40
+            // an eighth of the square of the interval times the third derivative, up to 40
             let [before, after] = [0.3999, 0.4001].map(|t| curve.at(t));
             let slope = sub(after, before).map(|d| d / 2e-4);
             assert!(norm(sub(slope, curve.slope(0.4))) < 1e-6, "{curve:?}");
@@ -276,7 +278,7 @@ mod tests {
                 let (chord, plain) = (curve.chord(0.4, dt), sub(curve.at(0.4 + dt), curve.at(0.4)));
                 assert!(norm(sub(chord, plain)) < 4e-16, "{curve:?} {dt}");
             }
-            // at 1e-12 a difference of points would have four digits
+            // at 1e-12 a difference of points would have only four digits
             let (chord, slope) = (curve.chord(0.4, 1e-12), curve.slope(0.4));
             assert!(norm(sub(chord, [1e-12 * slope[0], 1e-12 * slope[1]])) < 1e-23, "{curve:?}");
         }

@@ -1,8 +1,9 @@
-//! Damping: one law for every tank and mode ([`of_tank`], by `formulas::damping`), the published correlations by
-//! themselves, ring baffles.
+//! Damping: one law for every tank and mode ([`of_tank`], by `formulas::damping`), the individual published
+//! correlations, and ring baffles.
 //!
-//! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R the fill; zeta is the
-//! logarithmic decrement over 2 pi. Measured tanks scatter by some 30 % around any of these.
+//! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
+//! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any of these
+//! correlations.
 
 use core::f64::consts::PI;
 
@@ -14,15 +15,15 @@ use crate::shape::{self, Recognised};
 use crate::table::significant;
 use crate::tank::{Geometry, Shape, Tank};
 
-/// The damping of a tank that was solved for `data`, of a liquid of the kinematic viscosity `nu`, m2/s, under the specific
-/// force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a box; empty: none.
-/// `sigma`, N/m, where it is known, is for what is known of low Bond numbers.
+/// Computes the damping of a tank solved as `data`, for a liquid of kinematic viscosity `nu`, m2/s, at the specific
+/// force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a box; empty for none.
+/// `sigma`, N/m, if known, is used for low Bond numbers.
 ///
-/// A contour that *is* a sphere, an upright cylinder, a cone or a torus, to 1e-6 of its size over the wetted part, has
-/// that shape's damping.
+/// A contour that is a sphere, an upright cylinder, a cone or a torus, to 1e-6 of its size over the wetted part, has
+/// the damping of that shape.
 ///
 /// # Errors
-/// No natural frequency: neither gravity nor a centring stiffness.
+/// Without gravity and centring stiffness there is no natural frequency.
 pub fn of_tank(
     tank: &Tank,
     data: &ModalData,
@@ -32,7 +33,7 @@ pub fn of_tank(
     sigma: Option<f64>,
 ) -> Result<Damping, Problems> {
     let recognised = data.wall.as_ref().and_then(|wall| shape::recognise(wall, data.fill));
-    // The same modes for the same shape: those of its dimensions.
+    // A shape must have the same modes as its dimensions give.
     let is_given = |found: &Recognised| {
         let Geometry::Revolution { shape: Some(given), .. } = &tank.geometry else { return false };
         core::mem::discriminant(given) == core::mem::discriminant(&found.shape)
@@ -79,8 +80,8 @@ pub fn of_tank(
                     let high = formula::low_bond_cylinder(radius, nu, gravity, bond);
                     interval[1] = interval[1].max(high);
                     warnings.push(format!(
-                        "damping: at the Bond number {bond:.1} the contact line may take more: {} was found in \
-                         drop-tower tests, which ends the interval",
+                        "damping: at the Bond number {bond:.1} the contact line may dissipate more: drop-tower tests found \
+                         {}, the upper end of the interval",
                         significant(high)
                     ));
                 }
@@ -126,10 +127,10 @@ pub fn of_tank(
     Ok(Damping { nu, gravity, shape: name, correlation, taken, modes, modes_y, warnings })
 }
 
-/// The shape's own modes at its fill, as many as `data` has.
+/// Solves for the shape's own modes at its fill, as many as `data` has.
 fn solve_shape(tank: &Tank, found: &Recognised, data: &ModalData) -> Option<ModalData> {
     let whole = match found.shape {
-        // Open above the fill.
+        // The cone is open above the fill.
         Shape::Cone { half_angle, height } => Shape::Cone { half_angle, height: 1.5 * height },
         Shape::Cylinder { radius, height } => Shape::Cylinder { radius, height: 1.5 * height },
         shape => shape,
@@ -160,7 +161,7 @@ fn source_of(shape: formula::Shape) -> &'static str {
     }
 }
 
-/// Lists where a shape's correlation leaves its range, one sentence each.
+/// Lists the ranges that a shape's correlation leaves, one sentence each.
 fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
     match shape {
         formula::Shape::Sphere { radius, depth } => sphere(radius, depth, nu, g).outside,
@@ -170,12 +171,12 @@ fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
     }
 }
 
-/// A damping ratio, and where the formula is used outside its range.
+/// A damping ratio, with the ranges that its formula leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formula {
     /// Damping ratio.
     pub zeta: f64,
-    /// One sentence for each range that is left; empty inside.
+    /// One sentence for each range that the formula leaves; empty inside.
     pub outside: Vec<String>,
 }
 
@@ -186,11 +187,12 @@ impl Formula {
     }
 }
 
-/// Laminar layer at the wetted wall of any tank, mode by mode: zeta_n = beta_n sqrt(nu/(8 omega_n)),
-/// omega_n^2 = g lambda_n (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the box).
+/// Damping ratio by the laminar layer at the wetted wall of any tank, for one mode. zeta_n = beta_n
+/// sqrt(nu/(8 omega_n)), omega_n^2 = g lambda_n (cylinder: Case and Parkinson 1957, box: Keulegan
+/// 1959).
 ///
-/// It leaves out the surface film, the contact line and everything turbulent: measured cylinders have
-/// 1.4 to 1.5 times as much, see [`of_tank`].
+/// It does not include surface film, contact line and turbulence. Measured cylinders have 1.4 to
+/// 1.5 times as much, see [`of_tank`].
 pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Formula {
     let omega = (g * mode.lambda).sqrt();
     let layer = (2.0 * nu / omega).sqrt();
@@ -199,8 +201,8 @@ pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Formula {
     Formula::new(formula::laminar(mode.beta, nu, omega), &[(thin, text)])
 }
 
-/// Upright cylinder, Mikishev and Dorozhkin. In shallow liquid it falls below the laminar layer, where
-/// [`stephens`] is sounder.
+/// Upright cylinder, Mikishev and Dorozhkin. In shallow liquid the formula falls below the laminar layer; use
+/// [`stephens`] there.
 pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let x = fill / radius;
     let text =
@@ -247,14 +249,14 @@ pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     )
 }
 
-/// Box, `length` along the motion and `width` across it, first mode: the laminar layer in closed form
-/// (Keulegan 1959), beta = 2/a + 2/w + 2 k (1 - 2 h/a)/sinh 2 k h, k = pi/a.
+/// Box, `length` along the motion and `width` across it, first mode (Keulegan 1959). The laminar
+/// layer has the closed form beta = 2/a + 2/w + 2 k (1 - 2 h/a)/sinh 2 k h, k = pi/a.
 pub fn keulegan(length: f64, width: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let axis = crate::closed_form::box_axis(length, width, fill, 1.0, 1);
     laminar(&axis.modes[0], nu, g)
 }
 
-/// A flat ring at the wall.
+/// A flat ring baffle at the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ring {
     /// Depth below the free surface, m.
@@ -263,8 +265,9 @@ pub struct Ring {
     pub width: f64,
 }
 
-/// Ranges of the square-root law: 2 < UT/D < 20 with D = 2 w, ring under the wave's trough, little of
-/// the section covered. `reach` is the wave's decay from the surface to the ring.
+/// Checks the ranges of the square-root law: 2 < UT/D < 20 with D = 2 w, ring under the wave's
+/// trough, small part of the section covered. `reach` is the decay of the wave from the surface to
+/// the ring.
 fn ring_ranges(ring: Ring, amplitude: f64, reach: f64, covered: f64) -> Vec<(bool, String)> {
     let Ring { depth, width } = ring;
     let stroke = amplitude / width * reach;
@@ -295,11 +298,11 @@ pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Formula {
 }
 
 /// Ring baffle at the outer wall of any tank of revolution, first mode: zeta = 1.53 lambda w^(3/2)
-/// eta^(1/2) G^(5/2) r_b phi(R_F)^2/N, with G = |phi_s|/(lambda phi(R_F)) at the ring's radius r_b
-/// (from Keulegan and Carpenter's plates, scaled to Miles for the cylinder). phi(R_F)^2/N =
-/// rho pi lambda wave^2/m.
+/// eta^(1/2) G^(5/2) r_b phi(R_F)^2/N. G = |phi_s|/(lambda phi(R_F)) at the ring's radius r_b, and
+/// phi(R_F)^2/N = rho pi lambda wave^2/m. The law comes from Keulegan and Carpenter's plates,
+/// scaled to Miles for the cylinder.
 ///
-/// None if no wall is that deep, or for a box.
+/// Returns `None` for a box, or if no wall is at this depth.
 pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Formula> {
     let (mode, wall) = (data.modes.first()?, data.wall.as_ref()?);
     let at = mode.wall_speed(wall.z_surface - ring.depth)?;
@@ -315,8 +318,8 @@ pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Formula> {
     Some(Formula::new(zeta, &ring_ranges(ring, amplitude, at.ratio, w * (2.0 - w))))
 }
 
-/// Part of a full ring's damping that a sector keeps: int |cos theta|^(5/2) dtheta/2.8756 between two
-/// angles from the direction of slosh, rad. A half ring keeps half.
+/// Returns the part of a full ring's damping that a sector has: int |cos theta|^(5/2) dtheta/2.8756
+/// between two angles from the direction of slosh, rad. A half ring has half.
 pub fn sector(from: f64, to: f64) -> f64 {
     let rule = crate::gauss::Gauss::new(24);
     let part = |a: f64, b: f64| -> f64 {

@@ -1,8 +1,8 @@
-//! Tables over the fill for the six-axis FMUs: which fills to take, so that few of them are enough.
+//! Tables over the fill for the six-axis FMUs, with fills placed so that few are enough.
 //!
 //! Between its points an FMU interpolates 1/l, the height of the bob at rest and m/m_liq over the mass of liquid
-//! (`fmu/craft/src/table.rs`, with the slopes of [`formulas::interpolation`]). [`place`] solves at many fills
-//! and moves the points among them until the largest error between the points is least.
+//! (`fmu/craft/src/table.rs`, with the slopes of [`formulas::interpolation`]). [`place`] solves at many fills and
+//! chooses points among them that minimise the largest error between the points.
 
 use core::f64::consts::PI;
 
@@ -14,29 +14,29 @@ use crate::sweep::{self, Sweep};
 use crate::table::short;
 use crate::tank::Tank;
 
-/// Most points of an FMU's table.
+/// Largest number of points of an FMU's table.
 pub const POINTS: usize = 12;
 
-/// Most modes that a six-axis FMU keeps of a tank.
+/// Largest number of modes of a tank in a six-axis FMU.
 const MODES: usize = 3;
 
-/// Fills among which points are placed.
+/// Number of fills among which points are chosen.
 const CANDIDATES: usize = 97;
 
-/// Unit of errors: 0.5 % of a frequency, a mass or the largest radius of the surface.
+/// Unit of the errors: 0.5 % of a frequency, a mass or the largest radius of the surface.
 const LIMIT: f64 = 5e-3;
 
-/// Fills of a table between two ends, m above the lowest point, and how well they are chosen.
+/// Fills of a table between two ends, m above the lowest point, with their errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     /// The rows of the table.
     pub sweep: Sweep,
-    /// Largest errors between the points: of the first mode's frequency and mass, relative, and of its hinge over
-    /// the largest radius of the surface.
+    /// Largest errors between the points for the first mode: frequency and mass relative, hinge over the largest radius
+    /// of the surface.
     pub error: [f64; 3],
 }
 
-/// A mode at the candidates: mass of liquid, frequency's square over g, bob, share.
+/// A mode at the candidate fills: mass of liquid, omega^2/g, bob, share of mass.
 struct Curves {
     liquid: Vec<f64>,
     modes: Vec<[Vec<f64>; 3]>,
@@ -61,7 +61,7 @@ impl Curves {
         }
     }
 
-    /// Largest errors of a mode with these points, in frequency, mass and hinge.
+    /// Returns the largest errors of a mode with these points, in frequency, mass and hinge.
     fn errors(&self, n: usize, points: &[usize]) -> [f64; 3] {
         let taken = |y: &[f64]| points.iter().map(|i| y[*i]).collect::<Vec<_>>();
         let x = taken(&self.liquid);
@@ -81,7 +81,8 @@ impl Curves {
         worst
     }
 
-    /// Cost function: the first mode's largest error, and those of the others weighted by their share of its mass.
+    /// Cost function: the largest error of the first mode and those of the other modes weighted by their share of its
+    /// mass.
     fn cost(&self, points: &[usize]) -> f64 {
         let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);
         let of = |n: usize| {
@@ -92,24 +93,26 @@ impl Curves {
     }
 }
 
-/// Height of the bob; of a mode that carries nothing, which has none, the liquid's centre.
+/// Returns the height of the bob, or of the liquid's centre for a mode without mass, which has no
+/// bob.
 fn bob(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
 
-/// Modes that all rows have and that carry liquid in each, at least one.
+/// Returns the number of modes that carry liquid in all rows, at least one.
 fn carrying(rows: &[ModalData]) -> usize {
     let most = rows.iter().map(|row| row.modes.len()).min().unwrap_or(0);
     let carries = |n: &usize| rows.iter().all(|row| row.modes[*n].m > 1e-6 * row.m_liq);
     (1..most.min(MODES)).take_while(carries).last().map_or(1, |n| n + 1)
 }
 
-/// Places [`POINTS`] fills between two, m above the lowest point, ends included.
+/// Places [`POINTS`] fills between two, m above the lowest point, including the ends.
 ///
 /// # Errors
-/// Ends without a free surface, and those of a solution.
+/// Ends without a free surface, and the errors of [`Tank::solve`].
 pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, Problems> {
-    // closer to the ends, where the surface of a closed tank gets narrow and the modes change most
+    // denser near the ends, where the surface of a closed tank gets narrow and the modes change
+    // most
     let share = |i: usize| 0.5 - 0.5 * (PI * i as f64 / (CANDIDATES - 1) as f64).cos();
     let fills: Vec<f64> = (0..CANDIDATES)
         .map(|i| match i {
@@ -155,10 +158,11 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
     Ok(Placed { sweep: Sweep { rows }, error })
 }
 
-/// The parameters of a tank that can drain: those at its largest fill, where it starts, and its table.
+/// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its table.
 ///
 /// # Errors
-/// Those of [`ParameterSet::new`]; HubSlosh, whose tank does not drain; fewer than two fills, or more than [`POINTS`].
+/// Those of [`ParameterSet::new`], a HubSlosh target, whose tank does not drain, and fewer than two fills or more than
+/// [`POINTS`].
 pub fn parameters(
     tank: &Tank,
     sweep: &Sweep,
@@ -232,7 +236,7 @@ pub fn parameters(
             ));
         }
     }
-    // what the table has in place of
+    // parameters that the table replaces
     let replaced = ["m_0", "H_0", "I_0", "I_z", "mass[", "length[", "hinge["]
         .map(|what| format!("{prefix}.{what}"));
     set.values.retain(|(name, _)| !replaced.iter().any(|start| name.starts_with(start)));
@@ -245,7 +249,7 @@ pub fn parameters(
         let (at, rest) = (i + 1, row.rest(modes));
         real(format!("fill.liquid[{at}]"), row.m_liq);
         real(format!("fill.H_0[{at}]"), rest.height);
-        // the largest number of modes may leave it below 0 by rounding
+        // with the largest number of modes it may be below 0 by rounding
         real(format!("fill.I_0[{at}]"), rest.inertia.max(0.0));
         real(format!("fill.I_z[{at}]"), row.i_eff_axis.unwrap_or(0.0));
         for n in 0..modes {

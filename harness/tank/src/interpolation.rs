@@ -1,9 +1,9 @@
-//! Interpolation with two continuous derivatives that is monotone where the data are.
+//! Interpolation with two continuous derivatives that is monotone wherever the data are.
 
 use formulas::interpolation::{derivatives, quintic};
 
-/// Piecewise quintic through (x_i, y_i), twice continuously differentiable: [`formulas::interpolation`]. At a
-/// turning point of the data nothing is limited: the true maximum lies between the points.
+/// Piecewise quintic through (x_i, y_i), twice continuously differentiable: [`formulas::interpolation`]. It is not
+/// limited at a turning point of the data, because the true maximum lies between the points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monotone {
     x: Vec<f64>,
@@ -13,19 +13,19 @@ pub struct Monotone {
 }
 
 impl Monotone {
-    /// Through points with ascending `x`; one point is a constant.
+    /// Interpolates points with ascending `x`; one point gives a constant.
     ///
     /// # Panics
-    /// If there is no point, or `x` does not ascend.
+    /// If there is no point, or `x` is not ascending.
     pub fn new(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::through(x, y, false)
     }
 
-    /// The same, and between its two points everywhere, as the FMUs' tables: a turning point of the data is the
-    /// curve's.
+    /// Interpolates like [`Monotone::new`], but stays between its two points everywhere, like the FMUs' tables: a
+    /// turning point of the data is one of the curve.
     ///
     /// # Panics
-    /// As [`Monotone::new`].
+    /// The same as for [`Monotone::new`].
     pub fn within(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::through(x, y, true)
     }
@@ -37,7 +37,7 @@ impl Monotone {
         Monotone { x: x.to_vec(), y: y.to_vec(), slope, curvature }
     }
 
-    /// Value at `x`; outside the points the nearest end's.
+    /// Returns the value at `x`; outside the points that of the nearest end.
     pub fn at(&self, x: f64) -> f64 {
         let count = self.x.len();
         let x = x.clamp(self.x[0], self.x[count - 1]);
@@ -68,7 +68,7 @@ mod tests {
                 .map(|x| (curve.at(x) - x.exp()).abs())
                 .fold(0.0, f64::max)
         };
-        // halving the step gains 2^5 = 32 in the middle, 2^4 next to the ends
+        // halving the step reduces the error by 2^5 = 32 in the middle, by 2^4 near the ends
         assert!(
             error(20) < 1e-6 && error(20) / error(40) > 14.0,
             "{:e} {:e}",
@@ -77,8 +77,8 @@ mod tests {
         );
     }
 
-    /// Data with a jump, a plateau, and a turning point: where they rise, so does the curve, and two
-    /// derivatives are continuous everywhere.
+    /// Data with a jump, a plateau, and a turning point. The curve rises wherever they rise, and
+    /// two derivatives are continuous everywhere.
     #[test]
     fn curve_is_monotone_where_data_are_and_twice_differentiable() {
         let x = [0.0, 0.1, 0.2, 0.5, 0.6, 0.61, 0.9, 1.0, 1.3, 1.4, 1.5];
@@ -89,8 +89,8 @@ mod tests {
             let samples: Vec<f64> = (0..=30000).map(|i| sign * curve.at(i as f64 * 5e-5)).collect();
             assert!(samples.windows(2).all(|w| w[1] >= w[0] - 1e-15));
             for &x in &x[1..10] {
-                // the difference of the second differences on both sides falls with their step; 1e-4
-                // is what rounding leaves of them
+                // the difference of the second differences on both sides falls with their step,
+                // down to the rounding error of 1e-4
                 let jump = |h: f64| {
                     let second =
                         |c: f64| (curve.at(c + h) - 2.0 * curve.at(c) + curve.at(c - h)) / (h * h);

@@ -1,8 +1,8 @@
 //! Modal parameters of the liquid in a tank: a body of revolution of any contour, or a box.
 //!
-//! A [`Tank`] is read from a TOML file ([`Tank::read`]) and solved at a fill ([`Tank::solve`]): slosh
-//! masses, pendulum lengths, heights, wall waves and what stays with the tank, with their error. The
-//! theory, the file format and the measured accuracy are in the crate's `README.md`.
+//! [`Tank::read`] reads a [`Tank`] from a TOML file, and [`Tank::solve`] solves it at a fill. The
+//! result has slosh masses, pendulum lengths, heights, wall waves and the rigid liquid, with their
+//! errors. The crate's `README.md` has theory, file format and measured accuracy.
 //!
 //! * [`curve`], [`contour`], [`tank`]: geometry and the file
 //! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
@@ -10,8 +10,8 @@
 //! * [`sweep`]: tables over the fill and their [`interpolation`]
 //! * [`fill_table`]: such tables for FMUs whose tanks drain
 //! * [`table()`], [`picture`]: to read and to look at; [`parameters`]: files for the FMUs
-//! * [`damping`], [`low_gravity`], [`third_order`]: what the modal parameters leave out; `shape`: which measured shape a
-//!   contour is
+//! * [`damping`], [`low_gravity`], [`third_order`]: effects beyond the modal parameters;
+//!   `shape`: recognises measured shapes
 
 pub mod closed_form;
 pub mod contour;

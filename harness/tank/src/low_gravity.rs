@@ -1,15 +1,13 @@
-//! Capillarity: a flat surface with a free contact line exactly, the curved meniscus of a cylinder by a
-//! table.
+//! Capillarity: exact for a flat surface with a free contact line, from a table for the curved meniscus of a cylinder.
 //!
-//! The length l_n stays 1/lambda_n, geometry, never g/omega^2. Capillarity adds a centring spring
-//! k_s = m_n (omega_n^2 - g lambda_n) at the bob, or k_s l_n^2 as a torsion spring at the hinge, and at
-//! g = 0 it alone is left. Masses and heights are those of the flat surface: for a curved one nothing
-//! is known.
+//! The length l_n stays 1/lambda_n, which is geometry, not g/omega^2. Capillarity adds a centring spring k_s = m_n
+//! (omega_n^2 - g lambda_n) at the bob, or a torsion spring k_s l_n^2 at the hinge. At g = 0 only this spring remains.
+//! Masses and heights are those of the flat surface; those of a curved surface are unknown.
 
 use crate::interpolation::Monotone;
 use crate::modal::Mode;
 
-/// A liquid under a specific force.
+/// A liquid at a specific force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fluid {
     /// Density, kg/m³.
@@ -34,16 +32,17 @@ pub struct Capillary {
     pub omega2: f64,
     /// Centring spring at the bob, N/m. Slightly negative for a wetting liquid at a large Bond number.
     pub spring: f64,
-    /// One sentence for each range that is left; empty inside.
+    /// One sentence for each range that the formula leaves; empty inside.
     pub outside: Vec<String>,
-    /// The formula says nothing about this tank, and what it adds is more than 10 % of omega^2.
+    /// True if the formula does not apply to this tank and its contribution exceeds 10 % of
+    /// omega^2.
     pub unknown: bool,
 }
 
-/// Flat surface (contact angle 90 degrees), contact line free to slide, at a vertical wall:
-/// omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F (phi_r^2 + phi^2/r^2) r dr/N_n.
-/// Exact where phi_n does not change, in cylinders, annuli (K = k^2) and boxes; to first order in
-/// the capillary part elsewhere.
+/// Computes capillarity for a flat surface (contact angle 90 degrees) with a contact line free to
+/// slide at a vertical wall: omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F (phi_r^2
+/// + phi^2/r^2) r dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2)
+/// and boxes, and of first order in the capillary part elsewhere.
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;
     let gravity = fluid.g * mode.lambda;
@@ -54,13 +53,11 @@ pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     }
     if unknown && fluid.g > 0.0 {
         outside.push(format!(
-            "it adds {:.0} % to omega^2, too much for the first order in it",
+            "it adds {:.0} % to omega^2, too much for the first order",
             100.0 * added / gravity
         ));
     } else if unknown {
-        outside.push(
-            "without gravity it is all of omega^2, too much for the first order in it".into(),
-        );
+        outside.push("without gravity it is all of omega^2, too much for the first order".into());
     }
     Capillary { omega2: gravity + added, spring: mode.m * added, outside, unknown }
 }
@@ -71,9 +68,9 @@ const XI: f64 = formulas::cylinder::XI[0];
 const BOND: [f64; 6] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0];
 /// Contact angles of its columns, degrees.
 const ANGLE: [f64; 7] = [90.0, 75.0, 60.0, 45.0, 30.0, 15.0, 5.0];
-/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder with a curved meniscus, contact angle
-/// constant, line free: computed from the capillary eigenproblem on the static meniscus, 1e-6 in
-/// both limits; the digits written.
+/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder with a curved meniscus, constant contact
+/// angle and free line. The values come from the capillary eigenproblem on the static meniscus,
+/// with errors of 1e-6 in both limits, and are given to their digits.
 const TABLE: [[f64; 7]; 6] = [
     [6.2415, 5.7952, 5.2173, 4.5463, 3.8352, 3.1642, 2.8263],
     [8.0827, 7.5726, 6.9609, 6.2873, 5.6101, 5.0195, 4.7587],
@@ -93,21 +90,21 @@ fn flat_omega2(bond: f64) -> f64 {
     XI * bond + XI.powi(3)
 }
 
-/// Shift of Omega_1^2 by the curved meniscus, relative to the flat surface.
+/// Returns the shift of Omega_1^2 by the curved meniscus, relative to the flat surface.
 ///
-/// Interpolated between the values of the table in cos(angle) and ln(1 + Bo), so that 90 degrees is exact;
-/// beyond Bo = 100 it goes as 1/Bo to its limit -2 xi^2 cos(angle) (shape derivative of the eigenvalue).
+/// The table is interpolated in cos(angle) and ln(1 + Bo), so that 90 degrees is exact. Beyond Bo = 100 the shift
+/// approaches its limit -2 xi^2 cos(angle) as 1/Bo (shape derivative of the eigenvalue).
 fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     let cosine = |angle: f64| if angle == 90.0 { 0.0 } else { angle.to_radians().cos() };
     let cos = cosine(contact_angle);
-    // cos rises with falling angle; at 90 degrees the difference is 0 exactly
+    // cos rises with falling angle; at 90 degrees the shift is exactly 0
     let cosines = ANGLE.map(cosine);
     let at_row = |row: usize| {
         let difference: Vec<f64> = (0..7)
             .map(|k| if k == 0 { 0.0 } else { TABLE[row][k] - flat_omega2(BOND[row]) })
             .collect();
         let [c5, c6] = [cosines[5], cosines[6]];
-        // the last 5 degrees are 0.4 % of the cosine: straight on
+        // the last 5 degrees are 0.4 % of the cosine: linear extrapolation
         if cos > c6 {
             return difference[6] + (difference[6] - difference[5]) * (cos - c6) / (c6 - c5);
         }
@@ -122,16 +119,16 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     Monotone::new(&places, &values).at(bond.ln_1p())
 }
 
-/// The published formula for 10 < Bo < 100 (NASA SP-106, chapter 11, after Satterlee and Reynolds 1964):
-/// Omega_1^2 = 6.26 + 1.84 Bo - 4.76 cos(angle). Below the table by 0.6 % at Bo = 100 and by up to 4 %
-/// at 10 (17 % at 3); [`cylinder_omega2`] is closer everywhere.
+/// The published formula for 10 < Bo < 100 (NASA SP-106, chapter 11, after Satterlee and Reynolds 1964): Omega_1^2 =
+/// 6.26 + 1.84 Bo - 4.76 cos(angle). It is below the table by 0.6 % at Bo = 100 and by up to 4 % at 10 (17 % at 3).
+/// [`cylinder_omega2`] is more accurate everywhere.
 pub fn satterlee_reynolds(bond: f64, contact_angle: f64) -> f64 {
     6.26 + 1.84 * bond - 4.76 * contact_angle.to_radians().cos()
 }
 
-/// First mode of an upright cylinder filled to `fill`, m, with a curved meniscus: what the deep cylinder's
-/// meniscus adds to Omega_1^2, times tanh(xi h/R), on top of [`flat`]. 90 degrees is [`flat`] exactly, and so is
-/// no surface tension. Beyond 0 to 90 degrees the nearer end is taken.
+/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2
+/// of the deep cylinder's meniscus, times tanh(xi h/R), is added to [`flat`]. At 90 degrees, and without surface
+/// tension, the result is exactly [`flat`]. Outside 0 to 90 degrees the nearer end is used.
 pub fn cylinder(
     mode: &Mode,
     radius: f64,
@@ -139,7 +136,7 @@ pub fn cylinder(
     contact_angle: f64,
     fluid: Fluid,
 ) -> Capillary {
-    // 0/0 without gravity and surface tension: whatever it is, it counts 0 times below.
+    // 0/0 without gravity and surface tension; the value has no effect below.
     let bond = fluid.bond(radius);
     let Capillary { omega2, spring, mut outside, unknown } = flat(mode, fluid);
     if !(0.0..=90.0).contains(&contact_angle) {

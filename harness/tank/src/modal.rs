@@ -1,4 +1,4 @@
-//! Modes of the liquid as equivalent pendulums or spring-masses, and what stays with the tank.
+//! Modes of the liquid as equivalent pendulums or spring-masses, and the rigid liquid.
 //!
 //! With A_n = int_F phi_n r^2 dr, N_n = int_F phi_n^2 r dr and B_n = int_F psi phi_n r dr
 //! (Green: lambda_n B_n = int_W phi_n (z n_r - r n_z) r ds - A_n), the momenta of the liquid in a
@@ -10,16 +10,16 @@
 //!
 //!   m_n = rho pi lambda_n A_n^2/N_n,   H_n = B_n/A_n,   I_eff = rho pi int psi dpsi/dn r ds
 //!
-//! (Lomen, NASA CR-230; Dodge 2000, chapter 3; signs and the rest derived anew.) A mode that
-//! carries hardly any mass can have any height H_n; m_n H_n and m_n H_n^2 always are finite. So
-//! A_n/sqrt(N_n) and B_n/sqrt(N_n) are kept, and H_n is given only where it means something.
+//! Sources: Lomen, NASA CR-230; Dodge 2000, chapter 3; signs and I_eff derived anew. A mode with
+//! hardly any mass can have any height H_n, but m_n H_n and m_n H_n^2 are always finite. The code
+//! therefore keeps A_n/sqrt(N_n) and B_n/sqrt(N_n), and gives H_n only where it has a meaning.
 
 use serde::Serialize;
 
 use crate::contour::{Problems, Volume, Wall};
 use crate::potential_flow::{Discretisation, Solution};
 
-/// Below this part of the liquid's mass a mode has no height.
+/// Share of the liquid's mass below which a mode has no height.
 const MASSLESS: f64 = 1e-9;
 
 /// One mode.
@@ -42,14 +42,14 @@ pub struct Mode {
     /// Length of the pendulum, m: 1/lambda_n.
     pub l: f64,
     /// Height of the spring-mass, or of the pendulum's bob at rest, m from the contour's own zero;
-    /// none where m_n < 1e-9 m_liq.
+    /// `None` if m_n < 1e-9 m_liq.
     #[serde(rename = "H")]
     pub height: Option<f64>,
     /// Height of the pendulum's hinge, m: H_n + l_n.
     pub hinge: Option<f64>,
     /// Elevation of the surface at the outer wall per angle of the pendulum, m/rad.
     pub wave: f64,
-    /// The same at the inner wall.
+    /// Elevation of the surface at the inner wall per angle of the pendulum, m/rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wave_inner: Option<f64>,
     /// beta_n = int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, for the damping by the laminar
@@ -58,7 +58,7 @@ pub struct Mode {
     /// Largest elevation per angle anywhere on the surface, m/rad (first mode only).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wave_peak: Option<f64>,
-    /// Radius where that is, m.
+    /// Radius of the largest elevation, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub r_peak: Option<f64>,
     /// m_n h_n with h_n = H_n - z_cg, kg m.
@@ -70,13 +70,14 @@ pub struct Mode {
     /// Elevation per angle along the surface: (r, m/rad), from the axis or inner wall outwards.
     #[serde(skip)]
     pub shape: Vec<[f64; 2]>,
-    /// int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2: what capillarity adds to the stiffness.
+    /// int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2: the contribution of capillarity to the stiffness.
     #[serde(skip)]
     pub surface_gradient: f64,
-    /// The walls are vertical at the free surface.
+    /// True if the walls are vertical at the free surface.
     #[serde(skip)]
     pub vertical_wall: bool,
-    /// The tank has vertical walls and a flat bottom, so that capillarity does not change phi_n.
+    /// True if the tank has vertical walls and a flat bottom, so that capillarity does not change
+    /// phi_n.
     #[serde(skip)]
     pub upright: bool,
     /// Speed of the liquid along the outer wall over that of the surface at the wall.
@@ -102,15 +103,15 @@ pub struct Rest {
     pub modes: usize,
     /// Fixed mass, kg.
     pub m_0: f64,
-    /// Its height, m from the contour's own zero. It can lie outside the tank.
+    /// Height of the fixed mass, m from the contour's own zero. It can lie outside the tank.
     #[serde(rename = "H_0")]
     pub height: f64,
-    /// Its inertia across the axis about its own centre, kg·m².
+    /// Inertia of the fixed mass across the axis about its own centre, kg·m².
     #[serde(rename = "I_0")]
     pub inertia: f64,
 }
 
-/// The liquid as seen along one horizontal axis of a box.
+/// Modal parameters along one horizontal axis of a box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axis {
     /// Inertia of the rigid liquid about its centre of mass, kg·m².
@@ -121,7 +122,7 @@ pub struct Axis {
     pub i_eff_cg: f64,
     /// The modes.
     pub modes: Vec<Mode>,
-    /// The rest after 1, 2, ... modes.
+    /// Fixed mass after 1, 2, ... modes.
     pub rest: Vec<Rest>,
 }
 
@@ -134,14 +135,14 @@ pub struct Axes {
     pub y: Axis,
 }
 
-/// The damping of a tank's modes, smooth walls.
+/// Damping of a tank's modes with smooth walls.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Damping {
     /// Kinematic viscosity, m2/s.
     pub nu: f64,
-    /// Specific force along the axis at which it holds, m/s².
+    /// Specific force along the axis at which the damping holds, m/s².
     pub gravity: f64,
-    /// The measured shape that the wetted wall is, or `other`.
+    /// Measured shape of the wetted wall, or `other`.
     pub shape: &'static str,
     /// Damping of the first mode from the shape's correlation, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -164,37 +165,38 @@ pub struct Capillarity {
     pub sigma: f64,
     /// Contact angle between surface and wall, degrees; 90 is a flat surface.
     pub contact_angle: f64,
-    /// Specific force along the axis at which it holds, m/s².
+    /// Specific force along the axis at which the frequencies hold, m/s².
     pub gravity: f64,
-    /// Bond number rho g R^2/sigma of the free surface's outer radius; none for a box or without surface tension.
+    /// Bond number rho g R^2/sigma with the free surface's outer radius; `None` for a box or without surface tension.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bond: Option<f64>,
-    /// The modes, in the order of [`ModalData::modes`]. Of a box, those along its first length.
+    /// The modes, in the order of [`ModalData::modes`]; for a box those along its first length.
     pub modes: Vec<CapillaryMode>,
-    /// Of a box, those along its second length.
+    /// For a box, the modes along its second length.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modes_y: Vec<CapillaryMode>,
-    /// What leaves the range of a formula, one sentence each.
+    /// Ranges that a formula leaves, one sentence each.
     pub warnings: Vec<String>,
 }
 
 /// One mode with surface tension.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CapillaryMode {
-    /// Natural frequency, rad/s; none where no formula holds.
+    /// Natural frequency, rad/s; `None` where no formula holds.
     pub omega: Option<f64>,
-    /// Centring stiffness at the bob, N/m; below 0 for a meniscus that softens the surface; none where no formula holds.
+    /// Centring stiffness at the bob, N/m, negative for a meniscus that softens the surface; `None` where no formula
+    /// holds.
     pub k: Option<f64>,
 }
 
 /// The damping of one mode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModeDamping {
-    /// Natural frequency, capillarity included, rad/s.
+    /// Natural frequency with capillarity, rad/s.
     pub omega: f64,
     /// Damping ratio.
     pub zeta: f64,
-    /// Between what it is to be expected.
+    /// Expected interval of the damping ratio.
     pub interval: [f64; 2],
     /// Damping by the laminar layer at the wall alone.
     pub laminar: f64,
@@ -218,7 +220,7 @@ pub struct ModalData {
     /// Inner radius of the free surface, m; 0 if it reaches the axis.
     #[serde(rename = "R_inner", skip_serializing_if = "Option::is_none")]
     pub r_inner: Option<f64>,
-    /// Lengths of a box, m.
+    /// First length of a box, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length_x: Option<f64>,
     /// Second length, m.
@@ -226,10 +228,10 @@ pub struct ModalData {
     pub length_y: Option<f64>,
     /// Mass of the liquid, kg.
     pub m_liq: f64,
-    /// Height of its centre of mass, m from the contour's own zero.
+    /// Height of the liquid's centre of mass, m from the contour's own zero.
     pub z_cg: f64,
-    /// Height of the tank's lowest point, m from the contour's own zero; 0 for shapes and boxes, whose
-    /// heights count from there.
+    /// Height of the tank's lowest point, m from the contour's own zero; 0 for shapes and boxes, whose heights count
+    /// from their lowest point.
     pub z_lowest: f64,
     /// Inertia of the rigid liquid across the axis about its centre of mass, kg·m².
     #[serde(rename = "I_frozen_cg")]
@@ -237,34 +239,34 @@ pub struct ModalData {
     /// Inertia of the rigid liquid about the axis, kg·m².
     #[serde(rename = "I_frozen_axis")]
     pub i_frozen_axis: f64,
-    /// Effective inertia about the axis: what a body that turns about it drags along (a box does, a
-    /// tank of revolution does not), kg·m².
+    /// Effective inertia about the axis, kg·m²: the inertia of the liquid that rotates with the
+    /// tank (0 in a tank of revolution).
     #[serde(rename = "I_eff_axis", skip_serializing_if = "Option::is_none")]
     pub i_eff_axis: Option<f64>,
     /// Effective inertia of the liquid under a lid, across the axis, about its centre of mass, kg·m².
     #[serde(rename = "I_eff_cg")]
     pub i_eff_cg: f64,
-    /// The modes, in the order of their frequency. Of a box, those along its first length.
+    /// The modes, in the order of their frequencies; for a box those along its first length.
     pub modes: Vec<Mode>,
     /// Fixed mass after 1, 2, ... modes.
     pub rest: Vec<Rest>,
     /// Both axes of a box.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axes: Option<Axes>,
-    /// Estimated error of all values but beta and I_0: relative for lambda and l; of m_liq for masses; of
-    /// m_liq R for m_n H_n and m_0 H_0; of m_liq R^2 for inertias; of R for waves and z_cg (R the
-    /// outer radius of the free surface).
+    /// Estimated error of all values except beta and I_0. It is relative for lambda and l, and otherwise a part of:
+    /// m_liq for masses; m_liq R for m_n H_n and m_0 H_0; m_liq R^2 for inertias; R for waves and z_cg. R is the outer
+    /// radius of the free surface.
     pub error: f64,
-    /// Estimated error of I_0, of m_liq R^2. The fixed mass of a shallow dish stands far above it, and its
-    /// lever multiplies what is wrong with m_0.
+    /// Estimated error of I_0, as a part of m_liq R^2. The fixed mass of a shallow dish is far above it, and its lever
+    /// arm multiplies the error of m_0.
     #[serde(rename = "error_I_0")]
     pub error_i_0: f64,
     /// Estimated relative error of beta.
     pub error_beta: f64,
-    /// Natural frequencies with surface tension, where that is known.
+    /// Natural frequencies with surface tension, if it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub capillarity: Option<Capillarity>,
-    /// Damping, where the liquid's viscosity is known.
+    /// Damping, if the liquid's viscosity is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damping: Option<Damping>,
     /// The wetted wall.
@@ -279,7 +281,7 @@ pub(crate) struct Surface {
     pub(crate) shape: Vec<[f64; 2]>,
     /// Largest elevation per angle: (r, m/rad).
     pub(crate) peak: Option<[f64; 2]>,
-    /// Same as in [`Mode`].
+    /// The same as in [`Mode`].
     pub(crate) gradient: f64,
     pub(crate) vertical_wall: bool,
     pub(crate) upright: bool,
@@ -287,7 +289,7 @@ pub(crate) struct Surface {
 }
 
 impl Mode {
-    /// `mass` is m, m h, m h^2 with h from the centre of mass at `z_cg`.
+    /// Creates a mode. `mass` is m, m h, m h^2 with h from the centre of mass at `z_cg`.
     pub(crate) fn new(
         n: usize,
         lambda: f64,
@@ -325,7 +327,7 @@ impl Mode {
         }
     }
 
-    /// A mode between two of a table: without its shape.
+    /// Creates a mode between two of a table, without its shape.
     pub(crate) fn interpolated(
         n: usize,
         l: f64,
@@ -340,8 +342,8 @@ impl Mode {
         mode
     }
 
-    /// Speed along the outer wall at the height z, m from the contour's own zero; the place nearest to
-    /// the surface if there are several, none if there is none.
+    /// Returns the speed along the outer wall at the height z, m from the contour's own zero. If several positions have
+    /// this height, the one nearest to the surface counts; `None` if none has.
     pub fn wall_speed(&self, z: f64) -> Option<WallSpeed> {
         let pair = self.wall.windows(2).find(|p| (p[0].z - z) * (p[1].z - z) <= 0.0)?;
         let (a, b) = (pair[0], pair[1]);
@@ -352,7 +354,8 @@ impl Mode {
 }
 
 impl ModalData {
-    /// `inertias`: rigid across the axis about the centre of mass, rigid about the axis, effective.
+    /// Creates the result. `inertias`: rigid across the axis about the centre of mass, rigid about
+    /// the axis, effective.
     pub(crate) fn new(
         kind: &'static str,
         rho: f64,
@@ -391,7 +394,7 @@ impl ModalData {
         }
     }
 
-    /// States the errors. That of I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2 follows by propagation: its
+    /// Sets the errors. The error of I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2 follows by propagation. Its
     /// derivatives by I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2.
     pub(crate) fn set_error(&mut self, error: f64, error_beta: f64) {
         (self.error, self.error_beta) = (error, error_beta);
@@ -402,13 +405,13 @@ impl ModalData {
             (None, Some(x), Some(y)) => 0.5 * x.min(y),
             (r, ..) => r.unwrap_or(0.0),
         };
-        // a full tank has no rest and no R
+        // a full tank has neither fixed mass nor R
         let lever = if highest > 0.0 { highest / r } else { 0.0 };
         self.error_i_0 = error * (1.0 + lever).powi(2);
     }
 
-    /// Natural frequencies, Hz, under the specific force `gravity`, m/s²; of a box along one of its lengths, the first or
-    /// (`along_y`) the second. With surface tension those of [`Capillarity`], none where no formula holds.
+    /// Returns natural frequencies, Hz, at the specific force `gravity`, m/s²; for a box along its first or (`along_y`)
+    /// second length. With surface tension they are those of [`Capillarity`], `None` where no formula holds.
     pub fn frequencies(&self, gravity: f64, along_y: bool) -> Vec<Option<f64>> {
         let omegas: Vec<Option<f64>> = match (&self.capillarity, &self.axes) {
             (Some(found), _) => {
@@ -424,7 +427,7 @@ impl ModalData {
         omegas.iter().map(|omega| omega.map(|omega| omega / core::f64::consts::TAU)).collect()
     }
 
-    /// Where heights count from, in words.
+    /// Describes the origin of heights.
     pub fn origin(&self) -> String {
         if self.z_lowest.abs() < 1e-9 {
             return "z = 0 is the tank's lowest point, z up".to_string();
@@ -435,17 +438,17 @@ impl ModalData {
         )
     }
 
-    /// Fixed mass when the first `modes` modes are pendulums.
+    /// Returns the fixed mass when the first `modes` modes are pendulums.
     ///
     /// # Panics
-    /// If there are not so many modes.
+    /// If there are fewer modes.
     pub fn rest(&self, modes: usize) -> Rest {
         rest(self.m_liq, self.z_cg, self.i_eff_cg, &self.modes[..modes])
     }
 }
 
-/// m_0 = m_liq - sum m_n; m_0 H_0 = m_liq z_cg - sum m_n H_n; I_0 = I_eff - m_0 H_0^2 - sum m_n H_n^2,
-/// all heights from z_cg.
+/// Returns m_0 = m_liq - sum m_n; m_0 H_0 = m_liq z_cg - sum m_n H_n; I_0 = I_eff - m_0 H_0^2 - sum m_n H_n^2, with all
+/// heights from z_cg.
 pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest {
     let m_0 = m_liq - modes.iter().map(|m| m.m).sum::<f64>();
     let h_0 = if m_0 == 0.0 { 0.0 } else { -modes.iter().map(|m| m.m_h).sum::<f64>() / m_0 };
@@ -459,8 +462,8 @@ struct Approximation {
     i_eff: f64,
 }
 
-/// Orders of the discretisations that are compared: with `panels` of them the largest one has at
-/// most some 800 unknowns. The first is for the estimated error alone.
+/// Returns the orders of the discretisations that are compared. With `panels` panels the largest
+/// one has at most about 800 unknowns. The first serves only to estimate the error.
 fn orders(panels: usize) -> [usize; 4] {
     match panels {
         0..=24 => [12, 16, 20, 24],
@@ -471,15 +474,15 @@ fn orders(panels: usize) -> [usize; 4] {
     }
 }
 
-/// The estimate beyond which a finer discretisation is tried.
+/// Error estimate above which a finer discretisation is tried.
 const WANTED: f64 = 2e-7;
-/// The estimate beyond which finer panels are tried.
+/// Error estimate above which finer panels are tried.
 const ENOUGH: f64 = 1e-6;
-/// A larger estimated error is no result.
+/// Largest estimated error of a valid result.
 const WORST: f64 = 1e-2;
-/// Rounding: no estimate is below.
+/// Rounding, the lower limit of an estimate.
 const ROUNDING: f64 = 1e-10;
-/// The same for beta, whose integrand is not smooth at corners.
+/// Rounding for beta, whose integrand is not smooth at corners.
 const ROUNDING_BETA: f64 = 1e-6;
 
 /// The best approximation and its estimated errors.
@@ -489,7 +492,8 @@ struct Pair {
     error_beta: f64,
 }
 
-/// On the usual panels, and on finer ones where these do not do.
+/// Returns the best approximation on the usual panels, or on finer ones if these are not accurate
+/// enough.
 fn pair(wall: &Wall, volume: &Volume, rho: f64, modes: usize) -> Option<Pair> {
     let usual = pair_on(wall, volume, rho, modes, false);
     if usual.as_ref().is_some_and(|pair| pair.error < ENOUGH) {
@@ -521,15 +525,16 @@ fn pair_on(wall: &Wall, volume: &Volume, rho: f64, modes: usize, fine: bool) -> 
     })
 }
 
-/// The estimated error from the last two differences between discretisations: their geometric mean, the last counted twice, or
-/// the last if that is larger. Convergence is not regular, so two discretisations may agree by chance: the last difference alone is exceeded. The
-/// more suddenly it falls, the further the mean stays above it.
+/// Estimates the error from the last two differences between discretisations. It is their geometric mean with the last
+/// counted twice, or the last if that is larger. Convergence is irregular: two discretisations may agree by chance, so
+/// the last difference alone is not a bound. The more suddenly the difference falls, the farther the mean stays above
+/// it.
 fn estimate(before: f64, last: f64) -> f64 {
     last.max((before * last * last).cbrt())
 }
 
-/// The first `modes` modes of a liquid of density `rho` above `wall`; no modes and the effective inertia
-/// alone for a full closed tank, whose `wall` has no free surface.
+/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. A full closed tank, whose `wall` has
+/// no free surface, has no modes and only the effective inertia.
 ///
 /// # Errors
 /// If the estimated error is above 1e-2.
@@ -555,9 +560,10 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<Mod
     Ok(data)
 }
 
-/// Twice the largest differences between two discretisations, as defined at [`ModalData::error`].
-/// Twice, because weak corners converge as the order's fourth power only: with orders 12 and 16 the
-/// finer one's own error is then 0.46 of the difference, with 20 and 24 0.93.
+/// Returns twice the largest differences between two discretisations, as defined at
+/// [`ModalData::error`]. The factor is needed because weak corners converge only with the fourth
+/// power of the order. With orders 12 and 16 the error of the finer one is then 0.46 of the
+/// difference, with 20 and 24 0.93.
 fn difference(a: &Approximation, b: &Approximation, r: f64, m_liq: f64) -> (f64, f64) {
     let mut error = (a.i_eff - b.i_eff).abs() / (m_liq * r * r);
     let mut error_beta: f64 = 0.0;
@@ -578,7 +584,7 @@ fn difference(a: &Approximation, b: &Approximation, r: f64, m_liq: f64) -> (f64,
     (2.0 * error, 2.0 * error_beta)
 }
 
-/// Modal parameters from the solution at one discretisation.
+/// Computes modal parameters from the solution at one discretisation.
 fn approximate(
     mesh: &Discretisation,
     wall: &Wall,
@@ -646,8 +652,8 @@ fn approximate(
 mod tests {
     use super::*;
 
-    /// Twice each difference over what the error is stated of: lambda of itself, masses of the liquid's 5 kg, moments and
-    /// waves of R = 2 m, inertias of both; beta by itself.
+    /// Returns twice each difference over its scale: lambda and beta themselves, the liquid's 5 kg for masses, R = 2 m
+    /// for moments and waves, both for inertias.
     #[test]
     fn each_quantity_s_difference_counts_over_what_its_error_is_stated_of() {
         let approximation = |change: &dyn Fn(&mut Mode)| {
@@ -684,7 +690,8 @@ mod tests {
         assert!((ratios.1.0 - 2.0 / 3.0).abs() < 1e-15 && (ratios.1.1 - 2.0 / 3.0).abs() < 1e-15);
     }
 
-    /// A sphere filled up to a surface of 0.14 m: errors are of that radius, not of the tank's.
+    /// In a sphere filled up to a surface of 0.14 m, errors are parts of that radius, not of the
+    /// tank's.
     #[test]
     fn errors_are_over_the_radius_of_the_free_surface() {
         let segments = vec![crate::curve::Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)];
@@ -698,7 +705,7 @@ mod tests {
         let over =
             |a: &Approximation, b: &Approximation| difference(a, b, radius, 2.0 * volume.volume).0;
         let [first, second, third] = [over(&a, &b), over(&b, &c), over(&c, &d)];
-        // where the estimate is above what is wanted, the next discretisation is taken
+        // if the estimate is above the wanted error, the next discretisation is used
         let mean = |before: f64, last: f64| last.max((before * last * last).cbrt());
         let first = mean(first, second);
         let expected = if first > WANTED { mean(second, third) } else { first };
@@ -706,8 +713,9 @@ mod tests {
         assert!((found.error / expected - 1.0).abs() < 1e-6, "{:e} {expected:e}", found.error);
     }
 
-    /// Random contours of lines, splines and ellipses with corners, fills and numbers of modes: the result against that on panels
-    /// of half the length, which shares no point with it. Contours that even these do not resolve are no reference.
+    /// Solves random contours of lines, splines and ellipses with corners, fills and numbers of modes. Compares with
+    /// the result on panels of half the length, which has no point in common. Contours that the halved panels do not
+    /// resolve cannot serve as a reference.
     fn errors_over_stated_ones(seeds: core::ops::Range<u64>) -> Vec<f64> {
         seeds.filter_map(error_over_stated_one).collect()
     }
@@ -754,12 +762,12 @@ mod tests {
         let volume = Volume::of(&wall);
         let found = pair(&wall, &volume, 1.0, modes)?;
         let mesh = Discretisation::new(&wall.segments, modes, 16, false);
-        // Beyond 20 points the rules for close points integrate no better.
+        // Beyond 20 points the rules for close points do not integrate better.
         let top = (1000 / mesh.panel_count()).clamp(8, 20);
         let [rough, exact] = [top - 4, top]
             .map(|order| approximate(&mesh.halved(order), &wall, &volume, 1.0, modes));
         let (rough, exact) = (rough?, exact?);
-        // differences are stated twice
+        // differences count twice
         let off = |a: &Approximation| {
             difference(a, &exact, wall.r_outer, volume.volume).0 / 2.0 / found.error
         };
@@ -770,7 +778,8 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// By twice the last difference alone the error was 0.74 (seed 7) and 0.99 (114) of the stated one: no margin for chance.
+    /// With twice the last difference alone the error would be 0.74 (seed 7) and 0.99 (114) of the stated one, which
+    /// leaves no margin.
     #[test]
     fn stated_errors_hold_of_random_contours() {
         for seeds in [6..8, 114..115] {

@@ -2,14 +2,15 @@
 
 use crate::curve::{Curve, Point, Segment, add, cross, dot, norm, sub};
 
-/// A corner of the boundary, by the index of the segment that starts there.
+/// A corner of the boundary, by the index of the segment that starts at it.
 pub(crate) type Corner = usize;
 
-/// Part of a segment, with a coordinate v = 0..1 of its own: seen from the segment's `end` (or
-/// start), the curve's parameter is s = s0 + length v^gamma.
+/// Part of a segment with its own coordinate v = 0..1. Counted from the segment's `end` (or start),
+/// the curve's parameter is s = s0 + length v^gamma.
 ///
-/// At a corner of interior angle al the velocity potential goes as rho^(pi/al), rho the distance;
-/// with gamma > 1 it is a smooth function of v, and so are all of the kernels' singular parts.
+/// At a corner of interior angle al the velocity potential behaves as rho^(pi/al), rho the
+/// distance. With gamma > 1 it is a smooth function of v, and so are the singular parts of all
+/// kernels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
     pub(crate) segment: usize,
@@ -21,7 +22,7 @@ pub(crate) struct Panel {
     pub(crate) nu: f64,
 }
 
-/// A point of the boundary as the integral equation needs it.
+/// A point of the boundary with the data for the integral equation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryPoint {
     pub(crate) p: Point,
@@ -43,7 +44,7 @@ pub(crate) struct BoundaryPoint {
 #[derive(Clone, Debug)]
 pub(crate) struct Boundary {
     pub(crate) segments: Vec<Segment>,
-    /// Index of the free surface among the segments; their number if there is none.
+    /// Index of the free surface among the segments, or their number without one.
     pub(crate) surface: usize,
     /// Starts and ends, exact on the axis.
     ends: Vec<[Point; 2]>,
@@ -52,11 +53,12 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    /// `wall` from the axis or the inner contact line to the outer one, cut at the free surface.
+    /// Creates the boundary from `wall`, from the axis or the inner contact line to the outer one,
+    /// cut at the free surface.
     pub(crate) fn new(wall: &[Segment]) -> Boundary {
         let mut segments = wall.to_vec();
         let (inner, outer) = (wall[0].start(), wall[wall.len() - 1].end());
-        // A full tank has no surface: its wall ends on the axis or where it began.
+        // A full tank has no surface: its wall ends on the axis or at its start.
         let open = outer[0] > 0.0 && norm(sub(outer, inner)) > 1e-9 * outer[0];
         if open {
             let inner = if inner[0] > 0.0 { inner[0] } else { 0.0 };
@@ -76,7 +78,8 @@ impl Boundary {
                 (grading[i][1].0, grading[next][0].0) = (apex(before), apex(after));
                 continue;
             }
-            // In a cusp the tangents do not tell the inside; the curves shortly before and after do.
+            // In a cusp the tangents do not determine the inside, but the curves shortly before and
+            // after do.
             let inner = cross(segments[i].tangent(0.999), segments[next].tangent(0.001));
             let cusp = cross(before, after).atan2(dot(before, after)).abs() > 3.13 && inner > 0.0;
             let corner = if cusp { (1.0, 1.0) } else { grading_at(before, after, count > FEW) };
@@ -122,7 +125,7 @@ impl Boundary {
         }
     }
 
-    /// y - x, to full relative accuracy also where both are next to a corner.
+    /// Returns y - x, to full relative accuracy also if both are near a corner.
     pub(crate) fn difference(&self, x: &BoundaryPoint, y: &BoundaryPoint) -> Point {
         if x.segment == y.segment {
             let segment = &self.segments[x.segment];
@@ -137,8 +140,8 @@ impl Boundary {
         }
     }
 
-    /// Fraction s of the panel (v^gamma, also outside 0..1) whose point is nearest to x, and the
-    /// distance over the panel's local ds; `w` = x - start of the panel.
+    /// Returns the fraction s of the panel (v^gamma, also outside 0..1) whose point is nearest to
+    /// x, and the distance over the panel's local ds. `w` is x minus the start of the panel.
     pub(crate) fn foot(&self, panel: &Panel, w: Point) -> [f64; 2] {
         let segment = &self.segments[panel.segment];
         let run = (segment.to - segment.from).signum();
@@ -161,17 +164,17 @@ impl Boundary {
         [s, norm(residual) / norm(slope)]
     }
 
-    /// Returns true at the axis, where the boundary's two ends are different points.
+    /// Returns true at the axis, where the two ends of the boundary are different points.
     fn on_axis(&self, corner: Corner) -> bool {
         corner == 0 && self.ends[0][0][0] == 0.0
     }
 
-    /// Cuts the boundary into panels over which the solution is smooth: none turns by more than
-    /// 60 degrees, is long against the free surface or its distance from it, long against the
-    /// gap to another part of the boundary, or much longer than its neighbour. `modes` modes are to
-    /// be resolved. A `fine` cut is for contours whose details the usual one does not resolve.
+    /// Cuts the boundary into panels over which the solution is smooth. No panel turns by more than
+    /// 60 degrees. None is long compared with the free surface, its distance from the surface, the
+    /// gap to another part of the boundary, or its neighbour. The panels must resolve `modes`
+    /// modes. A `fine` cut is for contours whose details the usual one does not resolve.
     pub(crate) fn panels(&self, modes: usize, fine: bool) -> Vec<Panel> {
-        // A thin layer or a cusp would take panels without end: the gap counts less then.
+        // A thin layer or a cusp would take too many panels, so the gap has less weight then.
         let (width, many) = if fine { (0.6 * WIDTH, 2 * MANY) } else { (WIDTH, MANY) };
         let gaps = if fine { [1.0, 4.0, 16.0] } else { [2.5, 10.0, 40.0] };
         for gap in gaps {
@@ -182,7 +185,7 @@ impl Boundary {
         self.panels_for(modes, f64::INFINITY, width, many).unwrap_or_default()
     }
 
-    /// The same panels, each cut in two.
+    /// Cuts each panel in two.
     #[cfg(test)]
     pub(crate) fn halved(panels: &[Panel]) -> Vec<Panel> {
         let halves = |panel: &Panel| {
@@ -196,8 +199,8 @@ impl Boundary {
         panels.iter().flat_map(halves).collect()
     }
 
-    /// None if a panel at most `gap` times as long as its distance from another part takes more
-    /// than `many` panels; those on the surface are at most `width` of its width.
+    /// Returns `None` if panels at most `gap` times as long as their distance from another part
+    /// would number more than `many`. Panels on the surface are at most `width` of its width.
     fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {
         // The n-th mode has n half waves on the surface.
         let (longest, z_surface) = match self.ends.get(self.surface) {
@@ -277,18 +280,19 @@ impl Boundary {
     }
 }
 
-/// Contours with more segments than this are taken for curves given point by point.
+/// Number of segments above which a contour counts as a curve given point by point.
 const FEW: usize = 12;
-/// More panels are made only if the contour has many segments.
+/// Number of panels that is exceeded only if the contour has many segments.
 const MANY: usize = 36;
 /// Longest panel on the free surface over the surface's width, for up to five modes.
 const WIDTH: f64 = 0.35;
-/// gamma at an apex on the axis: the exponents there are between 0.8 and 2 for all but needles.
+/// gamma at an apex on the axis: the exponents there are between 0.8 and 2 except for very slender
+/// cones.
 const APEX: f64 = 4.0;
 
-/// gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole number, so
-/// that the curve is an analytic function of v, and gamma nu at least 6. A contour of `many` short
-/// segments turns little at each: its corners are so weak that they need no panels of their own.
+/// Returns gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole
+/// number, so that the curve is an analytic function of v, and gamma nu is at least 6. A contour of
+/// `many` short segments turns little at each. Such weak corners need no panels of their own.
 fn grading_at(before: Point, after: Point, many: bool) -> (f64, f64) {
     let turn = cross(before, after).atan2(dot(before, after));
     let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);
@@ -348,8 +352,9 @@ mod tests {
         vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)]
     }
 
-    /// Right angles are pi/2 of the liquid, nu = 2; a re-entrant one 3 pi/2, nu = 2/3; where the curvature jumps rho^2 log
-    /// rho is smooth in the cube of v; a cusp has the largest gamma. Weak corners of many segments count less.
+    /// A right angle of the liquid, pi/2, has nu = 2, a re-entrant one, 3 pi/2, has nu = 2/3. At a jump of the
+    /// curvature rho^2 log rho is smooth in the cube of v. A cusp has the largest gamma. Weak corners of many segments
+    /// count less.
     #[test]
     fn corners_are_graded_by_their_angle() {
         let at = |degrees: f64, many: bool| {
@@ -376,8 +381,8 @@ mod tests {
         assert_eq!(at(1.0, false).0, 6.0);
     }
 
-    /// Points begin and end where the panels do, one panel after the other; ds/dv is their distance's slope, the normal
-    /// is across and out; lengths add up.
+    /// Points begin and end with the panels, one panel after the other. ds/dv is the slope of their distance, the
+    /// normal is perpendicular and outwards, and lengths add up.
     #[test]
     fn panels_follow_one_another_along_the_whole_boundary() {
         let cap = 0.8 * 20f64.to_radians().cos();
@@ -412,7 +417,7 @@ mod tests {
                         // h^2 times the third derivative of v^9, 504 of the length
                         assert!((norm(slope) - x.speed).abs() < 1e-7, "{panel:?}");
                         assert!(dot(slope, x.n).abs() < 1e-7 && (norm(x.n) - 1.0).abs() < 1e-15);
-                        // to the left of the way along the boundary is the liquid
+                        // the liquid is to the left of the direction of travel
                         let way = if panel.end { -1.0 } else { 1.0 };
                         assert!(way * cross(slope, x.n) < 0.0, "{panel:?}");
                         assert!(norm(sub(boundary.difference(&a, &b), sub(b.p, a.p))) < 1e-15);
@@ -423,7 +428,8 @@ mod tests {
         }
     }
 
-    /// Next to a corner places differ by v^gamma, far less than coordinates have digits: on one wall and across the corner.
+    /// Near a corner positions differ by v^gamma, far below the resolution of coordinates, on one wall and across the
+    /// corner.
     #[test]
     fn differences_next_to_a_corner_keep_their_digits() {
         let boundary = Boundary::new(&step());
@@ -432,7 +438,8 @@ mod tests {
             let own = |p: &&Panel| p.segment == segment && p.end == end && p.gamma > 1.0;
             *panels.iter().find(own).unwrap()
         };
-        // the floor's inner edge, nu = 2/3 and gamma = 9: along -r on the upper floor, down the step
+        // the inner edge of the floor, nu = 2/3 and gamma = 9: along -r on the upper floor, down
+        // the step
         let (above, below) = (corner(0, true), corner(1, false));
         for (v, w) in [(1e-3, 2e-3), (0.01, 0.02), (0.5, 0.3)] {
             let [x, y] = [v, w].map(|v| boundary.point(&above, v));
@@ -449,8 +456,8 @@ mod tests {
         }
     }
 
-    /// The foot of a point beside an arc is at its angle, and its distance over the arc's; beside a line over the line. Four
-    /// steps, each of which leaves the ratio of distance to radius of what there was, 1e-1.
+    /// The foot of a point near an arc is at the angle of the point, and its distance is measured along the arc; near a
+    /// line, along the line. Each of the four steps reduces the error by the ratio of distance to radius, 1e-1.
     #[test]
     fn the_foot_of_a_point_is_the_nearest_of_the_panel() {
         for wall in [sphere(), ring(), step()] {
@@ -470,7 +477,8 @@ mod tests {
         }
     }
 
-    /// 60 degrees a panel, 1.05 rad: a full sphere, whose three are neither close to each other nor to a surface, has no more.
+    /// 60 degrees per panel, 1.05 rad: a full sphere has only three panels, because they are close neither to each
+    /// other nor to a surface.
     #[test]
     fn a_full_sphere_has_three_panels() {
         let boundary = Boundary::new(&[Segment::arc([0.0, 0.0], 1.0, -90.0, 90.0)]);
@@ -483,7 +491,8 @@ mod tests {
         }
     }
 
-    /// Three times its neighbour's length, at most; around a ring the last panel and the first are neighbours, too.
+    /// A panel is at most three times as long as its neighbour. In a ring the last panel and the first are neighbours,
+    /// too.
     #[test]
     fn panels_change_their_length_gradually() {
         let fine = [

@@ -1,7 +1,7 @@
 //! A tank's modal parameters under the names of the FMUs' variables, and files of them.
 //!
-//! A set file holds `"name" = value`, TOML with quoted names; the same as SSV is SSP 1.0's parameter
-//! set. `hubslosh run --set-file`, the Python package and SSP tools read them.
+//! A set file holds `"name" = value`, TOML with quoted names. The SSV form is the parameter set of
+//! SSP 1.0. `hubslosh run --set-file`, the Python package and SSP tools read them.
 
 use core::fmt::Write as _;
 
@@ -15,14 +15,14 @@ use crate::{damping, modal};
 /// The FMU that the parameters are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// `HubSlosh.fmu`: a table of modes (`slosh.source = table`). The tank's place on the hub,
-    /// `tank.r`, stays as it is.
+    /// `HubSlosh.fmu`: a table of modes (`slosh.source = table`). The tank's position on the hub,
+    /// `tank.r`, does not change.
     HubSlosh,
     /// `SloshTank.fmu`.
     SloshTank,
     /// `Spacecraft.fmu`, tank 1 to 4.
     Spacecraft {
-        /// Its number.
+        /// Number of the tank.
         tank: usize,
     },
 }
@@ -30,9 +30,10 @@ pub enum Target {
 /// Properties of the liquid other than its density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
-    /// Specific force along the axis at which damping ratios and stiffnesses hold, m/s²; 0 or more.
+    /// Specific force along the axis at which damping ratios and stiffnesses hold, m/s²; at least
+    /// 0.
     pub gravity: f64,
-    /// Kinematic viscosity, m2/s; without it the damping ratios stay as they are in the FMU.
+    /// Kinematic viscosity, m2/s. Without it the damping ratios are not set.
     pub nu: Option<f64>,
     /// Surface tension, N/m; without it there is no centring stiffness.
     pub sigma: Option<f64>,
@@ -45,9 +46,9 @@ pub struct Liquid {
 pub enum Value {
     /// A quantity in SI units.
     Real(f64),
-    /// A number of something.
+    /// An integer.
     Integer(i64),
-    /// Yes or no.
+    /// A Boolean.
     Boolean(bool),
     /// An item of an enumeration.
     Item(&'static str),
@@ -60,14 +61,14 @@ pub struct ParameterSet {
     pub notes: Vec<String>,
     /// Omitted or unknown values, one line each.
     pub warnings: Vec<String>,
-    /// Values far outside of what their formula holds for, which nobody should use unseen: one line each.
+    /// Values far outside the range of their formula, which nobody should use unseen, one line each.
     pub unknown: Vec<String>,
     /// Names and values.
     pub values: Vec<(String, Value)>,
 }
 
-/// The modes with surface tension: of a flat surface, and of the first mode of an upright cylinder of the meniscus that the
-/// contact angle makes.
+/// Adds capillarity to the modes: that of a flat surface and, for the first mode of an upright cylinder, that of the
+/// meniscus at the contact angle.
 fn with_capillarity(
     tank: &Tank,
     data: &ModalData,
@@ -112,7 +113,7 @@ fn with_capillarity(
     all
 }
 
-/// Centring stiffnesses of the modes, N/m. The FMUs take none below 0.
+/// Returns the centring stiffnesses of the modes, N/m. The FMUs accept none below 0.
 fn springs(
     tank: &Tank,
     data: &ModalData,
@@ -147,8 +148,8 @@ fn springs(
     all.iter().map(|capillary| capillary.spring).collect()
 }
 
-/// Axis and number of the modes of a box in Spacecraft, which has three: the first along either axis, and the heavier one of the
-/// second.
+/// Returns axis and number of the modes of a box in Spacecraft, which has three: the first along each axis, and the
+/// second with the larger mass.
 fn along_both(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     let mass = |axis: usize| axes[axis].get(1).map_or(0.0, |mode| mode.m);
     let mut chosen = vec![(0, 0), (1, 0)];
@@ -158,8 +159,8 @@ fn along_both(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     chosen
 }
 
-/// Natural frequencies of a tank's modes with the surface tension and the contact angle of the liquid, at its gravity; none
-/// without surface tension.
+/// Returns the natural frequencies of a tank's modes with the surface tension and contact angle of the liquid, at its
+/// gravity; `None` without surface tension.
 pub fn capillarity_of(tank: &Tank, data: &ModalData, liquid: Liquid) -> Option<modal::Capillarity> {
     let sigma = liquid.sigma?;
     let fluid = Fluid { rho: data.rho, sigma, g: liquid.gravity };
@@ -194,10 +195,11 @@ pub fn capillarity_of(tank: &Tank, data: &ModalData, liquid: Liquid) -> Option<m
     })
 }
 
-/// The damping of a tank's modes with the capillarity of the liquid: see [`damping::of_tank`].
+/// Returns the damping of a tank's modes with the capillarity of the liquid, see
+/// [`damping::of_tank`].
 ///
 /// # Errors
-/// No natural frequency, because neither gravity nor surface tension brings the liquid back.
+/// Without gravity and surface tension there is no natural frequency.
 pub fn damping_of(
     tank: &Tank,
     data: &ModalData,
@@ -214,11 +216,12 @@ pub fn damping_of(
 }
 
 impl ParameterSet {
-    /// The parameters of a tank that was solved for `data`, as many modes as both have.
+    /// Returns the parameters of a tank solved as `data`, with as many modes as both the tank and
+    /// the FMU have.
     ///
     /// # Errors
-    /// A tank that the FMU cannot have: more than four of them, a full one;
-    /// damping ratios without a specific force.
+    /// A tank that the FMU cannot represent: number above four, or full; damping ratios without a
+    /// specific force.
     pub fn new(
         tank: &Tank,
         data: &ModalData,
@@ -260,14 +263,15 @@ impl ParameterSet {
             }
             _ => None,
         };
-        // Of a box with unequal sides the modes along both; else those along the first axis.
+        // For a box with unequal sides, the modes along both; otherwise those along the first axis.
         let both = data.axes.as_ref().filter(|_| sides.is_some());
         let count = match (both, target) {
             (Some(_), Target::HubSlosh) => data.modes.len().min(most / 2),
             _ => data.modes.len().min(most),
         };
         let chosen: Vec<(usize, usize)> = match (both, target) {
-            // Those of one axis are HubSlosh's first: its outputs are mode 1's.
+            // The modes of one axis come first in HubSlosh, because its outputs are those of mode
+            // 1.
             (Some(_), Target::HubSlosh) => {
                 (0..2).flat_map(|axis| (0..count).map(move |n| (axis, n))).collect()
             }
@@ -305,7 +309,7 @@ impl ParameterSet {
                 vec![0.0; modes.len()]
             }
         };
-        // The same of every FMU, under the name of its tank.
+        // The same parameters for every FMU, with the prefix of its tank.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
             for (n, (mode, &(axis, of_axis))) in modes.iter().zip(&chosen).enumerate() {
                 for (what, value) in [
@@ -338,12 +342,12 @@ impl ParameterSet {
         match target {
             Target::HubSlosh => {
                 real("slosh.table.m_liq".into(), data.m_liq);
-                // where the damping ratios hold: there are none at 0
+                // specific force of the damping ratios; at 0 there are none
                 if liquid.gravity > 0.0 {
                     real("slosh.table.g_ref".into(), liquid.gravity);
                 }
                 real("fluid.rho".into(), data.rho);
-                // The free surface's width along the first length of a box.
+                // For a box, the width of the free surface along its first length.
                 real(
                     "tank.d".into(),
                     2.0 * data.r_surface.unwrap_or(data.length_x.unwrap_or(0.0) / 2.0),
@@ -351,7 +355,7 @@ impl ParameterSet {
                 real("tank.I_own".into(), data.i_eff_axis.unwrap_or(0.0));
                 of_modes("slosh.table", &mut values);
                 values.push(("slosh.source".into(), Value::Item("table")));
-                // As the laminar layer that they are made of.
+                // The damping ratios come from the laminar layer.
                 values.push(("slosh.damping_law".into(), Value::Item("laminar")));
                 values.push(("slosh.modes".into(), Value::Integer(modes.len() as i64)));
             }
@@ -367,13 +371,13 @@ impl ParameterSet {
                     _ => "tank".to_string(),
                 };
                 let rest = match both {
-                    // Each bob is rigid liquid for motion along the other axis. About x: moved along y.
+                    // Each bob is rigid liquid for motion along the other axis. Rotation about x moves it along y.
                     Some(axes) => modal::rest(data.m_liq, data.z_cg, axes.y.i_eff_cg, &modes),
                     None => data.rest(modes.len()),
                 };
                 real(format!("{prefix}.m_0"), rest.m_0);
                 real(format!("{prefix}.H_0"), rest.height);
-                // The largest number of modes may leave it below 0 by rounding.
+                // With the largest number of modes it may be below 0 by rounding.
                 let least = if both.is_some() { f64::NEG_INFINITY } else { 0.0 };
                 real(format!("{prefix}.I_0"), rest.inertia.max(least));
                 real(format!("{prefix}.I_z"), data.i_eff_axis.unwrap_or(0.0));
@@ -410,7 +414,7 @@ impl ParameterSet {
         Ok(ParameterSet { notes, warnings, unknown, values })
     }
 
-    /// Notes and warnings, as they stand at the head of a file.
+    /// Returns notes and warnings as comments for the head of a file.
     fn comments(&self) -> impl Iterator<Item = String> {
         let warnings = self.warnings.iter().map(|warning| format!("warning: {warning}"));
         self.notes.iter().cloned().chain(warnings)
@@ -437,7 +441,7 @@ impl ParameterSet {
     pub fn to_ssv(&self) -> String {
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n");
         for note in self.comments() {
-            // Two hyphens end a comment.
+            // Two hyphens would end a comment.
             let _ = writeln!(text, "  {}", note.replace("--", "- -"));
         }
         text.push_str(

@@ -1,4 +1,4 @@
-//! The tank drawn with its liquid and mode shapes, and a sweep drawn beside it: self-contained SVG.
+//! Drawings of the tank with its liquid and mode shapes, and of a sweep: self-contained SVG.
 
 use core::fmt::Write as _;
 
@@ -12,13 +12,13 @@ use crate::third_order::Overlaps;
 
 /// Colours of the modes, distinct also for colour-blind readers (Okabe and Ito).
 const COLOURS: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00"];
-/// Modes that are drawn.
+/// Number of modes drawn.
 const DRAWN: usize = 5;
 const LIQUID: &str = "#dcecf7";
 const INK: &str = "#222";
 const FAINT: &str = "#999";
 
-/// A rectangle of the page, px, and the values at its edges.
+/// A rectangle of the page, px, with the values at its edges.
 #[derive(Clone, Copy)]
 struct Frame {
     left: f64,
@@ -50,7 +50,7 @@ impl Frame {
         let _ = writeln!(svg, "<path d=\"{}\" fill=\"none\" {style}/>", self.path(points));
     }
 
-    /// Axes on the left and at the bottom with round ticks and labels.
+    /// Draws axes on the left and at the bottom with round ticks and labels.
     fn axes(&self, svg: &mut String, x_label: &str, y_label: Option<&str>) {
         let Frame { left, top, width, height, .. } = *self;
         let bottom = top + height;
@@ -83,7 +83,7 @@ impl Frame {
     }
 }
 
-/// Round values within a range, about `count`.
+/// Returns about `count` round values within a range.
 fn ticks([from, to]: [f64; 2], count: usize) -> Vec<f64> {
     let raw = (to - from) / count.max(2) as f64;
     let power = 10f64.powf(raw.log10().floor());
@@ -112,7 +112,7 @@ fn page(width: f64, height: f64, title: &str, content: &str) -> String {
     )
 }
 
-/// Points of segments, close enough to look smooth.
+/// Returns points of segments, close enough to look smooth.
 fn outline(segments: &[Segment]) -> Vec<Point> {
     let mut points = Vec::new();
     for segment in segments {
@@ -122,7 +122,7 @@ fn outline(segments: &[Segment]) -> Vec<Point> {
     points
 }
 
-/// Drawn section of a tank: its wall and the wetted wall, both on the right of the axis.
+/// Drawn section of a tank: wall and wetted wall, both to the right of the axis.
 struct Section {
     wall: Vec<Point>,
     wetted: Vec<Point>,
@@ -158,7 +158,7 @@ fn section(tank: &Tank, data: &ModalData) -> Section {
     }
 }
 
-/// Frame with equal scales that holds both halves of the tank and `margin` m more above and below.
+/// Returns a frame with equal scales for both halves of the tank and `margin` m above and below.
 fn tank_frame(
     section: &Section,
     left: f64,
@@ -210,7 +210,8 @@ fn draw_tank(svg: &mut String, frame: &Frame, section: &Section) {
     }
 }
 
-/// Free surface displaced by each mode, on both sides of the axis; the largest elevation is `height`.
+/// Draws the free surface displaced by each mode, on both sides of the axis; the largest elevation
+/// is `height`.
 fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode], height: f64) {
     for (mode, colour) in modes.iter().take(DRAWN).zip(COLOURS) {
         let peak = mode.shape.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
@@ -233,9 +234,9 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
     }
 }
 
-/// The tank in section with its liquid, the free surface in each mode (largest elevations drawn alike)
-/// and, for modes with more than 1 % of the mass, the pendulum's hinge and bob if they lie in the
-/// drawing. `gravity`, m/s², gives the frequencies where the result has none with surface tension.
+/// Draws the tank in section with its liquid and the free surface in each mode, with equal largest elevations. For
+/// modes with more than 1 % of the mass it draws the pendulum's hinge and bob if they lie in the drawing. `gravity`,
+/// m/s², gives the frequencies if the result has none with surface tension.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);
     let margin = 0.16 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
@@ -310,7 +311,7 @@ pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     page(x + 280.0, (frame.top + frame.height + 60.0).max(y + 20.0), &title, &svg)
 }
 
-/// Three digits that mean something.
+/// Returns three significant digits.
 fn digits(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
@@ -319,15 +320,15 @@ fn digits(value: f64) -> String {
     if places == 12 { format!("{value:.2e}") } else { format!("{value:.places$}") }
 }
 
-/// A sweep over the fill: the tank on the left, and at the same height of the free surface the modes'
-/// frequencies, mass ratios and hinges.
+/// Draws a sweep over the fill: the tank on the left, and frequencies, mass ratios and hinges of
+/// the modes at the same height of the free surface.
 pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     let rows: Vec<&ModalData> = sweep.rows.iter().filter(|r| !r.modes.is_empty()).collect();
     let Some(last) = rows.last() else { return page(200.0, 60.0, "sweep", "") };
     let section = section(tank, last);
     let margin = 0.05 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
     let mut frame = tank_frame(&section, 80.0, 70.0, [320.0, 420.0], margin);
-    // low tanks are drawn small but their charts are not
+    // the charts of low tanks keep their size
     let scale = (300.0 / frame.height).max(1.0);
     let chart_height = frame.height * scale;
     frame.top += 0.5 * (chart_height - frame.height);
@@ -358,7 +359,7 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
         if k < 2 {
             low = 0.0;
         }
-        // all frequencies are 0 without gravity, all hinges where a sphere is drawn around its centre
+        // all frequencies are 0 without gravity, and all hinges equal for a sphere
         if high - low < 1e-9 {
             (low, high) = (low - 0.5, high + 0.5);
         }
@@ -407,9 +408,9 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     page(left, 70.0 + chart_height + 60.0, &title, &svg)
 }
 
-/// Chart of the amplitude dependence of an upright cylinder's first frequency over the depth: the shifts of
-/// omega^2 per squared slosh angle, planar and circular, those of a pendulum, and the secondary resonances, where the
-/// third order has poles. Points mark the bench's fills, 5 and 10 cm.
+/// Draws the amplitude dependence of an upright cylinder's first frequency over the depth: planar and circular shifts
+/// of omega^2 per squared slosh angle, and those of a pendulum. The third order has poles at the secondary resonances.
+/// Points mark the bench's fills, 5 and 10 cm.
 pub fn third_order(overlaps: &Overlaps) -> String {
     let frame =
         Frame { left: 80.0, top: 96.0, width: 620.0, height: 360.0, x: [0.1, 2.0], y: [-1.0, 1.0] };
@@ -422,7 +423,7 @@ pub fn third_order(overlaps: &Overlaps) -> String {
         let (x, y) = frame.place(depth, frame.y[1]);
         text(&mut svg, x, y - 6.0, "middle", &format!("({azimuth},{number})"));
     }
-    // Between the poles, closer and closer to them.
+    // Intervals between the poles, with points ever closer to them.
     let mut ends = vec![frame.x[0]];
     ends.extend(
         overlaps.resonant_depths().into_iter().filter(|d| (frame.x[0]..frame.x[1]).contains(d)),
@@ -471,7 +472,7 @@ pub fn third_order(overlaps: &Overlaps) -> String {
 mod tests {
     use super::*;
 
-    /// 1, 2 or 5 times a power of ten apart, the ends included where they are round, in any unit; no more than asked for.
+    /// Ticks are 1, 2 or 5 times a power of ten apart, include round ends, and are at most as many as requested.
     #[test]
     fn ticks_are_round_and_reach_both_ends() {
         for unit in [1e-9, 1e-3, 1.0, 1e6] {

@@ -1,7 +1,7 @@
 //! The m = 1 sloshing problem of linear potential flow, by a boundary integral equation.
 //!
-//! For a harmonic function u(r, z) cos(theta) with normal derivative q (out of the liquid),
-//! Green's third identity on the boundary of the liquid reads, with the ring potential g,
+//! u(r, z) cos(theta) is a harmonic function with normal derivative q (out of the liquid). Green's
+//! third identity on the boundary of the liquid reads, with the ring potential g,
 //!
 //!   u(x)/2 + int dg/dn(x, y) u(y) r ds = int g(x, y) q(y) r ds.
 //!
@@ -10,9 +10,9 @@
 //! self-adjoint under the weight r ds. The pitch function psi has q = z n_r - r n_z everywhere
 //! (on F, n_z = 1 and n_r = 0: q = -r).
 //!
-//! Nystrom's method on graded panels with Gauss points; the integrals over a panel close to x
-//! by bisection in the panel's own coordinate v until x is far from every part, the own panel
-//! by rules that absorb the logarithm.
+//! The method is Nystrom's on graded panels with Gauss points. Integrals over a panel close to x
+//! bisect the panel's own coordinate v until x is far from every part. Rules that absorb the
+//! logarithm integrate over the panel that contains x.
 
 use nalgebra::DMatrix;
 
@@ -31,11 +31,11 @@ pub(crate) struct Discretisation {
     points: Vec<BoundaryPoint>,
     /// Index of the first point on the free surface.
     surface: usize,
-    /// Projects values at the points of a panel on Legendre polynomials: [k * order + j].
+    /// Projects values at the points of a panel onto Legendre polynomials: [k * order + j].
     projection: Vec<f64>,
 }
 
-/// Solutions on the boundary's points.
+/// Solutions at the boundary's points.
 #[derive(Debug)]
 pub(crate) struct Solution {
     /// lambda_n, 1/m, ascending.
@@ -46,7 +46,7 @@ pub(crate) struct Solution {
     pub(crate) psi: Vec<f64>,
 }
 
-/// A part [v0, v1] of a panel with points to integrate over it.
+/// A part [v0, v1] of a panel with points for integration over it.
 struct Part {
     v0: f64,
     v1: f64,
@@ -57,36 +57,37 @@ struct Part {
     halves: Option<[usize; 2]>,
 }
 
-/// Points of the rule on a part of a panel.
+/// Number of points of the rule on a part of a panel.
 const PART: usize = 16;
-/// x is far from a part if it is outside the Bernstein ellipse of this sum of semi-axes.
+/// Sum of semi-axes of the Bernstein ellipse outside which x is far from a part.
 const FAR: f64 = 2.3;
-/// The same for a whole panel, whose own points are used then.
+/// The same limit for a whole panel, which then uses its own points.
 const FAR_WHOLE: f64 = 3.0;
-/// Iterations for the eigenvectors: the slowest part falls by about a third in each.
+/// Number of iterations for the eigenvectors. The slowest error component falls by about a third in
+/// each.
 const ITERATIONS: usize = 30;
-/// Points of the rule on each side of a point of the own panel, and the power that it absorbs the
-/// logarithm with.
+/// Number of points of the rule on each side of a point of its own panel, and the power with which
+/// the rule absorbs the logarithm.
 const OWN: usize = 20;
 const OWN_POWER: i32 = 5;
 /// Longest interval of v for that rule: the density is a polynomial of degree order - 1.
 const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {
-    /// For `modes` modes of the liquid above a wall, given from the axis or the inner contact line to
-    /// the outer one; on more and shorter panels if `fine`.
+    /// Discretises the liquid above a wall for `modes` modes. The wall runs from the axis or the
+    /// inner contact line to the outer one. `fine` uses more and shorter panels.
     pub(crate) fn new(wall: &[Segment], modes: usize, order: usize, fine: bool) -> Discretisation {
         let boundary = Boundary::new(wall);
         let panels = boundary.panels(modes, fine);
         Discretisation::on_panels(boundary, panels, order)
     }
 
-    /// The same panels with another number of points.
+    /// Returns the same panels with another number of points.
     pub(crate) fn with_order(&self, order: usize) -> Discretisation {
         Discretisation::on_panels(self.boundary.clone(), self.panels.clone(), order)
     }
 
-    /// On panels of half the length.
+    /// Returns panels of half the length.
     #[cfg(test)]
     pub(crate) fn halved(&self, order: usize) -> Discretisation {
         Discretisation::on_panels(self.boundary.clone(), Boundary::halved(&self.panels), order)
@@ -134,12 +135,12 @@ impl Discretisation {
         self.points.iter().enumerate().map(weight).collect()
     }
 
-    /// Radii of the points.
+    /// Returns the radii of the points.
     pub(crate) fn radii(&self) -> Vec<f64> {
         self.points.iter().map(|x| x.p[0]).collect()
     }
 
-    /// Normal velocity of the boundary that turns about (0, `z0`), at all points.
+    /// Returns the normal velocity of the boundary that rotates about (0, `z0`), at all points.
     pub(crate) fn pitch(&self, z0: f64) -> Vec<f64> {
         self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
@@ -149,8 +150,9 @@ impl Discretisation {
         self.surface..self.points.len()
     }
 
-    /// The first `modes` modes, and psi of the normal velocity `pitch`. None if the matrix cannot be
-    /// solved: for m = 1 the operator is regular, so only if the panels are useless.
+    /// Solves for the first `modes` modes, and psi for the normal velocity `pitch`. Returns `None`
+    /// if the matrix cannot be solved. For m = 1 the operator is regular, so this happens only with
+    /// unusable panels.
     pub(crate) fn solve(&self, modes: usize, pitch: &[f64]) -> Option<Solution> {
         let count = self.len();
         let surface = self.on_surface();
@@ -164,9 +166,9 @@ impl Discretisation {
         if size == 0 {
             return Some(Solution { lambda: Vec::new(), phi: Vec::new(), psi });
         }
-        // Subspace iteration; T is self-adjoint under the weight r ds, so its projection on an
-        // orthonormal basis is symmetric but for the discretisation's error. (Symmetrising T
-        // itself would divide the error by the tiny weights next to the contact line.)
+        // Subspace iteration. T is self-adjoint under the weight r ds, so its projection on an
+        // orthonormal basis is symmetric up to the discretisation error. (Symmetrising T itself
+        // would divide the error by the small weights near the contact line.)
         let weights = self.weights();
         let t = solved.view((surface.start, 0), (size, size));
         let radius = self.points[surface.clone()].iter().map(|x| x.p[0]).fold(0.0, f64::max);
@@ -201,7 +203,7 @@ impl Discretisation {
         Some(Solution { lambda, phi, psi })
     }
 
-    /// 1/2 + D, and S for sources at each point of F and for `q` on the whole boundary.
+    /// Assembles 1/2 + D, and S for sources at each point of F and for `q` on the whole boundary.
     fn assemble(&self, q: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
         let (count, order) = (self.len(), self.order);
         let own = self.own_rules();
@@ -320,8 +322,8 @@ impl Discretisation {
         Part { v0, v1, points, weights, values, halves: None }
     }
 
-    /// Preimages of the point x and of its mirror image behind the axis in the complex plane of a panel's v: the kernels are singular at both.
-    /// `None` far from the panel.
+    /// Returns the preimages of the point x and of its mirror image behind the axis in the complex plane of a panel's
+    /// v. The kernels are singular at both. Returns `None` far from the panel.
     fn preimages(
         &self,
         panel: &Panel,
@@ -334,7 +336,7 @@ impl Discretisation {
             if norm(w) > reach {
                 return None;
             }
-            // s + i d: the foot of x on the panel's curve, and its distance, over the length
+            // s + i d: foot of x on the panel's curve, and its distance, over the length
             let [re, im] = self.boundary.foot(panel, w);
             let v = if panel.gamma > 1.0 {
                 let size = re.hypot(im).powf(1.0 / panel.gamma);
@@ -349,7 +351,7 @@ impl Discretisation {
         [find(self.boundary.difference(&ends[0], x)), find(sub([-x.p[0], x.p[1]], start))]
     }
 
-    /// Rules over the own panel for each of its points.
+    /// Returns rules over the own panel for each of its points.
     fn own_rules(&self) -> Vec<OwnRule> {
         let (side, rest) = (Gauss::new(OWN), Gauss::new(PART));
         let mut rules = Vec::with_capacity(self.order);
@@ -388,7 +390,7 @@ impl Discretisation {
         rules
     }
 
-    /// Value of a function given at all points, at `v` of a panel.
+    /// Returns the value at `v` of a panel of a function given at all points.
     pub(crate) fn interpolate(&self, u: &[f64], panel: usize, v: f64) -> f64 {
         let mut values = vec![0.0; self.order];
         legendre(v, &mut values);
@@ -404,9 +406,9 @@ impl Discretisation {
         basis.iter().enumerate().map(|(k, value)| value * coefficient(k)).sum()
     }
 
-    /// int [u_s^2 + u^2/r^2] r ds over the free surface or the wall, u given at all points. Next to a corner u_s goes as
-    /// rho^(nu - 1), and dividing du/dv by ds/dv loses all digits; the integral over the last 1e-6
-    /// of the panel follows from the exponent (1 where nu > 1: u_s has a limit there).
+    /// Returns int [u_s^2 + u^2/r^2] r ds over the free surface or the wall, with u given at all points. Near a corner
+    /// u_s behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. The integral over the last 1e-6 of
+    /// the panel therefore follows from the exponent (1 if nu > 1, where u_s has a limit).
     pub(crate) fn gradient(&self, u: &[f64], on_surface: bool) -> f64 {
         let rule = Gauss::new(24);
         let mut slopes = vec![0.0; self.order];
@@ -438,7 +440,7 @@ impl Discretisation {
         total
     }
 
-    /// (r, z, |u_s|) along the wall from the outer contact line, u given at all points. Places next to
+    /// Returns (r, z, |u_s|) along the wall from the outer contact line, with u given at all points. Positions near
     /// corners, where u_s has no limit or no digits, are left out.
     pub(crate) fn along_wall(&self, u: &[f64]) -> Vec<[f64; 3]> {
         let mut slopes = vec![0.0; self.order];
@@ -462,7 +464,7 @@ impl Discretisation {
         all
     }
 
-    /// Position and value of the largest |u| on the free surface: (r, u).
+    /// Returns position and value of the largest |u| on the free surface: (r, u).
     pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
         let step = 1.0 / 16.0;
         let mut best = [0.0; 2];
@@ -488,8 +490,9 @@ impl Discretisation {
         best
     }
 
-    /// A function given at all points, along the free surface: (r, value), from the outer contact
-    /// line to the axis or inner contact line, both ends included; `dense` intervals per panel.
+    /// Returns a function given at all points, along the free surface: (r, value), with `dense`
+    /// intervals per panel. It runs from the outer contact line to the axis or inner contact line,
+    /// including both ends.
     pub(crate) fn along_surface(&self, u: &[f64], dense: usize) -> Vec<[f64; 2]> {
         let first = self.surface / self.order;
         let mut all = Vec::new();
@@ -513,7 +516,7 @@ impl Discretisation {
     }
 }
 
-/// Gram-Schmidt under the given weights, twice.
+/// Orthonormalises by Gram-Schmidt under the given weights, twice.
 fn orthonormalise(basis: &mut DMatrix<f64>, weights: &[f64]) {
     let product = |a: &[f64], b: &[f64]| -> f64 {
         a.iter().zip(b).zip(weights).map(|((a, b), w)| a * b * w).sum()
@@ -538,8 +541,9 @@ struct OwnRule {
     values: Vec<f64>,
 }
 
-/// Sum of the semi-axes of the ellipse with foci at the ends of [v0, v1] through a point of the
-/// complex plane, over the half length. Gauss with n points converges as its power -2n.
+/// Returns the sum of the semi-axes of the ellipse with foci at the ends of [v0, v1] through a
+/// point of the complex plane, over the half length. The error of Gauss with n points falls as its
+/// power -2n.
 fn bernstein(point: [f64; 2], v0: f64, v1: f64) -> f64 {
     let half = 0.5 * (v1 - v0);
     let x = (point[0] - 0.5 * (v0 + v1)) / half;
@@ -554,7 +558,8 @@ mod tests {
     use crate::curve::dot;
     use nalgebra::DVector;
 
-    /// A bowl, a cylinder with an inner corner on its floor, and a ring, each with a free surface.
+    /// Returns a bowl, a cylinder with an inner corner on its floor, and a ring, each with a free
+    /// surface.
     fn walls() -> [Vec<Segment>; 3] {
         [
             vec![Segment::arc([0.0, 0.1], 0.8, -90.0, 20.0)],
@@ -568,15 +573,15 @@ mod tests {
         ]
     }
 
-    /// Harmonic with cos theta: r, r z and r (4 z^2 - r^2), with their gradients.
+    /// Harmonic functions with cos theta: r, r z and r (4 z^2 - r^2), with their gradients.
     const HARMONIC: [fn(Point) -> (f64, Point); 3] = [
         |[r, _]| (r, [1.0, 0.0]),
         |[r, z]| (r * z, [z, r]),
         |[r, z]| (r * (4.0 * z * z - r * r), [4.0 * z * z - 3.0 * r * r, 8.0 * r * z]),
     ];
 
-    /// Green's third identity, to the error of 16 points a panel: at the step's inner edge, where r goes as v^9, the cubic is a
-    /// polynomial of degree 27.
+    /// Checks Green's third identity to the error of 16 points per panel. At the step's inner edge, where r behaves as
+    /// v^9, the cubic is a polynomial of degree 27.
     #[test]
     fn harmonic_functions_satisfy_the_integral_equation() {
         for wall in walls() {
@@ -603,8 +608,8 @@ mod tests {
         }
     }
 
-    /// r cos theta is a uniform flow: int [u_s^2 + u^2/r^2] r ds by hand over the free surfaces and the walls. Next to the
-    /// step's inner edge the last 1e-6 of a panel counts thrice, as a flow around the edge does.
+    /// r cos theta is a uniform flow, with int [u_s^2 + u^2/r^2] r ds by hand over the free surfaces and the walls.
+    /// Near the step's inner edge the last 1e-6 of a panel counts three times, as for a flow around the edge.
     #[test]
     fn the_gradient_of_a_uniform_flow_is_that_of_the_surface_it_is_taken_on() {
         let (sin, cos) = 20f64.to_radians().sin_cos();
@@ -627,8 +632,8 @@ mod tests {
         }
     }
 
-    /// The radius itself along surface and wall, and the speed of the uniform flow along the wall, |dr/ds|. Dividing by
-    /// ds/dv next to corners leaves 1e-5 of it where they are nearest.
+    /// Checks the radius along surface and wall, and the speed of the uniform flow along the wall, |dr/ds|. Division by
+    /// ds/dv has an error of 1e-5 nearest to corners.
     #[test]
     fn values_along_the_boundary_are_at_their_places() {
         for wall in walls() {
@@ -658,7 +663,7 @@ mod tests {
                 };
                 assert!((speed - direction).abs() < 2e-5, "({r}, {z}): {speed} {direction}");
             }
-            // from the outer contact line, one after the other, without holes and twice the same
+            // from the outer contact line, in order, without gaps and duplicates
             let length: f64 =
                 along.windows(2).map(|p| norm(sub([p[1][0], p[1][1]], [p[0][0], p[0][1]]))).sum();
             let whole: f64 = wall
@@ -683,7 +688,7 @@ mod tests {
                 let wave = |r: f64| sign * r * (1.0 - r * r / (3.0 * b * b));
                 let u: Vec<f64> = mesh.radii().into_iter().map(wave).collect();
                 let [r, value] = mesh.surface_peak(&u);
-                // A flat maximum is known to the root of its value's digits.
+                // The position of a flat maximum has half the digits of its value.
                 assert!(
                     (r - b).abs() < 1e-6 && (value - sign * b / 1.5).abs() < 1e-12,
                     "{r} {value}"
@@ -692,7 +697,8 @@ mod tests {
         }
     }
 
-    /// On 1..3 about 2: 1.25 on the real axis and 0.75 on the imaginary one are on the ellipse with semi-axes 5/4 and 3/4.
+    /// For 1..3 with centre 2, the points 1.25 on the real axis and 0.75 on the imaginary axis are on the ellipse with
+    /// semi-axes 5/4 and 3/4.
     #[test]
     fn bernstein_s_ellipse_has_its_foci_at_the_ends() {
         for point in [[2.0 + 1.25, 0.0], [2.0 - 1.25, 0.0], [2.0, 0.75], [2.0, -0.75]] {
@@ -701,8 +707,8 @@ mod tests {
         assert_eq!([bernstein([1.0, 0.0], 1.0, 3.0), bernstein([2.5, 0.0], 1.0, 3.0)], [1.0; 2]);
     }
 
-    /// int v^k log|v - x| dv for k = 0 and 1, and of the polynomials themselves: 20 points on each side of x, stretched by
-    /// the fifth power, which leave 1e-12 of the logarithm.
+    /// Checks int v^k log|v - x| dv for k = 0 and 1, and of the polynomials themselves. 20 points on each side of x,
+    /// stretched by the fifth power, have an error of 1e-12 of the logarithm.
     #[test]
     fn the_own_panel_s_rules_integrate_a_logarithm() {
         let mesh = Discretisation::new(&walls()[0], 3, 12, false);
@@ -734,8 +740,9 @@ mod tests {
         }
     }
 
-    /// Preimages of a point and of its image behind the axis in a panel's own v: v^gamma is the foot point on the panel and the distance
-    /// over the length. The preimages lie closer than the rule of the panel's own points allows.
+    /// Checks the preimages of a point and of its image behind the axis in a panel's own v. v^gamma is the foot point
+    /// on the panel plus i times the distance over the length. The preimages are closer than the rule of the panel's
+    /// own points allows.
     #[test]
     fn a_point_s_preimage_is_the_root_of_its_place() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);
@@ -751,7 +758,7 @@ mod tests {
                     for (found, w) in found.into_iter().zip(places) {
                         let Some(v) = found else {
                             far += 1;
-                            // nothing that touches the panel is left out
+                            // no panel that touches the point is left out
                             assert!(norm(w) > 0.1 * length, "{panel:?} {w:?}");
                             continue;
                         };

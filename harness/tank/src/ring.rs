@@ -1,4 +1,4 @@
-//! The potential of a ring of sources whose strength goes as cos(theta).
+//! Potential of a ring of sources with a strength proportional to cos(theta).
 //!
 //! With x = (r, z) and y = (r', z') in the half plane, d^2 = |y - x|^2 and
 //! chi = 1 + d^2/(2 r r'),
@@ -10,7 +10,7 @@
 //!
 //!   Q = chi k K - (2/k) E,        Q' = (k/2) [K - chi E/(chi - 1)]        (DLMF 14.5(v), 14.10.4).
 
-/// Number of terms of the series in 1/chi^2: at chi = 3 the rest is below 1e-16.
+/// Number of terms of the series in 1/chi^2. At chi = 3 the truncation error is below 1e-16.
 const TERMS: usize = 17;
 
 /// Coefficients of F(5/4, 3/4; 2; x), DLMF 15.2.1.
@@ -25,7 +25,7 @@ const SERIES: [f64; TERMS] = {
     c
 };
 
-/// Complete elliptic integrals K and E of the complementary modulus `kc` > 0, by the
+/// Returns the complete elliptic integrals K and E of the complementary modulus `kc` > 0, by the
 /// arithmetic-geometric mean (DLMF 19.8).
 fn elliptic(kc: f64) -> (f64, f64) {
     let (mut a, mut b) = (1.0, kc);
@@ -45,7 +45,7 @@ fn elliptic(kc: f64) -> (f64, f64) {
     }
 }
 
-/// Q_1/2 and its derivative at chi = 1 + `x`, x > 0. Relative error below 1e-13.
+/// Returns Q_1/2 and its derivative at chi = 1 + `x`, x > 0, with a relative error below 1e-13.
 pub(crate) fn legendre_q(x: f64) -> (f64, f64) {
     let chi = 1.0 + x;
     if x > 2.0 {
@@ -64,7 +64,8 @@ pub(crate) fn legendre_q(x: f64) -> (f64, f64) {
     (chi * k * big_k - 2.0 / k * big_e, 0.5 * k * (big_k - chi / x * big_e))
 }
 
-/// g(x, y) and dg/dn at y. `r` and `ry` are the radii of x and y, `d` = y - x, `n` the normal at y.
+/// Returns g(x, y) and dg/dn at y. `r` and `ry` are the radii of x and y, `d` = y - x, `n` the
+/// normal at y.
 pub(crate) fn potential(r: f64, ry: f64, d: [f64; 2], n: [f64; 2]) -> (f64, f64) {
     let rr = r * ry;
     let x = (d[0] * d[0] + d[1] * d[1]) / (2.0 * rr);
@@ -78,8 +79,8 @@ pub(crate) fn potential(r: f64, ry: f64, d: [f64; 2], n: [f64; 2]) -> (f64, f64)
 mod tests {
     use super::*;
 
-    /// Q = int_0^pi cos t/sqrt(2 chi - 2 cos t) dt: the trapezoidal rule converges
-    /// geometrically for a periodic integrand, at chi >= 1.05 to rounding with 2000 points.
+    /// Q = int_0^pi cos t/sqrt(2 chi - 2 cos t) dt. The trapezoidal rule converges geometrically
+    /// for a periodic integrand. At chi >= 1.05 it is exact to rounding with 2000 points.
     #[test]
     fn legendre_function_is_its_integral() {
         for x in [0.05, 0.5, 1.0, 1.9999, 2.0001, 5.0, 100.0] {

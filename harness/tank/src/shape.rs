@@ -1,4 +1,5 @@
-//! Recognises the shape of the wetted contour: a tank has one damping, however it was drawn.
+//! Recognises the shape of the wetted contour, so that the damping of a tank does not depend on how
+//! it is drawn.
 
 use formulas::damping;
 
@@ -9,20 +10,20 @@ use crate::tank::Shape;
 /// Largest distance of the wetted wall from a shape, over its size.
 const SAME: f64 = 1e-6;
 
-/// Places on each segment that are compared.
+/// Number of positions compared on each segment.
 const PLACES: usize = 64;
 
-/// A shape whose damping was measured, its wetted part, and how deep it is filled.
+/// A shape with measured damping, its wetted part, and its fill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Recognised {
-    /// Large enough for the fill.
+    /// The shape, large enough for the fill.
     pub shape: Shape,
-    /// m above its lowest point.
+    /// Fill, m above the lowest point.
     pub fill: f64,
 }
 
 impl Recognised {
-    /// The shape as the damping formulas take it.
+    /// Returns the shape for the damping formulas.
     pub fn measured(&self) -> damping::Shape {
         let depth = self.fill;
         match self.shape {
@@ -38,8 +39,8 @@ impl Recognised {
     }
 }
 
-/// The sphere, upright cylinder, cone or torus that a wetted wall is.
-/// `fill`: height of the free surface above the lowest point, m.
+/// Recognises a wetted wall as a sphere, upright cylinder, cone or torus. `fill` is the height of
+/// the free surface above the lowest point, m.
 pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
     let points: Vec<Point> = wall
         .segments

@@ -5,15 +5,15 @@ use nalgebra::{DMatrix, DVector};
 use crate::contour::Problems;
 use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
 
-/// Between straight pieces that turn by more than this, rad, the curve keeps its corner.
+/// Angle between straight pieces, rad, above which the curve keeps a corner.
 const CORNER: f64 = 0.7;
 
-/// More points are thinned out.
+/// Number of points above which points are thinned out.
 const MANY: usize = 100;
 
-/// Cubic splines through the points, twice continuously differentiable between corners; a point
-/// where the polyline turns by more than 40 degrees is a corner. At the axis the curve is level,
-/// at its other ends and at corners its third derivative is constant over two intervals
+/// Fits cubic splines through the points, twice continuously differentiable between corners. A
+/// point where the polyline turns by more than 40 degrees is a corner. At the axis the curve is
+/// horizontal. At its other ends and at corners its third derivative is constant over two intervals
 /// (not-a-knot).
 ///
 /// # Errors
@@ -46,7 +46,7 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     Ok(segments)
 }
 
-/// Keeps every k-th of very many points and both ends, so that all `total` points make some 100 segments.
+/// Keeps every k-th of very many points and both ends, so that all `total` points give about 100 segments.
 fn thinned(points: &[Point], total: usize) -> Vec<Point> {
     let every = total.div_ceil(MANY);
     let last = points.len() - 1;
@@ -54,7 +54,7 @@ fn thinned(points: &[Point], total: usize) -> Vec<Point> {
     (0..=count).map(|i| points[(i * last) / count]).collect()
 }
 
-/// One spline, its parameter the length of the polyline.
+/// Fits one spline, with the length of the polyline as its parameter.
 fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
     let count = points.len();
     let h: Vec<f64> = points.windows(2).map(|p| norm(sub(p[1], p[0]))).collect();
@@ -119,7 +119,8 @@ fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
 mod tests {
     use super::*;
 
-    /// Value and first three derivatives by arc length of the polyline at both ends of every piece.
+    /// Returns value and first three derivatives by arc length of the polyline at both ends of
+    /// every piece.
     fn derivatives(points: &[Point]) -> Vec<[[Point; 4]; 2]> {
         let pieces = spline(points).unwrap();
         let one = |(segment, p): (&Segment, &[Point])| {
@@ -147,7 +148,7 @@ mod tests {
         assert!(norm(sub(a, b)) < 1e-10 * (1.0 + norm(b)), "{a:?} {b:?}");
     }
 
-    /// Points at uneven distances, none at the axis.
+    /// Points at unequal distances, none at the axis.
     const POINTS: [Point; 6] =
         [[1.0, 0.0], [1.3, 0.2], [1.4, 0.5], [1.35, 0.9], [1.1, 1.2], [0.9, 1.3]];
 
@@ -171,7 +172,7 @@ mod tests {
         near(all[0][0][3], all[1][0][3]);
         near(all[3][0][3], all[4][0][3]);
         assert!(norm(sub(all[1][0][3], all[2][0][3])) > 1.0);
-        // Three points have one parabola.
+        // Three points determine one parabola.
         for piece in derivatives(&POINTS[..3]) {
             near(piece[0][3], [0.0, 0.0]);
         }

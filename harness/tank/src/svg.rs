@@ -1,4 +1,4 @@
-//! A contour from the first path of an SVG drawing.
+//! Reads a contour from the first path of an SVG drawing.
 
 use std::path::Path;
 
@@ -7,9 +7,8 @@ use svgtypes::{PathParser, PathSegment};
 use crate::contour::Problems;
 use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 
-/// Reads the first `<path>` of a drawing: the axis at x = 0, y downwards, `scale` m per unit. Lines,
-/// cubic and quadratic curves, and arcs whose axes are not rotated. What closes the path along the axis
-/// is left out.
+/// Reads the first `<path>` of a drawing, with the axis at x = 0, y downwards, and `scale` m per unit. Supports lines,
+/// cubic and quadratic curves, and arcs with unrotated axes. Leaves out lines that close the path along the axis.
 ///
 /// # Errors
 /// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
@@ -20,9 +19,9 @@ pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
         .map_err(|problem| Problems::from(format!("{}: {problem}", path.display())))
 }
 
-/// The `d` of the first path.
+/// Returns the `d` of the first path.
 fn first_path(text: &str) -> Result<String, String> {
-    // drawing programs name SVG's document type
+    // drawing programs write SVG's document type
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
     let drawing = roxmltree::Document::parse_with_options(text, options)
         .map_err(|error| format!("not well-formed: {error}."))?;
@@ -95,7 +94,7 @@ fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, String> {
                     return Err("an arc has rotated axes; draw it as a curve.".to_string());
                 }
                 let d = to(abs, x, y);
-                // y is mirrored, and with it the sense
+                // y is mirrored, and so is the sense of rotation
                 segments.push(arc(
                     place(here),
                     place(d),
@@ -132,13 +131,14 @@ fn bezier([a, b, c, d]: [Point; 4]) -> Segment {
     Segment { curve: Curve::Cubic { c: coefficients }, from: 0.0, to: 1.0 }
 }
 
-/// A quadratic curve as a cubic one.
+/// Returns a quadratic curve as a cubic one.
 fn raised([a, b, c]: [Point; 3]) -> Segment {
     let third = |p: Point, q: Point| [(p[0] + 2.0 * q[0]) / 3.0, (p[1] + 2.0 * q[1]) / 3.0];
     bezier([a, third(a, b), third(c, b), c])
 }
 
-/// Arc between two points of an ellipse, `up` counter-clockwise (SVG 2, appendix B.2.4).
+/// Creates the arc between two points of an ellipse, `up` counter-clockwise (SVG 2, appendix
+/// B.2.4).
 fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
     let (rx, ry) = (rx.abs(), ry.abs());
     // on the unit circle
@@ -168,8 +168,8 @@ mod tests {
     use super::*;
     use core::f64::consts::{PI, TAU};
 
-    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs: a quarter and three, about one centre and
-    /// the one opposite, each one way and the other.
+    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs. They are a quarter and three quarters,
+    /// about one of two centres and in either direction.
     #[test]
     fn the_four_arcs_between_two_points_have_their_turns_and_centres() {
         let (p, q) = ([2.0, 0.0], [0.0, 1.0]);
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// An ellipse that does not reach from one point to the other grows until it does: half of it, about their middle.
+    /// An ellipse too small to connect two points grows until it does, as half an ellipse about their middle.
     #[test]
     fn an_arc_that_is_too_small_grows() {
         let found = arc([0.0, 0.0], [4.0, 0.0], 1.0, 0.5, false, true);
@@ -205,9 +205,9 @@ mod tests {
         assert!((found.to - found.from - PI).abs() < 1e-15);
     }
 
-    /// Smooth curves begin with the last control point mirrored, without a curve of their kind before them with their own
-    /// start: (1, 0), (2, 1) ends with the slope (1, 1), so it goes on to (3, 2). Horizontal and vertical lines keep the
-    /// other coordinate. Both of each, absolute and relative, y down.
+    /// A smooth curve begins with the mirrored last control point, or with its own start if the previous curve is of
+    /// another kind. (1, 0), (2, 1) ends with the slope (1, 1), so the next control point is (3, 2). Horizontal and
+    /// vertical lines keep the other coordinate. The test covers absolute and relative commands, with y down.
     #[test]
     fn short_commands_of_a_path_are_the_long_ones() {
         let read = |path: &str| segments(path, 0.5).unwrap();
@@ -231,7 +231,7 @@ mod tests {
                 "{short}"
             );
         }
-        // what has no length is no segment, and lines along the axis are none
+        // zero-length segments and lines along the axis are left out
         assert_eq!(read("M 1 5 L 1 5 L 2 5").len(), 1);
         assert_eq!(read("M 0 5 L 2 5 L 0 1 L 0 3 Z").len(), 2);
         let [line] = &read("M 1 5 l 2 -1")[..] else { panic!() };

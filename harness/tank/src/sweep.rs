@@ -10,16 +10,16 @@ use crate::tank::Tank;
 /// Modal parameters at ascending fills.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// One for each fill. Without liquid, and without a free surface, there are no modes.
+    /// One result for each fill. Without liquid or without a free surface it has no modes.
     pub rows: Vec<ModalData>,
 }
 
 /// Solves at each of the `fills`, m above the lowest point, for `modes` modes.
 ///
-/// A fill of 0, and that of a closed tank without a free surface, give a row without modes.
+/// A fill of 0 or without a free surface gives a row without modes.
 ///
 /// # Errors
-/// The problems of every fill that has one, and fills that do not ascend.
+/// The problems of all fills, and fills that are not ascending.
 pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems> {
     let mut problems = Vec::new();
     if fills.is_empty() {
@@ -89,13 +89,13 @@ impl Sweep {
     }
 }
 
-/// Modal parameters of a tank that empties, as functions of the fill with two continuous derivatives,
-/// monotone wherever the table is (see [`Monotone`]). Where the wall has a corner or a change of
-/// curvature the true functions are less smooth than that, and the error is that of the fills' spacing.
+/// Modal parameters of a tank that empties, as functions of the fill with two continuous derivatives, monotone wherever
+/// the table is (see [`Monotone`]). Where the wall has a corner or a jump of curvature, the true functions are less
+/// smooth. The error there is that of the fills' spacing.
 ///
-/// Interpolated are m_liq, z_cg, the pendulums' l_n, and, over m_liq, the masses m_n, m_n h_n (H is
-/// unbounded where m is small), the rigid inertias and the rest's inertia I_0. m_0, H_0 and I_eff follow
-/// from these, so that mass and moment are those of the liquid and I_0 stays positive.
+/// Interpolation covers m_liq, z_cg, the pendulums' l_n, and, over m_liq, the masses m_n, m_n h_n (H is unbounded for
+/// small m), the rigid inertias and I_0. m_0, H_0 and I_eff follow from these, so that mass and moment are those of the
+/// liquid and I_0 stays positive.
 #[derive(Clone, Debug)]
 pub struct Depletion {
     range: [f64; 2],
@@ -130,10 +130,10 @@ pub struct AtFill {
 }
 
 impl Depletion {
-    /// From the rows of a sweep that have modes.
+    /// Creates the functions from the rows of a sweep that have modes.
     ///
     /// # Errors
-    /// If fewer than two have.
+    /// If fewer than two rows have modes.
     pub fn new(sweep: &Sweep) -> Result<Depletion, Problems> {
         let rows: Vec<&ModalData> = sweep.rows.iter().filter(|r| !r.modes.is_empty()).collect();
         if rows.len() < 2 {
@@ -169,18 +169,18 @@ impl Depletion {
         })
     }
 
-    /// Least and largest fill of the table, m.
+    /// Returns the smallest and largest fill of the table, m.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
 
-    /// At a fill; outside the table's range at its nearest end.
+    /// Returns the parameters at a fill; outside the table's range those at its nearest end.
     pub fn at(&self, fill: f64) -> AtFill {
         let fill = fill.clamp(self.range[0], self.range[1]);
         let [m_liq, z_cg, across, axial, inertia] = self.liquid.each_ref().map(|t| t.at(fill));
         let mode = |(i, table): (usize, &ModeTable)| {
             let [l, m, m_h, m_h2, wave, beta] = table.0.each_ref().map(|t| t.at(fill));
-            // m h^2 belongs to m and m h, unless there is no mass to divide by
+            // m h^2 follows from m and m h, unless m is too small to divide by
             let m_h2 = if m > 1e-6 { m_h * m_h / m } else { m_h2 };
             Mode::interpolated(i + 1, l, [m, m_h, m_h2].map(|x| x * m_liq), z_cg, m_liq, wave, beta)
         };
@@ -199,7 +199,7 @@ impl Depletion {
         }
     }
 
-    /// The fill that holds a mass of liquid, kg, within the table's range.
+    /// Returns the fill with this mass of liquid, kg, within the table's range.
     pub fn fill_of(&self, m_liq: f64) -> f64 {
         let [mut low, mut high] = self.range;
         for _ in 0..60 {

@@ -10,7 +10,7 @@ use crate::curve::{Curve, Point, Segment};
 use crate::modal::{self, ModalData};
 use crate::spline::spline;
 
-/// The file as it is written.
+/// Contents of the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -169,7 +169,7 @@ impl Shape {
                 above("knuckle_radius", knuckle_radius, 0.0);
                 above("radius - knuckle_radius", radius - knuckle_radius, 0.0);
                 above("crown_radius", crown_radius, radius);
-                // Crown and knuckle touch where the line between their centres meets them.
+                // Crown and knuckle touch on the line through their centres.
                 let (crown, knuckle) = (crown_radius, knuckle_radius);
                 let rise = ((crown - knuckle).powi(2) - (radius - knuckle).powi(2)).sqrt();
                 let depth = crown - rise;
@@ -209,7 +209,7 @@ pub enum Geometry {
     Revolution {
         /// Generating curve.
         contour: Contour,
-        /// The shape it was given by.
+        /// The shape from which it was built, if any.
         shape: Option<Shape>,
     },
     /// A box, lengths in m; open at the top.
@@ -224,11 +224,11 @@ pub enum Geometry {
 /// A tank and its liquid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tank {
-    /// Its name, if it has one.
+    /// Name of the tank, if it has one.
     pub name: Option<String>,
     /// Density of the liquid, kg/m³.
     pub density: f64,
-    /// Its geometry.
+    /// Geometry of the tank.
     pub geometry: Geometry,
 }
 
@@ -243,7 +243,7 @@ pub enum Fill {
     Mass(f64),
 }
 
-/// A height in m, or per cent of the volume: `1.2`, `60%`.
+/// Parses a height in m, or per cent of the volume: `1.2`, `60%`.
 impl core::str::FromStr for Fill {
     type Err = String;
 
@@ -260,26 +260,26 @@ impl core::str::FromStr for Fill {
     }
 }
 
-/// The largest number of segments: each takes panels of its own.
+/// Largest number of segments; each takes panels of its own.
 const MOST_SEGMENTS: usize = 200;
 
 /// The largest number of modes.
 pub const MOST_MODES: usize = 20;
 
 impl Tank {
-    /// Reads a file. Files that it names are sought next to it.
+    /// Reads a file. Other files that it names are relative to it.
     ///
     /// # Errors
-    /// Everything that is wrong with it.
+    /// All problems of the file.
     pub fn read(path: &Path) -> Result<Tank, Problems> {
         let text = crate::contour::read_text(path)?;
         Tank::parse(&text, path.parent().unwrap_or(Path::new("")))
     }
 
-    /// From the text of a file; `folder` is where the files that it names are.
+    /// Parses the text of a file; `folder` is the folder of the files that it names.
     ///
     /// # Errors
-    /// Everything that is wrong with it.
+    /// All problems of the file.
     pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
         let file: File =
             toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
@@ -345,16 +345,16 @@ impl Tank {
         }
     }
 
-    /// A tank of a shape, with a liquid of `density`, kg/m³.
+    /// Creates a tank from a shape, with a liquid of `density`, kg/m³.
     ///
     /// # Errors
-    /// Every dimension that is not allowed.
+    /// Every dimension outside its range.
     pub fn of_shape(shape: Shape, density: f64) -> Result<Tank, Problems> {
         let geometry = revolution(shape.segments()?, Some(shape))?;
         Ok(Tank { name: None, density, geometry })
     }
 
-    /// The largest fill, m above the lowest point; none for a box.
+    /// Returns the largest fill, m above the lowest point; `None` for a box.
     pub fn depth(&self) -> Option<f64> {
         match &self.geometry {
             Geometry::Revolution { contour, .. } => Some(contour.depth()),
@@ -362,11 +362,11 @@ impl Tank {
         }
     }
 
-    /// The height of the free surface above the lowest point, m, at a fill. A part of the volume and a mass
-    /// may be 0 or all that the tank holds; a height is returned as it is.
+    /// Returns the height of the free surface above the lowest point, m, at a fill. A part of the volume and a mass may
+    /// be 0 or the tank's whole capacity. A height is returned unchanged.
     ///
     /// # Errors
-    /// More than the tank holds, less than nothing, or a part of a box, which is open at the top.
+    /// More than the tank holds, less than 0, or a part of a box, which is open at the top.
     pub fn height_of(&self, fill: Fill) -> Result<f64, Problems> {
         let capacity = match &self.geometry {
             Geometry::Revolution { contour, .. } => Some(contour.capacity()),
@@ -408,11 +408,11 @@ impl Tank {
         })
     }
 
-    /// Modal parameters at `fill`, m above the lowest point, for `modes` modes. A full closed tank has no
-    /// free surface and no modes.
+    /// Solves for the modal parameters at `fill`, m above the lowest point, with `modes` modes. A full closed tank has
+    /// no free surface and no modes.
     ///
-    /// Cylinders and annuli given by their dimensions, and boxes, in closed form; all others by the
-    /// boundary integral equation.
+    /// Cylinders and annuli given by their dimensions, and boxes, have a closed form. The boundary
+    /// integral equation solves all others.
     ///
     /// # Errors
     /// A fill outside the tank, a number of modes that is not 1 to [`MOST_MODES`].
@@ -464,7 +464,7 @@ impl Tank {
         }
     }
 
-    /// No liquid: every mass 0, no modes.
+    /// Returns the result without liquid: all masses 0, no modes.
     pub(crate) fn empty(&self) -> ModalData {
         let bottom = match &self.geometry {
             Geometry::Revolution { contour, .. } => contour.bottom(),
@@ -475,7 +475,7 @@ impl Tank {
         self.described(data)
     }
 
-    /// With what the tank knows of itself: its name, and where its lowest point is.
+    /// Adds the tank's name and the height of its lowest point.
     fn described(&self, mut data: ModalData) -> ModalData {
         data.name.clone_from(&self.name);
         if let Geometry::Revolution { contour, shape: None } = &self.geometry {
@@ -484,7 +484,8 @@ impl Tank {
         data
     }
 
-    /// The full closed tank: no free surface and no modes; none if `fill` is not that.
+    /// Returns the result for the full closed tank, without free surface and modes; `None` if
+    /// `fill` is not full.
     fn full(&self, fill: f64) -> Option<ModalData> {
         let Geometry::Revolution { contour, .. } = &self.geometry else { return None };
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
@@ -537,7 +538,7 @@ fn segment(entry: &Entry) -> Segment {
     }
 }
 
-/// Two columns r, z in m; a first line that is not numbers is a heading, `#` begins a comment.
+/// Reads two columns r, z in m. A first line without numbers is a heading, `#` begins a comment.
 fn read_points(path: &Path) -> Result<Vec<Point>, Problems> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)

@@ -9,18 +9,18 @@
 //! G_2 = -(1/2) (D^2 eta^2 G_0 + G_0 eta^2 D^2 - 2 G_0 eta G_0 eta G_0)
 //! ```
 //!
-//! which holds as it stands for a vertical wall, since products of functions with no slope at the
-//! wall have none. With R = g = 1, psi = J1(k r) cos theta the first mode, k = xi_1, T = k tanh k h
-//! = omega^2, its square excites the modes chi of the azimuthal numbers 0 and 2 (wave number kappa,
-//! t = kappa tanh kappa h) at frequencies 0 and 2 omega:
+//! This holds unchanged for a vertical wall, because products of functions with zero slope at the
+//! wall also have zero slope. With R = g = 1, psi = J1(k r) cos theta is the first mode, with k =
+//! xi_1 and T = k tanh k h = omega^2. Its square excites the modes chi of the azimuthal numbers 0
+//! and 2 (wave number kappa, t = kappa tanh kappa h) at frequencies 0 and 2 omega:
 //!
 //! ```text
 //! planar     eta = a cos(wt) psi + sum (p_0 + p_2 cos 2wt) chi,  Phi = b sin(wt) psi + sum f sin(2wt) chi
 //! circular   the same with theta - wt in place of theta: p at azimuthal number 0, f and q at 2
 //! ```
 //!
-//! L averaged over a period is stationary in p_0, p_2, q and f. What is left, L = L_2 a^2 + L_4 a^4,
-//! is stationary in a: the nonlinear dispersion relation (Whitham 1974). The integrals are
+//! L averaged over a period is stationary in p_0, p_2, q and f. The remaining L = L_2 a^2 + L_4 a^4
+//! is stationary in a, which is the nonlinear dispersion relation (Whitham 1974). The integrals are
 //! C = int chi psi^2, N = int chi^2 and by grad psi.grad psi = k^2 psi^2 + (1/2) Lap psi^2
 //!
 //! ```text
@@ -42,7 +42,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::closed_form::zeros_of_j1_slope;
 use crate::gauss::Gauss;
 
-/// A mode that the square of the first excites.
+/// A mode that the square of the first mode excites.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
     /// Azimuthal number, 0 or 2.
@@ -53,7 +53,7 @@ pub struct Excited {
     pub overlap: f64,
 }
 
-/// The first mode and what its square excites: pure numbers, the same at every depth.
+/// The first mode and the modes that its square excites: pure numbers, equal at every depth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
     /// xi_1
@@ -67,10 +67,10 @@ pub struct Overlaps {
 }
 
 impl Overlaps {
-    /// With `count` modes of each azimuthal number.
+    /// Computes the overlaps with `count` modes of each azimuthal number.
     pub fn new(count: usize) -> Overlaps {
         let xi = zeros_of_j1_slope(1)[0];
-        // The integrands have 2 count half waves: 4 points for each and some.
+        // The integrands have 2 count half waves: 4 points for each, plus a margin.
         let rule = Gauss::new(8 * count + 40);
         let integral = |f: &dyn Fn(f64) -> f64| -> f64 {
             rule.nodes.iter().zip(&rule.weights).map(|(r, w)| w * r * f(*r)).sum()
@@ -91,13 +91,14 @@ impl Overlaps {
         Overlaps { xi, fourth, amplitude2, excited }
     }
 
-    /// Relative shifts of omega^2 per squared slosh angle, planar and circular, at h/R = `fill`.
+    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at h/R
+    /// = `fill`.
     pub fn shifts(&self, fill: f64) -> [f64; 2] {
         let t_1 = self.xi * (self.xi * fill).tanh();
         let (omega, k2) = (t_1.sqrt(), self.xi * self.xi);
         // The potential's amplitude to first order, a = 1: eta_t = G_0 Phi.
         let [planar_b, circular_b] = [-omega / t_1, omega / t_1];
-        // L_4 of both motions, over N of the first mode; of the fourth order first.
+        // L_4 of both motions, over N of the first mode; first the terms of fourth order.
         let mut planar = planar_b * planar_b / 16.0 * k2 * t_1 * 0.75 * self.fourth;
         let mut circular = circular_b * circular_b / 8.0 * k2 * t_1 * self.fourth;
         for Excited { azimuth, xi, overlap } in &self.excited {
@@ -130,20 +131,22 @@ impl Overlaps {
         [-8.0 * planar * self.amplitude2, -4.0 * circular * self.amplitude2]
     }
 
-    /// s and kappa of the equivalent mass at h/R = `fill`.
+    /// Returns s and kappa of the equivalent mass at h/R = `fill`.
     pub fn equivalent(&self, fill: f64) -> [f64; 2] {
         let [planar, circular] = self.shifts(fill);
         let kappa = 2.0 * circular;
         [0.75 * kappa - 2.0 * planar, kappa]
     }
 
-    /// The depths h/R at which an excited mode has twice the frequency of the first, in rising order.
+    /// Returns the depths h/R at which an excited mode has twice the frequency of the first, in
+    /// ascending order.
     pub fn resonant_depths(&self) -> Vec<f64> {
         self.resonances().iter().map(|(depth, ..)| *depth).collect()
     }
 
-    /// The depths h/R at which an excited mode has twice the frequency of the first; next to them
-    /// the third order says nothing. With the mode's azimuthal number and its own, from 1.
+    /// Returns the depths h/R at which an excited mode has twice the frequency of the first, with
+    /// the mode's azimuthal number and its own number, from 1. Near these depths the third order is
+    /// not valid.
     pub fn resonances(&self) -> Vec<(f64, i32, usize)> {
         let mut found = Vec::new();
         for (place, mode) in self.excited.iter().enumerate() {
@@ -169,14 +172,14 @@ impl Overlaps {
     }
 }
 
-/// The stationary value of x.M x/2 + v.x.
+/// Returns the stationary value of x.M x/2 + v.x.
 fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
     let [a, b, c, d] = [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]];
     let inverse = Matrix2::new(d, -b, -c, a) / (a * d - b * c);
     -0.5 * v.dot(&(inverse * v))
 }
 
-/// The first positive zeros of J'_m for m = 0 and 2, by bisection between those of an asymptotic grid.
+/// Returns the first positive zeros of J'_m for m = 0 and 2, by bisection between those of an asymptotic grid.
 fn zeros_of_slope(m: i32, count: usize) -> Vec<f64> {
     let slope = |x: f64| match m {
         0 => -libm::j1(x),
@@ -204,8 +207,9 @@ fn zeros_of_slope(m: i32, count: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Abramowitz and Stegun, table 9.5, to more digits. The zero of J0' at 0 is none of a mode. Bisection ends within
-    /// four times the last digit, and the slope's own rounding, 1e-16 over its slope of 0.2 to 0.4, adds some 5e-16.
+    /// Abramowitz and Stegun, table 9.5, to more digits. The zero of J0' at 0 does not belong to a mode. Bisection ends
+    /// within four times the last digit. The slope's own rounding, 1e-16 over its slope of 0.2 to 0.4, adds about
+    /// 5e-16.
     #[test]
     fn zeros_of_the_excited_modes_are_those_of_the_tables() {
         for (m, known) in [

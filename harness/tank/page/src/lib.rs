@@ -1,9 +1,9 @@
 //! The tank solver for a page: text in, text out.
 //!
-//! A module for WebAssembly has no strings, and a page's memory is not this crate's: text passes letter by letter (UTF-8 bytes), a few
-//! thousand calls beside a solution that takes millions of operations. A host puts the text of a tank's file by [`put`], calls
-//! [`solve`], and reads the answer of [`get`]: JSON, with `problems`, or with `modal` (as `hubslosh tank --json` writes it), `depth` and
-//! `surfaces`.
+//! A WebAssembly module has no strings, and a page's memory is separate. Text therefore passes byte by byte (UTF-8), in
+//! a few thousand calls, which is little compared with a solution of millions of operations. A host writes the text of
+//! a tank's file with [`put`], calls [`solve`], and reads the answer with [`get`]. The answer is JSON with `problems`,
+//! or with `modal` (as written by `hubslosh tank --json`), `depth` and `surfaces`.
 
 mod abi;
 

@@ -1,4 +1,4 @@
-//! Tank files: what is accepted, and what is said of the rest.
+//! Tank files: accepted input, and messages for refused input.
 
 use std::path::Path;
 
@@ -315,8 +315,8 @@ fn per_cent_of_the_volume_and_a_mass_are_the_heights_that_hold_them() {
     assert!("1.2 m".parse::<Fill>().unwrap_err().contains("neither a height in m"));
 }
 
-/// Heights of a shape count from its lowest point, of a contour from the zero it was drawn with: the same tank both
-/// ways, and what table, JSON and file say.
+/// Heights of a shape count from its lowest point, of a contour from the zero of its drawing. The test compares the
+/// same tank in both forms, in table, JSON and file.
 #[test]
 fn table_and_file_state_where_heights_count_from() {
     let shape = tank("density = 1.0\nshape = { sphere = { radius = 1.0 } }");
@@ -399,8 +399,8 @@ fn shapes_have_their_volumes() {
     assert!(bottom.solve(1.5, 2).is_ok());
 }
 
-/// Points are joined by straight lines; with `spline` a curve of the same points is far closer to
-/// what they were taken from: 25 points of a half circle, chord error 2e-3, spline 1e-6.
+/// Points are joined by straight lines. With `spline` a curve through the same points is far closer
+/// to the original: for 25 points of a half circle the chord error is 2e-3, the spline error 1e-6.
 #[test]
 fn points_are_straight_lines_or_a_spline() {
     let folder = tempfile::tempdir().unwrap();

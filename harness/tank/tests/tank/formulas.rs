@@ -37,8 +37,9 @@ fn mikishev_dorozhkin_leaves_its_range_in_shallow_liquid() {
     assert!((shallow - 0.90).abs() < 0.01 && outside == 1, "{shallow}");
 }
 
-/// beta of a cylinder in closed form, of its contour by the solver; of a box Keulegan's decrement in
-/// his own form: (sqrt(pi nu T)/w) [1 + w/a + (pi w/a)(1 - 2 h/a)/sinh(2 pi h/a)] = 2 pi zeta.
+/// beta of a cylinder in closed form and of its contour by the solver. For a box, Keulegan's
+/// decrement in his own form: (sqrt(pi nu T)/w) [1 + w/a + (pi w/a)(1 - 2 h/a)/sinh(2 pi h/a)] = 2
+/// pi zeta.
 #[test]
 fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
     let contour = "profile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 1] }]";
@@ -114,8 +115,8 @@ fn miles_ring_has_its_known_value_and_ranges() {
     assert_eq!(ring(0.1, 0.2, 0.1).outside.len(), 2); // covers 0.36, and the wave is small against it
 }
 
-/// The ring of any tank is scaled to Miles in the cylinder: 1.53 2 xi/(1 - 1/xi^2) against 2.83 2^(3/2),
-/// 0.2 %, but for 4.60 against 2.5 xi = 4.603 and alpha^(3/2) = (2 w/R)^(3/2) (1 - w/2R)^(3/2).
+/// The ring of any tank is scaled to Miles's in the cylinder: 1.53 2 xi/(1 - 1/xi^2) compared with 2.83 2^(3/2), 0.2 %.
+/// Other differences are 4.60 for 2.5 xi = 4.603 and alpha^(3/2) = (2 w/R)^(3/2) (1 - w/2R)^(3/2).
 #[test]
 fn ring_of_any_tank_is_miles_in_a_deep_cylinder() {
     let exact = solve("shape = { cylinder = { radius = 1.0, height = 3.0 } }", 3.0, 1);
@@ -252,8 +253,8 @@ fn real(set: &ParameterSet, name: &str) -> f64 {
     }
 }
 
-/// omega_1^2 = g/l + k/m of the file for the FMU, as rho R^3 omega_1^2/sigma: every value of the table to its
-/// last digit; tanh(20 xi) is 1.
+/// Checks omega_1^2 = g/l + k/m of the file for the FMU, as rho R^3 omega_1^2/sigma. Every value of the table must
+/// agree to its last digit; tanh(20 xi) is 1.
 #[test]
 fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
     let sigma = 0.072;
@@ -271,9 +272,9 @@ fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
     }
 }
 
-/// 90 degrees is the flat surface to the last bit; Bo -> infinity is xi^3 - 2 xi^2 cos(angle) over rho R^3/sigma
-/// (1e-9 of the way at Bo = 1e12), where below some 23 degrees 0 stands in its place and is told; no surface
-/// tension is no stiffness.
+/// At 90 degrees the result is bit-identical to the flat surface. For Bo -> infinity it is xi^3 - 2 xi^2 cos(angle)
+/// over rho R^3/sigma (to 1e-9 at Bo = 1e12). Below about 23 degrees the file has 0 in its place and a warning. Without
+/// surface tension there is no stiffness.
 #[test]
 fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     let (xi, sigma) = (1.841_183_781_340_659_3f64, 0.072);
@@ -550,8 +551,9 @@ fn a_box_with_two_lengths_says_along_which_its_modes_are() {
     assert!(square.iter().all(|(name, _)| !name.starts_with("slosh.table.direction")));
 }
 
-/// In a cylinder of 2 m by both formulas: what a wave leaves dry, a ring of more than a quarter of the section, strokes out
-/// of 0.64 to 6.4 (exp(-1.84 0.25) = 0.6313 half a metre down). A quarter is covered at w/R = 1 - 0.75^(1/2) = 0.134.
+/// A cylinder of 2 m, by both formulas: a ring that the wave uncovers, a ring of more than a quarter of the section,
+/// strokes outside 0.64 to 6.4 (exp(-1.84 0.25) = 0.6313 half a metre down). A quarter is covered at w/R = 1 -
+/// 0.75^(1/2) = 0.134.
 #[test]
 fn a_ring_says_which_of_its_limits_it_leaves_and_by_how_much() {
     let cylinder = solve("shape = { cylinder = { radius = 2.0, height = 9.0 } }", 6.0, 1);
@@ -660,10 +662,10 @@ fn capillarity_is_unknown_from_a_tenth_of_gravity_s_share_on() {
     assert!(!flat(1.01 * limit).unknown && flat(1.01 * limit).outside.is_empty());
     let near = flat(0.99 * limit);
     assert!(near.unknown);
-    assert_eq!(near.outside, ["it adds 10 % to omega^2, too much for the first order in it"]);
+    assert_eq!(near.outside, ["it adds 10 % to omega^2, too much for the first order"]);
     assert_eq!(
         flat(0.1 * limit).outside,
-        ["it adds 100 % to omega^2, too much for the first order in it"]
+        ["it adds 100 % to omega^2, too much for the first order"]
     );
 }
 
@@ -719,8 +721,8 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     }
 }
 
-/// A spheroid as high as it is wide but for so much, of which up to a fifth is its distance from the sphere through bottom and
-/// contact line; of a model's size and of a launcher's.
+/// A spheroid almost as high as it is wide. Up to a fifth of the difference is its distance from the sphere through
+/// bottom and contact line. The test covers the size of a model and of a launcher.
 #[test]
 fn a_drawing_is_a_shape_to_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {

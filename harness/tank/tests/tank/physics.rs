@@ -49,8 +49,8 @@ fn spheres_have_the_known_frequencies_and_masses() {
     }
 }
 
-/// Ends of the range of fills. Shallow paraboloid: lambda_n R -> 2 n^2 - 1 with corrections of
-/// the order of h/R times n^4; nearly full: the ice-fishing problem, 2.7547 with the surface's radius.
+/// Ends of the range of fills. Shallow paraboloid: lambda_n R -> 2 n^2 - 1 with corrections of the order of h/R times
+/// n^4. Nearly full: the ice-fishing problem, 2.7547 with the surface's radius.
 #[test]
 fn spheres_have_the_known_limits() {
     let data = solve("shape = { sphere = { radius = 1.0 } }", 1e-3, 3);
@@ -78,8 +78,8 @@ fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     }
 }
 
-/// Effective inertias in closed form against their sums over 20,000 modes, whose tail is 50^-3 of that of 400: in shallow
-/// liquid it was 3e-10 m R^2 of the cylinder, and 7e-9 of the annulus, beside a stated 1e-11.
+/// Effective inertias in closed form compared with their sums over 20,000 modes, whose tail is 50^-3 of that of 400. In
+/// shallow liquid the latter was 3e-10 m R^2 for the cylinder and 7e-9 for the annulus, with a stated error of 1e-11.
 #[test]
 fn closed_forms_keep_their_error_in_shallow_liquid() {
     let xi = closed_form::zeros_of_j1_slope(20_000);
@@ -106,8 +106,8 @@ fn closed_forms_keep_their_error_in_shallow_liquid() {
     assert!(off.abs() < 1e-11, "annulus: {off}");
 }
 
-/// I_0 = I_eff - m_0 h_0^2 - sum m h^2: as inexact as I_eff is at least, and farther the farther the fixed mass stands
-/// from the centre of mass.
+/// The error of I_0 = I_eff - m_0 h_0^2 - sum m h^2 is at least that of I_eff and grows with the distance of the fixed
+/// mass from the centre of mass.
 #[test]
 fn the_inertia_of_the_fixed_mass_is_never_more_exact_than_what_it_follows_from() {
     for (shape, fill) in [
@@ -229,8 +229,8 @@ fn closed_forms_obey_their_sums_and_limits() {
     );
 }
 
-/// The bench's cylinder as it is computed by the FMU's own formulas: m_n = m_liq d tanh(2 xi h/d)/
-/// (xi (xi^2 - 1) h), l_n = d/(2 xi tanh(2 xi h/d)), wave 2 R/(xi^2 - 1).
+/// The bench's cylinder by the FMU's own formulas: m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h),
+/// l_n = d/(2 xi tanh(2 xi h/d)), wave 2 R/(xi^2 - 1).
 #[test]
 fn the_upright_cylinder_of_the_fmu_is_unchanged() {
     let (d, h) = (0.163, 0.1);
@@ -293,8 +293,8 @@ fn cutting_a_wall_into_more_segments_changes_nothing() {
     }
 }
 
-/// The stated error is also honest where the solver is less accurate: nearly full and nearly empty
-/// tanks, cusps, thin gaps; checked by hinge and by the closed form of an annulus.
+/// The stated error also holds where the solver is less accurate: nearly full and nearly empty
+/// tanks, cusps, thin gaps. The hinge and the closed form of an annulus check it.
 #[test]
 fn stated_error_covers_hard_tanks() {
     for fill in [1e-3, 0.01, 1.95, 1.99, 1.999, 1.9999] {
@@ -375,8 +375,8 @@ fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
     }
 }
 
-/// Wave numbers are lengths' inverse; of a thin annulus the first is the circle's own, 1/R, and the next ones those of
-/// standing waves between two walls, n pi/(R - R_i).
+/// Wave numbers are inverse lengths. For a thin annulus the first is that of the circle, 1/R, and the next ones are
+/// those of standing waves between two walls, n pi/(R - R_i).
 #[test]
 fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     let ones = closed_form::annular_wave_numbers(0.4, 1.0, 5);

@@ -41,7 +41,7 @@ fn curves(svg: &str) -> Vec<&str> {
     svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
 }
 
-/// A tank four times as large is drawn as the same lines, beside other numbers.
+/// A tank four times as large is drawn with the same lines and other numbers.
 #[test]
 fn a_larger_tank_of_the_same_shape_has_the_same_lines() {
     let drawn = |factor: f64| {
@@ -121,9 +121,9 @@ fn points(path: &str) -> Vec<[f64; 2]> {
     path.split(['M', 'L']).skip(1).map(place).collect()
 }
 
-/// The area of the liquid to the right of the axis over the square of the distance from the axis to the tank's wall: of a
-/// cylinder fill over radius, of an annulus less its inside, of a bowl half its length times 2/3 of its depth and so on. A
-/// hundredth of a pixel in some hundred.
+/// Compares the area of the liquid to the right of the axis over the square of the distance from the axis to the tank's
+/// wall. Expected: for a cylinder fill over radius, for an annulus less its inside, for a bowl half its length times
+/// 2/3 of its depth, and so on. The tolerance is a hundredth of a pixel in some hundred.
 #[test]
 fn the_liquid_that_is_drawn_is_the_section_s() {
     for (text, fill, area) in [

@@ -86,8 +86,8 @@ fn interpolated_modes_are_monotone_and_leave_a_positive_rest() {
     }
 }
 
-/// No liquid, and no free surface: no modes, no NaN. A liquid that fills a sphere does not turn with it
-/// (I_eff = 0 of 2/5 m R^2); a full capsule keeps 8 % of its rigid inertia across the axis.
+/// Without liquid, and without a free surface, there are no modes and no NaN. A liquid that fills a sphere does not
+/// rotate with it (I_eff = 0 of 2/5 m R^2). In a full capsule 8 % of the rigid inertia across the axis remains.
 #[test]
 fn empty_and_full_tanks_have_no_modes() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -139,8 +139,8 @@ fn every_bad_fill_of_a_sweep_is_reported() {
     assert!(Depletion::new(&sweep(&tank, &[0.5], 2).unwrap()).is_err());
 }
 
-/// The law by which the FMUs interpolate, with the placed points, against solutions at eight fills that are none of
-/// them: frequency and mass within 0.5 %, hinge within 0.5 % of the radius.
+/// Compares the FMUs' interpolation, with the placed points, with solutions at eight other fills: frequency and mass
+/// within 0.5 %, hinge within 0.5 % of the radius.
 #[test]
 fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
     for shape in [
