@@ -1,8 +1,8 @@
-//! The Allan deviation of a gyro at rest, and what it says about its noise (IEEE Std 952).
+//! Allan deviation of a gyro at rest, and the noise parameters that it shows (IEEE Std 952).
 //!
-//! Of white noise of density N it is N/sqrt(tau): slope −1/2. Of a first-order Gauss–Markov bias b,
-//! E\[b(t) b(t+s)\] = sigma² exp(−|s|/T), it follows from the averages b1, b2 over two neighbouring
-//! spans tau = x T, with
+//! White noise of density N has the Allan deviation N/sqrt(tau), with the slope −1/2. A first-order
+//! Gauss–Markov bias b has E\[b(t) b(t+s)\] = sigma² exp(−|s|/T). Its Allan deviation follows from
+//! the averages b1, b2 over two neighbouring intervals tau = x T, with
 //!
 //! ```text
 //! var b1      = 2 sigma² (x − 1 + e^−x) / x²
@@ -10,16 +10,15 @@
 //! sigma_A²(tau) = ½ E[(b2 − b1)²] = var b1 − cov(b1, b2) = sigma² (2x − 3 + 4 e^−x − e^−2x) / x²
 //! ```
 //!
-//! It rises with slope +1/2, has its maximum 0.617 sigma at tau = 1.89 T, and falls with slope −1/2:
-//! there is no plateau. The *bias instability* B of data sheets is that of flicker noise, whose
-//! Allan deviation is flat at sqrt(2 ln 2/pi) B = 0.664 B. The FMU's bias has sigma = B/0.664
-//! (thesis 5.5), so the maximum stands at 0.617/0.664 B = 0.93 B, and B is read from it as 0.664/0.617
-//! = 1.076 times the maximum.
+//! The deviation rises with slope +1/2, has its maximum 0.617 sigma at tau = 1.89 T, and falls with slope −1/2, without
+//! a plateau. The *bias instability* B of data sheets is that of flicker noise, whose Allan deviation is constant at
+//! sqrt(2 ln 2/pi) B = 0.664 B. The FMU's bias has sigma = B/0.664 (thesis 5.5). The maximum is therefore 0.617/0.664 B
+//! = 0.93 B, and B is 0.664/0.617 = 1.076 times the maximum.
 
 /// Flat part of the Allan deviation of flicker noise over B; the FMU's bias has sigma = B/0.664.
 pub const FLICKER: f64 = 0.664;
 
-/// Averaging times for each factor of ten.
+/// Number of averaging times per decade.
 const PER_DECADE: f64 = 15.0;
 
 /// One point of the curve.
@@ -31,10 +30,10 @@ pub struct Point {
     pub variance: f64,
 }
 
-/// The overlapping Allan variance of samples that lie `step` (s) apart, at averaging times
-/// equally spaced in the logarithm from one sample to a tenth of the record.
+/// Returns the overlapping Allan variance of samples `step` (s) apart, at averaging times equally
+/// spaced in the logarithm from one sample to a tenth of the record.
 pub fn variances(step: f64, samples: &[f64]) -> Vec<Point> {
-    // sums[k]: of the first k samples
+    // sums[k] is the sum of the first k samples
     let mut sums = vec![0.0; samples.len() + 1];
     for (k, sample) in samples.iter().enumerate() {
         sums[k + 1] = sums[k] + sample;
@@ -51,7 +50,7 @@ pub fn variances(step: f64, samples: &[f64]) -> Vec<Point> {
         .collect()
 }
 
-/// Whole numbers from 1 to `last`, [`PER_DECADE`] or less for each factor of ten.
+/// Returns whole numbers from 1 to `last`, at most [`PER_DECADE`] per decade.
 fn factors(last: usize) -> Vec<usize> {
     let count = ((last.max(1) as f64).log10() * PER_DECADE).floor() as usize;
     let mut factors: Vec<usize> =
@@ -61,7 +60,7 @@ fn factors(last: usize) -> Vec<usize> {
     factors
 }
 
-/// A gyro's noise: white, with a first-order Gauss–Markov bias.
+/// Noise of a gyro: white noise and a first-order Gauss–Markov bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Angle random walk N, rad/s/√Hz.
@@ -73,18 +72,19 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Its Allan variance at averaging time `tau` (s), (rad/s)².
+    /// Returns the Allan variance at averaging time `tau` (s), (rad/s)².
     pub fn variance(&self, tau: f64) -> f64 {
         self.arw.powi(2) / tau
             + (self.bias_instability / FLICKER).powi(2) * markov(tau / self.bias_time)
     }
 
-    /// The noise whose Allan variance lies closest to the points; `None` if they show none.
+    /// Fits noise to the points of an Allan variance; `None` if they show no noise.
     ///
-    /// Misses are relative, squared, and weigh as many as the record has spans of that length, to
-    /// which the variance of an Allan variance is inverse. For a given T the curve is linear in
-    /// N² and sigma²; T is searched between ten times the shortest averaging time (a shorter bias
-    /// looks like white noise) and the longest. Without a bias T means nothing, and B is scatter.
+    /// The cost function sums squared relative errors, weighted with the number of intervals of
+    /// that length in the record, the inverse of an Allan variance's variance. For a given T the
+    /// curve is linear in N² and sigma². The search covers T from ten times the shortest averaging
+    /// time (a shorter bias looks like white noise) to the longest. Without a bias T has no
+    /// meaning, and B is scatter.
     pub fn fitted(points: &[Point]) -> Option<Noise> {
         let (first, last) = (points.first()?, points.last()?);
         if points.iter().any(|point| point.variance <= 0.0 || !point.variance.is_finite()) {
@@ -96,15 +96,17 @@ impl Noise {
     }
 }
 
-/// Allan variance of a Gauss–Markov process over its variance, at `x` correlation times.
+/// Returns the Allan variance of a Gauss–Markov process over its variance, at `x` correlation
+/// times.
 fn markov(x: f64) -> f64 {
-    // exp_m1, because for small x all but (2/3) x³ cancels
+    // exp_m1, because for small x everything except (2/3) x³ cancels
     (2.0 * x + 4.0 * (-x).exp_m1() - (-2.0 * x).exp_m1()) / (x * x)
 }
 
-/// The best noise with this correlation time (s), and the sum of its weighted squared misses.
+/// Returns the best noise with this correlation time (s), and the sum of its weighted squared
+/// errors.
 fn linear_fit(points: &[Point], time: f64) -> (Noise, f64) {
-    // per point: weight, and what N² = 1 and sigma² = 1 contribute, over the measured variance
+    // per point: weight, and the contributions of N² = 1 and sigma² = 1 over the measured variance
     let terms = points
         .iter()
         .map(|p| (1.0 / p.tau, 1.0 / p.tau / p.variance, markov(p.tau / time) / p.variance));
@@ -119,7 +121,7 @@ fn linear_fit(points: &[Point], time: f64) -> (Noise, f64) {
     let determinant = ww * bb - wb * wb;
     let (mut white, mut bias) =
         ((w1 * bb - b1 * wb) / determinant, (b1 * ww - w1 * wb) / determinant);
-    // variances are not negative: the best on the edge is the best with the other alone
+    // variances are not negative: on the boundary the other parameter alone is fitted
     if white < 0.0 {
         (white, bias) = (0.0, b1 / bb);
     } else if bias < 0.0 {
@@ -131,7 +133,7 @@ fn linear_fit(points: &[Point], time: f64) -> (Noise, f64) {
     (noise, miss)
 }
 
-/// Minimum of `f` from `low` to `high`: a coarse scan, then golden sections.
+/// Returns the minimum of `f` from `low` to `high` by a coarse scan and golden sections.
 fn minimum(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     const LOOKS: usize = 50;
     let step = (high - low) / LOOKS as f64;
@@ -223,8 +225,8 @@ mod tests {
             .collect();
         let noise = Noise { arw: 0.0, bias_instability: FLICKER, bias_time: 1.0 };
         for point in variances(0.02, &samples).iter().filter(|p| (0.2..20.0).contains(&p.tau)) {
-            // below 0.2 s the samples are seen, for which the formula knows no steps; a standard
-            // error is sqrt(1/(1.5 x 2e4/20)) = 2.6 % at the longest, less below
+            // below 0.2 s the sampling matters, which the formula does not include; a standard
+            // error is sqrt(1/(1.5 x 2e4/20)) = 2.6 % at the longest time and less below
             let ratio = point.variance / noise.variance(point.tau);
             assert!((ratio - 1.0).abs() < 0.1, "{point:?}: {ratio}");
         }

@@ -1,11 +1,11 @@
-//! Linear models without physics, ARX and ARMAX.
+//! Linear black-box models, ARX and ARMAX.
 //!
 //! ```text
 //! A(q) y_k = B(q) u_k + C(q) e_k,   A = 1 + a_1 q⁻¹ + … + a_n q⁻ⁿ,   B = b_0 + … + b_n q⁻ⁿ
 //! ```
 //!
-//! ARX has C = 1 and is linear least squares; ARMAX has C = 1 + c_1 q⁻¹ + …, a prediction-error fit (Ljung,
-//! System Identification, 2nd ed., 4.2, 7.2 and 10.3) that starts from the residual of a long ARX (Hannan and
+//! ARX has C = 1 and is a linear least-squares problem. ARMAX has C = 1 + c_1 q⁻¹ + …, a prediction-error fit (Ljung,
+//! System Identification, 2nd ed., 4.2, 7.2 and 10.3). The fit starts from the residual of a long ARX (Hannan and
 //! Rissanen).
 
 use std::f64::consts::TAU;
@@ -13,9 +13,9 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// Order of the ARX whose residual stands for e.
+/// Order of the ARX whose residual approximates e.
 const LONG: usize = 30;
-/// Steps of the prediction-error search at most.
+/// Largest number of steps of the prediction-error search.
 const STEPS: usize = 40;
 
 /// A fitted model.
@@ -33,8 +33,8 @@ pub struct Model {
     pub c: Vec<f64>,
 }
 
-/// y_k = Σ sign Σ_j c_j u_{k−j} − Σ_j a_j y_{k−j} from rest, j from 1 in `a` and from `first` in each of the `inputs`
-/// (sign, c, u, first).
+/// Returns y_k = Σ sign Σ_j c_j u_{k−j} − Σ_j a_j y_{k−j} from rest, with j from 1 in `a` and from `first` in each of
+/// the `inputs` (sign, c, u, first).
 fn recursion(inputs: &[(f64, &[f64], &[f64], usize)], a: &[f64]) -> Vec<f64> {
     let rows = inputs[0].2.len();
     let mut y: Vec<f64> = Vec::with_capacity(rows);
@@ -50,27 +50,28 @@ fn recursion(inputs: &[(f64, &[f64], &[f64], usize)], a: &[f64]) -> Vec<f64> {
         for (a, y) in a.iter().zip(y.iter().rev()) {
             value -= a * y;
         }
-        // an unstable model: far from everything, but finite
+        // an unstable model gives large but finite values
         y.push(value.clamp(-1e6, 1e6));
     }
     y
 }
 
 impl Model {
-    /// B/A u from rest.
+    /// Simulates B/A u from rest.
     pub fn simulate(&self, u: &[f64]) -> Vec<f64> {
         recursion(&[(1.0, &self.b, u, 0)], &self.a)
     }
 
-    /// e = (A y − B u)/C, the residual of the predictions one step ahead.
+    /// Returns e = (A y − B u)/C, the one-step prediction errors.
     pub fn innovations(&self, u: &[f64], y: &[f64]) -> Vec<f64> {
         let inputs = [(1.0, &[1.0][..], y, 0), (-1.0, &self.b[..], u, 0), (1.0, &self.a[..], y, 1)];
         recursion(&inputs, &self.c)
     }
 
-    /// Frequency (Hz) and damping ratio of the least damped pair of poles between two frequencies, from rows `step` s apart.
+    /// Returns frequency (Hz) and damping ratio of the least damped pair of poles between two frequencies, from rows
+    /// `step` s apart.
     pub fn poles(&self, step: f64, (from, to): (f64, f64)) -> Option<(f64, f64)> {
-        // the iteration for the eigenvalues would never end
+        // with non-finite values the eigenvalue iteration would not end
         if !self.a.iter().all(|a| a.is_finite()) {
             return None;
         }
@@ -84,8 +85,8 @@ impl Model {
     }
 }
 
-/// Least squares of rows (y_k, regressors) by Householder's triangularisation: at 50 Hz neighbouring rows are so
-/// much alike that normal equations would lose all digits.
+/// Solves least squares of rows (y_k, regressors) by Householder triangularisation. At 50 Hz neighbouring rows are so
+/// similar that normal equations would lose all digits.
 fn least_squares(rows: impl Iterator<Item = (f64, Vec<f64>)>, width: usize) -> Option<Vec<f64>> {
     let (mut right, mut all) = (Vec::new(), Vec::new());
     for (y, row) in rows {
@@ -109,7 +110,7 @@ fn past(signal: &[f64], k: usize, from: usize, to: usize) -> impl Iterator<Item 
     (from..=to).map(move |j| if k >= j { signal[k - j] } else { 0.0 })
 }
 
-/// ARX of order n by linear least squares; `None` where the rows do not determine it.
+/// Fits ARX of order n by linear least squares; `None` if the rows do not determine it.
 pub fn arx(u: &[f64], y: &[f64], n: usize) -> Option<Model> {
     let rows = (0..y.len()).map(|k| {
         let row: Vec<f64> = past(y, k, 1, n).map(|y| -y).chain(past(u, k, 0, n)).collect();
@@ -129,7 +130,7 @@ fn model(kind: &'static str, order: usize, x: &[f64]) -> Model {
     }
 }
 
-/// A signal through 1/C.
+/// Filters a signal with 1/C.
 fn through(signal: &[f64], c: &[f64]) -> Vec<f64> {
     let mut out: Vec<f64> = Vec::with_capacity(signal.len());
     for k in 0..signal.len() {
@@ -139,7 +140,7 @@ fn through(signal: &[f64], c: &[f64]) -> Vec<f64> {
     out
 }
 
-/// The matrix whose eigenvalues are the zeros of 1 + c_1 q⁻¹ + …, in q.
+/// Returns the matrix whose eigenvalues are the zeros of 1 + c_1 q⁻¹ + …, in q.
 fn companion(c: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(c.len(), c.len(), |i, j| match (i, j) {
         (0, j) => -c[j],
@@ -153,9 +154,9 @@ fn is_stable(c: &[f64]) -> bool {
     companion(c).complex_eigenvalues().iter().all(|z| z.norm() < 1.0)
 }
 
-/// The polynomial with its zeros drawn towards 0 until they are stable.
+/// Returns the polynomial with its zeros scaled towards 0 until they are stable.
 fn stable(mut c: Vec<f64>) -> Vec<f64> {
-    // zeros that are not finite are never drawn in
+    // non-finite zeros would never become stable
     if !c.iter().all(|c| c.is_finite()) {
         return vec![0.0; c.len()];
     }
@@ -169,8 +170,9 @@ fn stable(mut c: Vec<f64>) -> Vec<f64> {
     c
 }
 
-/// Two starts: e from a long ARX; and, for white noise on the output (C = A), Steiglitz and McBride's iteration, ARX of
-/// signals filtered with the last 1/A, from that long ARX's simulation.
+/// Returns two starts. The first takes e from a long ARX. The second, for white noise on the output (C = A), is
+/// Steiglitz and McBride's iteration: ARX of signals filtered with the last 1/A, starting from that long ARX's
+/// simulation.
 fn starts(u: &[f64], y: &[f64], n: usize) -> Option<[Vec<f64>; 2]> {
     let long = arx(u, y, LONG)?;
     let e = long.innovations(u, y);
@@ -190,7 +192,7 @@ fn starts(u: &[f64], y: &[f64], n: usize) -> Option<[Vec<f64>; 2]> {
     Some([first, second])
 }
 
-/// ARMAX of order n by Gauss and Newton's steps; `None` where the rows do not determine it.
+/// Fits ARMAX of order n by Gauss–Newton steps; `None` if the rows do not determine it.
 pub fn armax(u: &[f64], y: &[f64], n: usize) -> Option<Model> {
     let width = 3 * n + 1;
     let cost = |x: &[f64]| -> f64 {
@@ -203,7 +205,7 @@ pub fn armax(u: &[f64], y: &[f64], n: usize) -> Option<Model> {
     let from = starts(u, y, n)?.map(|x| (cost(&x), x));
     let (mut best, mut x) = from.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     for _ in 0..STEPS {
-        // Gauss and Newton: ∂e/∂a_j = y/C, ∂e/∂b_j = −u/C, ∂e/∂c_j = −e/C, each late by j
+        // Gauss–Newton: ∂e/∂a_j = y/C, ∂e/∂b_j = −u/C, ∂e/∂c_j = −e/C, each delayed by j
         let now = model("ARMAX", n, &x);
         let e = now.innovations(u, y);
         let [yc, uc, ec] = [y, u, &e].map(|signal| through(signal, &now.c));

@@ -1,48 +1,48 @@
-//! Sweep-synchronous demodulation: the Fourier coefficient of torque and rate at
-//! the sweep's own phase, over a window that slides with the sweep,
+//! Sweep-synchronous demodulation: Fourier coefficients of torque and rate at the sweep's own
+//! phase, over a window that moves with the sweep,
 //!
 //! ```text
 //! Y(t) = Σ w(t' − t) y(t') e^{−jφ(t')},   H(f(t)) = Y(t) / U(t)
 //! ```
 //!
-//! φ is the known phase of the sweep (it is not estimated), w a Hann window of
-//! [so many cycles](cycles). U is formed with the same window, so whatever the
-//! window does to amplitude and phase cancels in H. Harmonics that friction makes
-//! turn by many cycles within the window and drop out.
+//! φ is the known phase of the sweep (it is not estimated), w a Hann window of a number of
+//! [cycles]. U uses the same window, so the window's effect on amplitude and phase cancels in H.
+//! Harmonics due to friction rotate by many cycles within the window and average out.
 
 use crate::sweep::Sweep;
 use crate::{Complex64, FrequencyResponse};
 
-/// Fewest cycles that a window has: in three of them a Hann window tells a sweep from what does not
-/// turn with it.
+/// Smallest number of cycles of a window. With three cycles a Hann window separates a sweep from
+/// other components.
 pub const LEAST_CYCLES: f64 = 3.0;
 
-/// Length of the window in cycles of a sweep that is slow enough. 24 cycles are 10 s at 2.4 Hz, in which the thesis's
-/// sweep moves by 9 mHz: little against the 14 mHz half-power width of the slosh at 10 cm, and long
-/// enough to tell the harmonics of a sticking bearing from the sweep.
+/// Length of the window in cycles for a slow sweep. 24 cycles are 10 s at 2.4 Hz, in which the thesis's sweep moves by
+/// 9 mHz. This is small compared with the 14 mHz half-power width of the slosh at 10 cm, and long enough to separate
+/// the harmonics of a sticking bearing from the sweep.
 pub const CYCLES: f64 = 24.0;
 
 /// Largest relative change of a sweep's frequency within a window.
 const MOST_MOVE: f64 = 0.015;
 
-/// Cycles of the window at a frequency, Hz: 24, or fewer if the sweep would move by more
-/// than 1.5 % of its frequency, but not fewer than 3, in which harmonics drop out.
+/// Returns the cycles of the window at a frequency, Hz: 24, or fewer if the sweep would move by
+/// more than 1.5 % of its frequency. The minimum is 3, where harmonics still average out.
 pub fn cycles(sweep: &Sweep, frequency: f64) -> f64 {
     let slow = MOST_MOVE * frequency.powi(2) / sweep.rate_at(frequency).abs();
     slow.clamp(LEAST_CYCLES, CYCLES)
 }
 
-/// Responses, and what tells how uncertain they are.
+/// Responses with the data for their uncertainty.
 pub struct Demodulated<const N: usize> {
-    /// One for each output.
+    /// One response for each output.
     pub responses: [FrequencyResponse; N],
     /// Variance of H for a noise of unit power spectral density in the output, Σ|w|²/(h |U|²), at
     /// the responses' frequencies.
     pub noise_gain: Vec<f64>,
 }
 
-/// Standard deviation of |H| relative to |H| (and of the phase, rad) if `unexplained` is the
-/// two-sided power spectral density of what the response does not explain.
+/// Returns the standard deviation of |H| relative to |H| (and of the phase, rad). `unexplained` is
+/// the two-sided power spectral density of the part of the output that the response does not
+/// explain.
 pub fn deviation(
     response: &FrequencyResponse,
     unexplained: &[f64],
@@ -52,15 +52,15 @@ pub fn deviation(
     each.map(|((h, v), gain)| (v * gain / 2.0).sqrt() / h.norm()).collect()
 }
 
-/// Rate at which the error of a response changes along the frequency, in units of itself per Hz: the root
-/// of ∫w'²/∫w², 2π/√3 per length of a Hann window, over the sweep's rate.
+/// Returns the rate at which the error of a response changes along the frequency, relative to the error, 1/Hz. It is
+/// the root of ∫w'²/∫w², 2π/√3 per length of a Hann window, over the sweep's rate.
 pub fn slope(sweep: &Sweep, frequency: f64) -> f64 {
     let window = cycles(sweep, frequency) / frequency;
     std::f64::consts::TAU / 3f64.sqrt() / (window * sweep.rate_at(frequency).abs())
 }
 
-/// Frequency responses of `outputs` to `input`, sampled at `time` (s, equal steps), while `sweep` passes
-/// each of `frequencies` (Hz). Frequencies it does not pass are left out.
+/// Returns the frequency responses of `outputs` to `input`, sampled at `time` (s, equal steps), while `sweep` passes
+/// each of `frequencies` (Hz). Leaves out frequencies that the sweep does not pass.
 pub fn frequency_responses<const N: usize>(
     sweep: &Sweep,
     time: &[f64],
@@ -79,8 +79,8 @@ pub fn frequency_responses<const N: usize>(
         let to = time.partition_point(|&t| t <= centre + half);
         let (mut u, mut squares) = (Complex64::default(), 0.0);
         let mut y = [Complex64::default(); N];
-        // the window's cosine turns by the same angle from sample to sample; over some hundred of
-        // them that is exact to 1e-13, and costs a fifth of asking for each
+        // the window's cosine rotates by the same angle from sample to sample; over some hundred
+        // samples the recurrence is exact to 1e-13 and takes a fifth of the time
         let turns = |seconds: f64| Complex64::cis(std::f64::consts::PI * seconds / half);
         let Some(first) = time.get(from) else { continue };
         let (mut window, turn) = (turns(first - centre), turns(step));

@@ -23,9 +23,9 @@ pub struct Deviations {
 }
 
 impl Features {
-    /// Standard deviations of the features, from the response, its relative standard
-    /// deviation at each frequency, and the rate at which its error changes along a frequency, in units of
-    /// itself per Hz. An error ε of ln |H| moves an extremum by −ε'/(ln |H|)''.
+    /// Returns the standard deviations of the features, from the response, its relative standard deviation at each
+    /// frequency, and the relative rate at which its error changes along the frequency, 1/Hz. An error ε of ln |H|
+    /// moves an extremum by −ε'/(ln |H|)''.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,
@@ -45,19 +45,19 @@ impl Features {
         Deviations { f_res: of(self.f_res), f_dip: of(self.f_dip) }
     }
 
-    /// Finds the antiresonance and the resonance: the two ends of the largest rise of |H| (in dB)
-    /// as the frequency grows.
+    /// Finds antiresonance and resonance: the two ends of the largest rise of |H| (in dB) with
+    /// frequency.
     ///
-    /// Where the thesis's definition holds, smallest and largest |H| in the band (its 6.9 and
-    /// 6.10), this is the same. It also holds where that one fails: a damped resonance is lower than the
-    /// band's edge at 1.25 Hz, where the hub's inertia alone answers, and the ripple behind the
-    /// resonance may go deeper than the antiresonance. An end of the band is neither antiresonance
-    /// nor resonance, and a rise of less than [`LEAST`] is no slosh.
+    /// The result equals the thesis's definition, smallest and largest |H| in the band (its 6.9 and 6.10), where that
+    /// definition works. It also works where that definition fails: a damped resonance is lower than the band's edge at
+    /// 1.25 Hz, where the hub's inertia dominates. The ripple behind the resonance may also be lower than the
+    /// antiresonance. An end of the band is neither antiresonance nor resonance, and a rise of less than [`LEAST`] is
+    /// not slosh.
     pub fn of(response: &FrequencyResponse) -> Self {
         Features::within(response, (f64::NEG_INFINITY, f64::INFINITY))
     }
 
-    /// The same of the frequencies from one to the other, Hz.
+    /// Finds the features between two frequencies, Hz.
     pub fn within(response: &FrequencyResponse, (from, to): (f64, f64)) -> Self {
         let level = response.decibels();
         let first = response.frequency.partition_point(|f| *f < from);
@@ -87,11 +87,11 @@ impl Features {
     }
 }
 
-/// Least rise from antiresonance to resonance that counts, dB: a tank damped to ζ = 0.05 still
-/// rises by 3.9.
+/// Smallest rise from antiresonance to resonance that counts, dB. A tank damped to ζ = 0.05 still
+/// rises by 3.9 dB.
 pub const LEAST: f64 = 1.0;
 
-/// Places of the lowest and the highest value between which a sequence rises most.
+/// Returns the indices of the lowest and highest value between which a sequence rises most.
 fn largest_rise(level: &[f64]) -> Option<(usize, usize)> {
     let (mut lowest, mut best, mut rise) = (0, None, LEAST);
     for (i, &value) in level.iter().enumerate() {
@@ -104,8 +104,8 @@ fn largest_rise(level: &[f64]) -> Option<(usize, usize)> {
     best
 }
 
-/// Vertex of the parabola through the extremum's three points (dB over log f): frequency in Hz and
-/// level in dB. The grid is even in log f.
+/// Returns the vertex of the parabola through the extremum's three points (dB over log f):
+/// frequency in Hz and level in dB. The grid is equally spaced in log f.
 fn vertex(response: &FrequencyResponse, level: &[f64], i: usize) -> (f64, f64) {
     let (a, b, c) = (level[i - 1], level[i], level[i + 1]);
     let offset = 0.5 * (a - c) / (a - 2.0 * b + c);
@@ -141,7 +141,7 @@ mod tests {
             Linear::bench_10_cm(0.0029757).frequency_response(&logarithmic_grid(BAND, 2000));
         let clean = Features::of(&response);
         for (f, h) in response.frequency.iter().zip(&mut response.response) {
-            // a trough of a beat, 60 mHz behind the resonance, 5 dB deeper than the antiresonance
+            // a trough of a beat 60 mHz above the resonance, 5 dB lower than the antiresonance
             *h *= 1.0 - 0.994 * (-((f - 2.52) / 0.004_f64).powi(2)).exp();
         }
         let level = response.decibels();
@@ -155,7 +155,7 @@ mod tests {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::of(&hub.frequency_response(&grid)), Features::default());
-        // up to 2.4 Hz there is the antiresonance, but the resonance is not reached
+        // the band up to 2.4 Hz has the antiresonance but not the resonance
         let early = logarithmic_grid((1.25, 2.4), 2000);
         let features = Features::of(&Linear::bench_10_cm(0.003).frequency_response(&early));
         assert!(features.f_dip.is_some() && features.f_res.is_none(), "{features:?}");

@@ -1,4 +1,4 @@
-//! Free decay: frequency and damping of an oscillation that nothing drives, and how both depend on its amplitude,
+//! Free decay: frequency and damping of an undriven oscillation, and their dependence on its amplitude,
 //!
 //! ```text
 //! A'/A = −ω (ζ + ζ_A A)          ω = 2πf
@@ -6,17 +6,17 @@
 //! x    =  x₀ + s t + A cos φ
 //! ```
 //!
-//! ζ_A is what friction that grows with the square of the speed adds (quadratic drag, a baffle: its decrement is
-//! proportional to the amplitude), κ a spring that hardens or softens. The first equation is Bernoulli's; with
-//! g = (1 − e^{−ζωt})/ζ
+//! ζ_A is the contribution of friction proportional to the square of the speed (quadratic drag, a baffle), whose
+//! decrement is proportional to the amplitude. κ is that of a hardening or softening spring. The first equation is
+//! Bernoulli's. With g = (1 − e^{−ζωt})/ζ
 //!
 //! ```text
 //! A = A₀ e^{−ζωt} / (1 + ζ_A A₀ g)
 //! ```
 //!
-//! The start is found from the oscillation's phasor over windows of two periods, linear least squares of its logarithm;
-//! then all is fitted in time. The noise need not be white: standard deviations follow from the power of the residual
-//! beside f, where alone it disturbs f and ζ.
+//! The start comes from the oscillation's phasor over windows of two periods, by linear least squares of its logarithm.
+//! All parameters are then fitted in the time domain. The noise need not be white: standard deviations follow from the
+//! power of the residual near f, because only that noise disturbs f and ζ.
 
 use std::f64::consts::TAU;
 
@@ -26,13 +26,13 @@ use crate::Complex64;
 use crate::least_squares::{differences, minimise, smallest};
 use crate::statistics::{deviation, mean};
 
-/// Fewest periods from which frequency and damping are told.
+/// Smallest number of periods for an estimate of frequency and damping.
 pub const LEAST_PERIODS: f64 = 5.0;
 
 /// One record of a free decay.
 #[derive(Clone, Copy, Debug)]
 pub struct Record<'a> {
-    /// Times, s, growing; they need not be equally spaced.
+    /// Times, s, increasing; they need not be equally spaced.
     pub time: &'a [f64],
     /// The oscillating signal, in any unit U.
     pub signal: &'a [f64],
@@ -58,7 +58,7 @@ pub struct FreeDecay {
     pub zeta_amplitude: Value,
     /// κ, 1/U².
     pub hardening: Value,
-    /// ζ if it is the same at all amplitudes, U.
+    /// ζ with the same damping at all amplitudes.
     pub constant: f64,
     /// Amplitude at each record's beginning and end, U.
     pub amplitudes: Vec<[f64; 2]>,
@@ -66,20 +66,22 @@ pub struct FreeDecay {
     pub periods: Vec<f64>,
     /// Root mean square of the residual, U.
     pub residual: f64,
-    /// The same with ζ constant, U.
+    /// Root mean square of the residual with constant ζ, U.
     pub residual_constant: f64,
     /// Largest other oscillation in the residual: its frequency, Hz, and amplitude, U.
     pub other: (f64, f64),
-    /// The search ended at a minimum.
+    /// True if the search ended at a minimum.
     pub converged: bool,
 }
 
-/// Unknowns of all records: f, ζ, ζ_A, κ, the last two in units of the largest amplitude.
+/// Number of unknowns common to all records: f, ζ, ζ_A, κ, the last two in units of the largest
+/// amplitude.
 const COMMON: usize = 4;
-/// Unknowns of one record: ln A₀, φ₀, x₀, s.
+/// Number of unknowns of one record: ln A₀, φ₀, x₀, s.
 const OWN: usize = 4;
 
-/// The model at the times of a record that begins at `time[0]`; `size` is the unit of the amplitude.
+/// Evaluates the model at the times of a record that begins at `time[0]`; `size` is the unit of the
+/// amplitude.
 fn model(time: &[f64], common: &[f64], own: &[f64], size: f64) -> Vec<f64> {
     let [frequency, zeta, zeta_a, kappa] = [common[0], common[1], common[2], common[3]];
     let omega = TAU * frequency;
@@ -94,7 +96,7 @@ fn model(time: &[f64], common: &[f64], own: &[f64], size: f64) -> Vec<f64> {
     let values = time.iter().map(|t| {
         let t = t - time[0];
         let a = amplitude(t);
-        // Simpson's rule over the row: the amplitude hardly changes within one
+        // Simpson's rule over the row: the amplitude hardly changes within a row
         let middle = amplitude((t + before.0) / 2.0);
         square += (t - before.0) / 6.0 * (before.1.powi(2) + 4.0 * middle.powi(2) + a * a);
         before = (t, a);
@@ -122,7 +124,8 @@ impl FreeDecay {
         for start in &starts {
             x.extend([(start.amplitude / size).ln(), start.phase, start.offset / size, 0.0]);
         }
-        // the steps of differences: relative to what a period or the record's end would notice
+        // steps of the differences: relative to a significant change over a period or over the
+        // record
         let longest = starts.iter().map(|start| start.periods).fold(0.0, f64::max);
         let small = 1e-4 / longest;
         let mut steps = vec![small * x[0], small, small, small];
@@ -139,7 +142,7 @@ impl FreeDecay {
             }
             all
         };
-        // first with κ and ζ_A as they are, and constant damping for comparison
+        // first with fixed κ and ζ_A, and with constant damping for comparison
         let fixed = |x: &[f64]| {
             let mut all = x.to_vec();
             all.insert(2, 0.0);
@@ -201,7 +204,7 @@ impl FreeDecay {
         })
     }
 
-    /// ζ(A) = ζ + ζ_A A at an amplitude, U.
+    /// Returns ζ(A) = ζ + ζ_A A at an amplitude, U.
     pub fn zeta_at(&self, amplitude: f64) -> f64 {
         self.zeta.value + self.zeta_amplitude.value * amplitude
     }
@@ -209,16 +212,17 @@ impl FreeDecay {
 
 /// The residual's spectrum.
 struct Beside {
-    /// Its power beside the frequency, as the variance of white noise that has as much.
+    /// Its power near the frequency, as the variance of white noise of equal power.
     power: f64,
     /// Frequency, Hz, and amplitude of its largest line.
     other: (f64, f64),
 }
 
-/// Lines of 1/T to either side of f: what the fit takes up itself, and as far as counts as beside.
+/// Number of lines of 1/T on either side of f that the fit absorbs, and width of the neighbourhood
+/// of f.
 const TAKEN: usize = 2;
 const SIDE: usize = 12;
-/// Frequencies at which a residual's lines are looked for.
+/// Number of frequencies in the search for lines of a residual.
 const LINES: usize = 400;
 
 fn beside(time: &[f64], residual: &[f64], frequency: f64) -> Beside {
@@ -266,11 +270,11 @@ struct Start {
     periods: f64,
 }
 
-/// Points per cycle of 1/T at which the spectrum's largest line is looked for.
+/// Points per cycle of 1/T in the search for the spectrum's largest line.
 const FINE: f64 = 4.0;
-/// Most frequencies that are looked at.
+/// Largest number of frequencies in this search.
 const MOST: usize = 20_000;
-/// Part of the largest amplitude from which on the phasor tells anything.
+/// Share of the largest amplitude below which the phasor is not used.
 const LEAST_PART: f64 = 0.02;
 
 impl Start {
@@ -282,7 +286,7 @@ impl Start {
             return None;
         }
         let offset = mean(signal);
-        // the largest line under a Hann window, which hides what drifts
+        // the largest line under a Hann window, which suppresses drift
         let window = |t: f64| 0.5 - 0.5 * (TAU * (t - time[0]) / seconds).cos();
         let weighted: Vec<f64> =
             time.iter().zip(signal).map(|(t, y)| window(*t) * (y - offset)).collect();
@@ -290,7 +294,8 @@ impl Start {
         let low = 0.8 * LEAST_PERIODS / seconds;
         let count = (((top - low) * seconds * FINE).max(10.0) as usize).min(MOST);
         let power = |f: f64| {
-            // e^{−jωt} by recurrence where rows are even would be faster; a record is looked at once
+            // a recurrence for e^{−jωt} with equally spaced rows would be faster, but each record
+            // needs it only once
             let sum: Complex64 =
                 time.iter().zip(&weighted).map(|(t, y)| Complex64::cis(-TAU * f * t) * y).sum();
             sum.norm_sqr()
@@ -300,7 +305,7 @@ impl Start {
             let best = (0..=count).max_by(|a, b| power(at(*a)).total_cmp(&power(at(*b))));
             at(best.unwrap_or(0))
         });
-        // a parabola through the logarithms beside it
+        // a parabola through the logarithms around it
         let h = 0.25 / seconds;
         let [a, b, c] = [coarse - h, coarse, coarse + h].map(|f| power(f).max(1e-300).ln());
         let bend = a - 2.0 * b + c;
@@ -369,7 +374,8 @@ impl Start {
     }
 }
 
-/// The largest line of an equally sampled signal between two frequencies, Hz; `None` if its rows are uneven.
+/// Returns the largest line of an equally sampled signal between two frequencies, Hz; `None` if its rows are not
+/// equally spaced.
 fn signals_peak(time: &[f64], weighted: &[f64], low: f64, top: f64) -> Option<f64> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
@@ -391,7 +397,8 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// A'' by its own equation, RK4, with a quadratic and a linear damping and a cubic spring: not the formula above.
+    /// Integrates A'' by its own equation, RK4, with quadratic and linear damping and a cubic spring, independent of
+    /// the formula above.
     fn oscillator(
         zeta: f64,
         quadratic: f64,
@@ -429,8 +436,8 @@ mod tests {
 
     #[test]
     fn damping_that_grows_with_the_amplitude_is_found_as_averaging_predicts_it() {
-        // x'' + ... + q x'|x'|: per cycle ζ_A = 4 q/(3π) (Nayfeh and Mook 1979, 3.3.3: averaging), a cubic spring
-        // makes κ = 3 α/8; both to first order in the amplitude squared: 0.2² α q below 1 %
+        // x'' + ... + q x'|x'|: averaging gives ζ_A = 4 q/(3π) (Nayfeh and Mook 1979, 3.3.3), and a cubic spring gives
+        // κ = 3 α/8. Both hold to first order in the amplitude squared: 0.2² α q below 1 %
         let (q, alpha) = (0.02, -0.05);
         let (time, signal) = oscillator(0.004, q, alpha, 0.3, 60.0);
         let found = FreeDecay::of(&[Record { time: &time, signal: &signal }]).unwrap();
@@ -444,7 +451,8 @@ mod tests {
 
     #[test]
     fn intervals_hold_the_truth_in_white_and_in_coloured_noise() {
-        // 60 records of 25 s each; of 95 %, 57, the count scatters by 1.7: three of them below
+        // 60 records of 25 s each. The 95 % interval covers 57 on average with a scatter of 1.7;
+        // the limit is three below
         for (colour, least) in [(0.0, 52), (0.9, 52)] {
             let mut held = [0; 3];
             for seed in 0..60 {

@@ -1,16 +1,16 @@
-//! The noise of a rate gyro, and the filter that makes it white.
+//! Noise of a rate gyro, and the filter that whitens it.
 //!
 //! ```text
 //! y_k = ω(t_k) + b_k + σ_w n_k,   b_{k+1} = φ b_k + σ_b sqrt(1 − φ²) m_k,   φ = exp(−Δt/T)
 //! ```
 //!
-//! White noise and a Gauss–Markov bias (IEEE Std 952). The Kalman filter of b turns a residual
-//! r into innovations e, which are white if the residual is this noise; the same linear filter
-//! turns sensitivities of the rate into sensitivities of the innovations. Least squares of the
-//! innovations is then maximum likelihood, and slow drift does not pass for a signal.
+//! The noise is white noise plus a Gauss–Markov bias (IEEE Std 952). The Kalman filter of b turns a
+//! residual r into innovations e, which are white if the residual is this noise. The same linear
+//! filter turns sensitivities of the rate into sensitivities of the innovations. Least squares of
+//! the innovations is then maximum likelihood, and slow drift is not mistaken for a signal.
 
-/// Least white noise, rad/s or rad. Recordings made by a simulation have less, but then it is the solvers'
-/// errors that differ, and these are not random.
+/// Smallest white noise, rad/s or rad. Simulated recordings have less, but their differences are solver errors, which
+/// are not random.
 pub const FLOOR: f64 = 1e-6;
 
 /// White noise and a Gauss–Markov bias.
@@ -38,14 +38,15 @@ impl Noise {
         Noise { white: sigma, drift: 0.0, time: 100.0 }
     }
 
-    /// The filter for rows at these times, s. Rows that are not `fresh` say nothing: their innovation is 0.
+    /// Returns the filter for rows at these times, s. Rows that are not `fresh` carry no information: their innovation
+    /// is 0.
     pub fn whitening(&self, time: &[f64], fresh: Option<&[bool]>) -> Whitening {
         let (white, drift) = (self.white.powi(2), (self.white * self.drift).powi(2));
         let mut variance = drift;
         let mut log_variance = 0.0;
         let mut rows = Vec::with_capacity(time.len());
         let (mut last_step, mut keep) = (0.0, 1.0);
-        // once the filter has settled, nothing has to be computed anew
+        // a settled filter has constant gains
         let (mut last_innovation, mut settled) = (f64::NEG_INFINITY, ([1.0, 0.0, 1.0], 0.0));
         for k in 0..time.len() {
             if k > 0 {
@@ -73,11 +74,11 @@ impl Noise {
         Whitening { rows, log_variance }
     }
 
-    /// The noise of maximum likelihood for a residual, rad/s, at these times.
+    /// Estimates the noise from a residual, rad/s, at these times, by maximum likelihood.
     pub fn of(time: &[f64], residual: &[f64], fresh: Option<&[bool]>) -> Self {
         let new = |fresh: &[bool]| fresh.iter().filter(|new| **new).count();
         let count = fresh.map_or(residual.len(), new) as f64;
-        // σ_w follows from the rest; what is minimised is −2 ln L
+        // σ_w follows from the other parameters; the search minimises −2 ln L
         let sized = |ln_drift: f64, ln_time: f64| {
             let unit = Noise { white: 1.0, drift: ln_drift.exp(), time: ln_time.exp() };
             let filter = unit.whitening(time, fresh);
@@ -89,7 +90,7 @@ impl Noise {
         let longest = (time[time.len() - 1] - time[0]).ln();
         let mut best = sized(-4.0, 4.6);
         let (mut at, mut reach): ((f64, f64), _) = ((-4.0, 4.6f64.min(longest)), (1.5, 1.5));
-        // coordinate search: two smooth variables, a few tens of evaluations
+        // coordinate search: two smooth variables, some tens of evaluations
         for _ in 0..40 {
             let mut moved = false;
             for (dx, dt) in [(reach.0, 0.0), (-reach.0, 0.0), (0.0, reach.1), (0.0, -reach.1)] {
@@ -111,7 +112,7 @@ impl Noise {
 }
 
 impl Whitening {
-    /// Turns a residual, or a sensitivity, into innovations over their standard deviation.
+    /// Turns a residual, or a sensitivity, into innovations divided by their standard deviation.
     pub fn apply(&self, signal: &mut [f64]) {
         let mut bias = 0.0;
         for (value, [keep, gain, scale]) in signal.iter_mut().zip(&self.rows) {
@@ -122,7 +123,7 @@ impl Whitening {
         }
     }
 
-    /// Σ ln(innovation variance): with Σ e² it is −2 ln L but for a constant.
+    /// Returns Σ ln(innovation variance); with Σ e² it is −2 ln L up to a constant.
     pub fn log_variance(&self) -> f64 {
         self.log_variance
     }

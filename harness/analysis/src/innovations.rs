@@ -1,47 +1,47 @@
-//! Is the residual of a model the gyro's noise? Tests of the innovations (Ljung, System Identification,
-//! chapter 16), which are white with unit variance if it is.
+//! Tests whether the residual of a model is the gyro's noise. The innovations are then white with unit variance (Ljung,
+//! System Identification, chapter 16).
 //!
 //! * whiteness: Ljung and Box's Q of the autocorrelations up to [`LAGS`];
 //! * in time: power in windows of [`WINDOW`] rows against the white noise level, which a burst or a clipped
 //!   stretch raises;
 //! * in frequency: power in bands of the periodogram;
-//! * cross-correlation with the torque and with its square: what depends on the input is
-//!   something the model does not do.
+//! * cross-correlation with the torque and with its square: a dependence on the input is missing in
+//! the model.
 //!
-//! Many rows make each test sensitive to effects of no importance; so the size of the excess
-//! is stated with them.
+//! With many rows each test is sensitive to effects of no importance, so the result includes the
+//! size of the excess.
 
 use serde::Serialize;
 use signals::fourier::Forward;
 
 use crate::statistics::{mean, median};
 
-/// Lags of the whiteness test.
+/// Number of lags of the whiteness test.
 pub const LAGS: usize = 50;
-/// Rows of a window: 20 s at 50 Hz.
+/// Number of rows of a window: 20 s at 50 Hz.
 pub const WINDOW: usize = 1000;
-/// Bands of the periodogram.
+/// Number of bands of the periodogram.
 const BANDS: usize = 100;
-/// Lines of a band at least.
+/// Smallest number of lines of a band.
 const FEWEST_LINES: usize = 4;
-/// A test fails beyond this many standard deviations: a chance of 1e-6 for one, and some 1e-4 for
-/// the hundred or so that are made.
+/// Limit of each test in standard deviations: the chance of exceeding it is 1e-6 for one test and
+/// about 1e-4 for about a hundred tests.
 pub const LIMIT: f64 = 5.0;
 
-/// Test results, each in standard deviations of what chance does.
+/// Test results, in standard deviations of chance.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Tests {
-    /// Whiteness.
+    /// Result of the whiteness test.
     pub whiteness: f64,
-    /// Largest excess of a window in time, and when, s.
+    /// Largest excess of a window in time, and its time, s.
     pub in_time: (f64, f64),
-    /// Largest excess of a band, and where, Hz.
+    /// Largest excess of a band, and its frequency, Hz.
     pub in_frequency: (f64, f64),
     /// Largest cross-correlation with the torque up to 2 s.
     pub torque: f64,
     /// Largest cross-correlation with the torque's square.
     pub torque_squared: f64,
-    /// Root mean square of the residual in the worst band beyond the noise, rad/s.
+    /// Root mean square of the residual above the noise in the worst band, rad/s.
     #[serde(rename = "left")]
     pub excess: f64,
 }
@@ -52,24 +52,25 @@ impl Tests {
         self.worst() < LIMIT
     }
 
-    /// The worst of them.
+    /// Returns the largest of the test results.
     pub fn worst(&self) -> f64 {
         [self.whiteness, self.in_time.0, self.in_frequency.0, self.torque, self.torque_squared]
             .into_iter()
             .fold(0.0, f64::max)
     }
 
-    /// Tests innovations `e` at `time` (s) under `torque`; `white` is the noise's size, rad/s.
+    /// Tests innovations `e` at `time` (s) under `torque`; `white` is the standard deviation of the
+    /// noise, rad/s.
     pub fn of(time: &[f64], torque: &[f64], e: &[f64], white: f64) -> Self {
         let count = e.len() as f64;
         let middle = mean(e);
         let e: Vec<f64> = e.iter().map(|v| v - middle).collect();
         let power = e.iter().map(|v| v * v).sum::<f64>() / count;
         if power < 0.01 {
-            // a tenth of the least noise that is reckoned with ([`crate::gauss_markov::FLOOR`]): no residual
+            // below a tenth of the smallest noise ([`crate::gauss_markov::FLOOR`]) the residual counts as zero
             return Tests::default();
         }
-        // of a short record as many as it has a few independent products for
+        // a short record uses fewer lags, so that each has several independent products
         let lags = LAGS.min(e.len() / 4).max(1);
         let q: f64 = (1..=lags)
             .map(|lag| {
@@ -79,7 +80,7 @@ impl Tests {
             .sum();
         let step = (time[time.len() - 1] - time[0]) / (count - 1.0);
         let window = WINDOW.min(e.len());
-        // where the noise stands by itself
+        // windows with noise alone
         let windows: Vec<(f64, f64)> = e
             .chunks_exact(window)
             .enumerate()
@@ -104,14 +105,14 @@ impl Tests {
     }
 }
 
-/// χ² with n degrees of freedom as a normal deviate (Wilson and Hilferty).
+/// Returns χ² with n degrees of freedom as a normal deviate (Wilson and Hilferty).
 fn normal(chi_squared: f64, n: f64) -> f64 {
     let spread = 2.0 / (9.0 * n);
     ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Largest excess over the median in standard deviations, and where. A level is a mean of n squares, and as a normal deviate
-/// what is rare by chance is so whatever n.
+/// Returns the largest excess over the median in standard deviations, and its position. A level is a mean of n squares;
+/// as a normal deviate it is equally rare for every n.
 fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
     let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
     // the median of χ² is below its mean
@@ -122,8 +123,8 @@ fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
         .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a })
 }
 
-/// Mean periodogram in bands from 0 to half the sampling frequency, the bands' width (Hz) and how
-/// many lines are in each.
+/// Returns the mean periodogram in bands from 0 to half the sampling frequency, the bands' width
+/// (Hz), and the number of lines in each.
 fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
     let spectrum = Forward::new(e.len()).of(e.to_vec());
     let bands = BANDS.min((spectrum.len() - 1) / FEWEST_LINES).max(1);
@@ -137,8 +138,8 @@ fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
     (bands, lines as f64 / (e.len() as f64 * step), lines as f64)
 }
 
-/// Largest cross-correlation of e with an input over lags from 0 to 2 s, in standard deviations if e
-/// is white, whatever the input.
+/// Returns the largest cross-correlation of e with an input over lags from 0 to 2 s, in standard
+/// deviations for white e and any input.
 pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
     let mean = mean(input);
     let lags = ((2.0 / step) as usize).min(e.len() / 2);
@@ -159,7 +160,7 @@ pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A test of one record exceeds the limit by chance in one of some 10,000.
+    /// By chance about one record in 10,000 exceeds the limit.
     #[test]
     fn white_noise_passes_in_short_records_too() {
         let mut random = crate::random::Random::new(7, 0);
@@ -181,7 +182,7 @@ mod tests {
         let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
         let tests = Tests::of(&time, &torque, &white, 1.0);
         assert!(tests.passed(), "{tests:?}");
-        // a tenth of the noise, in the band of the torque alone
+        // a tenth of the noise, only in the band of the torque
         let leaking: Vec<f64> = white.iter().zip(&torque).map(|(e, t)| e + t).collect();
         let tests = Tests::of(&time, &torque, &leaking, 1.0);
         assert!(tests.torque > 10.0 && !tests.passed(), "{tests:?}");

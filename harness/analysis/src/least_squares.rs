@@ -1,11 +1,11 @@
-//! Levenberg and Marquardt's method for closures.
+//! Levenberg–Marquardt method for closures.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 
 /// Residuals at x.
 pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
-/// Their derivatives at x, a row for each residual; `None` ends the search.
+/// Returns the derivatives of the residuals at x, one row per residual; `None` ends the search.
 pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 
 /// Minimum of the sum of squares.
@@ -15,14 +15,14 @@ pub struct Minimum {
     pub x: Vec<f64>,
     /// Sum of squares.
     pub cost: f64,
-    /// The search ended at a minimum, not at the end of its patience.
+    /// True if the search ended at a minimum, not at its iteration limit.
     pub converged: bool,
     /// Reason for stopping.
     pub reason: String,
 }
 
-/// The smallest x for which |a x − b| is least; singular values up to `least` count as 0. `None` if an entry is not finite:
-/// the iteration for the singular values would never end.
+/// Returns the smallest x that minimises |a x − b|. Singular values up to `least` count as 0. Returns `None` if an
+/// entry is not finite, because the iteration for the singular values would not end.
 pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector<f64>> {
     if !a.iter().chain(b.iter()).all(|entry| entry.is_finite()) {
         return None;
@@ -30,17 +30,18 @@ pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector
     a.svd(true, true).solve(b, least).ok()
 }
 
-/// The minimum of the sum of squares near `x`.
+/// Returns the minimum of the sum of squares near `x`.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
     minimise_by(&tolerances(1e-9, 1e-9), residuals, derivatives, x)
 }
 
-/// The method with tolerances of the sum of squares and of x, both relative.
+/// Returns the method with relative tolerances of the sum of squares and of x.
 pub fn tolerances(cost: f64, x: f64) -> LevenbergMarquardt<f64> {
     LevenbergMarquardt::new().with_ftol(cost).with_xtol(x)
 }
 
-/// The same with other tolerances. Derivatives are asked for where residuals were last, if at all.
+/// Works like [`minimise`] with other tolerances. It evaluates derivatives only where residuals
+/// were evaluated last.
 pub fn minimise_by(
     method: &LevenbergMarquardt<f64>,
     residuals: Residuals,
@@ -57,7 +58,7 @@ pub fn minimise_by(
     }
 }
 
-/// Derivatives by central differences with these steps.
+/// Returns derivatives by central differences with these steps.
 pub fn differences(residuals: Residuals, x: &[f64], steps: &[f64]) -> DMatrix<f64> {
     let columns: Vec<DVector<f64>> = (0..x.len())
         .map(|j| {
@@ -109,7 +110,7 @@ mod tests {
         let residuals = |x: &[f64]| vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let derivatives = |x: &[f64]| Some(differences(&residuals, x, &[1e-5, 1e-5]));
         let found = minimise(&residuals, &derivatives, &[-1.2, 1.0]);
-        // no residual is left there: the last step is quadratic in the one before, of 1e-9 of x
+        // the residual is 0 there, so the last step is quadratic in the step before, of 1e-9 of x
         assert!(found.converged && (found.x[0] - 1.0).abs() + (found.x[1] - 1.0).abs() < 1e-8);
     }
 }

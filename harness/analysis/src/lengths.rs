@@ -1,12 +1,12 @@
-//! Lengths of windows, lags and segments. They follow from the torque's own band and duration, so
-//! that a spacecraft whose slosh takes 20 s is resolved as sharply as a bench's, whose takes 0.4 s. For
-//! the thesis's sweep, 1.25 to 3.5 Hz in 2700 s, they are 24 cycles, 200 s and 20 s.
+//! Lengths of windows, lags and segments. They follow from the band and duration of the torque, so that slosh with a
+//! period of 20 s in a spacecraft is resolved as well as slosh with 0.4 s on a bench. For the thesis's sweep, 1.25 to
+//! 3.5 Hz in 2700 s, they are 24 cycles, 200 s and 20 s.
 
 use crate::sweep::Sweep;
 use crate::{BAND, spa, welch};
 
-/// Samples in a cycle of the band's highest frequency that an estimate of the whole record needs;
-/// the thesis's sweep has 14.3.
+/// Number of samples per cycle of the band's highest frequency that a whole-record estimate needs.
+/// The thesis's sweep has 14.3.
 const SAMPLES: f64 = 14.0;
 /// Longest lag as a share of the record.
 const MOST_LAG: f64 = 0.5;
@@ -14,18 +14,20 @@ const MOST_LAG: f64 = 0.5;
 /// Lengths for estimates from a whole record, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lengths {
-    /// Longest lag of [`spa`]: as many cycles of the band's middle as 200 s are of the thesis's, and
-    /// at most half of the record. It resolves 1/lag.
+    /// Longest lag of [`spa`]: the same number of cycles at the band's centre as 200 s of the
+    /// thesis's sweep, and at most half of the record. Its resolution is 1/lag.
     pub lag: f64,
-    /// Segments for coherence: so long that six half-overlapping ones see each frequency of the
-    /// sweep, L = sqrt(1/(3 rate)); of noise, as many cycles as 20 s are of the thesis's.
+    /// Length of the segments for coherence. For a sweep, six half-overlapping segments cover each
+    /// frequency, L = sqrt(1/(3 rate)). For noise, a segment has as many cycles as 20 s of the
+    /// thesis's sweep.
     pub segment: f64,
-    /// Samples whose mean is taken as one, in torque and rate alike.
+    /// Number of samples that are averaged into one, equally in torque and rate.
     pub decimation: usize,
 }
 
 impl Lengths {
-    /// Lengths for a record of `duration` s sampled every `step` s whose torque has power in the band, Hz.
+    /// Returns the lengths for a record of `duration` s, sampled every `step` s, whose torque has power in the band,
+    /// Hz.
     pub fn of(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
         let middle = |(from, to): (f64, f64)| (from * to).sqrt();
         let slower = middle(BAND) / middle(band);

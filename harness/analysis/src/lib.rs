@@ -1,14 +1,12 @@
-//! From a run's signals to the frequency response of torque to hub rate, and
-//! from that to its features.
+//! Frequency responses from torque to hub rate, from a run's signals, and their features.
 //!
-//! Three estimators, which answer different questions, and a fourth for records that are too short
-//! for them:
-//! * [`demodulation`]: what the hub does while the sweep passes a frequency, as
-//!   a lock-in amplifier shows it. It feeds `features.csv`.
-//! * [`spa`]: MATLAB's Blackman–Tukey estimate over the whole record, as the
-//!   thesis used it. It stands beside the first in the report.
-//! * [`welch`]: the H1 estimate from averaged segments, which most tools call
-//!   the transfer function of two records.
+//! Three estimators answer different questions, and a fourth is for records that are too short for
+//! them:
+//! * [`demodulation`]: the hub's response while the sweep passes a frequency, like a lock-in
+//! amplifier. It provides `features.csv`.
+//! * [`spa`]: MATLAB's Blackman–Tukey estimate over the whole record, as in the thesis. The report
+//! compares it with the first.
+//! * [`welch`]: the H1 estimate from averaged segments, the usual transfer function of two records.
 //! * [`rational`]: a transfer function fitted to the spectra of the whole record.
 
 pub mod allan;
@@ -40,7 +38,7 @@ pub use signals::fourier::Complex64;
 /// A complex frequency response on a grid of frequencies.
 #[derive(Clone, Debug, Default)]
 pub struct FrequencyResponse {
-    /// Frequencies, Hz, growing.
+    /// Frequencies, Hz, increasing.
     pub frequency: Vec<f64>,
     /// Rate over torque, (rad/s)/(N·m).
     pub response: Vec<Complex64>,
@@ -58,10 +56,10 @@ impl FrequencyResponse {
     }
 }
 
-/// The band the thesis looks at (6.3.1), Hz.
+/// The thesis's band (6.3.1), Hz.
 pub const BAND: (f64, f64) = (1.25, 3.5);
 
-/// `points` frequencies from one end of the band to the other, equally spaced in log f, Hz.
+/// Returns `points` frequencies from one end of the band to the other, equally spaced in log f, Hz.
 pub fn logarithmic_grid((from, to): (f64, f64), points: usize) -> Vec<f64> {
     let step = (to / from).ln() / (points - 1) as f64;
     (0..points).map(|i| from * (i as f64 * step).exp()).collect()

@@ -5,9 +5,9 @@
 //! ```
 //!
 //! from the hub's equation I0 ω' = τ − b ω − k θ + r Σ (m_i g α_i + c_i l_i α_i') and the
-//! pendulums' α_i'' + 2 ζ_i ω_i α_i' + ω_i² α_i = −(r/l_i) ω' (thesis 4.27 and 4.29 with the sign
-//! of the slosh torque corrected). Its zeros are the pendulums' own poles: the antiresonance stands
-//! at the slosh frequency, the resonance above it.
+//! pendulums' α_i'' + 2 ζ_i ω_i α_i' + ω_i² α_i = −(r/l_i) ω'. These are thesis 4.27 and 4.29 with
+//! the sign of the slosh torque corrected. The zeros are the pendulums' own poles: the
+//! antiresonance is at the slosh frequency, the resonance above it.
 
 use std::f64::consts::TAU;
 
@@ -22,7 +22,7 @@ pub struct Linear {
     pub inertia: f64,
     /// b, viscous friction, N·m·s.
     pub friction: f64,
-    /// k, torsional stiffness of the line that the hub hangs from, N·m/rad.
+    /// k, torsional stiffness of the suspension line, N·m/rad.
     pub stiffness: f64,
     /// r, distance of the tank from the axis, m.
     pub arm: f64,
@@ -42,7 +42,7 @@ pub struct Mode {
 }
 
 impl Linear {
-    /// Ω/τ at a frequency in Hz, (rad/s)/(N·m).
+    /// Returns Ω/τ at a frequency in Hz, (rad/s)/(N·m).
     pub fn response(&self, frequency: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency);
         let slosh: Complex64 = self
@@ -57,17 +57,18 @@ impl Linear {
         (s * (slosh + self.inertia) + self.friction + self.stiffness / s).inv()
     }
 
-    /// The rate, rad/s, that a torque (N·m) makes that is linear between samples `step` s apart, from
-    /// a rate and a liquid at rest.
+    /// Simulates the rate, rad/s, for a torque (N·m) that is linear between samples `step` s apart,
+    /// from an initial rate and liquid at rest.
     pub fn simulate(&self, step: f64, torque: &[f64], start: f64) -> Vec<f64> {
         let slope = |pair: &[f64]| (pair[1] - pair[0]) / step;
         let slopes: Vec<f64> = torque.windows(2).map(slope).chain([0.0]).collect();
         self.simulate_ramps(step, torque, &slopes, start)
     }
 
-    /// The same of a torque that has at the begin of each step of `step` s a value (N·m) and over it
-    /// a slope (N·m/s): exact, by the matrix exponential of the state and the input's
-    /// value and slope. The state is ω, for each mode y = l α and y', and the angle from its start.
+    /// Simulates the rate for a torque given by its value (N·m) at the beginning of each step of
+    /// `step` s and its slope (N·m/s) over the step. The matrix exponential of the state and the
+    /// input's value and slope makes it exact. The state is ω, y = l α and y' for each mode, and
+    /// the angle from the start.
     pub fn simulate_ramps(
         &self,
         step: f64,
@@ -113,7 +114,7 @@ impl Linear {
         rates
     }
 
-    /// The response on a grid of frequencies, Hz.
+    /// Returns the response on a grid of frequencies, Hz.
     pub fn frequency_response(&self, frequencies: &[f64]) -> FrequencyResponse {
         FrequencyResponse {
             frequency: frequencies.to_vec(),
@@ -123,13 +124,13 @@ impl Linear {
 }
 
 impl Linear {
-    /// The thesis's bench with 10 cm of water: Table 4.1 with the exact first root of J1',
+    /// Returns the thesis's bench with 10 cm of water: Table 4.1 with the exact first root of J1',
     /// ρ = 1000 kg/m³, g = 9.81 m/s².
     pub fn bench_10_cm(damping: f64) -> Self {
         Self::bench(1.3304311085, 0.7562932719, 2.3436181431, damping)
     }
 
-    /// The same with 5 cm.
+    /// Returns the same bench with 5 cm of water.
     pub fn bench_5_cm(damping: f64) -> Self {
         Self::bench(0.4165810206, 0.6267811696, 2.1335346636, damping)
     }
@@ -155,7 +156,8 @@ mod tests {
 
     #[test]
     fn a_torque_that_jumps_between_steps_is_no_slope() {
-        // a free hub: 0.2 N·m for a second, none, -0.2 for another; edges between samples 0.1 s apart
+        // a free hub: 0.2 N·m for a second, 0 for a second, -0.2 for a third; edges between samples
+        // 0.1 s apart
         let hub = Linear { inertia: 0.4, arm: 0.2, ..Linear::default() };
         let torque: Vec<f64> = (0..40)
             .map(|k| match k {
@@ -179,13 +181,14 @@ mod tests {
                 (0..40_000).map(|k| (TAU * f * f64::from(k) * step).sin()).collect();
             let rate = plant.simulate(step, &torque, 0.0);
             let largest = rate[35_000..].iter().fold(0.0f64, |m, y| m.max(y.abs()));
-            // after 70 s the start has decayed; chords of the sine and the sampled maximum: (w h)²/8
+            // after 70 s the initial transient has decayed; error of the sine's chords and the
+            // sampled maximum: (w h)²/8
             assert!((largest / plant.response(f).norm() - 1.0).abs() < 2e-4, "{largest}");
         }
     }
 
-    /// The linear bench driven by a sweep sampled at 50 Hz and joined by lines, integrated with RK4
-    /// in 2.5 ms (phase error over a whole sweep: 2e-5 rad). Returns time, torque and rate.
+    /// Integrates the linear bench, driven by a sweep sampled at 50 Hz and joined by lines, with
+    /// RK4 in 2.5 ms (phase error over a whole sweep: 2e-5 rad). Returns time, torque and rate.
     fn swept(plant: &Linear, sweep: &Sweep) -> [Vec<f64>; 3] {
         let mode = plant.modes[0];
         let (w, r) = (TAU * mode.frequency, plant.arm);
@@ -235,14 +238,15 @@ mod tests {
             assert_eq!(lock_in.frequency.len(), grid.len());
             let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
             let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
-            // the whole record knows no direction: the bounds of the upward sweep
+            // the whole-record estimate does not depend on direction: the bounds of the upward
+            // sweep
             assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {spa:?}");
             assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{law:?}: {spa:?}");
             // the resonance was passed 125 s before the antiresonance and still rings with
             // exp(-0.0525 * 125) of its 2.2 (rad/s)/(N.m); near the antiresonance |H| grows by 1.5
             // per hertz: 2 mHz
             assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-3, "{law:?}: {lock_in:?}");
-            // the shift of the upward sweep, with the other sign
+            // the shift of the upward sweep with opposite sign
             let shift = f_res - lock_in.f_res.unwrap();
             assert!((0.014..0.020).contains(&shift), "{law:?}: {lock_in:?}");
         }
@@ -263,14 +267,14 @@ mod tests {
                         .responses;
                 let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
                 let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
-                // the acceptance figure for the antiresonance is 2 mHz; both are several times
+                // the acceptance limit for the antiresonance is 2 mHz; both are several times
                 // better
                 assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {lock_in:?}");
                 assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {spa:?}");
-                // the whole record knows no sweep rate: the resonance stands where it should, to a
-                // fraction of the 5 mHz resolution
+                // the whole-record estimate does not depend on the sweep rate: the resonance is
+                // right to a fraction of the 5 mHz resolution
                 assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{law:?}: {spa:?}");
-                // while the sweep passes, the resonance comes late by about its half-power width,
+                // while the sweep passes, the resonance appears late by about its half-power width,
                 // 14 and 15 mHz
                 let shift = lock_in.f_res.unwrap() - f_res;
                 assert!((0.014..0.020).contains(&shift), "{law:?}: {lock_in:?}");

@@ -1,33 +1,32 @@
 //! Part of an output that no linear response to the input explains: gyro noise, and the effects of dry friction and
 //! a nonlinear liquid. It determines the uncertainty of a frequency response.
 //!
-//! The local rational method (McKelvey and Guérin, *Non-parametric frequency response estimation
-//! using a local rational model*, SYSID 2012; Pintelon and Schoukens, *System Identification: A
-//! Frequency Domain Approach*, 2nd ed., 2012, chapter 7): at the line k of the spectra of the whole record and
-//! n lines to either side of it,
+//! The method is the local rational method (McKelvey and Guérin, *Non-parametric frequency response estimation using a
+//! local rational model*, SYSID 2012; Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd
+//! ed., 2012, chapter 7). At line k of the whole record's spectra and n lines on either side,
 //!
 //! ```text
 //! (1 + a r) Y(k + r) = (b0 + b1 r + b2 r²) U(k + r) + t0 + t1 r + t2 r² + (1 + a r) V(k + r),   |r| ≤ n
 //! ```
 //!
-//! by least squares. The rational function follows a resonance as narrow as a few lines, the
-//! polynomial in t what the record's ends leave in the spectra. The residual is V.
+//! by least squares. The rational function follows a resonance as narrow as a few lines, and the
+//! polynomial in t represents the leakage of the record's ends. The residual is V.
 
 use nalgebra::{SMatrix, SVector};
 use signals::fourier::Forward;
 
 use crate::Complex64;
 
-/// Lines to either side, n.
+/// Number of lines on either side, n.
 const SIDE: usize = 6;
 const LINES: usize = 2 * SIDE + 1;
-/// b0, b1, b2, t0, t1, t2, a.
+/// Number of unknowns: b0, b1, b2, t0, t1, t2, a.
 const UNKNOWNS: usize = 7;
 
-/// Two-sided power spectral density of V (unit of the output squared, times s) at frequencies (Hz)
-/// of signals sampled every `step` s; NaN where nothing can be said.
+/// Returns the two-sided power spectral density of V (unit of the output squared, times s) at
+/// frequencies (Hz) of signals sampled every `step` s; NaN where there is no estimate.
 pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> Vec<f64> {
-    // N steps have N + 1 samples: N is as a rule a round number, whose transform is twice as fast
+    // N steps have N + 1 samples. N is usually a round number, with a transform twice as fast
     let count = input.len() / 2 * 2;
     let transform = Forward::new(count);
     let (u, y) = (transform.of(input[..count].to_vec()), transform.of(output[..count].to_vec()));
@@ -50,7 +49,7 @@ pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> V
     frequencies.iter().map(at).collect()
 }
 
-/// Mean of |V|² over the lines.
+/// Returns the mean of |V|² over the lines.
 fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
     let mean = |x: &[Complex64]| x.iter().map(|x| x.norm()).sum::<f64>() / LINES as f64;
     let (scale_u, scale_y) = (mean(u), mean(y));
@@ -83,7 +82,7 @@ mod tests {
 
     const STEP: f64 = 0.02;
 
-    /// The thesis's sweep of some amplitude, N·m, and the rate of the linear bench.
+    /// Returns the thesis's sweep with some amplitude, N·m, and the rate of the linear bench.
     fn sweep(amplitude: f64) -> (Sweep, Vec<f64>, Vec<f64>) {
         let sweep = Sweep { amplitude, ..Sweep::THESIS };
         let torque: Vec<f64> = (0..135_000).map(|k| sweep.torque(f64::from(k) * STEP)).collect();
@@ -148,7 +147,7 @@ mod tests {
             let stated = stated.iter().sum::<f64>() / 24.0;
             ratios.push(stated / scatter);
         }
-        // 24 noises tell a scatter to 15 %, three of which are allowed
+        // 24 noise records determine a scatter to 15 %; the limit is three times that
         assert!(ratios.iter().all(|ratio| (0.6..1.7).contains(ratio)), "{ratios:?}");
     }
 }

@@ -1,17 +1,18 @@
-//! Share of the liquid's force that is not about the axis (thesis 6.3.6, as far as a hub that cannot
-//! tilt shows it).
+//! Share of the liquid's force that does not act about the axis (thesis 6.3.6, as far as a hub that
+//! cannot tilt shows it).
 //!
-//! The thesis takes the rates that a gyro reads about x and y. What makes a platform tilt is the
-//! liquid's force on the tank: the tangential force F_t turns the hub, the radial force F_r only
-//! pulls at the bearing. So F_r stands for what is off the axis, F_t for what is on it:
+//! The thesis uses the rates of a gyro about x and y. The liquid's force on the tank tilts a
+//! platform. The tangential force F_t turns the hub, the radial force F_r only loads the bearing.
+//! F_r therefore represents the off-axis part and F_t the on-axis part:
 //!
 //! ```text
 //! fraction(t) = F_r² / (F_r² + F_t²)      leakage(f) = r |F_r(f)| / |τ(f)|
 //! ```
 //!
 //! with the Fourier coefficients at the sweep's phase in the leakage (by demodulation) and r the
-//! tank's distance from the axis. A wave in a plane pulls radially at twice the sweep's frequency
-//! only, by its centripetal force: no leakage. A circling wave has the fraction 1/2 on the average.
+//! tank's distance from the axis. The radial force of a planar wave, its centripetal force, is only
+//! at twice the sweep's frequency and causes no leakage. A circular wave has the fraction 1/2 on
+//! average.
 
 use crate::FrequencyResponse;
 use crate::statistics::about_mean;
@@ -57,9 +58,9 @@ impl OffAxis {
 /// The same of a platform that may tilt, from its rates (rad/s) about the hub's axis and about others, each with its
 /// response to the torque: the thesis's own, CEF = Σω_i²/(Σω_i² + ω²) and L = √(Σ|H_i|²)/|H|. The leakage at the
 /// responses' frequencies first; nothing without another rate.
-///
-/// Each rate is taken about its mean. A gyro's bias would else count as energy: a bias of 1 deg/s about x is larger
-/// than the rate of a bench about that axis. [`OffAxis::of`] keeps the means of the forces: no sensor measures them, and the
+/// Each rate is used relative to its mean. Otherwise a gyro's bias would count as energy: a bias of 1 deg/s about x is
+/// larger than the rate of a bench about that axis. [`OffAxis::of`] keeps the means of the forces, because no sensor
+/// measures them and the centripetal force of a wave has a mean.
 /// centripetal force of a wave has a mean.
 pub fn of_rates(
     response: &FrequencyResponse,

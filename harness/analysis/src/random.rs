@@ -1,5 +1,5 @@
-//! Random numbers that are the same on every machine: PCG64 (the crate `rand_pcg` promises its
-//! values) and `libm`'s functions, which do not depend on the platform's.
+//! Random numbers that are equal on every machine: PCG64 (the crate `rand_pcg` guarantees its
+//! values) and functions of `libm`, which do not depend on the platform.
 
 use std::f64::consts::TAU;
 
@@ -10,22 +10,22 @@ use rand_pcg::rand_core::Rng;
 pub struct Random(Pcg64);
 
 impl Random {
-    /// The stream of that number for this seed; streams of one seed are independent.
+    /// Returns stream number `stream` for this seed; the streams of one seed are independent.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut generator = Pcg64::new(seed.into(), stream.into());
-        // seeds and streams that differ in few bits begin alike
+        // seeds and streams that differ in few bits begin similarly
         for _ in 0..16 {
             generator.next_u64();
         }
         Random(generator)
     }
 
-    /// Uniformly from 0 (can come) to 1 (cannot).
+    /// Returns a uniform number from 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// From the normal distribution with mean 0 and standard deviation 1 (Box and Muller).
+    /// Returns a normal number with mean 0 and standard deviation 1 (Box and Muller).
     pub fn normal(&mut self) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.uniform()));
         radius * libm::cos(TAU * self.uniform())

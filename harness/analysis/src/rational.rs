@@ -1,16 +1,15 @@
 //! A transfer function with three poles and two zeros, fitted to the spectra of a whole record
-//! together with what the record's ends leave in them (Pintelon and Schoukens, *System
-//! Identification: A Frequency Domain Approach*, 2nd ed., 2012, chapter 6): without windows, torque U
-//! and rate Y of a linear plant H = B/A obey
+//! together with the leakage of the record's ends (Pintelon and Schoukens, *System Identification:
+//! A Frequency Domain Approach*, 2nd ed., 2012, chapter 6). Without windows, torque U and rate Y of
+//! a linear plant H = B/A obey
 //!
 //! ```text
 //! A(s) Y = B(s) U + T(s),   s = jω, T of the degree of B
 //! ```
 //!
-//! however fast the sweep and however long the plant still rings behind it. So it tells
-//! antiresonance and resonance apart that lie closer than the record resolves, if the plant is
-//! linear. Least squares relative to |Y|, weighted with the last denominator (Sanathanan and
-//! Koerner).
+//! for any sweep rate and any duration of ringing. For a linear plant the fit therefore separates
+//! an antiresonance and a resonance that are closer than the record's resolution. Least squares is
+//! relative to |Y|, weighted with the last denominator (Sanathanan and Koerner).
 
 use std::f64::consts::TAU;
 
@@ -21,11 +20,11 @@ use crate::features::{Deviations, Features};
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::{Complex64, FrequencyResponse};
 
-/// The most frequencies that are fitted; of more, some at equal distances.
+/// Largest number of frequencies in a fit; of more, equally spaced ones are used.
 const POINTS: usize = 1500;
-/// The fewest.
+/// Smallest number of frequencies.
 const LEAST: usize = 20;
-/// Rounds of the iteration; ten settle it.
+/// Number of iterations; ten are enough for convergence.
 const ROUNDS: usize = 20;
 
 /// Columns of six coefficients, one for each unknown.
@@ -44,8 +43,8 @@ pub struct Rational {
 }
 
 impl Rational {
-    /// Fits torque and rate, sampled every `step` s, between two frequencies, Hz; `None` where there
-    /// is nothing to fit.
+    /// Fits torque and rate, sampled every `step` s, between two frequencies, Hz; `None` without
+    /// data.
     pub fn fit(step: f64, torque: &[f64], rate: &[f64], (from, to): (f64, f64)) -> Option<Self> {
         let count = torque.len();
         let bin = 1.0 / (step * count as f64);
@@ -74,8 +73,9 @@ impl Rational {
         misfit.is_finite().then_some(Rational { unit, coefficients, misfit, spread })
     }
 
-    /// Relative standard deviation of the response on a grid of frequencies (Hz), and that of its
-    /// antiresonance and resonance: each column of the covariance's root moves the coefficients.
+    /// Returns the relative standard deviation of the response on a grid of frequencies (Hz), and
+    /// those of its antiresonance and resonance. Each column of the covariance's root moves the
+    /// coefficients.
     pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
         let nominal = self.frequency_response(frequencies);
         let found = Features::of(&nominal);
@@ -103,7 +103,7 @@ impl Rational {
         (squares.into_iter().map(f64::sqrt).collect(), Deviations { f_res, f_dip })
     }
 
-    /// The response on a grid of frequencies, Hz.
+    /// Returns the response on a grid of frequencies, Hz.
     pub fn frequency_response(&self, frequencies: &[f64]) -> FrequencyResponse {
         self.response(self.coefficients, frequencies)
     }
@@ -115,8 +115,8 @@ impl Rational {
     }
 }
 
-/// Least squares of nine unknowns; the equations' root mean square residual, and a root of the covariance
-/// of the first and the last three unknowns.
+/// Solves least squares of nine unknowns. Also returns the root mean square residual, and a root of the covariance of
+/// the first and the last three unknowns.
 fn solved(mut a: DMatrix<f64>, b: DVector<f64>) -> Option<(DVector<f64>, (f64, Spread))> {
     let sizes = DVector::from_iterator(9, a.column_iter().map(|column| column.norm().max(1e-300)));
     for (mut column, size) in a.column_iter_mut().zip(&sizes) {
@@ -160,8 +160,8 @@ mod tests {
         let found = Rational::fit(step, &torque, &rate, band).unwrap();
         let features = Features::of(&found.frequency_response(&logarithmic_grid(band, 2000)));
         let (antiresonance, resonance) = (0.2752 / TAU, 0.2827 / TAU);
-        // 1.1 mHz of a record have little more than one period; a thousandth of the frequency is
-        // what sampling leaves
+        // a separation of 1.1 mHz is little more than one period of the record; the error of a
+        // thousandth of the frequency is due to sampling
         assert!((features.f_dip.unwrap() / antiresonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!((features.f_res.unwrap() / resonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!(found.misfit < 0.2, "{}", found.misfit);

@@ -1,11 +1,11 @@
-//! The thesis's linear model of a run, how well it fits, and what it leaves (6.3.2 to 6.3.5).
+//! The thesis's linear model of a run, the quality of its fit, and its residual (6.3.2 to 6.3.5).
 
 use crate::features::Features;
 use crate::transfer_function::{TransferFunction, fit_time};
 use crate::welch::{Segments, Spectra};
 use crate::{FrequencyResponse, statistics};
 
-/// A transfer function fitted to a run, and what it leaves of the run.
+/// A transfer function fitted to a run, and its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelFit {
     /// Three poles, two zeros.
@@ -14,8 +14,7 @@ pub struct ModelFit {
     pub fit_frequency: f64,
     /// Fit in the time domain, %.
     pub fit_time: f64,
-    /// Mean coherence of residual and torque between antiresonance and resonance, if there are
-    /// such.
+    /// Mean coherence of residual and torque between antiresonance and resonance, if both exist.
     pub coherence: Option<f64>,
     /// Skewness of the residual.
     pub skewness: f64,
@@ -24,9 +23,9 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Fits the model to the measured response and drives it with the run's own torque.
-    /// Signals are sampled every `step` s; `None` where there is no response to fit. Also returns
-    /// the spectra of torque and residual, in segments of `segment` s.
+    /// Fits the model to the measured response and simulates it with the run's own torque. Signals
+    /// are sampled every `step` s. Returns `None` without a response, otherwise also the spectra of
+    /// torque and residual, in segments of `segment` s.
     pub fn of(
         step: f64,
         segment: f64,
@@ -59,7 +58,7 @@ impl ModelFit {
     }
 }
 
-/// Skewness and kurtosis of a signal: the means of z³ and z⁴, z the signal less its mean
+/// Returns skewness and kurtosis of a signal: the means of z³ and z⁴, z the signal minus its mean
 /// over its standard deviation. A Gaussian has 0 and 3.
 pub fn skewness_and_kurtosis(signal: &[f64]) -> (f64, f64) {
     let count = signal.len() as f64;

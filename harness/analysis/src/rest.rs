@@ -1,14 +1,15 @@
-//! A gyro's record at rest: Allan variances, and whether what they are read by is true, noise that is normal, white and
-//! steady (thesis 5.5.3): quantiles beside the normal distribution's, autocorrelation, statistics of chunks.
+//! Statistics of a gyro's record at rest: Allan variances, and checks of their assumption of normal, white and
+//! stationary noise (thesis 5.5.3). The checks are quantiles compared with the normal distribution, autocorrelation,
+//! and statistics of chunks.
 
 use signals::fourier::{Forward, Inverse};
 
 use crate::allan::{self, Noise, Point};
 use crate::statistics::{deviation, mean, variance};
 
-/// Quantiles that are compared.
+/// Number of quantiles compared.
 const QUANTILES: usize = 200;
-/// Chunks, at most.
+/// Largest number of chunks.
 const CHUNKS: usize = 1000;
 
 /// Statistics of a record at rest.
@@ -16,11 +17,11 @@ const CHUNKS: usize = 1000;
 pub struct Rest {
     /// Time between samples, s.
     pub step: f64,
-    /// Samples.
+    /// Number of samples.
     pub count: usize,
     /// Mean, rad/s: the bias.
     pub mean: f64,
-    /// Slope of the line that fits best, rad/s².
+    /// Slope of the best-fitting line, rad/s².
     pub trend: f64,
     /// Standard deviation of the samples without that line, rad/s, …
     pub deviation: f64,
@@ -45,16 +46,16 @@ pub struct Rest {
 /// A part of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chunk {
-    /// Its beginning, s.
+    /// Beginning of the chunk, s.
     pub from: f64,
     /// Mean of the samples without the record's line, rad/s.
     pub mean: f64,
-    /// Their variance, (rad/s)².
+    /// Variance of the samples without the record's line, (rad/s)².
     pub variance: f64,
 }
 
 impl Rest {
-    /// Analyses samples that are `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to `lag` (s).
+    /// Analyses samples `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to `lag` (s).
     pub fn of(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
         let n = samples.len() as f64;
         let middle = (n - 1.0) / 2.0;
@@ -109,20 +110,21 @@ impl Rest {
         }
     }
 
-    /// Half of the 95 % interval of the autocorrelation of white noise, 1.96/√n.
+    /// Returns half of the 95 % interval of the autocorrelation of white noise, 1.96/√n.
     pub fn white_bound(&self) -> f64 {
         1.96 / (self.count as f64).sqrt()
     }
 
-    /// Part of the autocorrelation beyond lag 0 that lies outside the interval of white noise, 0.05 of such.
+    /// Returns the share of the autocorrelation, beyond lag 0, outside the interval of white noise; 0.05 for white
+    /// noise.
     pub fn outside(&self) -> f64 {
         let rest = &self.autocorrelation[1..];
         let out = rest.iter().filter(|r| r.abs() > self.white_bound()).count();
         out as f64 / rest.len().max(1) as f64
     }
 
-    /// Scatter of the chunks' means over what white noise of the record's standard deviation makes, and of their variances
-    /// over what normal noise makes (√(2/n) of the variance); 1 if the noise is white and steady.
+    /// Returns the scatter of the chunks' means relative to white noise of the record's standard deviation, and of
+    /// their variances relative to normal noise (√(2/n) of the variance). Both are 1 for white, stationary noise.
     pub fn scatter(&self, chunk: usize) -> [f64; 2] {
         let means: Vec<f64> = self.chunks.iter().map(|chunk| chunk.mean).collect();
         let variances: Vec<f64> = self.chunks.iter().map(|chunk| chunk.variance).collect();
@@ -133,13 +135,13 @@ impl Rest {
         ]
     }
 
-    /// Samples of a chunk.
+    /// Returns the number of samples of a chunk.
     pub fn chunk_length(&self) -> usize {
         self.chunks.get(1).map_or(self.count, |second| (second.from / self.step).round() as usize)
     }
 }
 
-/// Autocorrelation of a signal without mean at 0 to `lags` steps, Σ x_k x_{k+m} / Σ x².
+/// Returns the autocorrelation of a zero-mean signal at 0 to `lags` steps, Σ x_k x_{k+m} / Σ x².
 fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     let lags = lags.clamp(1, signal.len() - 1);
     let length = (signal.len() + lags + 1).next_power_of_two();
@@ -153,13 +155,13 @@ fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     sums[..=lags].iter().map(|sum| sum / sums[0]).collect()
 }
 
-/// The value below which a standard normal variable lies with this probability, by Newton's method on erfc.
+/// Returns the value below which a standard normal variable lies with this probability, by Newton's method on erfc.
 pub fn normal_quantile(part: f64) -> f64 {
     let mut x = 0.0;
     for _ in 0..60 {
         let error = 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2) - part;
         let density = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
-        // steps of one deviation at most: far out the tangent is flat
+        // steps of at most one standard deviation, because the tangent is flat far out
         let by = (error / density).clamp(-1.0, 1.0);
         x -= by;
         if by.abs() < 1e-14 {

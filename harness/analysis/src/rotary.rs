@@ -1,20 +1,20 @@
-//! Is the slosh rotary? From the radial and the tangential slosh angle, both demodulated
-//! at the sweep's phase: X, Y their Fourier coefficients, the *swirl number*
+//! Detection of rotary slosh. From the radial and the tangential slosh angle, both demodulated at
+//! the sweep's phase, with Fourier coefficients X and Y, the *swirl number*
 //!
 //! ```text
 //! S = 2 Im(X conj(Y)) / (|X|² + |Y|²)
 //! ```
 //!
-//! is 0 for motion in a plane, ±1 for a circle, + counter-clockwise from above (from
+//! is 0 for motion in a plane and ±1 for a circle, + counter-clockwise seen from above (from
 //! outwards towards +θ).
 
 use crate::{Complex64, FrequencyResponse};
 
-/// Swirl beyond which motion counts as rotary: an ellipse of axes 1 : 3.7.
+/// Swirl number above which motion counts as rotary: an ellipse with axes 1 : 3.7.
 pub const ROTARY: f64 = 0.5;
 
-/// Least amplitude that counts, rad: below it the swirl of a planar wave's small radial
-/// part says nothing.
+/// Smallest amplitude that counts, rad. Below it the small radial part of a planar wave makes the
+/// swirl number meaningless.
 pub const LEAST: f64 = 0.02;
 
 /// Rotary motion in a sweep.
@@ -26,11 +26,11 @@ pub struct Rotary {
     pub to: Option<f64>,
     /// Time in rotary slosh, s.
     pub time: f64,
-    /// Swirl of largest size in the sweep.
+    /// Swirl number with the largest magnitude in the sweep.
     pub swirl: f64,
 }
 
-/// Swirl number at each frequency, 0 where the motion is too small to tell.
+/// Returns the swirl number at each frequency, 0 where the motion is too small.
 pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque: f64) -> Vec<f64> {
     let number = |(x, y): (&Complex64, &Complex64)| {
         let power = x.norm_sqr() + y.norm_sqr();
@@ -40,10 +40,10 @@ pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque:
 }
 
 impl Rotary {
-    /// From the swirl at the frequencies (Hz) that a sweep passes at these times (s).
+    /// Evaluates the swirl numbers at the frequencies (Hz) that a sweep passes at these times (s).
     pub fn of(frequency: &[f64], time: &[f64], swirl: &[f64]) -> Self {
         let turning: Vec<usize> = (0..swirl.len()).filter(|&i| swirl[i].abs() > ROTARY).collect();
-        // each point stands for the time half-way to its neighbours
+        // each point represents the time half-way to its neighbours
         let share = |i: usize| {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(time.len() - 1));
             (time[after] - time[before]).abs() / 2.0

@@ -5,8 +5,8 @@
 //! A(s) Y = B(s) U + T(s),   A = s³ + a2 s² + a1 s + a0,   B = b2 s² + b1 s + b0
 //! ```
 //!
-//! by linear least squares, each round weighted with 1/|A| of the one before. T, of the degree of B,
-//! is what the ends of a record leave in its spectra.
+//! by linear least squares. Each iteration is weighted with 1/|A| of the previous one. T, of the
+//! same degree as B, represents the leakage of the record's ends.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,7 +15,7 @@ use crate::Complex64;
 /// Spectra at one frequency.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// jω, in a unit near the middle of the lines, for the equations' condition.
+    /// jω, in a unit near the middle of the lines, for the condition of the equations.
     pub s: Complex64,
     /// U.
     pub input: Complex64,
@@ -47,8 +47,8 @@ impl Coefficients {
     }
 }
 
-/// Fits spectra in so many rounds, with T if `transient`, and gives what `solve` says of the last
-/// equations beside their solution by least squares; `None` where there is nothing to fit.
+/// Fits spectra in `rounds` iterations, with T if `transient`. Returns the result of `solve` for
+/// the last equations and their least-squares solution; `None` without data.
 pub fn fit<S>(
     lines: &[Line],
     transient: bool,

@@ -1,5 +1,5 @@
-//! Blackman–Tukey estimate of the frequency response, as MATLAB's `spa`:
-//! covariances of the whole record, tapered by a Hann lag window and transformed,
+//! Blackman–Tukey estimate of the frequency response, like MATLAB's `spa`: covariances of the whole
+//! record, tapered by a Hann lag window and transformed,
 //!
 //! ```text
 //! R_yu(τ) = 1/N Σ y(t+τ) u(t),   Φ_yu(ω) = Σ_{|τ|≤M} w(τ) R_yu(τ) e^{−jωτ}
@@ -10,11 +10,11 @@ use signals::fourier::{Forward, Inverse};
 
 use crate::{Complex64, FrequencyResponse, statistics};
 
-/// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s leave the antiresonance,
-/// whose half-power width is 14 mHz, nearly its own shape.
+/// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s hardly change the shape
+/// of the antiresonance, whose half-power width is 14 mHz.
 pub const LAG: f64 = 200.0;
 
-/// A frequency response, and what tells how uncertain it is.
+/// A frequency response with the data for its uncertainty.
 pub struct Estimate {
     /// Output over input.
     pub response: FrequencyResponse,
@@ -28,7 +28,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Estimate from input and output; arguments as of [`frequency_response`].
+    /// Estimates from input and output; arguments as for [`frequency_response`].
     pub fn of(step: f64, input: &[f64], output: &[f64], frequencies: &[f64], lag: f64) -> Estimate {
         let (response, power) = estimate(step, input, output, frequencies, lag);
         let duration = step * input.len() as f64;
@@ -40,8 +40,9 @@ impl Estimate {
         }
     }
 
-    /// Standard deviation of |H| relative to |H| (and of the phase, rad), from the power of what the
-    /// response does not explain: the window averages T/∫w² = T/(3M/4) independent lines,
+    /// Returns the standard deviation of |H| relative to |H| (and of the phase, rad), from the
+    /// power that the response does not explain. The window averages T/∫w² = T/(3M/4) independent
+    /// lines:
     ///
     /// ```text
     /// var |H| / |H|² = Φ_v / (2 n |H|² Φ_uu),   n = 4 T / (3 M)
@@ -54,7 +55,7 @@ impl Estimate {
         each.map(|((h, v), u)| (v / (2.0 * average * h.norm_sqr() * u)).sqrt()).collect()
     }
 
-    /// Rate at which the error changes along the frequency, in units of itself per Hz: 2π times the root
+    /// Returns the rate at which the error changes along the frequency, relative to the error, 1/Hz: 2π times the root
     /// mean square of the lag under the squared window, (1/2 − 15/(4π²)) 2/3 M² for Hann's.
     pub fn slope(&self) -> f64 {
         let pi = std::f64::consts::PI;
@@ -62,8 +63,8 @@ impl Estimate {
     }
 }
 
-/// Frequency response of `output` to `input`, sampled every `step` s, at `frequencies` (Hz), with
-/// lags up to `lag` s. Means are taken off first.
+/// Returns the frequency response of `output` to `input`, sampled every `step` s, at `frequencies`
+/// (Hz), with lags up to `lag` s. Means are removed first.
 pub fn frequency_response(
     step: f64,
     input: &[f64],
@@ -75,7 +76,7 @@ pub fn frequency_response(
     FrequencyResponse { response, frequency: frequencies.to_vec() }
 }
 
-/// The response, and the power spectral density of the input.
+/// Returns the response, and the power spectral density of the input.
 fn estimate(
     step: f64,
     input: &[f64],
@@ -84,7 +85,7 @@ fn estimate(
     lag: f64,
 ) -> (Vec<Complex64>, Vec<f64>) {
     let lags = ((lag / step).round() as usize).min(input.len() - 1);
-    // zeros behind the record, so that covariances up to `lags` do not wrap around
+    // zeros after the record, so that covariances up to `lags` do not wrap around
     let length = (input.len() + lags).next_power_of_two();
     let (forward, inverse) = (Forward::new(length), Inverse::new(length));
 
@@ -94,8 +95,8 @@ fn estimate(
         padded.resize(length, 0.0);
         forward.of(padded)
     };
-    // sum and difference of the covariances at +k and -k steps under the Hann lag window: what
-    // multiplies cosine and sine; at 0 there is one covariance
+    // sum and difference of the covariances at +k and -k steps under the Hann lag window, the
+    // factors of cosine and sine; at 0 there is only one covariance
     let tapered = |cross: Vec<Complex64>| -> Vec<(f64, f64)> {
         let covariance = inverse.of(cross);
         let weight = |k: usize| (1.0 + (std::f64::consts::PI * k as f64 / lags as f64).cos()) / 2.0;
@@ -126,12 +127,12 @@ fn estimate(
     response.map(|(h, power)| (h, power * unit)).unzip()
 }
 
-/// Frequencies that are summed at once. Each sum waits for the one before it; sixteen that do not
-/// wait for each other keep the processor busy, six times as fast.
+/// Number of frequencies summed together. Each sum waits for the previous one; sixteen independent
+/// sums keep the processor busy and are six times as fast.
 const TOGETHER: usize = 16;
 
-/// Σ even cos kφ + j odd sin kφ over Σ auto cos kφ, and the latter, at each angle φ per lag, rad. Summed at the very
-/// frequencies: a line between a transform's bins misses deep antiresonances.
+/// Returns Σ even cos kφ + j odd sin kφ over Σ auto cos kφ, and the latter, at each angle φ per lag, rad. The sums use
+/// the exact frequencies, because interpolation between a transform's bins misses deep antiresonances.
 fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64); TOGETHER] {
     let turn = angles.map(Complex64::cis);
     let (turn_re, turn_im) = (turn.map(|t| t.re), turn.map(|t| t.im));
@@ -157,7 +158,7 @@ mod tests {
 
     #[test]
     fn it_is_the_sum_of_its_definition() {
-        // noise through a short filter; 40 samples, lags up to 9 of them, summed as it is written
+        // noise through a short filter; 40 samples, lags up to 9 samples, summed by definition
         let step = 0.1;
         let u: Vec<f64> = (0..40u32).map(|k| f64::from(k * k * 7919 % 101) / 50.0 - 1.0).collect();
         let y: Vec<f64> =

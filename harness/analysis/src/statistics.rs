@@ -5,7 +5,7 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Values less their arithmetic mean.
+/// Returns the values minus their arithmetic mean.
 pub fn about_mean(values: &[f64]) -> Vec<f64> {
     let mean = mean(values);
     values.iter().map(|v| v - mean).collect()
@@ -29,25 +29,25 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     product / a.len() as f64 / (deviation(a) * deviation(b))
 }
 
-/// Largest magnitude; 0 of no values.
+/// Returns the largest magnitude; 0 without values.
 pub fn peak(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()))
 }
 
-/// The value below which this part of the values lies; `None` of no values.
+/// Returns the value below which this part of the values lies; `None` without values.
 pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get((sorted.len() as f64 * part) as usize).copied()
 }
 
-/// The middle one of the values, of an even number the upper of two; `None` of no values.
+/// Returns the middle value, for an even number the upper of two; `None` without values.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// Standard deviation of the white noise of a signal, from its third differences (a motion of a few
-/// hertz has almost none), and at least that of rounding to the smallest step it ever makes, step/√12.
+/// Returns the standard deviation of a signal's white noise from its third differences, in which a motion of a few
+/// hertz almost vanishes. The result is at least the rounding to the smallest step of the signal, step/√12.
 pub fn noise_level(signal: &[f64]) -> f64 {
     let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
     let squares: Vec<f64> = third.map(|d| d * d).collect();

@@ -1,10 +1,10 @@
-//! A sine whose frequency sweeps: its phase is known, so estimates are made along it.
+//! A sine sweep with known phase, along which estimates are made.
 
 use std::f64::consts::TAU;
 
 use crate::BAND;
 
-/// A sin φ(t), with a frequency φ'/2π that goes from f0 to f1, upwards or downwards.
+/// A sin φ(t), with a frequency φ'/2π from f0 to f1, upwards or downwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     /// A, N·m.
@@ -15,11 +15,11 @@ pub struct Sweep {
     pub f1: f64,
     /// T, s.
     pub duration: f64,
-    /// Law of the frequency's growth.
+    /// Law of the frequency over time.
     pub law: Law,
 }
 
-/// Law of the growth of a sweep's frequency.
+/// Laws of a sweep's frequency over time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
     /// f = f0 e^{at}, a = ln(f1/f0)/T (Rubaga's thesis 5.1.4).
@@ -50,7 +50,7 @@ impl Sweep {
         }
     }
 
-    /// The time at which it passes `frequency` (Hz), s; `None` if it never does.
+    /// Returns the time at which the sweep passes `frequency` (Hz), s; `None` if it does not.
     pub fn time_of(&self, frequency: f64) -> Option<f64> {
         let Sweep { f0, f1, duration, .. } = *self;
         let t = match self.law {
@@ -60,7 +60,7 @@ impl Sweep {
         (-1e-9..=duration * (1.0 + 1e-12)).contains(&t).then_some(t)
     }
 
-    /// df/dt at `frequency`, Hz/s, negative downwards.
+    /// Returns df/dt at `frequency`, Hz/s, negative for a downward sweep.
     pub fn rate_at(&self, frequency: f64) -> f64 {
         let Sweep { f0, f1, duration, .. } = *self;
         match self.law {
@@ -69,7 +69,8 @@ impl Sweep {
         }
     }
 
-    /// Lowest and highest frequency, Hz; of a sweep that begins at 0 Hz the lowest is that at the end of its first cycle, √(2 f1/T).
+    /// Returns the lowest and highest frequency, Hz. For a sweep that begins at 0 Hz the lowest is that at the end of
+    /// its first cycle, √(2 f1/T).
     pub fn band(&self) -> (f64, f64) {
         if self.f0 == 0.0 {
             return ((2.0 * self.f1 / self.duration).sqrt().min(self.f1), self.f1);

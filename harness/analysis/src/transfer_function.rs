@@ -1,12 +1,12 @@
-//! The thesis's parametric model (6.1.3): a transfer function with three poles and two
-//! zeros, fitted to a frequency response, and how well it does (6.3.2).
+//! The thesis's parametric model (6.1.3): a transfer function with three poles and two zeros,
+//! fitted to a frequency response, and the quality of the fit (6.3.2).
 //!
 //! ```text
 //! H(s) = (b2 s² + b1 s + b0) / ((s + p) (s² + 2 ζ ω s + ω²))
 //! ```
 //!
-//! [Sanathanan and Koerner's iteration](crate::sanathanan_koerner) gives the start; Levenberg–Marquardt minimises Σ |H_meas − H_mod|², which is
-//! what Fit_freq measures. p, ω and ζ are fitted as logarithms, so the poles are stable.
+//! [Sanathanan and Koerner's iteration](crate::sanathanan_koerner) gives the start. Levenberg–Marquardt minimises Σ
+//! |H_meas − H_mod|², the quantity in Fit_freq. p, ω and ζ are fitted as logarithms, so the poles are stable.
 
 use std::f64::consts::TAU;
 
@@ -34,13 +34,13 @@ pub struct TransferFunction {
 }
 
 impl TransferFunction {
-    /// Frequency of the zeros, Hz; `None` where they are real and of opposite sign.
+    /// Returns the frequency of the zeros, Hz; `None` if they are real with opposite signs.
     pub fn zero_frequency(&self) -> Option<f64> {
         let [b2, _, b0] = self.numerator;
         (b0 / b2 >= 0.0).then(|| (b0 / b2).sqrt() / TAU)
     }
 
-    /// Damping ratio of the zeros; `None` where they have no frequency.
+    /// Returns the damping ratio of the zeros; `None` if they have no frequency.
     pub fn zero_damping(&self) -> Option<f64> {
         let [b2, b1, b0] = self.numerator;
         (b0 / b2 > 0.0).then(|| b1 / b2 / (2.0 * (b0 / b2).sqrt()))
@@ -69,7 +69,7 @@ impl TransferFunction {
         s * s + 2.0 * self.pole_damping * w * s + w * w
     }
 
-    /// Fits a measured response; `None` when there is nothing to fit.
+    /// Fits a measured response; `None` without data.
     pub fn fit(measured: &FrequencyResponse) -> Option<Self> {
         let starts = [by_sanathanan_koerner(measured), at_the_resonance(measured)];
         let fitted = starts.into_iter().flatten().filter_map(|start| {
@@ -78,7 +78,7 @@ impl TransferFunction {
             let (cost, fitted) = (report.objective_function, problem.model);
             (cost.is_finite() && fitted.pole_omega.is_finite()).then_some((cost, fitted))
         });
-        // of two that are as good the first, whatever their last digits
+        // of two equally good fits the first, independent of rounding
         let best = fitted.reduce(|a, b| if b.0 < 0.999 * a.0 { b } else { a });
         best.map(|(_, fitted)| fitted)
     }
@@ -95,8 +95,8 @@ impl TransferFunction {
         100.0 * (1.0 - (miss / spread).sqrt())
     }
 
-    /// The answer to an input that is linear between samples `step` s apart, from rest:
-    /// exact, by the matrix exponential of the state and the input's value and slope.
+    /// Simulates the response to an input that is linear between samples `step` s apart, from rest,
+    /// exactly, by the matrix exponential of the state and the input's value and slope.
     pub fn simulate(&self, step: f64, input: &[f64]) -> Vec<f64> {
         let (p, w, z) = (self.real_pole, self.pole_omega, self.pole_damping);
         let [b2, b1, b0] = self.numerator;

@@ -403,7 +403,7 @@ fn a_tank_whose_liquid_is_less_than_nothing_is_refused() {
     assert_eq!(
         said,
         [
-            "tank.m_0 = -1120.0 kg leaves 0.0 kg of liquid with the bobs of all modes (allowed: more than 0)"
+            "tank.m_0 = -1120.0 kg and the bobs of all modes add up to 0.0 kg of liquid (allowed: more than 0)"
         ]
     );
     (p.tank.m_0, p.tank.direction) = (-120.0, Default::default());

@@ -227,7 +227,7 @@ fn a_table_of_the_fill_rises_and_holds_its_bobs() {
     };
     one(|t| t.fill.points = 1, "tank[1].fill.points = 1 (allowed: 0, or 2 to 12)");
     one(|t| t.fill.points = 13, "tank[1].fill.points = 13");
-    one(|t| t.fill.liquid[2] = t.fill.liquid[1], "more than at the point before");
+    one(|t| t.fill.liquid[2] = t.fill.liquid[1], "more than at the previous point");
     one(|t| t.fill.liquid[2] = t.fill.liquid[1] * 0.99, "tank[1].fill.liquid[3] = 125.9");
     one(|t| t.liquid_0 = 63.6, "tank[1].liquid_0 = 63.6 (allowed: 63.6173 to 190.852 kg)");
     one(|t| t.liquid_0 = 190.9, "tank[1].liquid_0 = 190.9");
