@@ -160,7 +160,7 @@ pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// By chance about one record in 10,000 exceeds the limit.
+    /// About one record in 10,000 exceeds the limit by chance.
     #[test]
     fn white_noise_passes_in_short_records_too() {
         let mut random = crate::random::Random::new(7, 0);

@@ -20,7 +20,7 @@ use crate::statistics::about_mean;
 /// Off-axis figures of a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OffAxis {
-    /// Median of the fraction over the samples, 0 to 1: how the thesis condenses it.
+    /// Median of the fraction over the samples, 0 to 1, as in the thesis.
     pub median: f64,
     /// Σ F_r² / Σ (F_r² + F_t²), 0 to 1: the fraction of the whole record.
     pub energy: f64,
@@ -29,7 +29,7 @@ pub struct OffAxis {
 }
 
 impl OffAxis {
-    /// From the forces (N) at every sample and the leakage over the sweep.
+    /// Computes the figures from the forces (N) at every sample and the leakage over the sweep.
     pub fn of(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
         let (mut off, mut all) = (0.0, 0.0);
         let mut fractions: Vec<f64> = Vec::with_capacity(radial.len());
@@ -55,13 +55,13 @@ impl OffAxis {
     }
 }
 
-/// The same of a platform that may tilt, from its rates (rad/s) about the hub's axis and about others, each with its
-/// response to the torque: the thesis's own, CEF = Σω_i²/(Σω_i² + ω²) and L = √(Σ|H_i|²)/|H|. The leakage at the
-/// responses' frequencies first; nothing without another rate.
+/// Computes the figures for a platform that may tilt, from its rates (rad/s) about the hub's axis and about other axes,
+/// each with its response to the torque. As in the thesis, CEF = Σω_i²/(Σω_i² + ω²) and L = √(Σ|H_i|²)/|H|. Returns the
+/// leakage at the responses' frequencies first, and `None` without another rate.
+///
 /// Each rate is used relative to its mean. Otherwise a gyro's bias would count as energy: a bias of 1 deg/s about x is
 /// larger than the rate of a bench about that axis. [`OffAxis::of`] keeps the means of the forces, because no sensor
 /// measures them and the centripetal force of a wave has a mean.
-/// centripetal force of a wave has a mean.
 pub fn of_rates(
     response: &FrequencyResponse,
     rate: &[f64],
@@ -84,7 +84,7 @@ pub fn of_rates(
     (leakage, Some(off_axis))
 }
 
-/// The leakage at each frequency, from the radial force's response to the torque (N per N·m) and
+/// Returns the leakage at each frequency, from the radial force's response to the torque (N per N·m) and
 /// the tank's distance from the axis, m.
 pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
     radial.response.iter().map(|h| arm * h.norm()).collect()

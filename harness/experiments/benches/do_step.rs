@@ -1,8 +1,8 @@
-//! Cost of 20 ms of motion: one fmi2DoStep beside two explicit integrators on the
-//! same equations. Times are best of five and only their ratios mean anything:
-//! the unit is a fixed-step RK4 of 5 ms.
+//! CPU time for 20 ms of motion: one fmi2DoStep compared with two explicit integrators on the
+//! same equations. Each time is the best of five. Only ratios have a meaning; the unit is a
+//! fixed-step RK4 of 5 ms.
 //!
-//! All see the same torque, lines between knots 20 ms apart, from a sweep of
+//! All have the same torque, lines between knots 20 ms apart. The torque is a sweep of
 //! 0.1 N·m from 2.2 to 2.6 Hz over antiresonance and resonance (10 cm fill).
 //!
 //! `cargo bench -p experiments`

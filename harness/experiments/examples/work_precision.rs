@@ -1,10 +1,10 @@
-//! One point of the work-precision diagram: cost of 20 ms of motion and error over the
-//! thesis's sweep (0.1 N m, 10 cm, dry friction) by one method at one tolerance.
+//! One point of the work-precision diagram, for one method at one tolerance: CPU time for 20 ms
+//! of motion, and error over the thesis's sweep (0.1 N m, 10 cm, dry friction).
 //!
 //! `work_precision METHOD TOLERANCE SECONDS RUNS [REFERENCE]` prints
-//! `ns per 20 ms,largest error of omega in rad/s`. The motion is solved RUNS times over; of
-//! each piece of 10 s (of the whole, where a solver takes it in one call) the least CPU time
-//! counts, so that what else the machine does at times does not. METHOD:
+//! `ns per 20 ms,largest error of omega in rad/s`. The motion is solved RUNS times. For each
+//! piece of 10 s (for the whole, if a solver takes it in one call) the smallest CPU time
+//! counts, which excludes other load of the machine. METHOD:
 //!
 //! * `linear`, `spherical`: the packed FMU (`dist/HubSlosh.fmu`), slosh model of that
 //!   name, set-valued friction; without REFERENCE it writes its rates there to compare

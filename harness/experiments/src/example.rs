@@ -26,13 +26,13 @@ pub struct Example {
 /// Time function of an input; t in s, largest value 1.
 type Course = fn(t: f64) -> f64;
 
-/// A sine below the sloshing frequency of the bench that swells and fades within ten seconds, then nothing: the hub
-/// slips, reverses and comes to rest, while the liquid still pulls at it.
+/// A sine below the slosh frequency of the bench that grows and fades within ten seconds, then no torque. The hub slips,
+/// reverses and comes to rest while the liquid still loads it.
 const BENCH: Course = |t| swell(t) * (TAU * 2.0 * t).sin();
 /// A thrust that is there from the start.
 const THRUST: Course = |_| 1.0;
-/// Sines near the sloshing frequency of the default tank under that thrust, 0.42 Hz with the tank held; they swell and
-/// fade within ten seconds, then the liquid moves on its own. No two are in phase, so that nothing stays 0.
+/// Sines near the slosh frequency of the default tank under that thrust, 0.42 Hz with the tank held. They grow and fade
+/// within ten seconds, then the liquid oscillates freely. No two are in phase, so that no output stays 0.
 const NEAR_SLOSH: Course = |t| swell(t) * (TAU * 0.4 * t).sin();
 const BELOW_SLOSH: Course = |t| swell(t) * (TAU * 0.25 * t).sin();
 const SLOW: Course = |t| swell(t) * (TAU * 0.1 * t).cos();

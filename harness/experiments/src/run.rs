@@ -37,11 +37,11 @@ pub struct Run {
 /// The input that the torque drives, where an FMU has one of that name.
 pub const TORQUE: &str = "tau_cmd";
 
-/// The input of an FMU that is driven: the one that is `chosen`; else [`TORQUE`]; else its only Real
-/// input; else none, if it has none.
+/// Returns the driven input of an FMU: `chosen` if given, otherwise [`TORQUE`], otherwise its only Real
+/// input. Returns none if the FMU has no input.
 ///
 /// # Errors
-/// If there is no such input, or if several could be meant.
+/// The input does not exist, or several inputs are possible.
 pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Option<String>> {
     if let Some(name) = chosen {
         let variable = description.variable(name)?;
@@ -62,15 +62,15 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
     }
 }
 
-/// Column of a torque history that is no input: the derivative of [`TORQUE`] until the next row.
+/// Column of a torque history that is not an input: the derivative of [`TORQUE`] until the next row.
 pub const SLOPE: &str = "tau_slope";
 
 /// Reads a file's histories of inputs: every column that is a Real input of the FMU, and
-/// [`SLOPE`] with [`TORQUE`]. Other columns than these and `time` are refused by name, or passed
-/// over if `ignore`. The first is the input that is `chosen`, else [`TORQUE`], else the file's first.
+/// [`SLOPE`] with [`TORQUE`]. Columns other than these and `time` are refused by name, or ignored
+/// with `ignore`. The first history is the input `chosen`, else [`TORQUE`], else the file's first.
 ///
 /// # Errors
-/// If the file has no such column, or others; all that is wrong with its columns is said at once.
+/// The file has no such column, or other columns. The error lists all problems of the columns.
 pub fn histories(
     description: &ModelDescription,
     path: &Path,
@@ -206,7 +206,7 @@ impl Run {
         first.chain(self.others.iter().map(|(name, history)| (name.as_str(), history))).collect()
     }
 
-    /// The driven inputs as the FMU is told them.
+    /// The driven inputs as the FMU gets them.
     fn inputs(&self, description: &ModelDescription) -> Result<Inputs> {
         let driven = self.driven();
         let names: Vec<&str> = driven.iter().map(|(name, _)| *name).collect();

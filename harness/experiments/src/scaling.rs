@@ -1,8 +1,8 @@
-//! Similarity of a bench and a flight tank, in words: Bond numbers, the tank with the same ones,
+//! Similarity of a bench and a flight tank as text: Bond numbers, the tank with equal Bond numbers,
 //! Froude's factors (`formulas::similarity`; Rubaga's thesis 2.5, 2.6, 7.2, with its numbers corrected).
 //!
-//! The two numbers of an angular acceleration are not the same: the thesis's 45.87 is Bo_i of
-//! its bench, and the equivalent tank it prints beside it follows from Bo_r.
+//! An angular acceleration has two different numbers. The thesis's 45.87 is Bo_i of its bench, but
+//! its equivalent tank follows from Bo_r.
 
 use std::fmt::Write;
 

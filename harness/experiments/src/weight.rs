@@ -32,8 +32,9 @@ pub struct Weightless {
 }
 
 impl Contents {
-    /// State of the liquid in the row in which weight dominates least, if it does not dominate, over rows of the specific force towards the bottom, m/s²,
-    /// and the speed of its surface, m/s. A row's Weber number uses the radius and the highest speed up to it.
+    /// Returns the state of the liquid in the row in which weight dominates least, if weight does not dominate there. The rows
+    /// are specific force towards the bottom, m/s², and speed of the surface, m/s. A row's Weber number uses the radius and
+    /// the highest speed up to it.
     pub fn without_weight(&self, rows: impl IntoIterator<Item = (f64, f64)>) -> Option<Weightless> {
         let (mut speed, mut worst) = (0.0f64, None::<(f64, Weightless)>);
         for (g, v) in rows {

@@ -135,7 +135,7 @@ const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif
     .frame { stroke: #66758a; fill: none }\
     .curve path { fill: none; stroke-width: 1.5 }";
 
-/// Space beside the plot for numbers and labels, px: left, right, top, bottom.
+/// Margins of the plot for numbers and labels, px: left, right, top, bottom.
 const MARGIN: (f64, f64, f64, f64) = (56.0, 12.0, 26.0, 40.0);
 
 impl Chart {

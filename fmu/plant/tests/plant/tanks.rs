@@ -116,7 +116,7 @@ fn a_table_that_is_no_tank_is_refused_with_everything_that_is_wrong() {
             p.slosh.table.length[0] = 0.0;
             (p.slosh.table.frequency[0], p.slosh.table.k[0]) = (0.1, 1e3);
         },
-        "not above that of slosh.table.k[1]",
+        "above the frequency of slosh.table.k[1]",
     );
 }
 

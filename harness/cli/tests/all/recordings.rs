@@ -146,10 +146,10 @@ fn a_twin_shows_the_features_of_its_run_to_the_last_digit_and_other_forms_of_it_
     );
     let page = std::fs::read_to_string(directory.join("found/report.html")).unwrap();
     for words in [
-        "The models beside the recordings",
+        "Comparison of models with recordings",
         "Models overlaid",
         ">recording<",
-        "1 recording, beside 1 run",
+        "1 recording, compared with 1 run",
     ] {
         assert!(page.contains(words), "{words}");
     }

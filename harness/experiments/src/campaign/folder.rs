@@ -29,7 +29,7 @@ pub const RUNS: &str = "runs";
 /// The hashes of all files.
 pub const MANIFEST: &str = "manifest.sha256";
 const LOCK: &str = ".lock";
-/// What a study of Python's `monte_carlo` is.
+/// Description of a study by Python's `monte_carlo`.
 const STUDY: &str = "study.json";
 const UNFINISHED: &str = ".unfinished";
 
@@ -128,11 +128,11 @@ pub fn file_of(run: &str) -> String {
 }
 
 impl Folder {
-    /// Makes the directory if it is not there, and holds it. `about` is what others are told who
-    /// want it too.
+    /// Creates the directory if it does not exist, and locks it. Other processes that want to lock it get `about` as
+    /// the reason.
     ///
     /// # Errors
-    /// If another campaign holds it, if it is a study's, or if its manifest is damaged.
+    /// Another campaign has locked it, it belongs to a study, or its manifest is damaged.
     pub fn take(path: &Path, about: &str) -> Result<Folder> {
         ensure!(
             !path.join(STUDY).exists(),
@@ -185,7 +185,7 @@ impl Folder {
         self.lost.contains(&file_of(run)) && !self.run(run).exists()
     }
 
-    /// Whether a run is in the manifest.
+    /// Returns true if a run is in the manifest.
     pub fn lists(&self, run: &str) -> bool {
         self.manifest().sums.contains_key(&file_of(run))
     }
@@ -303,7 +303,7 @@ impl Folder {
     }
 }
 
-/// Whether HubSlosh wrote a run: the library of its Parquet files says so, which importers in other
+/// Returns true if HubSlosh wrote a run. Its Parquet files name their library, which importers in other
 /// languages do not use.
 fn is_ours(run: &Path) -> bool {
     table::writer(run).is_none_or(|writer| writer.starts_with("parquet-rs"))

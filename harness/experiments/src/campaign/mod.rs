@@ -154,13 +154,13 @@ impl Results {
 /// grow with the curves of its runs.
 pub const CURVES: usize = 400;
 
-/// Whether the curves of run `i` of `runs` are kept: they are spread over the plan, and its last run
-/// is among them.
+/// Returns true if the curves of run `i` of `runs` are kept. The kept runs are spread over the plan and
+/// include its last run.
 pub fn keeps_curves(i: usize, runs: usize) -> bool {
     i.is_multiple_of(runs.div_ceil(CURVES).max(1)) || i + 1 == runs
 }
 
-/// What became of one run.
+/// Outcome of one run.
 enum Done {
     Analysed(Box<Outcome>),
     Unanalysed(Box<Unanalysed>),
@@ -254,7 +254,7 @@ impl Campaign {
         host::input::text(&self.plan_file()).is_ok_and(|text| text != self.plan.text)
     }
 
-    /// The copy of the plan beside the results.
+    /// File name of the copy of the plan in the results folder.
     pub fn plan_file(&self) -> PathBuf {
         self.out.join("plan.toml")
     }
@@ -273,9 +273,9 @@ impl Campaign {
         )
     }
 
-    /// The expanded runs for another program to make: for each its name, its file in the campaign's
-    /// directory, what to set, the torque (as text for `hubslosh torque`), times, and the metadata
-    /// that its Parquet file must carry for the analysis to take it.
+    /// Returns the expanded runs for simulation by another program. Each has its name, its file in the campaign's
+    /// directory, settings, the torque (as text for `hubslosh torque`) and times. It also has the metadata that the
+    /// analysis requires in its Parquet file.
     pub fn list(&self, fmu: &Fmu) -> Result<serde_json::Value> {
         let description = fmu.description();
         let (mut columns, mut kept) = (Vec::<String>::new(), Vec::new());
@@ -364,7 +364,7 @@ impl Campaign {
             watch(Progress::Steps(run.steps() as u64));
             if !is_bench(fmu.description()) {
                 return Ok(Done::Failed(anyhow!(
-                    "recordings are analysed beside the bench, HubSlosh, alone"
+                    "recordings can be analysed only with HubSlosh (the bench): choose its FMU, or remove `recording` from the plan"
                 )));
             }
             let read = recorded::table(case, recorded, &mut |line| watch(Progress::Note(line)));
@@ -458,9 +458,9 @@ impl Campaign {
         })
     }
 
-    /// The tables with their names: `features.csv`, `features_spa.csv` and `features_h1.csv` with the
-    /// same columns from the `spa` and H1 responses, and `runs.csv`: every run, failed ones too, with
-    /// what it was made from and all features. Without a run of the bench there is `runs.csv` alone.
+    /// Returns the tables with their names: `features.csv`, and `features_spa.csv` and `features_h1.csv` with the
+    /// same columns from the `spa` and H1 responses. `runs.csv` has every run, also failed ones, with its settings
+    /// and all features. Without a run of the bench there is only `runs.csv`.
     pub fn tables(&self, fmu: &Fmu, results: &Results) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let plan = sha256(self.plan.text.as_bytes());
         let written = |header: Vec<String>, rows: Vec<Vec<String>>| -> Result<Vec<u8>> {

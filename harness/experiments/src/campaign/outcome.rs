@@ -119,9 +119,9 @@ const NOTABLE_MEAN: f64 = 0.1;
 const PARTS: usize = 8;
 
 impl Rates {
-    /// The bias is the mean of the record where the torque is a sweep or noise, which turn the hub to and fro. Under another
-    /// torque the mean is motion too: the bias of a simulated gyro is then the mean difference from the true rate, and
-    /// that of a recorded one is not known and kept.
+    /// For a sweep or noise, which turn the hub to and fro, the bias is the mean of the record. With another torque the mean
+    /// also contains motion. The bias of a simulated gyro is then the mean difference from the true rate, and that of a
+    /// recorded gyro is unknown and not removed.
     fn of(table: &Table, alternates: bool, is_recording: bool) -> Rates {
         let column = |name| table.column(name).unwrap_or_default();
         let (rate, truth) = (column("omega_imu"), column("omega"));
@@ -158,7 +158,7 @@ fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
     let degrees = |rate: f64| rate.to_degrees();
     if drift > NOTABLE_MEAN * deviation {
         return Some(format!(
-            "the mean of {name} drifts by {:.3} deg/s rms between eighths of the record, {:.0} % of its deviation; only the mean              of the whole record, {:.3} deg/s, is removed as the gyro's bias, and the drift counts as motion in peak_rate and              in the cross-axis figures",
+            "the mean of {name} drifts by {:.3} deg/s rms between eighths of the record, {:.0} % of its deviation. Only the mean              of the whole record, {:.3} deg/s, is removed as the gyro's bias, and the drift counts as motion in peak_rate and              in the cross-axis figures",
             degrees(drift),
             100.0 * drift / deviation,
             degrees(mean)
@@ -190,7 +190,7 @@ pub struct History {
 }
 
 impl History {
-    /// Stretches of a run that are told apart.
+    /// Phases of a run.
     pub const STRETCHES: usize = 300;
 
     /// History from columns of equal length.
@@ -228,10 +228,10 @@ impl History {
     }
 }
 
-/// What is left at a run's end.
+/// Residual motion at a run's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ending {
-    /// When the torque ends for good, s, if the run goes on after that: a manoeuvre.
+    /// Time at which the torque ends, s, if the run continues without torque: a manoeuvre.
     pub manoeuvre: Option<f64>,
     /// Largest |rate| after the manoeuvre, or in the last fifth of the run, rad/s.
     pub rate: Option<f64>,
@@ -314,11 +314,11 @@ pub struct Outcome {
     pub history: History,
     /// The crest's path seen from above.
     pub path: SloshPath,
-    /// What is left at its end.
+    /// Residual motion at the run's end.
     pub ending: Ending,
-    /// What ruled the liquid where its weight did not ([`Range::without_weight`]).
+    /// Dominant force on the liquid if it is not gravity ([`Range::without_weight`]).
     pub weightless: Option<String>,
-    /// It was not simulated but read.
+    /// True if the run was read from a file, not simulated.
     pub reused: bool,
     /// Warnings about the rates that a gyro measured.
     pub warnings: Vec<String>,
@@ -351,9 +351,9 @@ pub enum Doubt {
     TooShort,
     /// At the resonance there is more noise than signal.
     Noise,
-    /// Two estimates of one linear response differ by more than a quarter of the separation: after
-    /// a fast sweep a nonlinear liquid swings freely, at a frequency that follows its amplitude, and
-    /// no linear response makes that of the torque.
+    /// True if two estimates of one linear response differ by more than a quarter of the separation. After a fast sweep
+    /// a nonlinear liquid oscillates freely, at a frequency that depends on its amplitude. No linear response to the
+    /// torque represents this motion.
     Nonlinear,
 }
 
@@ -702,15 +702,14 @@ impl Outcome {
         self
     }
 
-    /// Whether its curves are there ([`Outcome::without_curves`]).
+    /// Returns true if the outcome has its curves ([`Outcome::without_curves`]).
     pub fn has_curves(&self) -> bool {
         !self.history.time.is_empty()
     }
 
-    /// The estimate of a sweep that goes into `features.csv`, and its name: that of the demodulated
-    /// response, which says what the hub did while the sweep passed, the sweep's shift of the
-    /// resonance included (see the report); if that is not to be trusted, `spa`'s, and
-    /// else that of a fitted transfer function.
+    /// Returns the estimate of a sweep for `features.csv`, and its name. The first choice is the demodulated
+    /// response, the hub's response while the sweep passed, with the sweep's shift of the resonance (see the
+    /// report). If it is not valid, the choice is `spa`, and after that a fitted transfer function.
     pub fn estimate(&self) -> Option<(&Estimate, &'static str)> {
         let passing = self.passing.as_ref()?;
         match (&passing.rate.doubt, &self.record) {
@@ -820,9 +819,9 @@ impl Range {
         }))
     }
 
-    /// Dominant force on the liquid of a run with these wave heights, m, at its least specific force, if it is not gravity:
-    /// Bond, Weber and Froude numbers by the tank's radius and the fastest wave before, V = η √(g/l) (thesis 2.5). `g`: `g_axial`
-    /// at each row, m/s², of a run that drives it.
+    /// Returns the dominant force on the liquid, if it is not gravity, at the smallest specific force of a run with these wave
+    /// heights, m. Bond, Weber and Froude numbers use the tank's radius and the fastest wave before, V = η √(g/l) (thesis
+    /// 2.5). `g` is `g_axial` at each row, m/s², of a run that drives it.
     pub fn without_weight(&self, waves: &[f64], g: Option<&[f64]>) -> Option<String> {
         if self.length <= 0.0 {
             return None;
@@ -835,8 +834,8 @@ impl Range {
         contents.without_weight(rows).map(|numbers| numbers.to_string())
     }
 
-    /// Describes how a run with these wave heights, m, left the range: a linear liquid in waves above a quarter of
-    /// the tank's radius (thesis 2.3.5), or any liquid whose trough would lie below the tank's bottom.
+    /// Describes how a run with these wave heights, m, left the range of its model. A linear liquid leaves it in waves above
+    /// a quarter of the tank's radius (thesis 2.3.5), any liquid if a trough would be below the tank's bottom.
     pub fn left(&self, waves: &[f64]) -> Option<String> {
         let wave = waves.iter().fold(0.0, |most: f64, wave| most.max(wave.abs()));
         let mm = |length: f64| format!("{:.1} mm", length * 1e3);
@@ -852,8 +851,8 @@ impl Range {
     }
 }
 
-/// Name of the item that an enumeration of an initialised instance has, or the integer `kind` beside
-/// it if that is not 0; `None` if the FMU, as one of an older version, has no such enumeration.
+/// Returns the item of an enumeration of an initialised instance, or of its integer twin `kind` if that is
+/// not 0. Returns `None` if the FMU has no such enumeration, because it is of an older version.
 fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String>> {
     let description = instance.fmu().description();
     let Ok(variable) = description.variable(name) else { return Ok(None) };
@@ -879,8 +878,8 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
         if mass <= 0.0 {
             continue;
         }
-        // A bench of before 0.5 has modes along the tangent alone. A mode at an angle to it has the arm r cos: to first order it is
-        // one of mass m cos^2 along the tangent, and the rest of it is carried along.
+        // Versions before 0.5 have only tangential modes. A mode at an angle to the tangent has the arm r cos. To first order
+        // it is a tangential mode of mass m cos^2, and its remaining mass moves with the tank.
         let direction = real(&format!("slosh.table.direction[{n}]")).unwrap_or(0.0);
         let across = mass * direction.sin().powi(2);
         carried += across;

@@ -37,11 +37,11 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
         .with_context(|| format!("{name} cannot be used"))
 }
 
-/// The recording of a run: time counts from the torque's beginning, which is found by correlation with the torque that the
-/// plan names; the columns are those of a stored run as far as a recording has them.
+/// Reads the recording of a run. Time counts from the torque's beginning, found by correlation with the torque of the
+/// plan. The columns are those of a stored run, as far as the recording has them.
 ///
 /// # Errors
-/// If it cannot be used, or is of another torque.
+/// The recording cannot be used, or has another torque.
 pub(super) fn table(
     case: &Case,
     recorded: &Recorded,

@@ -13,17 +13,17 @@ use signals::table::{self, Table};
 /// Raised when stored runs of an older program mean something else.
 const FORMAT: &str = "1";
 
-/// Everything that determines a run's numbers: two runs with the same recipe are the same run, whichever
-/// archive the FMU came in. It is the metadata of its Parquet file, which may hold more:
+/// Returns everything that determines a run's numbers. Two runs with the same recipe are the same run, independent of
+/// the archive of the FMU. The recipe is metadata of the run's Parquet file, which may have more:
 ///
 /// * `model`, `binary_sha256`: the model's name and the binary that was loaded,
 /// * `parameters`: every parameter and input with its start value, as a JSON object,
 /// * `settings`: what is set before the start, `name=value` in this order, separated by spaces,
 /// * `profile`: the torque; `torque_sha256`: of the file, if it comes from one,
 /// * `step`, `stop`: s; `tolerance`: the relative tolerance handed to the FMU,
-/// * `torque`: whether the FMU is told the torque's slope over each step,
-/// * `sensors`: what is recorded beside variables, as a JSON object, if anything is,
-/// * `columns`: what is recorded; `format`: of all this.
+/// * `torque`: true if the FMU gets the torque's slope over each step,
+/// * `sensors`: the recorded sensors, as a JSON object, if there are any,
+/// * `columns`: the recorded variables; `format`: version of the recipe.
 pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, String> {
     let settings: Vec<_> = case.settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
     let torque = if case.hold { "held over each step" } else { "linear over each step" };
@@ -54,8 +54,8 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
     recipe
 }
 
-/// The stored run, if it is complete and of this recipe, else why not; and whether it lacks the sensors' readings, having what they are made
-/// of: another program made it.
+/// Returns the stored run if it is complete and has this recipe, otherwise the reason. Also returns true if it has the
+/// signals for the sensors but not their readings, because another program wrote it.
 pub fn stored(
     path: &Path,
     run: &Run,

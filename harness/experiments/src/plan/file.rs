@@ -1,4 +1,4 @@
-//! A plan's file. Serde reads each value by itself, so that all that is wrong is said at once.
+//! A plan's file. Serde reads each value separately, so that one message can list all problems.
 
 use std::fmt;
 use std::ops::Range;

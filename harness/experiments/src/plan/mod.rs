@@ -250,7 +250,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// A plan of [`Plan::sweeps`] as a file, which the campaign leaves beside its results.
+    /// Returns a plan of [`Plan::sweeps`] as a file, which the campaign writes into its results folder.
     fn written(&self) -> Result<String> {
         let mut table = toml::Table::new();
         table.insert("title".into(), self.title.clone().into());
@@ -367,9 +367,9 @@ impl Plan {
         self.draws.is_some()
     }
 
-    /// Its runs, for the FMU of that description: every `[[run]]` with every combination of
-    /// `[vary]` (the last varies fastest) and every draw. All that is wrong with the plan is said
-    /// at once. Whether the FMU takes the values is only known when it runs.
+    /// Returns the plan's runs for an FMU with this description: every `[[run]]` with every combination of
+    /// `[vary]` (the last varies fastest) and every draw. The error lists all problems of the plan. The FMU
+    /// checks the values only when it runs.
     pub fn cases(&self, description: &ModelDescription) -> Result<Vec<Case>> {
         let draws = self.draws.as_ref().map_or(1, |d| d.runs);
         let count = self

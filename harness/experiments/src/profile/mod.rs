@@ -114,7 +114,7 @@ impl FromStr for Written {
 }
 
 impl Written {
-    /// From text; `what` it stands for begins what is said of errors.
+    /// Parses text. Error messages begin with `what`.
     pub(crate) fn read(what: &str, text: &str) -> Result<Self> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let name = name.trim();

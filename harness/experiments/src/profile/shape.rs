@@ -82,7 +82,7 @@ impl Piece {
 
 impl Shape for Pieces {
     fn after(&self, t: f64) -> f64 {
-        // a communication point k·H may lie an ulp beside the edge it is meant to be
+        // a communication point k·H may differ from the edge by an ulp
         let slack = 1e-9 * (1.0 + t.abs());
         let now = self.0.iter().find(|piece| t >= piece.from - slack && t < piece.to - slack);
         now.map_or(0.0, |piece| piece.torque)

@@ -1,9 +1,9 @@
 //! Cost of one communication step, and the number of internal steps that a deadline allows.
 //!
-//! A manoeuvre is made in steps with held inputs. Each step is taken several times from the same saved state, and the
-//! least of its times counts: other programs only add to a time. Which number for `solver.max_steps` fits a deadline is
-//! found by trying: at states along the manoeuvre an FMU with that number is asked for a step that is far too long, makes
-//! as many internal steps as it may and refuses. The longest of these times is what a step can take at worst.
+//! A manoeuvre is simulated in steps with held inputs. Each step is repeated several times from the same saved state, and
+//! the shortest time counts, because other programs only add to a time. Trials find the `solver.max_steps` that meets a
+//! deadline: at states along the manoeuvre an FMU with this limit gets a step that is far too long. It takes as many
+//! internal steps as allowed and refuses the step. The longest of these times is the worst case of a step.
 
 pub mod instructions;
 

@@ -48,7 +48,7 @@ fn replayed_input_gives_the_reference_result() {
         let reference = reference(example);
         assert_eq!(reference.rows(), 201);
         for (name, difference) in differences(&answer, &reference) {
-            // what README.md beside the example states; the default tolerance is 1e-8
+            // the figures in the README.md of the example; the default tolerance is 1e-8
             assert!(difference < 1e-6, "{}, {name}: {difference:e}", example.model);
             // nothing is divided by a value that is rounding alone
             let largest =

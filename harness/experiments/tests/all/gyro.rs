@@ -20,7 +20,7 @@ fn random_walk_and_bias_instability_come_back() {
         let found = recording(hours, 4, settings).characterise(&fmu, &|_| {}).unwrap();
         assert_eq!(found.specified, specified);
         // Standard errors: N 0.1 %; B sqrt(bias_time/(2 x 4 records x hours)) = 4 and 3 %.
-        // 5 and 20 % are what the gyro is specified to keep; the seeds are fixed.
+        // The gyro's specification allows 5 and 20 %; the seeds are fixed.
         let deviation = |found: f64, specified: f64| (found / specified - 1.0).abs();
         assert!(deviation(found.estimated.arw, specified.arw) < 0.05, "{}", found.text());
         let bias = deviation(found.estimated.bias_instability, specified.bias_instability);

@@ -14,7 +14,7 @@ fn settings(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
     pairs.iter().map(|(name, value)| (name.to_string(), value.to_string())).collect()
 }
 
-/// A sweep through resonance, and what sensors read of it; `columns` are recorded beside.
+/// Records a sweep through resonance with sensors and, in addition, `columns`.
 fn record(set: &[(&str, &str)], sensors: &[&str], columns: &[&str], seconds: f64) -> Table {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let profile = format!("lin-sweep:amplitude=0.1,f0=2,f1=3,duration={seconds}");
@@ -59,8 +59,8 @@ fn two_gauges_at_right_angles_see_the_wave_of_every_model() {
     }
 }
 
-/// The wall's pressure along the angle, times that angle's cosine: the force of the liquid on the wall, against `F_tangential`, that of
-/// the pendulums without damping and of the rigid part. With all ten modes or one: what is not kept moves with the tank in both.
+/// Compares the integral of the wall's pressure over the angle, times the angle's cosine, with `F_tangential`, the force of
+/// the pendulums without damping and of the rigid liquid. With ten modes or one, the other modes move with the tank in both.
 #[test]
 fn pressures_on_the_wall_add_up_to_the_force_on_the_tank() {
     // Gauss and Legendre's five points on each of 8 parts of the height

@@ -34,8 +34,8 @@ fn said(
     tanks.without_weight(&run.drive(&mut instance, &columns, |_| {}).unwrap())
 }
 
-/// The default craft at rest, 1180 kg with 381.704 kg of water in a tank of R = 0.376618 (1.841184² − 1)/2 = 0.45005 m: at 60 N,
-/// 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9; a tenth of that after a cut-off to 6 N; 0 without thrust.
+/// The default craft at rest, 1180 kg with 381.704 kg of water in a tank of R = 0.376618 (1.841184² − 1)/2 = 0.45005 m. At
+/// 60 N, 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9. A cut-off to 6 N gives a tenth of that, no thrust 0.
 #[test]
 fn a_cut_off_of_thrust_is_told_with_the_numbers_of_a_hand_calculation() {
     let rest = [("init.omega[1]", "0"), ("init.omega[3]", "0")];

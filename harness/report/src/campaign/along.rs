@@ -22,9 +22,8 @@ fn quantity<'a>(label: &'a str, of: &'a dyn Fn(&Outcome) -> Option<f64>) -> Quan
     Quantity { label, of, decades: false, level: None }
 }
 
-/// Antiresonance and resonance of every group, with the exact linear ones: the question of most
-/// plans of sweeps. Colour: what tells the groups apart beside their model; line: the model; marker:
-/// which of the two.
+/// Plots antiresonance and resonance of every group, with the exact linear ones, for plans of sweeps.
+/// The colour shows the group, the line style its model, the marker antiresonance or resonance.
 pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let models = distinct(page.groups.iter().map(|group| group.model));

@@ -1,4 +1,4 @@
-//! This campaign beside another one.
+//! Compares this campaign with another one.
 
 use std::collections::HashMap;
 use std::path::Path;

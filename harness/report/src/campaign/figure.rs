@@ -13,7 +13,7 @@ pub(super) struct Figure {
     pub title: String,
     /// Caption: the point that the figure makes.
     pub caption: Markup,
-    /// Panels beside each other on a wide screen.
+    /// Number of panels in a row on a wide screen.
     pub columns: usize,
     /// Height of a row of panels, px.
     pub height: usize,

@@ -49,7 +49,7 @@ pub fn telling(results: &Results) -> Option<&Outcome> {
     largest(radial).or_else(|| largest(tangential))
 }
 
-/// The report; `view` is the page beside it that shows the run named.
+/// Returns the report. `view` is the separate page that shows a named run.
 pub fn page(
     campaign: &Campaign,
     fmu: &Fmu,
@@ -92,7 +92,7 @@ pub fn page(
                         details { summary { "All figures" } ol { (figures.list()) } }
                     }
                     noscript {
-                        p .warning { "The figures need JavaScript; the numbers are in the results table and the files beside this page." }
+                        p .warning { "The figures need JavaScript; the numbers are in the results table and in the files in the folder of this page." }
                     }
                     @for (title, content) in &sections {
                         h2 id=(anchor(title)) { (title) }
@@ -162,7 +162,7 @@ fn bench_sections<'a>(
         }
         sections.push(("Frequency responses", add(all)));
     }
-    sections.push(("The models beside the recordings", recordings::beside(results)));
+    sections.push(("Comparison of models with recordings", recordings::beside(results)));
     sections.push(("Time histories", add(histories(&few))));
     if !random {
         let paths = few.iter().flat_map(|group| histories::paths(page, group));
@@ -249,7 +249,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
         @if !result.is_empty() { p .result { (result) } }
         p .lead {
             @if recorded > 0 {
-                (recorded) " recording" @if recorded > 1 { "s" } ", beside "
+                (recorded) " recording" @if recorded > 1 { "s" } ", compared with "
             }
             (runs(count - recorded)) " of the FMU " (fmu.model_name) " (version " (fmu.version)
             "), sampled at " (rate) " Hz: " (torques(results)) "."

@@ -73,8 +73,8 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     }
 }
 
-/// Describes the shift by the sweep of the last run of a group (the largest torque, if torques differ);
-/// `None` without a resonance.
+/// Describes the shift by the sweep of the last run of a group (the largest torque, if torques differ).
+/// Returns `None` without a resonance.
 fn swept_row(group: &Group) -> Option<Markup> {
     let run = group.runs.last()?;
     let (mode, exact) = (run.linear.modes.first()?, group.exact.last()?.f_res?);

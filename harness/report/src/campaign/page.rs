@@ -204,7 +204,7 @@ pub(super) fn axis(plan: &Plan, fmu: &Fmu, runs: &[Outcome]) -> Option<Axis> {
 
 pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
     let axis = plan.axis().unwrap_or("");
-    // the places, among all that is varied, of what tells groups apart beside model and fill
+    // the indices, among all varied parameters, of those that separate groups, apart from model and fill
     let grouping = plan.grouping();
     let recorded = results.recordings() > 0;
     let differs = |place: usize| {

@@ -1,4 +1,4 @@
-//! The model's runs beside what was recorded of the same run.
+//! Compares the model's runs with recordings of the same run.
 
 use experiments::campaign::{Outcome, Results};
 use maud::{Markup, html};

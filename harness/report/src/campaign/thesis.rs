@@ -374,7 +374,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.5, fig. 7.16",
         who: Who::Bench,
-        says: "The leakage stands in the resonance band, with nothing but noise beside it.",
+        says: "The leakage is in the resonance band, with only noise outside it.",
         rule: "at 0.25 N·m more than 90 % of its square lies within 0.3 Hz of the linear resonance",
         shows: |group| {
             let run = at(group, MOST)?;
@@ -558,7 +558,7 @@ pub(super) fn statements(groups: &[Group]) -> Markup {
                 (model) " " (tally(&rows, i, Who::Bench)) ", " (tally(&rows, i, Who::Synthetic))
             }
             @if let Some(place) = recorded {
-                ". Beside the recording: statements on the bench in which a model does what it does, whether or not that is what the thesis says (=; else ≠): "
+                ". Comparison with the recording: statements on the bench for which a model agrees with the recording, independent of the thesis (=; else ≠): "
                 @for (k, (i, model)) in models.iter().enumerate().filter(|(i, _)| *i != place).enumerate() {
                     @if k > 0 { "; " }
                     (model) " " (alike(&rows, i, place))

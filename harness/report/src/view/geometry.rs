@@ -1,6 +1,6 @@
 //! Geometry of a run's bench or craft, from its parameters.
 //!
-//! A tank's outline is no parameter of an FMU; where nobody names it, an upright cylinder stands for it:
+//! A tank's contour is not a parameter of an FMU. Without a contour from the user, an upright cylinder represents the tank:
 //!
 //! ```text
 //! radius R        from the wave at the wall, w_1 = 2 R/(xi^2 - 1)
@@ -8,8 +8,8 @@
 //! height          its middle at z_liq = [m_0 H_0 + sum m_n (h_n - l_n)]/m_liq
 //! ```
 //!
-//! An upright cylinder comes out as it is. Where a tank drains, its surface is at z_s = d(m z_liq)/dm, whatever its shape: what is
-//! added lies on top.
+//! The result is exact for an upright cylinder. In a tank that drains, the surface is at z_s = d(m z_liq)/dm for any shape,
+//! because added liquid lies on top.
 
 use std::collections::BTreeMap;
 
@@ -71,8 +71,8 @@ pub enum Outline {
     Box([f64; 4]),
 }
 
-/// Surfaces of the first modes of a tank with some liquid, kg: of each the elevation at equal steps of the radius from the axis or
-/// the inner wall to the outer wall, over that at the outer wall.
+/// Surface shapes of the first modes of a tank with a mass of liquid, kg. Each is the elevation at equal steps of the
+/// radius, from the axis or the inner wall to the outer wall, relative to that at the outer wall.
 pub type Surfaces = dyn Fn(f64, usize) -> anyhow::Result<Vec<Vec<f64>>>;
 
 /// A tank as somebody has drawn it.

@@ -39,7 +39,7 @@ pub struct Run<'a> {
     pub table: &'a Table,
 }
 
-/// A page and what is to be said about it.
+/// A page and its warnings.
 pub struct Page {
     /// The page.
     pub html: String,
