@@ -64,7 +64,7 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     let first = Figure {
         title: "Ranked sensitivities".into(),
         caption: html! {
-            "How far antiresonance and resonance move when a drawn parameter grows by one standard deviation, the others at random: the largest effect on top. ρ is the coefficient of correlation; in " (count) " draws what is below " (format!("{by_chance:.2}")) " may be chance."
+            "Shift of antiresonance and resonance if a drawn parameter grows by one standard deviation while the others vary at random, the largest effect first. ρ is the correlation coefficient; in " (count) " draws a magnitude below " (format!("{by_chance:.2}")) " may be chance."
         },
         height: 110 + 30 * ranked.len(),
         panels: vec![Panel::new("change for one standard deviation / mHz", "")],

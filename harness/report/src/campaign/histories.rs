@@ -48,7 +48,7 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
     Figure {
         title: format!("Time histories, {}", group.title()),
         caption: html! {
-            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual: the rate less that of the exact linear plant, with viscous friction at most, under the same torque; it is what dry friction and nonlinear slosh do."
+            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual. The residual is the rate minus that of the exact linear plant, with viscous friction at most, under the same torque. It shows dry friction and nonlinear slosh."
             @if runs.len() < group.runs.len() {
                 " " (runs.len()) " of " (super::page::runs(group.runs.len())) "."
             }

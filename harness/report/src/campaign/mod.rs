@@ -278,7 +278,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
                     @if beyond.len() == 1 { "its" } @else { "their" } " model"
                 }
                 @if beyond.len() == 1 { ": " } @else { ", such as " }
-                (one) ". Computed faithfully, but not what a tank does. The results table marks it."
+                (one) ". They are numerically correct but do not represent a real tank. The results table marks them."
             }
         }
     }
@@ -313,7 +313,7 @@ fn card(page: &Page, group: &Group) -> Markup {
             Some((low, high)) => format!("{}–{} Hz", digits(low, high), digits(high, low)),
             None => {
                 let doubt = group.runs.iter().find_map(|run| best(run)?.0.doubt);
-                doubt.map_or("none".into(), |doubt| format!("not to be trusted: {doubt}"))
+                doubt.map_or("none".into(), |doubt| format!("not valid: {doubt}"))
             }
         }
     };

@@ -21,28 +21,28 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     let rows: Vec<Markup> = groups.iter().filter_map(swept_row).collect();
     html! {
         p {
-            b { "Demodulation" } " (solid, in " code { "features.csv" } "). Torque and rate are multiplied by e" sup { "−jφ(t)" } ", φ being the sweep's own known phase, and averaged over a Hann window of " (demodulation::CYCLES) " cycles (fewer if the sweep is fast, at least 3) that slides with the sweep. Their ratio is the response the moment the sweep passes that frequency: what a lock-in amplifier would show. Both signals see the same window, so its effect on amplitude and phase cancels; harmonics that the bearing makes average out."
+            b { "Demodulation" } " (solid, in " code { "features.csv" } "). Torque and rate are multiplied by e" sup { "−jφ(t)" } ", with the sweep's known phase φ, and averaged over a Hann window of " (demodulation::CYCLES) " cycles (fewer if the sweep is fast, at least 3) that moves with the sweep. Their ratio is the response while the sweep passes that frequency, as a lock-in amplifier would show it. Both signals have the same window, so its effect on amplitude and phase cancels. Harmonics due to the bearing average out."
         }
         p {
-            b { code { "spa" } } " (dashed). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of " (format!("{lag:.0}")) " s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about " (format!("{:.2}", 1e3 / lag)) " mHz, which fills a narrow antiresonance a little."
+            b { code { "spa" } } " (dashed). MATLAB's Blackman–Tukey estimate, as in the thesis: covariances of the whole record up to a lag of " (format!("{lag:.0}")) " s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about " (format!("{:.2}", 1e3 / lag)) " mHz, which fills a narrow antiresonance a little."
         }
         p {
-            b { "Welch, H1." } " Eight half-overlapping Hamming segments, averaged cross spectrum over averaged input spectrum: what most tools call the transfer function of two records."
+            b { "Welch, H1." } " Eight half-overlapping Hamming segments, averaged cross spectrum over averaged input spectrum: the usual transfer function of two records."
         }
         p {
-            b { "Transfer function." } " Where none of these resolves antiresonance and resonance: three poles and two zeros, fitted to the spectra of the whole record together with what its ends leave in them; exact for a linear plant, however short the record."
+            b { "Transfer function." } " Used if none of these resolves antiresonance and resonance. Three poles and two zeros are fitted to the spectra of the whole record together with the leakage of its ends. The fit is exact for a linear plant and a record of any length."
         }
         p {
-            b { "What is trusted." } " The response of the passing sweep, unless the sweep shifts the resonance by more than a quarter of the separation (0.6 √rate); then " code { "spa" } ", if the separation is three times what it resolves and the signal-to-noise ratio at the resonance is above 1; then the transfer function, if it leaves less than 30 % of the rate. Where these two, after a fast sweep, differ by more than a quarter of the separation, neither is: the liquid then rings at a frequency that follows its amplitude, and no single linear response describes the record. Else there is no number. " code { "estimator" } " and " code { "not_trusted" } " in the tables say which."
+            b { "Choice of the estimate." } " The first choice is the response of the passing sweep, unless the sweep shifts the resonance by more than a quarter of the separation (0.6 √rate). The second is " code { "spa" } ", if the separation is three times its resolution and the signal-to-noise ratio at the resonance is above 1. The third is the transfer function, if its residual is less than 30 % of the rate. If the last two, after a fast sweep, differ by more than a quarter of the separation, neither is valid. The liquid then rings at a frequency that depends on its amplitude, and no single linear response represents the record. Otherwise there is no value. " code { "estimator" } " and " code { "not_trusted" } " in the tables give the choice and the reason."
         }
         p {
-            b { "Uncertainty." } " What of the rate no linear response explains is estimated by the local rational method: around each line of the whole record's spectra a rational function of the torque's spectrum and a polynomial for the record's ends are fitted, and what is left is gyro noise, dry friction and nonlinear slosh. From its power spectral density Φ" sub { "v" } " follow the standard deviations of |H|, √(Φ" sub { "v" } "/(2nΦ" sub { "uu" } ")) over n averaged lines, and of an extremum of ln |H|, that of its slope over its curvature. Intervals are two standard deviations to either side. A shift that the sweep itself makes (below) is not in them."
+            b { "Uncertainty." } " The local rational method estimates the part of the rate that no linear response explains. Around each line of the whole record's spectra it fits a rational function of the torque's spectrum and a polynomial for the record's ends. The residual is gyro noise, dry friction and nonlinear slosh. From its power spectral density Φ" sub { "v" } " follow the standard deviations of |H|, √(Φ" sub { "v" } "/(2nΦ" sub { "uu" } ")) over n averaged lines, and of an extremum of ln |H|, that of its slope over its curvature. Intervals are two standard deviations to either side. They do not include a shift by the sweep itself (below)."
         }
         p {
-            b { "Features." } " Antiresonance and resonance are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh resonance, and the ripple behind the resonance may go deeper than the antiresonance."
+            b { "Features." } " Antiresonance and resonance are the two ends of the largest rise of |H| with frequency within the sweep's band, refined by a parabola through three points of log |H|. Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis. With strong damping the largest |H| is at the band's lower edge, not at the slosh resonance, and the ripple above the resonance may be lower than the antiresonance."
         }
         p {
-            b { "Fit." } " Three poles, two zeros, least squares on the complex " code { "spa" } " response. In time it is driven with the run's torque from the initial state that fits best, as MATLAB's " code { "compare" } " does: the band says little of a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run."
+            b { "Fit." } " Three poles, two zeros, least squares on the complex " code { "spa" } " response. In the time domain the run's torque drives it from the best-fitting initial state, as MATLAB's " code { "compare" } " does. The band hardly determines a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run."
         }
         p {
             b { "Energy residual." } " Largest |E(t) − E(0) − work + heat| of a run over the energy throughput, Σ|Δwork| + heat. It checks the FMU's energy balance at every sample."
@@ -50,7 +50,7 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
         @if !rows.is_empty() {
             h3 { "Why the swept resonance lies above the exact one" }
             p {
-                "The sweep is not slow enough for the liquid. Bare-wall damping makes the resonance so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the resonance is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant."
+                "The sweep is not slow enough for the liquid. With bare-wall damping the resonance is so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay. The oscillation still grows after the sweep has passed the resonance. An upward sweep therefore shows the largest rate later, at a higher frequency, and slightly smaller than a dwell would. The ripple above the resonance is the beat between this ringing and the torque. A bench that sweeps at this rate and uses the envelope shows the same shift: it is a property of the experiment, not of the plant."
             }
             div .wide {
                 table {
@@ -67,7 +67,7 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
                 }
             }
             p {
-                "The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the resonance is in the record too; and there the shift is gone. The antiresonance hardly moves in either: there the hub stands nearly still, so there is little that could ring; only at the smallest torques, where the bearing sticks near the antiresonance, does the sweep see it a few mHz late. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, " code { "spa" } " gives the best linear summary of the whole."
+                "The second estimator confirms this. For a linear plant the ratio of whole-record spectra is the frequency response for any sweep rate, because the record includes the ringing after the resonance. In this estimate there is no shift. The antiresonance hardly moves in either estimate, because the hub is nearly still there and little can ring. Only at the smallest torques, where the bearing sticks near the antiresonance, does the sweep show it a few mHz late. For runs of a nonlinear model use both: demodulation shows the response at that moment, " code { "spa" } " gives the best linear summary of the whole."
             }
         }
     }

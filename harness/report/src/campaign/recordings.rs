@@ -124,7 +124,7 @@ pub(super) fn beside(results: &Results) -> Markup {
     }
     html! {
         p {
-            "Of each recording what the same estimators find in it, and below what the models' runs of the same torque and fill are off it. ✓: within the 95 % interval that both estimates have together. CEF and leakage are of the recording's rates about the other axes (thesis 6.3.6), which a hub that cannot tilt does not have."
+            "For each recording the results of the same estimators, and below them the deviations of the models' runs with the same torque and fill. ✓: within the joint 95 % interval of both estimates. CEF and leakage come from the recording's rates about the other axes (thesis 6.3.6). A hub that cannot tilt has no such rates."
         }
         div .wide {
             table {

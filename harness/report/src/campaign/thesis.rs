@@ -217,7 +217,7 @@ const STATEMENTS: &[Statement] = &[
             let there = (0.074..0.126).contains(&torque) && (50.0..=70.0).contains(&least);
             Some((text, inverted && there))
         },
-        why: "A linear model explains the nonlinear liquid less from its onset of rotary slosh on, and the bearing's friction most at the smallest torques: where the best fit lies is where both are small.",
+        why: "From the onset of rotary slosh on, a linear model fits the nonlinear liquid less well, and bearing friction has the largest effect at the smallest torques. The best fit is where both are small.",
     },
     Statement {
         section: "7.1.2, fig. 7.4",
@@ -305,7 +305,7 @@ const STATEMENTS: &[Statement] = &[
         section: "7.1.3, fig. 7.10",
         who: Who::Synthetic,
         says: "The residual coherence of the synthetic data starts high and falls to a plateau of 0.25 to 0.35.",
-        rule: "at 0.0125 N·m more than 0.2 above the mean from 0.125 N·m up, which lies there; the level hangs on the segments' length, 20 s here and unknown there",
+        rule: "at 0.0125 N·m more than 0.2 above the mean from 0.125 N·m up. The level depends on the length of the segments, which is 20 s here and unknown in the thesis",
         shows: |group| {
             let low = coherence(at(group, LEAST)?)?;
             let plateau = mean(&from(group, 0.125, coherence)?);
@@ -347,7 +347,7 @@ const STATEMENTS: &[Statement] = &[
         section: "7.1.4, fig. 7.13",
         who: Who::Bench,
         says: "Signal-to-noise ratio is lowest at the smallest torque and soon better.",
-        rule: "the band's mean is lowest at 0.0125 N·m, and 5 dB better at 0.1 N·m; where the gyro's noise is off, dry friction and the liquid's nonlinearity are all that counts as noise",
+        rule: "the band's mean is lowest at 0.0125 N·m, and 5 dB better at 0.1 N·m. Without gyro noise, only dry friction and the liquid's nonlinearity count as noise",
         shows: snr_grows,
         why: "",
     },

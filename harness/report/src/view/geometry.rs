@@ -358,8 +358,8 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         let part = fill.levels[1];
         bottom = first[1] - (part[1] - first[1]) * first[0] / (part[0] - first[0]);
         note = format!(
-            "{prefix} drains by a table: its surface is at the height where that puts the liquid which leaves; it is drawn as an \
-             upright cylinder with the radius that its wave at the wall has."
+            "{prefix} drains by a table, which determines the height of its surface. It is drawn as an upright cylinder with the \
+             radius of its wave at the wall."
         );
     } else if diameter > 0.0 {
         radius = 0.5 * diameter;

@@ -491,10 +491,10 @@ impl Draft<'_> {
     fn say_what_is_drawn(&mut self, tanks: &[Tank]) {
         self.notes.extend(tanks.iter().map(|tank| tank.note.clone()));
         self.notes.push(
-            "The surface is that of linear potential flow for the slosh angles, the sum of all modes, each as high at the wall as the FMU's \
-             wave per angle says: in an upright cylinder J₁(ξr/R) over the radius, in a box sin (2n − 1)πx/a, in another tank of --tank \
-             the modes that `hubslosh tank` finds there. A high wave breaks before it looks like that. Pendulums are drawn where they \
-             are; the exaggeration is of the surface alone, which ends at bottom and rim."
+            "The surface is that of linear potential flow for the slosh angles, the sum of all modes with the FMU's wave per angle at \
+             the wall. The shape is J₁(ξr/R) over the radius in an upright cylinder, sin (2n − 1)πx/a in a box, and the modes of \
+             `hubslosh tank` in another tank of --tank. A real high wave would break earlier. Only the surface is exaggerated, up to \
+             bottom and rim; pendulums are drawn at their positions."
                 .into(),
         );
         if !self.run.parameters_known {
