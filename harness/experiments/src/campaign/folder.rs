@@ -1,4 +1,4 @@
-//! A campaign's directory, held by one campaign at a time.
+//! A campaign's directory, locked by one campaign at a time.
 //!
 //! ```text
 //! plan.toml, features.csv, …, report.html   published together when the last run is there
@@ -8,9 +8,9 @@
 //! .unfinished/                              what is being written; removed at the start and the end
 //! ```
 //!
-//! A run's line is added to the manifest before the run gets its name. So a stored run that differs from
-//! the last line with its name is damaged. A run without a line is another program's; if HubSlosh wrote
-//! it, the manifest is damaged. The folder of a study has the same layout (`harness/python/hubslosh/store.py`).
+//! A run's line is added to the manifest before its file gets its final name. A stored run that differs from the last
+//! line with its name is therefore damaged. A run without a line comes from another program; if HubSlosh wrote it, the
+//! manifest is damaged. The folder of a study has the same layout (`harness/python/hubslosh/store.py`).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
@@ -40,30 +40,30 @@ pub struct Folder {
     unfinished: PathBuf,
     /// Files that are in the manifest, but not in the directory.
     lost: BTreeSet<String>,
-    /// No campaign was in the directory before: all runs are other programs'.
+    /// True if no campaign was in the directory before, so that all runs come from other programs.
     is_new: bool,
     manifest: Mutex<Manifest>,
     _registered: Registered,
     _lock: File,
 }
 
-/// The hashes of the files, by name, and the file in which they are.
+/// The hashes of the files, by name, and the manifest file.
 #[derive(Debug)]
 struct Manifest {
-    /// `None` from its publication on, and after a line that could not be written.
+    /// `None` after publication, and after a line that could not be written.
     file: Option<File>,
     sums: BTreeMap<String, String>,
 }
 
-/// The file's lines, as `sha256sum` writes them.
+/// Returns the file's lines in the format of `sha256sum`.
 fn lines(sums: &BTreeMap<String, String>) -> String {
     sums.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect()
 }
 
-/// The last hash of each name; a line that a kill cut off does not count.
+/// Returns the last hash of each name. A line that a kill has cut off does not count.
 ///
 /// # Errors
-/// If another line is not one of a manifest.
+/// Another line is not in the format of a manifest.
 fn sums(text: &str) -> Result<BTreeMap<String, String>> {
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let pair = |(row, line): (usize, &str)| {
@@ -80,10 +80,10 @@ fn sums(text: &str) -> Result<BTreeMap<String, String>> {
     whole.lines().enumerate().map(pair).collect()
 }
 
-/// Characters of a damaged line that a message shows.
+/// Number of characters of a damaged line in a message.
 const SHOWN: usize = 120;
 
-/// The bytes of a file. What is not a regular file, such as a pipe, might be read without an end.
+/// Reads the bytes of a regular file. Reading a pipe, for example, might never end.
 fn bytes(path: &Path) -> Result<Vec<u8>> {
     let read = || {
         ensure!(path.metadata()?.is_file(), "it is not a regular file");
@@ -95,8 +95,8 @@ fn bytes(path: &Path) -> Result<Vec<u8>> {
 /// Reads a directory's manifest.
 ///
 /// # Errors
-/// If nothing verifies the runs that are there: the manifest is damaged, or it is missing where a
-/// campaign was before.
+/// Nothing verifies the stored runs: the manifest is damaged, or it is missing although a campaign
+/// was here before.
 fn read_manifest(path: &Path) -> Result<BTreeMap<String, String>> {
     let runs = path.join(RUNS);
     let entries = fs::read_dir(&runs).with_context(|| format!("{} cannot be read", runs.display()));
@@ -122,7 +122,7 @@ fn read_manifest(path: &Path) -> Result<BTreeMap<String, String>> {
     }
 }
 
-/// The name of a run's file in the directory.
+/// Returns the name of a run's file in the directory.
 pub fn file_of(run: &str) -> String {
     format!("{RUNS}/{run}.parquet")
 }
@@ -190,8 +190,8 @@ impl Folder {
         self.manifest().sums.contains_key(&file_of(run))
     }
 
-    /// The SHA-256 of a stored run; the reason, if it is not what was stored. A run of another program
-    /// that is seen for the first time is taken as it is.
+    /// Returns the SHA-256 of a stored run, or the reason if it is not the stored file. A run of another program is
+    /// accepted the first time.
     pub fn check(&self, run: &str) -> Result<String, String> {
         let file = file_of(run);
         let found = self.hash(&file).map_err(|error| error.to_string())?;
@@ -207,7 +207,7 @@ impl Folder {
         }
     }
 
-    /// Adds a run to the manifest, in which it is not if another program has stored it.
+    /// Adds a run to the manifest, for runs that another program has stored.
     pub fn adopt(&self, run: &str, sum: String) -> Result<()> {
         self.add(file_of(run), sum)
     }
@@ -224,12 +224,12 @@ impl Folder {
         store().with_context(|| format!("{} cannot be stored", self.path.join(&file).display()))
     }
 
-    /// Publishes files by name, and the manifest. What an earlier campaign published and this one
-    /// does not is removed.
+    /// Publishes files by name, and the manifest. Removes files that an earlier campaign published
+    /// and this one does not.
     pub fn publish(self, files: Vec<(&str, Vec<u8>)>) -> Result<()> {
         for (name, bytes) in &files {
             let place = self.path.join(name);
-            // a plan that is carried out where it lies stays as it is
+            // a plan that is executed in its own place is not rewritten
             if !input::bytes(&place).is_ok_and(|there| there == *bytes) {
                 input::check_replaceable(&place)?;
             }
@@ -240,7 +240,7 @@ impl Folder {
             runs.map(|(name, sum)| (name.clone(), sum.clone())).collect();
         sums.extend(files.iter().map(|(name, bytes)| (name.to_string(), sha256(bytes))));
         let text = lines(&sums).into_bytes();
-        // a full disk is found out before anything is replaced
+        // a full disk is detected before any file is replaced
         let all = files.into_iter().chain([(MANIFEST, text)]);
         let names = all.map(|(name, bytes)| {
             let wrote =
@@ -250,7 +250,7 @@ impl Folder {
             Ok(name)
         });
         let names = names.collect::<Result<Vec<_>>>()?;
-        // Windows renames nothing to the name of a file that is open
+        // Windows does not rename a file to the name of an open file
         drop(manifest.file.take());
         let gone =
             manifest.sums.keys().filter(|name| is_published(name) && !sums.contains_key(*name));
@@ -294,7 +294,7 @@ impl Folder {
         let place = place.with_context(|| format!("{name} is closed, or could not be written"))?;
         let added = place.write_all(line.as_bytes()).and_then(|()| place.sync_data());
         if added.is_err() {
-            // no other line may follow half a line
+            // no other line may follow an incomplete line
             manifest.file = None;
         }
         added.with_context(|| format!("{name} cannot be written"))?;
@@ -325,7 +325,7 @@ fn hold(path: &Path, about: &str) -> Result<File> {
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
-            // Windows lets nobody read a locked file
+            // Windows does not allow reading a locked file
             let who = fs::read_to_string(&place).unwrap_or_default();
             let who = who.trim();
             let since = place.metadata().and_then(|file| file.modified()).ok();
@@ -347,7 +347,7 @@ fn hold(path: &Path, about: &str) -> Result<File> {
     Ok(lock)
 }
 
-/// Returns true for names of files that a campaign publishes: nothing else is removed, whatever
+/// Returns true for names of files that a campaign publishes. No other file is removed, whatever
 /// the manifest lists.
 fn is_published(name: &str) -> bool {
     let features = name.strip_prefix("features").and_then(|rest| rest.strip_suffix(".csv"));
@@ -397,7 +397,7 @@ mod tests {
         assert!(why.contains("its SHA-256 is not that in manifest.sha256"), "{why}");
         fs::write(&path, whole).unwrap();
         assert!(folder.check("b").is_ok());
-        // another program's, from then on as it was
+        // another program's run, verified from then on
         let other = directory.path().join("runs/c.parquet");
         write_as_another_program(&other, 1.0);
         folder.adopt("c", folder.check("c").unwrap()).unwrap();
@@ -405,7 +405,7 @@ mod tests {
         assert!(folder.check("c").is_err());
     }
 
-    /// A run that another library wrote.
+    /// Writes a run with another library.
     fn write_as_another_program(path: &Path, value: f64) {
         table(value).write(path, &BTreeMap::new()).unwrap();
         let mut bytes = fs::read(path).unwrap();
@@ -428,7 +428,7 @@ mod tests {
         let lines: Vec<&str> = good.split_inclusive('\n').collect();
         let zeros = "0".repeat(64);
         let wrong_hash = lines[0].replace(&lines[0][..64], &zeros);
-        // what is in the file, the words of the error or the runs that are not verified
+        // content of the manifest, and words of the error or the unverified runs
         type Expected<'a> = Result<&'a [&'a str], &'a str>;
         let cases: [(Vec<u8>, Expected); 11] = [
             (Vec::new(), Ok(&["a", "b", "c"])),

@@ -1,13 +1,13 @@
 //! A campaign: the runs of a plan, simulated in parallel, each stored and analysed.
 //!
-//! A stored run is reused, whoever made it, if `runs/<name>.parquet` is complete, its metadata
-//! (Parquet key-value pairs) hold the run's [recipe](store::recipe), and its hash is the manifest's
-//! ([`Folder`]). Everything in the tables comes
-//! from the run's [columns](STORED); so another importer that writes the columns and the metadata
-//! given by [`Campaign::list`] gets the same tables.
+//! A stored run is reused, whichever program wrote it, if three conditions hold.
+//! `runs/<name>.parquet` is complete, its metadata (Parquet key-value pairs) contain the run's
+//! [recipe](store::recipe), and its hash is the manifest's ([`Folder`]). All tables follow from the
+//! run's [columns](STORED), so another importer that writes the columns and metadata of
+//! [`Campaign::list`] gets the same tables.
 //!
-//! The analysis is that of the thesis's bench. Of an FMU without the bench's variables all outputs
-//! are stored, and `runs.csv` says what each run was made from.
+//! The analysis is that of the thesis's bench. For an FMU without the bench's variables, all
+//! outputs are stored, and `runs.csv` has the settings of each run.
 
 mod folder;
 mod outcome;
@@ -40,9 +40,9 @@ use crate::run::Run;
 use crate::sensors::Sensors;
 
 /// Columns of a stored run of the bench, SI units, at every communication point from the torque's
-/// start to the stop time; others may follow. The first six are what people look at; wave height,
-/// energy, work, dissipated energy, the time in stiction and the liquid's force on the tank are
-/// there for the tables.
+/// start to the stop time. Other columns may follow. The first six are for plots. Wave height,
+/// energy, work, dissipated energy, stuck time and the liquid's force on the tank are for the
+/// tables.
 pub const STORED: [&str; 13] = [
     "time",
     "tau_cmd",
@@ -59,7 +59,7 @@ pub const STORED: [&str; 13] = [
     "F_radial",
 ];
 
-/// Parameters of the bench that its analysis reads.
+/// Parameters of the bench that the analysis needs.
 const PARAMETERS: [&str; 8] = [
     "slosh.model",
     "slosh.mass[1]",
@@ -77,7 +77,7 @@ fn is_bench(description: &ModelDescription) -> bool {
     STORED[1..].iter().all(has) && PARAMETERS.iter().all(has)
 }
 
-/// Returns true for the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.
+/// Returns true if the variable is the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.
 pub fn is_slosh_angle(name: &str) -> bool {
     name.starts_with("tank") && (name.contains(".angle_x[") || name.contains(".angle_y["))
 }
@@ -88,7 +88,7 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
     }
-    // and the slosh angles of an FMU in six axes, which are local variables
+    // and the slosh angles of a six-axis FMU, which are local variables
     let outputs =
         description.variables.iter().filter(|v| v.causality == "output" || is_slosh_angle(&v.name));
     let outputs = outputs
@@ -97,14 +97,14 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     ["time".to_string()].into_iter().chain(input.map(String::from)).chain(outputs).collect()
 }
 
-/// A plan that is carried out.
+/// A plan with the settings for its execution.
 #[derive(Clone, Debug)]
 pub struct Campaign {
     /// Plan of the campaign.
     pub plan: Plan,
-    /// Simulate again what is stored already.
+    /// True to simulate stored runs again.
     pub force: bool,
-    /// Runs simulated and analysed at once; 0: as many as the machine has cores.
+    /// Number of runs simulated and analysed in parallel; 0 for the number of cores.
     pub jobs: usize,
     /// Directory of another campaign that the report compares with.
     pub compare: Option<PathBuf>,
@@ -112,7 +112,7 @@ pub struct Campaign {
     pub out: PathBuf,
 }
 
-/// A run that failed, and why.
+/// A failed run and the reason.
 #[derive(Clone, Debug)]
 pub struct Failure {
     /// The run.
@@ -128,21 +128,21 @@ pub struct Unanalysed {
     pub case: Case,
     /// Stored columns, thinned; empty for most runs of a large campaign ([`keeps_curves`]).
     pub history: History,
-    /// Its last rows, as they are; as `history`.
+    /// Last rows of the run, not thinned; as `history`.
     pub tail: History,
-    /// The largest of its slosh angles, rad, and the angle's name; `None` if there are no such.
+    /// Largest slosh angle, rad, and its name; `None` without slosh angles.
     pub largest_angle: Option<(f64, String)>,
-    /// It was not simulated but read.
+    /// True if the run was read from a file, not simulated.
     pub reused: bool,
 }
 
 impl Results {
-    /// Runs that were not simulated but recorded.
+    /// Returns the number of recorded runs.
     pub fn recordings(&self) -> usize {
         self.outcomes.iter().filter(|run| run.is_recording()).count()
     }
 
-    /// Runs that did not fail, and how many of them were reused.
+    /// Returns the number of runs that did not fail, and how many of them were reused.
     pub fn counts(&self) -> (usize, usize) {
         let reused = self.outcomes.iter().map(|run| run.reused);
         let reused: Vec<bool> = reused.chain(self.unanalysed.iter().map(|r| r.reused)).collect();
@@ -150,8 +150,8 @@ impl Results {
     }
 }
 
-/// Runs whose curves are kept for the report; of the others numbers alone. A campaign's memory does not
-/// grow with the curves of its runs.
+/// Number of runs whose curves are kept for the report. The others keep only numbers, which bounds the memory of a
+/// campaign.
 pub const CURVES: usize = 400;
 
 /// Returns true if the curves of run `i` of `runs` are kept. The kept runs are spread over the plan and
@@ -180,7 +180,7 @@ impl Done {
     }
 }
 
-/// All that a campaign found.
+/// Results of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
     /// Analysed runs of the bench, by model, fill and amplitude as in the plan.
@@ -192,16 +192,16 @@ pub struct Results {
 }
 
 impl Campaign {
-    /// Holds the directory for this campaign.
+    /// Locks the directory for this campaign.
     pub fn take(&self) -> Result<Folder> {
         Folder::take(&self.out, &format!("the plan \"{}\"", self.plan.title))
     }
 
-    /// Simulates all runs that are not stored yet and analyses all of them. Leaves the runs in the
-    /// directory; [`Campaign::tables`] gives the tables.
+    /// Simulates all runs that are not stored yet and analyses all of them. Stores the runs in the
+    /// directory; [`Campaign::tables`] returns the tables.
     ///
     /// # Errors
-    /// If there are no runs, or one cannot be stored. A run that cannot be simulated is a failure
+    /// There are no runs, or a run cannot be stored. A run that cannot be simulated is a failure
     /// among the results.
     pub fn execute(
         &self,
@@ -221,7 +221,7 @@ impl Campaign {
         let jobs = jobs.min(cases.len().max(1));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
         let warned = Mutex::new(BTreeSet::new());
-        // once of many runs, whose warnings differ in numbers at most
+        // once for many runs, whose warnings differ at most in numbers
         let warn = |case: &Case, warning: String| {
             let words: String = warning.chars().filter(|c| !c.is_ascii_digit()).collect();
             let mut warned = warned.lock().unwrap_or_else(PoisonError::into_inner);
@@ -249,7 +249,7 @@ impl Campaign {
         Ok(collected)
     }
 
-    /// Returns true if the directory holds the results of another plan.
+    /// Returns true if the directory contains the results of another plan.
     pub fn holds_another(&self) -> bool {
         host::input::text(&self.plan_file()).is_ok_and(|text| text != self.plan.text)
     }
@@ -259,7 +259,7 @@ impl Campaign {
         self.out.join("plan.toml")
     }
 
-    /// The command that reproduces everything in the directory, for a POSIX shell.
+    /// Returns the command that reproduces the directory, for a POSIX shell.
     pub fn command(&self, fmu: &Fmu) -> String {
         let word = |path: &Path| {
             let text = path.display().to_string();
@@ -284,7 +284,7 @@ impl Campaign {
         for case in cases.into_iter().filter(|case| case.recording.is_none()) {
             let run = case.run();
             kept = stored_columns(description, run.input.as_deref());
-            // what sensors read is recorded with the rest; their readings are made where the run is taken
+            // signals for sensors are recorded with the rest; readings are computed when the run is read
             let sensors = Sensors::new(&case.sensors, description, &case.settings, case.step)?;
             for name in kept.iter().map(String::as_str).chain(sensors.needs()) {
                 if !columns.iter().any(|column| column == name) {
@@ -297,7 +297,7 @@ impl Campaign {
                 at_rest.map(|name| (name.to_string(), json!(0.0))).collect();
             for (name, text) in &case.settings {
                 let value = match description.value(description.variable(name)?, text)? {
-                    // an enumeration keeps its item's name
+                    // an enumeration keeps the name of its item
                     Value::Integer(i) if i.to_string() == *text => json!(i),
                     Value::Integer(_) => json!(text),
                     Value::Real(x) => json!(x),
@@ -337,10 +337,10 @@ impl Campaign {
         }))
     }
 
-    /// One run.
+    /// Simulates or reads one run and analyses it.
     ///
     /// # Errors
-    /// If it cannot be stored: then none can.
+    /// The run cannot be stored, so no other run can.
     fn done(
         &self,
         fmu: &Fmu,
@@ -411,7 +411,7 @@ impl Campaign {
                 }
             }
             None => {
-                // time and the driven input are there anyway
+                // time and the driven input are always columns
                 let others = columns[1 + usize::from(run.input.is_some())..].iter();
                 let others: Vec<&str> = others.map(String::as_str).collect();
                 let others = run.columns_with(&others, sensors.needs());

@@ -26,24 +26,24 @@ use analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa, st
 use formulas::similarity::Liquid;
 use signals::table::Table;
 
-/// Frequencies at which responses are evaluated: 1.2 mHz apart at the antiresonance of the thesis's
+/// Number of frequencies of the responses: 1.2 mHz apart at the antiresonance of the thesis's
 /// sweep.
 const GRID_POINTS: usize = 2000;
 
-/// Separation of antiresonance and resonance that counts as resolved, in units of what is resolved.
+/// Separation of antiresonance and resonance that counts as resolved, in units of the resolution.
 const RESOLVED: f64 = 3.0;
-/// Most misfit of a fitted transfer function that is trusted: what does not follow from the torque
-/// has a tenth of the rate's power.
+/// Largest residual of a valid transfer function: a tenth of the rate's power does not follow from
+/// the torque.
 const MOST_MISFIT: f64 = 0.3;
-/// Part of the separation by which a passing sweep may shift the resonance, and by which two
-/// estimates from a whole record may differ. The shift is 0.6 times
-/// the root of the sweep's rate where the resonance is narrower than that.
+/// Largest valid shift of the resonance by a passing sweep, and difference of two estimates from a
+/// whole record, as parts of the separation. The shift is 0.6 times the root of the sweep's rate if
+/// the resonance is narrower.
 const MOST_SHIFT: f64 = 0.25;
 
-/// Least signal-to-noise ratio at a resonance that is trusted, dB.
+/// Smallest valid signal-to-noise ratio at a resonance, dB.
 const LEAST_SNR: f64 = 0.0;
 
-/// Maxima and totals of a run; NaN what a recording does not tell.
+/// Maxima and totals of a run; NaN where a recording has no value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
     /// Largest |slosh_angle|, rad.
@@ -52,12 +52,12 @@ pub struct Totals {
     pub peak_radial_angle: f64,
     /// Largest wave height, m.
     pub peak_wave_height: f64,
-    /// Largest |rate| that the gyro reads less its bias: its mean under a sweep or noise, rad/s.
+    /// Largest |gyro rate minus bias|, rad/s; the bias is the mean under a sweep or noise.
     pub peak_rate: f64,
-    /// Largest |angular acceleration|, rad/s²: central differences of the gyro's rate from row to row,
-    /// as Rubaga's thesis takes them (7.2.2).
+    /// Largest |angular acceleration|, rad/s², from central differences of the gyro's rate, as in Rubaga's thesis
+    /// (7.2.2).
     pub peak_acceleration: f64,
-    /// The gyro's errors were on: it read something else than the rate.
+    /// True if the gyro's errors were on, so that its reading differs from the rate.
     pub gyro_errors: bool,
     /// Largest |E(t) − E(0) − work + heat| over the energy throughput Σ|Δwork| + heat.
     pub max_energy_residual: f64,
@@ -66,7 +66,7 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Totals of a recording.
+    /// Returns the totals of a recording.
     fn of_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
@@ -101,21 +101,21 @@ impl Totals {
     }
 }
 
-/// Rates that a gyro read, less its biases, rad/s.
+/// Rates measured by a gyro, minus their biases, rad/s.
 struct Rates {
-    /// About the hub's axis.
+    /// Rate about the hub's axis.
     about_axis: Vec<f64>,
-    /// About x and y, where a recording has them.
+    /// Rates about x and y, if a recording has them.
     others: [Option<Vec<f64>>; 2],
-    /// Bias about the hub's axis, rad/s; 0 of a gyro without errors.
+    /// Bias about the hub's axis, rad/s; 0 for a gyro without errors.
     bias: f64,
     /// Warnings about the means of the rates.
     warnings: Vec<String>,
 }
 
-/// Mean of a rate over its deviation beyond which it is reported: it would add 1 % to the energy of the rate.
+/// Mean of a rate over its deviation above which it is reported: it would add 1 % to the energy of the rate.
 const NOTABLE_MEAN: f64 = 0.1;
-/// Parts of a record whose means are compared.
+/// Number of parts of a record whose means are compared.
 const PARTS: usize = 8;
 
 impl Rates {
@@ -149,7 +149,7 @@ impl Rates {
     }
 }
 
-/// Warning about a rate's mean over a record, or about its drift.
+/// Returns a warning about a rate's mean over a record, or about its drift.
 fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
     let (mean, deviation) = (statistics::mean(rate), statistics::deviation(rate));
     let parts: Vec<f64> =
@@ -173,14 +173,14 @@ fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
     })
 }
 
-/// Largest slope of a signal by central differences.
+/// Returns the largest slope of a signal by central differences.
 fn peak_slope(time: &[f64], signal: &[f64]) -> f64 {
     let slopes = time.windows(3).zip(signal.windows(3)).map(|(t, y)| (y[2] - y[0]) / (t[2] - t[0]));
     slopes.fold(0.0, |most, slope| f64::max(most, slope.abs()))
 }
 
-/// Signals of a run, thinned for drawing: of each of at most [`History::STRETCHES`] stretches the
-/// smallest and the largest value, in the order in which they come.
+/// Signals of a run, thinned for plots: the smallest and the largest value of each of at most
+/// [`History::STRETCHES`] stretches, in the order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     /// Times, s.
@@ -190,10 +190,10 @@ pub struct History {
 }
 
 impl History {
-    /// Phases of a run.
+    /// Largest number of stretches.
     pub const STRETCHES: usize = 300;
 
-    /// History from columns of equal length.
+    /// Creates the history from columns of equal length.
     pub fn of(time: &[f64], columns: &[(&str, &[f64])]) -> History {
         let length = time.len().div_ceil(Self::STRETCHES);
         if length <= 2 {
@@ -259,20 +259,20 @@ fn manoeuvre(torque: &Curve) -> Option<f64> {
     (end < 0.9 * whole).then_some(end)
 }
 
-/// The path of the liquid surface's crest seen from above, in two short stretches of a run: time, s,
-/// and angles outwards and towards +θ, rad.
+/// Path of the surface's crest seen from above, in two short stretches of a run: time, s, and
+/// angles outwards and towards +θ, rad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SloshPath {
     /// Points of the largest wave.
     pub largest: Vec<[f64; 3]>,
-    /// Around the onset of rotary slosh, if there is any.
+    /// Points around the onset of rotary slosh, if there is one.
     pub onset: Option<Vec<[f64; 3]>>,
 }
 
 impl SloshPath {
-    /// Length of the stretch around the largest wave in periods of the slosh.
+    /// Length of the stretch around the largest wave, in slosh periods.
     pub const LARGEST: f64 = 7.0;
-    /// Length of the stretch around the onset in periods of the slosh.
+    /// Length of the stretch around the onset, in slosh periods.
     pub const ONSET: f64 = 38.0;
 
     fn of(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
@@ -294,14 +294,14 @@ impl SloshPath {
     }
 }
 
-/// A run of the bench, and what it shows.
+/// A run of the bench with its results.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The run.
     pub case: Case,
     /// Model, tank and fill.
     pub range: Range,
-    /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
+    /// Exact linear plant with viscous friction for the run, from the FMU's calculated parameters.
     pub linear: Linear,
     /// Totals over the whole run.
     pub totals: Totals,
@@ -309,8 +309,8 @@ pub struct Outcome {
     pub record: Option<Record>,
     /// Estimates along the sweep; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
-    /// Torque, rate, slosh angles, and the residual: the rate less its bias and less that of the exact linear
-    /// counterpart under the same torque.
+    /// Torque, rate, slosh angles, and the residual: the rate minus its bias and minus that of the exact linear plant
+    /// under the same torque.
     pub history: History,
     /// The crest's path seen from above.
     pub path: SloshPath,
@@ -329,12 +329,12 @@ pub struct Outcome {
 pub struct Estimate {
     /// Rate over torque.
     pub response: FrequencyResponse,
-    /// Its antiresonance and resonance; none if they are not to be trusted.
+    /// Antiresonance and resonance; none if they are not valid.
     pub features: Features,
     /// Frequency resolution at the resonance, Hz.
     pub resolution: f64,
-    /// Standard deviation of its magnitude, relative, and of its phase, rad, from what of the rate
-    /// no linear response explains; empty if that is not known.
+    /// Relative standard deviation of the magnitude, and of the phase, rad, from the part of the
+    /// rate that no linear response explains; empty if unknown.
     pub deviation: Vec<f64>,
     /// Standard deviations of the features.
     pub deviations: Deviations,
@@ -347,12 +347,12 @@ pub struct Estimate {
 pub enum Doubt {
     /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.
     TooFast,
-    /// The record, or its lags or segments, is too short to tell one from the other.
+    /// The record, or its lags or segments, is too short to separate them.
     TooShort,
-    /// At the resonance there is more noise than signal.
+    /// There is more noise than signal at the resonance.
     Noise,
-    /// True if two estimates of one linear response differ by more than a quarter of the separation. After a fast sweep
-    /// a nonlinear liquid oscillates freely, at a frequency that depends on its amplitude. No linear response to the
+    /// Two estimates of one linear response differ by more than a quarter of the separation. After a fast sweep a
+    /// nonlinear liquid oscillates freely, at a frequency that depends on its amplitude. No linear response to the
     /// torque represents this motion.
     Nonlinear,
 }
@@ -369,8 +369,8 @@ impl std::fmt::Display for Doubt {
 }
 
 impl Estimate {
-    /// From a response whose features are looked for between two frequencies, Hz; `doubt` says what
-    /// speaks against them.
+    /// Creates an estimate from a response with the features between two frequencies, Hz; `doubt`
+    /// is the reason to reject them.
     fn of(
         response: FrequencyResponse,
         inner: (f64, f64),
@@ -384,7 +384,7 @@ impl Estimate {
         Estimate { response, features, resolution, deviation, deviations, doubt }
     }
 
-    /// The same with uncertainties: `slope` is how fast the error changes along a frequency.
+    /// Adds uncertainties; `slope` is the rate at which the error changes along a frequency.
     fn with(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
         Estimate { deviation, deviations, ..self }
@@ -407,7 +407,7 @@ fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
 
-/// Means of `count` neighbours; an incomplete group at the end is left out.
+/// Returns means of `count` neighbours, without an incomplete group at the end.
 fn means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
     if count == 1 {
         return signal.into();
@@ -416,7 +416,7 @@ fn means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
     signal.chunks_exact(count).map(mean).collect::<Vec<_>>().into()
 }
 
-/// Values over the frequency, Hz.
+/// Values over frequency, Hz.
 pub type Curve = Vec<(f64, f64)>;
 
 /// Estimates from the whole record.
