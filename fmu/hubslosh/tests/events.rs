@@ -1,5 +1,5 @@
-//! Events in Co-Simulation of FMI 3.0: the motion is the same whether the host is told of events or not, and stops
-//! exactly where they are. FMI 3.0.2, 4.2.1; FMI 2.0's face is the reference.
+//! Events in Co-Simulation of FMI 3.0 (FMI 3.0.2, 4.2.1). The motion is the same whether the FMU reports events to the
+//! host or not, and steps stop exactly at events. The reference is the FMI 2.0 interface.
 
 use HubSlosh::HubSlosh as Model;
 use runtime::call::{Events, InstanceState, Interface};
@@ -146,7 +146,7 @@ fn plain_cosimulation_gives_the_bits_of_fmi_2() {
         for (n, expected) in expected.iter().enumerate() {
             set(&mut three, "tau_cmd", Value::Real(torque(n)));
             let info = three.step_to_event(n as f64 * STEP, STEP, stops).unwrap();
-            assert!(!info.event && !info.early, "nobody is told of events without event mode");
+            assert!(!info.event && !info.early, "the FMU reports no event without event mode");
             assert_eq!(three.time(), n as f64 * STEP + STEP);
             assert_eq!(&(reals(&mut three), discrete(&mut three)), expected, "step {n}");
         }

@@ -1,5 +1,5 @@
-//! The example that travels with each FMU: histories of inputs, and what the FMU answers to them. The
-//! files' names are those of the FMI project's rules for exchanged reference results.
+//! The example of each FMU: histories of inputs, and the FMU's outputs. The files have the names of
+//! the FMI project's rules for exchanged reference results.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -29,7 +29,7 @@ type Course = fn(t: f64) -> f64;
 /// A sine below the slosh frequency of the bench that grows and fades within ten seconds, then no torque. The hub slips,
 /// reverses and comes to rest while the liquid still loads it.
 const BENCH: Course = |t| swell(t) * (TAU * 2.0 * t).sin();
-/// A thrust that is there from the start.
+/// A constant thrust.
 const THRUST: Course = |_| 1.0;
 /// Sines near the slosh frequency of the default tank under that thrust, 0.42 Hz with the tank held. They grow and fade
 /// within ten seconds, then the liquid oscillates freely. No two are in phase, so that no output stays 0.
@@ -41,8 +41,8 @@ fn swell(t: f64) -> f64 {
     (t / 2.0).min((10.0 - t) / 2.0).clamp(0.0, 1.0)
 }
 
-/// The examples, one for each FMU. 2340 N give the default craft with its liquid, 1562 kg, the 1.5 m/s² that its
-/// tank's damping holds for.
+/// The examples, one for each FMU. 2340 N give the default craft with its liquid, 1562 kg, an acceleration of 1.5 m/s²,
+/// for which its tank's damping holds.
 pub const EXAMPLES: [Example; 3] = [
     Example { model: "HubSlosh", inputs: &[("tau_cmd", 0.1, BENCH)] },
     Example {
@@ -70,16 +70,16 @@ pub const EXAMPLES: [Example; 3] = [
 /// Length of the example and its communication step, s.
 const STOP: f64 = 20.0;
 const STEP: f64 = 0.02;
-/// Every so many steps the reference has a row.
+/// Number of steps per row of the reference.
 const EVERY: usize = 5;
-/// Tolerance of the reference; results of the FMU's default tolerance lie within 1e-6 of it.
+/// Tolerance of the reference. Results with the FMU's default tolerance are within 1e-6 of it.
 const TOLERANCE: f64 = 1e-12;
 
 impl Example {
-    /// The example of the FMU.
+    /// Returns the example of the FMU.
     ///
     /// # Errors
-    /// If it has none.
+    /// The FMU has no example.
     pub fn of(fmu: &Fmu) -> Result<&'static Example> {
         let model = &fmu.description().model_name;
         let found = EXAMPLES.iter().find(|example| example.model == model);
@@ -89,17 +89,17 @@ impl Example {
         })
     }
 
-    /// Name of the file of the inputs: `time` (s) and them.
+    /// Returns the name of the file of the inputs: `time` (s) and the inputs.
     pub fn input(&self) -> String {
         format!("{}_in.csv", self.model)
     }
 
-    /// Name of the file of the answer: `time` and every output.
+    /// Returns the name of the file of the reference: `time` and every output.
     pub fn reference(&self) -> String {
         format!("{}_ref.csv", self.model)
     }
 
-    /// Name of the file of start, stop, step and tolerance.
+    /// Returns the name of the file of start, stop, step and tolerance.
     pub fn options(&self) -> String {
         format!("{}_ref.opt", self.model)
     }
@@ -110,7 +110,7 @@ impl Example {
         let none = BTreeMap::new();
         let input = folder.join(self.input());
         self.histories().write(&input, &none)?;
-        // what is compared with is the answer to the file, with the digits that are in it
+        // the reference uses the written file, with its digits
         let answer = replay(fmu, &input, Some(TOLERANCE), false)?;
         thinned(fmu.description(), &answer).write(&folder.join(self.reference()), &none)?;
         let options =
@@ -133,8 +133,8 @@ impl Example {
     }
 }
 
-/// Drives the FMU with the inputs of a file; `hold`: held over each step, as a host does that
-/// does not know slopes.
+/// Drives the FMU with the inputs of a file. `hold` holds them over each step, like a host that
+/// does not set slopes.
 pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Result<Table> {
     let description = fmu.description();
     let mut others = histories(description, input, None, hold, false)?;
@@ -160,7 +160,7 @@ fn outputs(description: &ModelDescription) -> Vec<&str> {
     outputs.map(|v| v.name.as_str()).collect()
 }
 
-/// Every so many rows, nine digits, without the inputs.
+/// Returns one row per [`EVERY`] steps with nine digits, without the inputs.
 fn thinned(description: &ModelDescription, answer: &Table) -> Table {
     let names: Vec<&str> = ["time"].into_iter().chain(outputs(description)).collect();
     let column = |name: &&str| {
@@ -171,7 +171,7 @@ fn thinned(description: &ModelDescription, answer: &Table) -> Table {
     Table::new(names.into_iter().map(String::from).collect(), columns)
 }
 
-/// `x` with so many decimals.
+/// Returns `x` with this number of decimals.
 fn round(x: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);
     (x * unit).round() / unit

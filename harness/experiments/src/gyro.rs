@@ -1,5 +1,5 @@
-//! The simulated gyro looked at as one on a bench: hours at rest, the Allan deviation, its noise
-//! estimated and compared with the specified one. What is computed: [`allan`].
+//! Tests the simulated gyro as on a bench: hours at rest, the Allan deviation, and its estimated
+//! noise compared with the specified one. [`allan`] has the formulas.
 
 use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
@@ -13,42 +13,43 @@ use host::budget;
 use host::fmu::Fmu;
 use signals::table::Table;
 
-/// Fewest records whose scatter is a standard error: that of four is uncertain by 40 %.
+/// Smallest number of records for a standard error from their scatter; that of four is uncertain by
+/// 40 %.
 const LEAST_RECORDS: usize = 4;
-/// More records would take days.
+/// Largest number of records; more would take days.
 const MOST_RECORDS: usize = 10_000;
-/// The shortest record in correlation times of the bias, for its maximum (at 1.89) to be seen: the
+/// Shortest record in correlation times of the bias, so that the maximum (at 1.89) is visible. The
 /// longest averaging time is a tenth of the record.
 const LEAST_TIMES: f64 = 30.0;
 
-/// A recording to be made.
+/// A recording to simulate.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// Start values by FMU name, as text; not `imu.enabled` and `imu.seed`.
     pub settings: Vec<(String, String)>,
     /// Length of a record, h.
     pub hours: f64,
-    /// Records: their `imu.seed` counts from 1.
+    /// Number of records; their `imu.seed` counts from 1.
     pub records: usize,
 }
 
 /// Specified and estimated noise.
 #[derive(Clone, Debug)]
 pub struct Characteristics {
-    /// Specified noise; N includes the noise of rounding to `imu.lsb`, lsb/√(12 rate).
+    /// Specified noise; N includes the quantisation noise of `imu.lsb`, lsb/√(12 rate).
     pub specified: Noise,
     /// Noise estimated from the mean of the records' Allan variances.
     pub estimated: Noise,
-    /// Standard errors of `estimated`, from the scatter of the single records; NaN if those that can
-    /// be fitted are fewer than [`LEAST_RECORDS`].
+    /// Standard errors of `estimated`, from the scatter of the single records; NaN if fewer than
+    /// [`LEAST_RECORDS`] can be fitted.
     pub error: Noise,
     /// The mean of the records' Allan variances, (rad/s)².
     pub points: Vec<Point>,
 }
 
 impl Recording {
-    /// Makes the records, several at a time, and looks at them. Fails if the hub does not rest, if
-    /// the gyro has no noise, or if the records are too short for its bias.
+    /// Simulates the records, several in parallel, and analyses them. Fails if the hub does not
+    /// rest, if the gyro has no noise, or if the records are too short for its bias.
     pub fn characterise(
         &self,
         fmu: &Fmu,
@@ -109,7 +110,7 @@ impl Recording {
         Characteristics::of(specified, &records)
     }
 
-    /// One record, sampled at the gyro's own instants.
+    /// Returns one record, sampled at the gyro's own instants.
     fn run(&self, seed: usize, step: f64, stop: f64) -> Result<Run> {
         let ours = [("imu.enabled", "true".to_string()), ("imu.seed", seed.to_string())];
         let ours = ours.map(|(name, value)| (name.to_string(), value));
@@ -128,7 +129,7 @@ impl Recording {
     }
 }
 
-/// The Allan variances of one record.
+/// Returns the Allan variances of one record.
 fn record(run: &Run, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Point>> {
     let mut instance = run.initialise(fmu)?;
     let table =
@@ -170,7 +171,7 @@ impl Characteristics {
         Ok(Characteristics { specified, estimated, error, points })
     }
 
-    /// Specified and estimated values, as lines of text.
+    /// Returns specified and estimated values as lines of text.
     pub fn text(&self) -> String {
         let mut text = format!(
             "{:22}{:>12}{:>12}{:>12}{:>16}\n",
@@ -192,7 +193,7 @@ impl Characteristics {
         text
     }
 
-    /// Specified and estimated values, for programs; null where a number is not finite.
+    /// Returns specified and estimated values for programs; null for a non-finite number.
     pub fn json(&self) -> serde_json::Value {
         let quantity = |(name, of): &Quantity| {
             let (specified, estimated, error) =
@@ -204,7 +205,7 @@ impl Characteristics {
         serde_json::Value::Object(QUANTITIES.iter().map(quantity).collect())
     }
 
-    /// The Allan deviations of the records, of the specified and of the fitted noise.
+    /// Returns the Allan deviations of the records, of the specified and of the fitted noise.
     pub fn table(&self) -> Table {
         let deviation = |of: &dyn Fn(&Point) -> f64| -> Vec<f64> {
             self.points.iter().map(|point| of(point).sqrt()).collect()

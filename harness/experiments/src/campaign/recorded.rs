@@ -1,4 +1,4 @@
-//! A recording as the run that it is of: on an even grid, from the torque's beginning to its end.
+//! Reads a recording as a run: on an equally spaced grid, from the torque's beginning to its end.
 
 use anyhow::{Context, Result, ensure};
 use host::budget;
@@ -17,15 +17,15 @@ const SIGNALS: [Signal; 4] = [
     Signal { name: "omega_y", required: false, between: Between::Line, unit: None },
 ];
 
-/// Least correlation of the recorded torque with the one that the plan names.
+/// Smallest correlation of the recorded torque with the torque of the plan.
 const LEAST_CORRELATION: f64 = 0.9;
-/// Part of the run that may be missing at its ends.
+/// Largest part of the run that may be missing at its ends.
 const MISSING: f64 = 0.5;
 
-/// Reads a recording on an even grid; its step, s.
+/// Reads a recording on an equally spaced grid. Returns its step, s, and the table.
 ///
 /// # Errors
-/// If it cannot be used.
+/// The recording cannot be used.
 pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     let name = recorded.path.display().to_string();
     let table = recording::read(
@@ -96,7 +96,7 @@ pub(super) fn table(
         to - from,
         100.0 * (1.0 - MISSING)
     );
-    // times as they are where they count from the beginning already
+    // times that already count from the beginning are kept
     let origin = time[0] + first as f64 * step - from;
     let origin = if origin.abs() < 1e-9 { 0.0 } else { origin };
     let cut = |values: &[f64]| rows.iter().map(|k| values[*k]).collect::<Vec<f64>>();
@@ -111,13 +111,13 @@ pub(super) fn table(
     }
     let (names, columns) =
         columns.into_iter().map(|(name, values)| (name.to_string(), values)).unzip();
-    // the plan's own step where they are the same but for rounding
+    // the plan's own step if it is equal to rounding
     let step = if (step / case.step - 1.0).abs() < 1e-6 { case.step } else { step };
     Ok((step, Table::new(names, columns)))
 }
 
-/// The row of a record at which a signal begins in it, perhaps before its first, and the coefficient of correlation of the
-/// two where they overlap.
+/// Returns the row of a record at which a signal begins, possibly before the first row, and the correlation coefficient
+/// of the two where they overlap.
 fn aligned(record: &[f64], wanted: &[f64]) -> (i64, f64) {
     let length = (record.len() + wanted.len()).next_power_of_two();
     let forward = Forward::new(length);

@@ -9,7 +9,7 @@ use analysis::features::Features;
 use host::input;
 use host::output::sha256_of;
 
-/// A row of `features.csv`; what is not found, or what the torque cannot show, stays empty.
+/// A row of `features.csv`. Values that do not exist, or that the torque cannot show, are empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FeatureRow {
     model: Option<String>,
@@ -54,7 +54,7 @@ pub struct FeatureRow {
 }
 
 impl FeatureRow {
-    /// Row of a run that was not analysed: its identification alone.
+    /// Returns the row of a run that was not analysed, with its identification only.
     pub fn unanalysed(case: &Case, plan_sha256: &str) -> FeatureRow {
         FeatureRow {
             model: case.model.clone(),
@@ -65,7 +65,7 @@ impl FeatureRow {
         }
     }
 
-    /// Row of a run with one of its estimates and the estimator's name.
+    /// Returns the row of a run with one of its estimates and the estimator's name.
     pub fn of(
         run: &Outcome,
         estimate: Option<(&Estimate, &'static str)>,
@@ -116,7 +116,7 @@ impl FeatureRow {
     }
 }
 
-/// The first columns of `runs.csv`: what a run was made from.
+/// First columns of `runs.csv`: the run's settings.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct MadeFrom {
     name: String,
@@ -132,7 +132,7 @@ pub struct MadeFrom {
 }
 
 impl MadeFrom {
-    /// Row of a run, with the reason if it failed.
+    /// Returns the row of a run, with the reason if it failed.
     pub fn of(case: &Case, failure: Option<&Failure>, fmu: &host::fmu::Fmu) -> MadeFrom {
         let recording = case.recording.as_ref();
         let file = recording.and_then(|recording| input::open(&recording.path).ok());
@@ -151,13 +151,13 @@ impl MadeFrom {
     }
 }
 
-/// Names of a row's columns.
+/// Returns the names of a row's columns.
 pub fn columns<Row: Serialize + Default>() -> Result<Vec<String>> {
     let [names, _] = names_and_values(&Row::default())?;
     Ok(names)
 }
 
-/// A row's values as text; a number that is not finite is none.
+/// Returns a row's values as text; a non-finite number is empty.
 pub fn record<Row: Serialize>(row: &Row) -> Result<Vec<String>> {
     let [_, mut values] = names_and_values(row)?;
     let finite = |value: &&mut String| value.parse::<f64>().is_ok_and(|number| !number.is_finite());

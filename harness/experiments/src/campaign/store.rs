@@ -1,4 +1,4 @@
-//! Stored runs, and whether they can be taken again.
+//! Stored runs, and the decision whether they can be reused.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::run::{self, Run};
 use crate::sensors::Sensors;
 use signals::table::{self, Table};
 
-/// Raised when stored runs of an older program mean something else.
+/// Version of the format; raised when stored runs of an older program have another meaning.
 const FORMAT: &str = "1";
 
 /// Returns everything that determines a run's numbers. Two runs with the same recipe are the same run, independent of
@@ -85,10 +85,10 @@ pub fn stored(
     Ok((table, lacks_sensors))
 }
 
-/// Parameters that are named when several differ.
+/// Number of parameters that a message names if several differ.
 const NAMED: usize = 3;
 
-/// In what a stored run differs from the one that is wanted, in one line; `None` if in nothing.
+/// Describes in one line how a stored run differs from the wanted one; `None` if it does not.
 fn difference(
     found: &BTreeMap<String, String>,
     wanted: &BTreeMap<String, String>,
@@ -97,10 +97,10 @@ fn difference(
         let text = notes.get("parameters").map_or("", String::as_str);
         serde_json::from_str(text).unwrap_or_default()
     };
-    // first what is behind everything else; parameters before the settings they come from
+    // causes first; parameters before the settings that set them
     const ORDER: [&str; 4] = ["format", "model", "binary_sha256", "parameters"];
     let rest = wanted.keys().map(String::as_str).filter(|key| !ORDER.contains(key));
-    // equal parameters set in another way are the same run
+    // equal parameters from other settings are the same run
     let keys = ORDER.into_iter().chain(rest).filter(|key| *key != "settings");
     for key in keys {
         let (was, is) = (found.get(key), &wanted[key]);
@@ -137,7 +137,7 @@ pub fn because(case: &Case, why: &str) -> String {
     format!("re-running {}: {why}", case.name)
 }
 
-/// Says that a stored run is another program's.
+/// States that a stored run comes from another program.
 pub fn unverified(case: &Case) -> String {
     format!(
         "reusing {}: another program stored it, and it has no line in {MANIFEST} yet",

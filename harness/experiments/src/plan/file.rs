@@ -62,7 +62,7 @@ const KEYS: [&str; 13] = [
     "sensor",
 ];
 
-/// The plan that a text says, if it is one but for `problems`.
+/// Reads the plan from a text; `None` with `problems` that prevent it.
 pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let table = table.get_ref();
@@ -103,7 +103,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let vary =
         reader.named("[vary] ", vary, "a list of values, such as [0.05, 0.1]", allowed).into_iter();
     let vary = vary.map(|vary| vary.map(|list| list.iter().map(Scalar::to_string).collect()));
-    // room for a run's number above it
+    // leaves room for a run's number
     let most = i64::from(i32::MAX / 2);
     let expected = format!("the whole number to count from, 0 to {most}");
     let count = reader.names(table, "count");
@@ -132,8 +132,8 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
 /// Values by name.
 type Values<'t, 'i> = Vec<(String, &'t Spanned<DeValue<'i>>)>;
 
-/// `tank.h = 1` is a table in a table in TOML; here it is the name `tank.h`. Tables that `is_value`
-/// accepts are values.
+/// Returns values by name. In TOML `tank.h = 1` is a table in a table; here it is the name
+/// `tank.h`. Tables that `is_value` accepts are values.
 fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) -> Values<'t, 'i> {
     let mut all = Values::new();
     for (key, value) in table {
@@ -148,7 +148,7 @@ fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) ->
     all
 }
 
-/// Reads values, and notes what is wrong with them.
+/// Reads values and records problems.
 struct Reader<'a> {
     text: &'a str,
     problems: &'a mut Problems,
@@ -164,13 +164,13 @@ impl Reader<'_> {
         self.problems.add(&lines, problem);
     }
 
-    /// Notes that a value is not what is expected.
+    /// Records that a value is not the expected one.
     fn other(&mut self, value: &Spanned<DeValue>, expected: &str) {
         let written = self.text[value.span()].split_whitespace().collect::<Vec<_>>().join(" ");
         self.add(value.span(), format!("{expected}, not {written}"));
     }
 
-    /// Notes the keys of a table that have no meaning there.
+    /// Records the keys of a table that have no meaning there.
     fn known(&mut self, place: &str, table: &DeTable, keys: &[&str]) {
         for (key, _) in table {
             let name: &str = key.get_ref();
@@ -182,7 +182,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A value, if it is what is expected.
+    /// Returns a value of the expected type.
     fn value<T: DeserializeOwned>(
         &mut self,
         place: &str,
@@ -197,7 +197,7 @@ impl Reader<'_> {
         Some(Named { name, value: read?, lines: self.lines(value.span()) })
     }
 
-    /// The value of a key, if it is there and what is expected.
+    /// Returns the value of a key, if it exists and has the expected type.
     fn take<T: DeserializeOwned>(
         &mut self,
         place: &str,
@@ -213,7 +213,7 @@ impl Reader<'_> {
         self.take(place, table, key, "a text in quotes", |_| true)
     }
 
-    /// The names in the table at a key, if there is one.
+    /// Returns the names in the table at a key, if there is one.
     fn names<'t, 'i>(&mut self, table: &'t DeTable<'i>, key: &str) -> Values<'t, 'i> {
         match table.get(key).map(|value| (value, value.get_ref())) {
             Some((_, DeValue::Table(inner))) => names(inner, &|_| false),
@@ -225,7 +225,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Those values that are what is expected.
+    /// Returns the values of the expected type.
     fn named<T: DeserializeOwned>(
         &mut self,
         place: &str,

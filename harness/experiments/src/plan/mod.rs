@@ -1,5 +1,5 @@
-//! A campaign's plan: a TOML file, read, checked and expanded into runs. The format by example:
-//! `book/campaigns.md`.
+//! A campaign's plan: a TOML file that is read, checked and expanded into runs. `book/campaigns.md`
+//! shows the format by example.
 
 mod file;
 mod problems;
@@ -23,8 +23,8 @@ use signals::recording::Columns;
 use self::problems::{Lines, Problems};
 use self::random::Draws;
 
-/// Slosh models of the default campaign: what the thesis's synthetic data have, and what its bench
-/// does.
+/// Slosh models of the default campaign: the model of the thesis's synthetic data, and the model
+/// closest to its bench.
 pub const MODELS: [&str; 2] = ["linear", "spherical"];
 /// The thesis's fills, m.
 pub const FILLS: [f64; 2] = [0.05, 0.10];
@@ -51,9 +51,9 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("slew", include_str!("../../../campaigns/slew.toml")),
 ];
 
-/// The communication step of a plan that names none: the thesis's IMU at 50 Hz, s.
+/// Communication step of a plan without one: the thesis's IMU at 50 Hz, s.
 const STEP: f64 = 0.02;
-/// Parts of the file names `<model>_<fill>mm_<amplitude>` that the interface fixes.
+/// Variables of the file names `<model>_<fill>mm_<amplitude>`, which the interface fixes.
 const NAMING: [&str; 3] = ["slosh.model", "tank.h", "profile.amplitude"];
 
 /// Value for a name in a plan file: an FMU variable, `profile`, `profile.PARAMETER`.
@@ -116,7 +116,7 @@ struct Listed {
     recording: Option<Recorded>,
 }
 
-/// A recording of a run, and which of its columns are which signals.
+/// A recording of a run, and the columns of its signals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorded {
     /// Its file.
@@ -131,12 +131,12 @@ pub const RECORDING: &str = "recording";
 /// One run of a plan.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Its name, unique in the plan; its file is `runs/<name>.parquet`.
+    /// Name, unique in the plan; the run's file is `runs/<name>.parquet`.
     pub name: String,
     /// The name of its `[[run]]`, if the plan gives one.
     pub listed: Option<String>,
-    /// The values of what the plan varies, in the order of [`Plan::varied`]; empty where a
-    /// `[[run]]` does not name one.
+    /// Values of the varied names, in the order of [`Plan::varied`]; empty where a `[[run]]` does
+    /// not set one.
     pub varied: Vec<String>,
     /// Value of `slosh.model`, by name, if the FMU has it.
     pub model: Option<String>,
@@ -146,11 +146,11 @@ pub struct Case {
     pub amplitude: Option<f64>,
     /// The profile's text.
     pub profile: String,
-    /// The torque it stands for.
+    /// Torque of the profile.
     pub torque: Arc<Torque>,
     /// SHA-256 of the torque's file, if it comes from one.
     pub torque_sha256: Option<String>,
-    /// The input that the torque drives; `None`: none.
+    /// Input that the torque drives, if any.
     pub input: Option<String>,
     /// Start values by FMU name.
     pub settings: Vec<(String, String)>,
@@ -160,11 +160,11 @@ pub struct Case {
     pub stop: f64,
     /// Relative tolerance of the FMU's solver; `None`: the FMU's own.
     pub tolerance: Option<f64>,
-    /// The torque is held over each step.
+    /// True if the torque is held over each step.
     pub hold: bool,
     /// Sensors recorded in addition to the FMU's variables.
     pub sensors: Vec<Sensor>,
-    /// It is not simulated but read: what a bench did under this torque.
+    /// Recording of a bench under this torque, read in place of a simulation.
     pub recording: Option<Recorded>,
 }
 
@@ -185,7 +185,7 @@ impl Case {
 }
 
 impl Plan {
-    /// Reads a plan file, or takes the built-in plan of that name.
+    /// Reads a plan file, or the built-in plan of that name.
     pub fn read(file: &str) -> Result<Self> {
         let built_in = BUILT_IN.iter().find(|(name, _)| *name == file);
         let text = match (input::text(Path::new(file)), built_in) {
@@ -215,10 +215,10 @@ impl Plan {
         plan.context("it has no profile")
     }
 
-    /// The thesis's sweeps for every one of these models, fills and amplitudes.
+    /// Creates the thesis's sweeps for every combination of models, fills and amplitudes.
     ///
     /// # Errors
-    /// If a setting is one of what is varied.
+    /// A setting is also varied.
     pub fn sweeps(sweeps: Sweeps) -> Result<Self> {
         let Sweeps { models, fills, amplitudes, profile, set, tolerance } = sweeps;
         let numbers = |values: Vec<f64>| values.iter().map(f64::to_string).collect();
@@ -265,7 +265,7 @@ impl Plan {
         Ok(toml::to_string(&table)?)
     }
 
-    /// A name may be set, varied, listed, counted or drawn, but only one of these.
+    /// Checks that a name is only one of set, varied, listed, counted or drawn.
     fn each_name_once(&self, problems: &mut Problems) {
         fn all<'a, T>(
             named: &'a [Named<T>],
@@ -291,8 +291,8 @@ impl Plan {
         }
     }
 
-    /// Names of what the plan varies: first what its `[[run]]`s name, then `[vary]`, `[random]` and
-    /// `[count]`.
+    /// Returns the names that the plan varies: first those of its `[[run]]`s, then `[vary]`,
+    /// `[random]` and `[count]`.
     pub fn varied(&self) -> Vec<&str> {
         let mut names = self.grouping();
         names.extend(self.draws.iter().flat_map(|d| &d.draw).map(|one| one.name.as_str()));
@@ -300,7 +300,7 @@ impl Plan {
         names
     }
 
-    /// Names of what the plan varies on purpose: by `[[run]]` and `[vary]`.
+    /// Returns the names that the plan varies systematically, by `[[run]]` and `[vary]`.
     pub fn grouping(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         let listed = self.listed.iter().flat_map(|run| &run.values).map(|one| one.name.as_str());
@@ -312,13 +312,13 @@ impl Plan {
         names
     }
 
-    /// The number that the plan varies most, along which its runs are drawn; of several with as many
-    /// values the last. None if there is none, or if values are drawn at random.
+    /// Returns the number with the most values in the plan, which is the axis of figures; of
+    /// several the last. Returns `None` without one, or if values are drawn at random.
     pub fn axis(&self) -> Option<&str> {
         self.axis_of_vary().or_else(|| self.axis_of_recordings())
     }
 
-    /// The number in which recordings differ most.
+    /// Returns the number in which recordings differ most.
     fn axis_of_recordings(&self) -> Option<&str> {
         let runs = self.listed.iter().filter(|run| run.recording.is_some());
         let mut values: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
@@ -326,7 +326,7 @@ impl Plan {
             values.entry(&one.name).or_default().insert(&one.value);
         }
         let several = values.into_iter().filter(|(_, values)| values.len() > 1);
-        // of as many values the torque's amplitude
+        // of several with as many values the torque's amplitude
         let most = several.max_by_key(|(name, values)| (values.len(), *name == NAMING[2]));
         most.map(|(name, _)| name).filter(|_| !self.is_random())
     }
@@ -338,8 +338,8 @@ impl Plan {
         most.map(|vary| vary.name.as_str()).filter(|_| !self.is_random())
     }
 
-    /// Writes values that have a unit (`50 mm`) as numbers in the FMU's own; what cannot be read stays, for
-    /// [`Plan::cases`] to refuse.
+    /// Converts values with a unit (`50 mm`) to numbers in the FMU's unit. Unreadable values stay, and [`Plan::cases`]
+    /// refuses them.
     pub fn convert_units(&mut self, description: &ModelDescription) {
         let convert = |name: &str, text: &mut String| {
             let variable = description.variable(name).ok();
@@ -409,7 +409,7 @@ impl Plan {
         let mut torques = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut cases = Vec::with_capacity(count);
-        // what was recorded stands before what is simulated of the same run
+        // a recording comes before the simulations of the same run
         for run in &self.listed {
             let Some(recording) = &run.recording else { continue };
             let case = self.case(description, &input, &mut torques, &mut problems, &run.values);
@@ -485,7 +485,7 @@ impl Plan {
             settings.push((name.clone(), value.clone()));
         }
 
-        // a file is read once, however many runs it drives
+        // a file is read once for all runs that use it
         let key = format!("{written:?}");
         if !torques.contains_key(&key) {
             let hash = written
@@ -503,7 +503,7 @@ impl Plan {
             let item = description.items(variable).iter().find(|i| i.value.to_string() == text);
             Some(item.map_or(text, |item| item.name.clone()))
         };
-        // a table of modes knows of no dimensions
+        // a table of modes has no dimensions
         let from_table = value("slosh.source").as_deref() == Some("table")
             || value("slosh.source_kind").as_deref() == Some("2");
         for name in ["tank.h", "slosh.zeta"] {
@@ -553,11 +553,12 @@ impl Plan {
         (problems.count() == before).then_some(case)
     }
 
-    /// The run's own name; or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) where
-    /// nothing else is varied; else what is varied, as `d_0.111_amplitude_0.1`. Draws have numbers.
+    /// Returns the run's own name, or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) if
+    /// nothing else is varied. Otherwise the name consists of the varied values, as
+    /// `d_0.111_amplitude_0.1`. Draws have numbers.
     fn name(&self, run: &Listed, case: &Case, draw: usize, taken: &mut BTreeSet<String>) -> String {
         let mut parts = match &run.name {
-            // a named run that is varied further: only that is added
+            // a named run with further variation: only the variation is added
             Some(name) => vec![name.clone()],
             None => Vec::new(),
         };
@@ -581,7 +582,7 @@ impl Plan {
                 for Named { name, value, .. } in values {
                     let name = name.rsplit('.').next().unwrap_or(name);
                     let value = value.split(':').next().unwrap_or(value);
-                    // a word speaks for itself, a number or a truth does not
+                    // a word needs no name of its variable, a number or a Boolean does
                     if value.parse::<f64>().is_ok() || value.parse::<bool>().is_ok() {
                         parts.push(format!("{name}_{value}"));
                     } else {
@@ -599,12 +600,12 @@ impl Plan {
         let plain = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' };
         let mut base: String = parts.join("_").chars().map(plain).collect();
         if base.len() > budget::NAME {
-            // as many letters as fit, and what tells it from others that begin so
+            // as many letters as fit, and a hash to separate names with the same beginning
             let fits = |(i, c): &(usize, char)| i + c.len_utf8() <= budget::NAME - 17;
             let begin: String = base.char_indices().take_while(fits).map(|(_, c)| c).collect();
             base = format!("{begin}_{}", &sha256(base.as_bytes())[..16]);
         }
-        // some file systems do not tell A from a
+        // some file systems do not distinguish A from a
         let mut name = base.clone();
         let mut number = 1;
         while !taken.insert(name.to_lowercase()) {
@@ -615,7 +616,7 @@ impl Plan {
     }
 }
 
-/// Fails unless the FMU has such a parameter or input and could read the value.
+/// Fails unless the FMU has such a parameter or input and can read the value.
 fn settable(
     description: &ModelDescription,
     input: &Option<String>,

@@ -1,8 +1,8 @@
-//! All errors of a plan at once, each with its lines in the file.
+//! Collects all problems of a plan, each with its lines in the file.
 
 use anyhow::{Result, bail};
 
-/// Lines of a file, growing; none where no file says it.
+/// Lines of a file, ascending; empty without a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Lines(Vec<usize>);
 
@@ -12,7 +12,7 @@ impl Lines {
         Lines(vec![line])
     }
 
-    /// These and others.
+    /// Returns both sets of lines.
     pub fn and(&self, other: &Lines) -> Self {
         let mut all = [&self.0[..], &other.0].concat();
         all.sort_unstable();
@@ -20,7 +20,7 @@ impl Lines {
         Lines(all)
     }
 
-    /// To stand in front of what is wrong there.
+    /// Returns the lines as words that begin a message.
     fn words(&self) -> String {
         match &self.0[..] {
             [] => String::new(),
@@ -45,7 +45,7 @@ impl Problems {
         }
     }
 
-    /// Takes the value, or notes what is wrong.
+    /// Returns the value, or records the problem.
     pub fn take<T>(&mut self, lines: &Lines, result: Result<T>) -> Option<T> {
         result.map_err(|error| self.add(lines, format!("{error:#}"))).ok()
     }
@@ -54,7 +54,7 @@ impl Problems {
         self.0.len()
     }
 
-    /// Fails if there are any, in the file's order.
+    /// Fails if there are problems, in the file's order.
     pub fn check(mut self) -> Result<()> {
         self.0.sort_by_key(|(lines, _)| lines.0.first().copied());
         let all: Vec<String> =

@@ -19,8 +19,8 @@ pub(super) struct Draws {
     pub draw: Vec<Named<Distribution>>,
 }
 
-/// Source of a random value; drawn again while outside `min` to `max` and the bounds of the
-/// variable itself.
+/// Source of a random value. Values outside `min` to `max` or the bounds of the variable are drawn
+/// again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Distribution {
     kind: Kind,
@@ -45,7 +45,7 @@ enum Kind {
     },
 }
 
-/// The distributions of a kind.
+/// Distributions of a kind.
 pub(super) struct Family {
     pub name: &'static str,
     pub parameters: [&'static str; 2],
@@ -80,7 +80,7 @@ impl Family {
         },
     ];
 
-    /// The distribution with these parameters and bounds, or what must hold of them.
+    /// Returns the distribution with these parameters and bounds, or the violated condition.
     pub fn distribution(
         &self,
         [a, b]: [f64; 2],
@@ -97,8 +97,8 @@ impl Family {
 }
 
 impl Draws {
-    /// The values of draw `number`. Every draw has its own stream, so that it stays the same
-    /// however many runs there are.
+    /// Returns the values of draw `number`. Every draw has its own stream, so that it does not
+    /// depend on the number of runs.
     pub fn draw(
         &self,
         description: &ModelDescription,
