@@ -5,9 +5,9 @@
 //! zeta_n = f beta_n sqrt(nu/(8 omega_n)),   omega_n^2 = g lambda_n + k_n/m_n
 //! ```
 //!
-//! beta_n, 1/m, is the mode's ratio of wall shear to volume, int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV. omega_n is
-//! the true natural frequency with capillarity, so that zeta stays finite if g vanishes. f accounts for surface film
-//! and contact line: the value of a measured shape, or [`UNMEASURED`] for any other.
+//! The ratio of wall shear to volume is beta_n = int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV, 1/m. The true natural
+//! frequency omega_n includes capillarity, so that zeta stays finite if g vanishes. The factor f accounts for surface
+//! film and contact line: the value of a measured shape, or [`UNMEASURED`] for any other.
 //!
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
 //! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any
@@ -216,8 +216,8 @@ pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
 }
 
 /// Damping ratio of the first mode of an upright cylinder at 10 < Bo < 100, where the contact line dissipates more than
-/// at large Bond numbers. 0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5)) is quoted for drop-tower tests (Salzman, Labus
-/// and Masica, NASA TN D-4132). We could not obtain the report, so the value serves as an upper bound only.
+/// at large Bond numbers. The formula `0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5))` is quoted for drop-tower tests
+/// (Salzman, Labus and Masica, NASA TN D-4132). We could not obtain the report, so the value is only an upper bound.
 pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
     0.83 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + 8.2 * pow(bond, -0.6))
 }
@@ -233,8 +233,8 @@ pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     0.79 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + bottom)
 }
 
-/// Upright cylinder, Stephens, Leonard and Perry (NASA TN D-1367). (5.23/2 pi) sqrt(Re) tanh(1.84
-/// x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x], which is 1.493 times the laminar layer at every depth.
+/// Upright cylinder, Stephens, Leonard and Perry (NASA TN D-1367), 1.493 times the laminar layer at every depth:
+/// `(5.23/2 pi) sqrt(Re) tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]`.
 pub fn stephens(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
     let bracket = 1.0 + if x > 100.0 { 0.0 } else { 2.0 * (1.0 - x) / sinh(3.68 * x) };
@@ -292,8 +292,8 @@ pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
     exp(-f64::min(1.84 * depth / radius, 100.0))
 }
 
-/// Ring baffle in an upright cylinder (Miles 1958): 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2). alpha is the covered
-/// area, eta the `amplitude` of the wave at the wall.
+/// Ring baffle in an upright cylinder (Miles 1958): `2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)`, with the covered
+/// area alpha and the `amplitude` eta of the wave at the wall.
 ///
 /// The ratio grows with the root of the amplitude, so a constant damping ratio holds only at one
 /// amplitude.

@@ -178,8 +178,8 @@ mod tests {
         }
     }
 
-    /// Returns the differences of the quintic's Bernstein coefficients between two points, over h, in the direction of
-    /// the rise: d/5, d/5 + h s/20, the remainder, and the same from the right end.
+    /// Returns the differences of the quintic's Bernstein coefficients between two points, over h. In the direction of
+    /// the rise they are d/5, d/5 + h s/20, the remainder, and the same from the right end.
     fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
         let secant = (y_1 - y_0) / h;
         let sign = if secant < 0.0 { -1.0 } else { 1.0 };

@@ -1,13 +1,13 @@
-//! The first mode in an upright cylinder to third order in its amplitude, without fitted numbers: a
-//! mass m on a paraboloid with a quartic spring, both functions of the fill,
+//! The first mode in an upright cylinder to third order in its amplitude, without fitted numbers. The
+//! model is a mass m on a paraboloid with a quartic spring, both functions of the fill,
 //!
 //! ```text
 //! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + s (q.q')^2/l^2]/2
 //!     + m (g/l) [|q|^2/2 + kappa |q|^4/(8 l^2)]
 //! ```
 //!
-//! The amplitude a l changes omega^2 of a planar motion by the factor 1 + (3 kappa/8 - s/2) a^2, and of a circular
-//! motion by 1 + (kappa/2) a^2. A pendulum has s = kappa = 1. Here s and kappa are chosen so that both shifts are those
+//! The amplitude a l changes omega^2 of a planar motion by the factor 1 + (3 kappa/8 - s/2) a^2. The factor of a circular
+//! motion is 1 + (kappa/2) a^2. A pendulum has s = kappa = 1. Here s and kappa are chosen so that both shifts are those
 //! of potential flow. `harness/tank/src/third_order.rs` derives them and computes them by another method;
 //! tests/physics/liquid.rs compares. The closed form below has R = g = 1, T = xi_1 tanh(xi_1 h) = omega_1^2. It sums
 //! over the modes with azimuthal numbers 0 and 2 that the square of the first mode excites (zero xi, overlap e, t = xi

@@ -8,10 +8,10 @@
 //! Laplace(phi) = 0,   dphi/dn = 0 on the wetted wall,   dphi/dz - s dphi/dx = Lambda phi at z = s x
 //! ```
 //!
-//! so that Lambda makes K - Lambda M singular. K_ij = int_D phi_i (phi_j,z - s phi_j,x) and M_ij = int_D phi_i phi_j,
-//! over the section D of the tank, both at z = s x (by Green's identity; g times the surface element equals that of
-//! gravity along the normal). The modes of the upright tank satisfy the wall condition for every s: phi = J_m(xi r)
-//! cos(m theta) cosh(xi (z + h))/cosh(xi h), xi the zeros of J_m'. Expansion to s^2 and Rayleigh-Schroedinger
+//! so that Lambda makes K - Lambda M singular. By Green's identity `K_ij = int_D phi_i (phi_j,z - s phi_j,x)` and
+//! `M_ij = int_D phi_i phi_j`, over the section D of the tank, both at z = s x. Here g times the surface element equals
+//! that of gravity along the normal. The modes of the upright tank, `J_m(xi r) cos(m theta) cosh(xi (z + h))/cosh(xi h)`
+//! with the zeros xi of J_m', satisfy the wall condition for every s. Expansion to s^2 and Rayleigh-Schroedinger
 //! perturbation of the mode a = xi_n of m = 1 give
 //!
 //! ```text
@@ -73,7 +73,7 @@ const XI_2: [f64; ZEROS] = [
 ];
 
 /// Returns the slope s of the surface up to which [`factors`] gives the frequency of the first mode within 1 % at h/R =
-/// `fill`; half of this slope gives 0.15 %. If the slope reaches h/R, the bottom falls dry.
+/// `fill`. Half of this slope gives 0.15 %. If the slope reaches h/R, the bottom falls dry.
 pub fn largest_slope(fill: f64) -> f64 {
     0.7 * f64::min(fill, 1.0)
 }
@@ -106,8 +106,8 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     ]
 }
 
-/// Returns the factors on omega^2 of mode n at h/R = `fill` for a surface of slope s with unchanged g along the axis:
-/// along the slope and across it.
+/// Returns the factors on omega^2 of mode n at h/R = `fill`, along the slope of the surface and across it. The surface has
+/// the slope s, with unchanged g along the axis.
 ///
 /// The factor is 1 + c s^2. For negative c it is 1/(1 - c s^2), which is equal to second order, more accurate beyond,
 /// and never negative.
@@ -124,7 +124,7 @@ mod tests {
 
     /// Fill h/R, slope, and the change of Lambda relative to the upright tank, of the first mode along the slope and
     /// across it. The values come from finite elements, `hubslosh.liquid_modes` (scikit-fem 12.0.2, gmsh 4.15.2,
-    /// resolution 14), for a cylinder of R = 1 with the fill h cos + sin of the tilt. Two meshes differ by up to 4e-4;
+    /// resolution 14). The cylinder has R = 1 and the fill h cos + sin of the tilt. Two meshes differ by up to 4e-4;
     /// upright they are within 1.4e-4 of tanh.
     const FINITE_ELEMENTS: [(f64, f64, [f64; 2]); 12] = [
         (0.35, 0.0525, [-0.00382, -0.00129]),
