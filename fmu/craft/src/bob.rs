@@ -320,8 +320,8 @@ impl Bob {
         }
     }
 
-    /// Returns coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and p'' = v'
-    /// - w' x p - w x p'.
+    /// Returns coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and p'' =
+    /// v' - w' x p - w x p'.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let turned = add(space::cross::<N>(w_d, &self.p), space::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
@@ -358,8 +358,8 @@ impl Bob {
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// Returns the wrench at a = 0 and w' = 0, with the tension T_0 = m (l |v|^2 - p.(w x (w x P)))
-    /// - k l |p_perp|^2.
+    /// Returns the wrench at a = 0 and w' = 0, with the tension T_0 = m (l |v|^2 - p.(w x (w x
+    /// P))) - k l |p_perp|^2.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));

@@ -56,8 +56,8 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     }
 }
 
-/// Returns the tank (d, h) with liquid of `density` whose first mode has this length and mass. From l and m above, d^4
-/// = 8 xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
+/// Returns the tank (d, h) with liquid of `density` whose first mode has this length and mass. From l and m above,
+/// d^4 = 8 xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
 /// fill, so tanh is limited to 0.995.
 pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     let xi = XI[0];

@@ -1,8 +1,8 @@
 //! Modes of an upright cylinder on a tilted bench. The free surface is tilted, which changes the frequencies
 //! (`formulas::tilt`). Pendulums hang obliquely, which also changes their frequencies.
 //!
-//! The liquid's force on a hub that turns through small angles has the frequency below. s is the tangent of the tilt. n
-//! = sin(beta) is the tangential component of the direction of gravity across the axis at the hub's start angle (e = g
+//! The liquid's force on a hub that turns through small angles has the frequency below. s is the tangent of the tilt.
+//! n = sin(beta) is the tangential component of the direction of gravity across the axis at the hub's start angle (e = g
 //! s (cos beta, sin beta), `hub.rs`):
 //!
 //! ```text

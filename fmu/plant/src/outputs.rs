@@ -59,8 +59,8 @@ pub struct Outputs {
     pub wheel_speed: f64,
     /// Work of tau_actuator and tau_ext on the hub since the start, J.
     pub work: f64,
-    /// Work done on the liquid by changes of g_axial since the start, J: energy - energy(0) = work
-    /// + work_axial - heat.
+    /// Work done on the liquid by changes of g_axial since the start, J: energy - energy(0) =
+    /// work + work_axial - heat.
     pub work_axial: f64,
     /// Energy dissipated in bearing, suspension line and liquid since the start, J.
     pub heat: f64,

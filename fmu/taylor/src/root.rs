@@ -9,8 +9,8 @@ const COARSE_STEPS: usize = 200;
 /// Returns the first t in (0, h] at which the polynomial `a`, positive at t = 0, has
 /// fallen to zero, and `None` if it stays positive. `a` has at most [`ORDER`] + 1 coefficients.
 ///
-/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t + s)
-/// >= f + f' s - M s^2 / 2. The root of that parabola is a step that cannot pass the first zero.
+/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t +
+/// s) >= f + f' s - M s^2 / 2. The root of that parabola is a step that cannot pass the first zero.
 /// The steps converge to it quadratically, like Newton's method.
 ///
 /// M is tight enough if the terms a_n h^n decay, like those of a converged series. If they grow, these steps become too

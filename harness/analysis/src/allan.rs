@@ -12,8 +12,8 @@
 //!
 //! The deviation rises with slope +1/2, has its maximum 0.617 sigma at tau = 1.89 T, and falls with slope −1/2, without
 //! a plateau. The *bias instability* B of data sheets is that of flicker noise, whose Allan deviation is constant at
-//! sqrt(2 ln 2/pi) B = 0.664 B. The FMU's bias has sigma = B/0.664 (thesis 5.5). The maximum is therefore 0.617/0.664 B
-//! = 0.93 B, and B is 0.664/0.617 = 1.076 times the maximum.
+//! sqrt(2 ln 2/pi) B = 0.664 B. The FMU's bias has sigma = B/0.664 (thesis 5.5). The maximum is therefore 0.617/0.664
+//! B = 0.93 B, and B is 0.664/0.617 = 1.076 times the maximum.
 
 /// Flat part of the Allan deviation of flicker noise over B; the FMU's bias has sigma = B/0.664.
 pub const FLICKER: f64 = 0.664;

@@ -6,7 +6,7 @@
 //!   stretch raises;
 //! * in frequency: power in bands of the periodogram;
 //! * cross-correlation with the torque and with its square: a dependence on the input is missing in
-//! the model.
+//!   the model.
 //!
 //! With many rows each test is sensitive to effects of no importance, so the result includes the
 //! size of the excess.

@@ -3,9 +3,9 @@
 //! Three estimators answer different questions, and a fourth is for records that are too short for
 //! them:
 //! * [`demodulation`]: the hub's response while the sweep passes a frequency, like a lock-in
-//! amplifier. It provides `features.csv`.
+//!   amplifier. It provides `features.csv`.
 //! * [`spa`]: MATLAB's Blackman–Tukey estimate over the whole record, as in the thesis. The report
-//! compares it with the first.
+//!   compares it with the first.
 //! * [`welch`]: the H1 estimate from averaged segments, the usual transfer function of two records.
 //! * [`rational`]: a transfer function fitted to the spectra of the whole record.
 

@@ -40,8 +40,8 @@ pub struct Capillary {
 }
 
 /// Computes capillarity for a flat surface (contact angle 90 degrees) with a contact line free to
-/// slide at a vertical wall: omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F (phi_r^2
-/// + phi^2/r^2) r dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2)
+/// slide at a vertical wall: omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F
+/// (phi_r^2 + phi^2/r^2) r dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2)
 /// and boxes, and of first order in the capillary part elsewhere.
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;

@@ -91,8 +91,8 @@ impl Overlaps {
         Overlaps { xi, fourth, amplitude2, excited }
     }
 
-    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at h/R
-    /// = `fill`.
+    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at
+    /// h/R = `fill`.
     pub fn shifts(&self, fill: f64) -> [f64; 2] {
         let t_1 = self.xi * (self.xi * fill).tanh();
         let (omega, k2) = (t_1.sqrt(), self.xi * self.xi);
