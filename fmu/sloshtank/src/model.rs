@@ -122,6 +122,7 @@ impl Parameters {
 /// the tank has the specific force [`START_ACCELERATION`].
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
+    /// Inputs of the tank model.
     pub tank: TankInputs,
     /// The slope of omega, rad/s2.
     pub omega_slope: [f64; 3],
