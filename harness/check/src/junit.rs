@@ -146,7 +146,7 @@ mod tests {
         outcomes[0].findings.fail("a\u{1}b", "<&\"]]>");
         outcomes[1].findings.add("c", "d");
         outcomes[2].findings.skip("e");
-        let report = Report { path: "x.fmu".into(), outcomes, unchecked: None };
+        let report = Report { path: "x.fmu".into(), outcomes, unchecked: None, bug: None };
         let mut out = Vec::new();
         write(&report, &mut out).unwrap();
         let root = Element::parse(&out).unwrap();

@@ -251,6 +251,8 @@ pub struct Report {
     pub outcomes: Vec<Outcome>,
     /// The error that no selected rule was checked, if that is so: such a report says nothing about the FMU.
     pub unchecked: Option<String>,
+    /// Report of a bug of this program for which a rule could not be checked.
+    pub bug: Option<String>,
 }
 
 /// Rules that say why a file cannot be opened as an FMU. If it cannot, those that are broken are in the report even
@@ -378,7 +380,8 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         let place = |outcome: &Outcome| table.iter().position(|rule| rule.id == outcome.rule.id);
         outcomes.sort_by_key(place);
     }
-    Ok(Report { path: path.to_path_buf(), outcomes, unchecked })
+    let bug = so_far.bug.into_inner();
+    Ok(Report { path: path.to_path_buf(), outcomes, unchecked, bug })
 }
 
 /// The error that no rule of `outcomes`, those selected by `only`, was checked.

@@ -135,7 +135,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     ] {
         let place = format!("fmi2Instantiate with {what}");
         let answer =
-            fmu.left_open(&place, findings, || fmu.binary(interface).instantiate_with(&with))?;
+            fmu.left_open(&place, findings, || fmu.binary(interface).instantiate_with(&with));
         expect_null(findings, &place, answer);
     }
     Ok(())
@@ -210,7 +210,7 @@ pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for binary in fmu.binaries() {
         let answers = fmu.left_open("a call with the instance NULL", findings, || {
             binary.calls_with_null_instance()
-        })?;
+        });
         for (call, status) in answers {
             if !matches!(status, Status::Error | Status::Fatal) {
                 findings.add(

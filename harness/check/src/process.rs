@@ -1,8 +1,6 @@
 //! Rules of calls run in a process of their own, guarded by `host::guard`: an FMU that crashes, hangs
-//! or ends the process is a finding. What the process is about to do and what it found go through a
-//! file, because the FMU may write to stdout.
+//! or ends the process is a finding. The process answers what it is about to do and what it found.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,10 +8,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use host::guard::{self, Cause, Limits, Output};
-use host::temporary;
 use host::xml::Element;
 
-use super::trace::{Crash, Line, Trace};
+use super::trace::{self, Answer, Crash};
 use super::under_test::{FmuUnderTest, Unusable};
 use super::{Check, Findings, Options, RULES, Rule, life, v3};
 
@@ -39,6 +36,8 @@ pub struct SoFar {
     hung: AtomicUsize,
     /// Why the binary cannot be loaded by any of them.
     lost: OnceLock<String>,
+    /// Report of a panic of our own code.
+    pub bug: OnceLock<String>,
 }
 
 /// Looks at one rule in a process of its own; `path` is what the FMU is called, `directory` where it
@@ -75,15 +74,13 @@ fn run(
     so_far: &SoFar,
     findings: &mut Findings,
 ) -> Result<bool> {
-    let folder = temporary::Folder::new()?;
-    let answer = folder.path().join("answer");
     let seconds = options.limit.as_secs_f64().to_string();
     let arguments = [
+        guard::OPTION.as_ref(),
         SUBCOMMAND.as_ref(),
         rule.id.as_ref(),
         directory.as_os_str(),
         path.as_os_str(),
-        answer.as_os_str(),
         seconds.as_ref(),
     ];
     let limits = Limits {
@@ -92,17 +89,14 @@ fn run(
         memory: guard::MEMORY,
         file: FILE,
     };
-    let ended = guard::run(&options.program, arguments, &limits, Output::Kept)?;
-    let lines = std::fs::read_to_string(&answer).unwrap_or_default();
     let (mut doing, mut crash) = (LOADING.to_string(), Crash::Error);
     let mut done = None;
-    for line in lines.lines() {
-        match serde_json::from_str(line) {
-            Ok(Line::Doing(what, then)) => (doing, crash) = (what, then),
-            Ok(Line::Done(found)) => done = Some(found),
-            Err(_) => {} // cut off by the crash
-        }
-    }
+    let hear = |answer: &[u8]| match serde_json::from_slice(answer) {
+        Ok(Answer::Doing(what, then)) => (doing, crash) = (what, then),
+        Ok(Answer::Done(found)) => done = Some(found),
+        Err(_) => {} // our own process sends nothing else
+    };
+    let ended = guard::run(&options.program, arguments, &limits, Output::Kept, hear)?;
     let [stdout, stderr] = &ended.printed;
     let last = ended.last_line().map(|line| format!("; it printed {line:?}")).unwrap_or_default();
     let endless = |limit: Duration| {
@@ -122,6 +116,15 @@ fn run(
             let most = limits.memory >> 20;
             let why = "its temporary files or its shared memory take";
             (format!("{why} more than {most} MiB (allowed: less)"), true)
+        }
+        Cause::Interfered => {
+            let why = "it writes to a connection of the host, or closes one";
+            (format!("{why} (allowed: files and connections that the FMU has opened)"), true)
+        }
+        Cause::Panicked(report) => {
+            let report = so_far.bug.get_or_init(|| report.clone());
+            findings.skip(report);
+            return Ok(false);
         }
         Cause::Flood => {
             (format!("it prints more than {} bytes (allowed: nothing)", guard::FLOOD), true)
@@ -166,14 +169,8 @@ fn tell_crash(findings: &mut Findings, doing: String, text: String, crash: Crash
 /// What the process does first.
 const LOADING: &str = "loading the binary";
 
-/// The other side: looks at the rule and writes what it finds to `answer`; it is ended after `limit`.
-pub fn answer(
-    id: &str,
-    directory: &Path,
-    path: &Path,
-    answer: &Path,
-    limit: Duration,
-) -> Result<()> {
+/// The other side: looks at the rule and answers with what it finds; it is ended after `limit`.
+pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Result<()> {
     let is_fmi3 = std::fs::read(directory.join("modelDescription.xml")).is_ok_and(|xml| {
         let version =
             Element::parse(&xml).ok().and_then(|root| root.get("fmiVersion").map(String::from));
@@ -181,8 +178,7 @@ pub fn answer(
     });
     let rules = if is_fmi3 { v3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
-    let trace = Trace(File::create(answer)?);
-    trace.doing(LOADING, Crash::Error);
+    trace::doing(LOADING, Crash::Error);
     let before = life::surroundings();
     let mut findings = Findings::new(rule.severity);
     // a rule that is slow, and not hung, shall tell what it has found by then
@@ -200,7 +196,7 @@ pub fn answer(
         false => findings.skip(format!("it cannot be loaded: {error:#}")),
     };
     match rule.check {
-        Check::Calls(check) => match FmuUnderTest::open(directory, path, trace, deadline) {
+        Check::Calls(check) => match FmuUnderTest::open(directory, path, deadline) {
             Err(error) => lost(error, &mut findings),
             Ok(mut fmu) => {
                 fmu.before = before;
@@ -208,26 +204,58 @@ pub fn answer(
                     failed(error, fmu.now(), &mut findings);
                 }
                 fmu.doing("unloading the binary");
-                let trace = fmu.close();
-                return trace.done(findings);
             }
         },
-        Check::Calls3(check) => {
-            let told = trace.again()?;
-            let tell = Box::new(move |what: &str| told.doing(what, Crash::Error));
-            match v3::Subject::open(directory, path, tell, deadline) {
-                Err(error) => lost(error, &mut findings),
-                Ok(subject) => {
-                    if let Err(error) = check(&subject, &mut findings) {
-                        failed(error, subject.now(), &mut findings);
-                    }
-                    subject.doing("unloading the library");
-                    drop(subject);
-                    return trace.done(findings);
+        Check::Calls3(check) => match v3::Subject::open(directory, path, deadline) {
+            Err(error) => lost(error, &mut findings),
+            Ok(subject) => {
+                if let Err(error) = check(&subject, &mut findings) {
+                    failed(error, subject.now(), &mut findings);
                 }
+                subject.doing("unloading the library");
             }
-        }
+        },
         _ => anyhow::bail!("{id} makes no calls"),
     }
-    Trace(File::options().append(true).open(answer)?).done(findings)
+    trace::done(findings)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+
+    /// Argument by which the test knows that it is the process of the rule. For the test harness it is the name of a test
+    /// that is not there.
+    const CHILD: &str = "process_of_the_rule";
+
+    #[test]
+    fn a_panic_of_our_own_code_is_no_fault_of_the_fmu() {
+        let program = std::env::current_exe().unwrap();
+        if std::env::args().any(|argument| argument == CHILD) {
+            host::bug::keep_panics();
+            guard::enter().unwrap();
+            trace::doing(LOADING, Crash::Error);
+            panic!("row 7 is odd");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let script = folder.path().join("hubslosh");
+        let name = "process::tests::a_panic_of_our_own_code_is_no_fault_of_the_fmu";
+        let text = format!("#!/bin/sh\nexec '{}' --exact {name} {CHILD}\n", program.display());
+        std::fs::write(&script, text).unwrap();
+        std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o700)).unwrap();
+        let limit = Duration::from_secs(60);
+        let options = Options { program: script, only: Vec::new(), limit };
+        let rule = RULES.iter().find(|rule| rule.id == "steps.run").unwrap();
+        let (so_far, mut findings) = (SoFar::default(), Findings::new(rule.severity));
+        let path = Path::new("a.fmu");
+        check(rule, folder.path(), path, &options, &so_far, &mut findings);
+        assert_eq!(findings.list, []);
+        let why = findings.skipped.unwrap();
+        assert!(why.starts_with("this is a bug of hubslosh"), "{why}");
+        assert!(why.contains("row 7 is odd"), "{why}");
+        assert_eq!(so_far.bug.get(), Some(&why));
+        assert_eq!(so_far.lost.get(), None, "the next rules are checked");
+    }
 }

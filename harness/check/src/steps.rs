@@ -83,7 +83,7 @@ pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             fmu.doing(&place);
             session.instance.do_step(time, h)
         } else {
-            fmu.left_open(&place, findings, || session.instance.do_step(time, h))?
+            fmu.left_open(&place, findings, || session.instance.do_step(time, h))
         };
         let is_refused = answer.is_err();
         expect_refusal(findings, place.clone(), answer);
@@ -105,7 +105,7 @@ pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let wrong = session.time + off * session.step;
         let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
         let step = session.step;
-        let answer = fmu.left_open(&place, findings, || session.instance.do_step(wrong, step))?;
+        let answer = fmu.left_open(&place, findings, || session.instance.do_step(wrong, step));
         expect_refusal(findings, place, answer);
     }
     Ok(())
@@ -286,7 +286,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let place = format!("{} = NaN, then a step", v.name);
         let refused = fmu.left_open(&place, findings, || {
             session.set(v, &Reading::Real(f64::NAN)).is_err() || session.go(session.step).is_err()
-        })?;
+        });
         if !refused {
             findings.add(place, "fmi2OK (allowed: fmi2Error and a message)");
         }

@@ -1,10 +1,7 @@
-//! The file through which a rule's process tells what it is about to do and what it found, for the FMU may
-//! write to stdout.
-
-use std::fs::File;
-use std::io::Write;
+//! Answers of a rule's process: what it is about to do and what it found.
 
 use anyhow::Result;
+use host::guard;
 use serde::{Deserialize, Serialize};
 
 use super::Findings;
@@ -20,40 +17,27 @@ pub enum Crash {
     ToldBy(String),
 }
 
-/// One line of the file.
+/// An answer.
 #[derive(Serialize, Deserialize)]
-pub(super) enum Line {
+pub(super) enum Answer {
     /// Announcement of the next call.
     Doing(String, Crash),
-    /// All that was found; the last line.
+    /// All that was found; the last answer.
     Done(Findings),
 }
 
-/// File to which the process writes its progress.
-pub struct Trace(pub(super) File);
+/// Tells what comes next.
+pub fn doing(what: &str, crash: Crash) {
+    // without it, the report of a crash does not name the call
+    let _ = send(&Answer::Doing(what.into(), crash));
+}
 
-impl Trace {
-    fn write(&self, line: &Line) -> Result<()> {
-        let mut text = serde_json::to_string(line)?;
-        text.push('\n');
-        // One call without a buffer: what was written is there when the process crashes.
-        (&self.0).write_all(text.as_bytes())?;
-        Ok(())
-    }
+/// Tells what was found; nothing comes after it.
+pub fn done(findings: Findings) -> Result<()> {
+    send(&Answer::Done(findings))
+}
 
-    /// Another hand on the same file.
-    pub fn again(&self) -> Result<Trace> {
-        Ok(Trace(self.0.try_clone()?))
-    }
-
-    /// Tells what comes next.
-    pub fn doing(&self, what: &str, crash: Crash) {
-        // Without it a crash is told less well; that is all.
-        let _ = self.write(&Line::Doing(what.into(), crash));
-    }
-
-    /// Tells what was found; nothing comes after it.
-    pub fn done(&self, findings: Findings) -> Result<()> {
-        self.write(&Line::Done(findings))
-    }
+fn send(answer: &Answer) -> Result<()> {
+    guard::answer(&serde_json::to_vec(answer)?);
+    Ok(())
 }

@@ -11,7 +11,7 @@ use anyhow::{Result, bail};
 
 use super::Findings;
 use super::description::{Description, Variable};
-use super::trace::{Crash, Trace};
+use super::trace::{self, Crash};
 use host::description::Type;
 use host::fmi2::{
     CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, PLATFORM, Status,
@@ -71,7 +71,6 @@ pub struct FmuUnderTest {
     broken: Option<String>,
     deadline: Instant,
     description: Description,
-    trace: Trace,
     doing: RefCell<String>,
     crash: RefCell<Crash>,
     sessions: Cell<usize>,
@@ -134,12 +133,7 @@ pub struct Experiment {
 impl FmuUnderTest {
     /// Loads the FMU that is unpacked in `directory`.
     /// Makes no instances after `deadline`.
-    pub fn open(
-        directory: &Path,
-        path: &Path,
-        trace: Trace,
-        deadline: Instant,
-    ) -> Result<FmuUnderTest> {
+    pub fn open(directory: &Path, path: &Path, deadline: Instant) -> Result<FmuUnderTest> {
         let xml = std::fs::read(directory.join("modelDescription.xml"))?;
         let description = Description::read(&xml).map_err(anyhow::Error::msg)?;
         let identifier = |interface: &Option<Element>| {
@@ -184,7 +178,6 @@ impl FmuUnderTest {
             broken: broken.filter(|_| is_there),
             deadline,
             description,
-            trace,
             doing: RefCell::default(),
             crash: RefCell::new(Crash::Error),
             sessions: Cell::new(0),
@@ -194,21 +187,16 @@ impl FmuUnderTest {
         })
     }
 
-    /// Unloads it.
-    pub fn close(self) -> Trace {
-        self.trace
-    }
-
     /// Copies the unpacked FMU to `directory` and loads the copy: a library of its own.
     pub fn copy(&self, directory: &Path) -> Result<FmuUnderTest> {
         copy_files(&self.directory, directory)?;
-        FmuUnderTest::open(directory, &self.path, self.trace.again()?, self.deadline)
+        FmuUnderTest::open(directory, &self.path, self.deadline)
     }
 
     /// Tells what comes next: the place of what goes wrong then.
     pub fn doing(&self, what: impl Into<String>) {
         let what = what.into();
-        self.trace.doing(&what, self.crash.borrow().clone());
+        trace::doing(&what, self.crash.borrow().clone());
         *self.doing.borrow_mut() = what;
     }
 
@@ -225,9 +213,9 @@ impl FmuUnderTest {
         what: impl Into<String>,
         findings: &Findings,
         calls: impl FnOnce() -> T,
-    ) -> Result<T> {
+    ) -> T {
         let what = what.into();
-        let (trace, mut found) = (self.trace.again()?, findings.clone());
+        let mut found = findings.clone();
         let place = what.clone();
         let (returned, waiting) = mpsc::channel::<()>();
         std::thread::spawn(move || {
@@ -235,7 +223,7 @@ impl FmuUnderTest {
                 found
                     .add(place, format!("no end after {PATIENCE:?} (allowed: every call returns)"));
                 // if that cannot be written, the time limit tells
-                let _ = trace.done(found);
+                let _ = trace::done(found);
                 std::process::exit(0);
             }
         });
@@ -244,7 +232,7 @@ impl FmuUnderTest {
             calls()
         });
         drop(returned);
-        Ok(answer)
+        answer
     }
 
     fn with_crash<T>(&self, crash: Crash, calls: impl FnOnce() -> T) -> T {

@@ -58,9 +58,9 @@ struct Cli {
     /// Understands the command line, and does nothing: for the tests of examples.
     #[arg(long, hide = true)]
     parse_only: bool,
-    /// Data with which a process that runs FMUs is started.
+    /// This process runs FMUs for another one.
     #[arg(long, hide = true)]
-    guarded: Option<String>,
+    guarded: bool,
     #[command(flatten)]
     terminal: Terminal,
     #[command(subcommand)]
@@ -179,13 +179,22 @@ fn main() -> ExitCode {
         if cli.parse_only {
             return Ok(0);
         }
-        match (&cli.guarded, cli.command.is_none() || cli.fmu().is_some()) {
-            (None, true) => guarded(&cli),
-            (Some(spec), _) => guard::enter(spec).map(|()| carry_out(cli)),
-            (None, false) => Ok(carry_out(cli)),
+        match (cli.guarded, cli.command.is_none() || cli.fmu().is_some()) {
+            (false, true) => guarded(&cli),
+            (true, _) => guard::enter().map(|()| carry_out(cli)),
+            (false, false) => Ok(carry_out(cli)),
         }
     };
-    let code = bug::caught(work).unwrap_or_else(|panic| Err(anyhow!(bug::report(&panic))));
+    let code = match bug::caught(work) {
+        Ok(code) => code,
+        Err(panic) => {
+            let report = bug::report(&panic);
+            if guard::panics(&report) {
+                return ExitCode::FAILURE; // the parent of this guarded process prints the report
+            }
+            Err(anyhow!(report))
+        }
+    };
     let code = code.unwrap_or_else(|error| {
         terminal::error(format_args!("{error:#}"));
         1
@@ -206,7 +215,8 @@ fn guarded(cli: &Cli) -> Result<u8> {
     }
     let limits = cli.limits()?;
     let program = std::env::current_exe().context("this program cannot find itself")?;
-    let outcome = guard::run(&program, std::env::args_os().skip(1), &limits, Output::Shown)?;
+    let arguments = [guard::OPTION.into()].into_iter().chain(std::env::args_os().skip(1));
+    let outcome = guard::run(&program, arguments, &limits, Output::Shown, |_| {})?;
     match outcome.cause {
         Cause::Done(code) => Ok(code),
         Cause::Ended(status) => {
@@ -233,6 +243,11 @@ fn guarded(cli: &Cli) -> Result<u8> {
              gives more)",
             limits.memory >> 20
         ),
+        Cause::Interfered => bail!(
+            "the FMU has written to the connection of the process that runs it, or has closed it \
+             (allowed: files and connections that the FMU has opened)"
+        ),
+        Cause::Panicked(report) => bail!(report),
         Cause::Flood => {
             bail!("the FMU has printed more than {} GiB (allowed: less)", guard::FLOOD_SHOWN >> 30)
         }

@@ -7,17 +7,23 @@
 //! whatever its exit code. It limits its own memory and files when the first binary is loaded, and
 //! keeps stdout and stderr for itself then; what the binary prints goes to the parent.
 //!
+//! The child answers over a connection ([`channel`]). Each message begins with a nonce that the child has read before it
+//! loads a binary. A binary that writes to the connection by mistake, or to look successful, is ended.
+//!
 //! Everything works on Linux; elsewhere on Unix the memory is not limited and processes that leave
 //! the group are not found; on Windows the process itself is ended, and nothing else.
 //!
-//! This is a guard against faults, and no sandbox: whoever is out for harm gets round it.
+//! The guard protects against faults. It is not a sandbox: a malicious binary shares the memory of the child, where it
+//! finds the nonce, and has the rights of the user.
+
+mod channel;
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{PipeReader, Read, Write};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError, Weak};
@@ -27,7 +33,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::temporary;
 
-/// The argument of `hubslosh` that makes it a guarded process, followed by what [`enter`] takes.
+/// The argument of `hubslosh` that makes it a guarded process.
 pub const OPTION: &str = "--guarded";
 /// Time that one call of an FMU may take, unless the user gives more.
 pub const CALL: Duration = Duration::from_secs(8);
@@ -73,6 +79,11 @@ pub enum Cause {
     /// It was ended because its temporary files or its shared memory took more than
     /// [`Limits::memory`].
     Hoard,
+    /// It was ended because something else than its messages came over its connection, or because the connection was
+    /// closed.
+    Interfered,
+    /// Our own code in it has panicked; the report for the user.
+    Panicked(String),
 }
 
 /// Result of a process.
@@ -111,30 +122,38 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// The processes that run now.
 static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 
-/// Runs a program that calls [`enter`], to its end and the end of whatever it started.
+/// Runs a program that calls [`enter`], to its end and the end of whatever it started. `hear` takes what the program
+/// answers.
 pub fn run<A: AsRef<OsStr>>(
     program: &Path,
     arguments: impl IntoIterator<Item = A>,
     limits: &Limits,
     output: Output,
+    hear: impl FnMut(&[u8]),
 ) -> Result<Outcome> {
     let folder = temporary::Folder::new()?;
-    let (told, files) = (folder.path().join("told"), folder.path().join("files"));
+    let files = folder.path().join("files");
     std::fs::create_dir(&files)?;
-    let mut news = News { file: File::create_new(&told).and(File::open(&told))?, text: Vec::new() };
     let (first, first_end) = std::io::pipe()?;
     let (second, second_end) = std::io::pipe()?;
     let mut command = Command::new(program);
-    command.arg(OPTION).arg(Spec { told, limits: limits.clone(), output }.write());
     command.args(arguments).env("TMPDIR", &files).env("TEMP", &files).env("TMP", &files);
-    match output {
-        Output::Kept => command.stdin(Stdio::null()).stdout(first_end).stderr(second_end),
-        // The child puts it in the place of stdout and stderr; to stdin a pipe can be handed everywhere.
+    let pipe = match output {
+        Output::Kept => {
+            command.stdout(first_end).stderr(second_end);
+            None
+        }
+        // the child puts it in the place of stdout and stderr
         Output::Shown => {
             drop(second_end);
-            command.stdin(first_end)
+            Some(first_end)
         }
     };
+    let call = limits.call.as_millis().try_into().unwrap_or(u64::MAX);
+    let request = [call, limits.memory, limits.file];
+    let (channel, stdin) = channel::open(request, pipe, folder.path())?;
+    command.stdin(stdin);
+    let mut news = News::new(channel, hear);
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let shown = output == Output::Shown;
@@ -167,7 +186,7 @@ pub fn run<A: AsRef<OsStr>>(
 /// Waits for the end of a process, or makes it.
 fn watch(
     mut child: Child,
-    news: &mut News,
+    news: &mut News<impl FnMut(&[u8])>,
     started: Instant,
     limits: &Limits,
     files: &Path,
@@ -175,22 +194,25 @@ fn watch(
 ) -> Result<Cause> {
     // a process says four times a second that it lives; one that is stopped does not
     let silence = limits.call.max(Duration::from_secs(3));
-    let (mut heard, mut heard_at, mut done_at) = (0, started, None);
+    let (mut done_at, mut closed_at) = (None, None);
     let mut counted_at = started;
     let mut cause = None;
     let mut pause = Duration::from_millis(1);
     while !has_ended(&mut child)? {
-        news.read();
+        news.read(pause);
+        pause = (pause * 2).min(Duration::from_millis(10));
         let now = Instant::now();
-        if news.text.len() > heard {
-            (heard, heard_at) = (news.text.len(), now);
-        }
-        if news.done().is_some() {
+        if news.done.is_some() {
             // what is left is the end of the program itself
             if now - *done_at.get_or_insert(now) > Duration::from_secs(2) {
                 break;
             }
-        } else if news.text.contains(&ENDLESS) || now - heard_at > silence {
+        } else if news.channel.is_forged
+            || news.channel.is_closed && now - *closed_at.get_or_insert(now) > CLOSED
+        {
+            cause = Some(Cause::Interfered);
+            break;
+        } else if news.is_endless || now - news.heard_at > silence {
             cause = Some(Cause::EndlessCall);
             break;
         } else if limits.total.is_some_and(|total| now - started > total) {
@@ -200,7 +222,7 @@ fn watch(
             cause = Some(Cause::Flood);
             break;
         } else if now - counted_at > COUNTING
-            && let Some(before) = news.loaded()
+            && let Some(before) = news.loaded
         {
             counted_at = now;
             let most = limits.memory;
@@ -209,20 +231,24 @@ fn watch(
                 break;
             }
         }
-        std::thread::sleep(pause);
-        pause = (pause * 2).min(Duration::from_millis(10));
     }
     let id = child.id();
     end(id, &mut child, files);
     let status = child.wait()?;
     lock(&RUNNING).remove(&id);
-    news.read();
-    Ok(match (news.done(), cause) {
-        (Some(code), _) => Cause::Done(code),
-        (None, Some(cause)) => cause,
-        (None, None) => Cause::Ended(status),
-    })
+    while news.read(Duration::from_millis(1)) {}
+    if let Some(code) = news.done {
+        return Ok(Cause::Done(code));
+    }
+    if news.channel.is_forged {
+        return Ok(Cause::Interfered);
+    }
+    let panic = news.panic.take().map(Cause::Panicked);
+    Ok(panic.or(cause).unwrap_or(Cause::Ended(status)))
 }
+
+/// Time from the end of the connection to the end of the process, at most.
+const CLOSED: Duration = Duration::from_secs(1);
 
 /// How often temporary files and shared memory are counted.
 const COUNTING: Duration = Duration::from_millis(50);
@@ -263,7 +289,7 @@ fn on_disk(file: &std::fs::Metadata) -> u64 {
 /// what it has mapped and what it has open.
 #[cfg(target_os = "linux")]
 fn shared(id: u32) -> u64 {
-    let process = PathBuf::from(format!("/proc/{id}"));
+    let process = Path::new("/proc").join(id.to_string());
     let status = std::fs::read_to_string(process.join("status")).unwrap_or_default();
     let mapped = kilobytes(&status, "RssShmem:").unwrap_or(0) << 10;
     let is_hidden = |name: &str| {
@@ -384,36 +410,55 @@ fn kill_descendants(_: &Path) -> bool {
     false
 }
 
-/// What a process tells: a point as long as it lives, [`LOADS`] with the bytes of its temporary files
-/// when it loads the first binary, [`ENDLESS`], at the end [`DONE`] and a code.
-struct News {
-    file: File,
-    text: Vec<u8>,
+/// Messages of a process.
+struct News<F> {
+    channel: channel::Parent,
+    hear: F,
+    heard_at: Instant,
+    /// Bytes of temporary files when the first binary was loaded, if one was.
+    loaded: Option<u64>,
+    is_endless: bool,
+    /// Report of the first panic since the last that was caught.
+    panic: Option<String>,
+    done: Option<u8>,
 }
 
+// The kinds of message, and what they contain.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
+/// The first binary is loaded; the bytes of temporary files.
 const LOADS: u8 = b'+';
-/// The end of the number after [`LOADS`].
-const LOADED: u8 = b';';
+/// An answer for the caller of [`run`].
+const ANSWER: u8 = b'>';
+/// Our code panics; the report.
+const PANICS: u8 = b'?';
+/// Our code has caught its panic.
+const CATCHES: u8 = b'-';
+/// The end; the exit code.
 const DONE: u8 = b'=';
 
-impl News {
-    fn read(&mut self) {
-        let _ = self.file.read_to_end(&mut self.text);
+impl<F: FnMut(&[u8])> News<F> {
+    fn new(channel: channel::Parent, hear: F) -> News<F> {
+        let heard_at = Instant::now();
+        let (loaded, panic, done) = (None, None, None);
+        News { channel, hear, heard_at, loaded, is_endless: false, panic, done }
     }
 
-    /// Bytes of temporary files when the first binary was loaded, if one was.
-    fn loaded(&self) -> Option<u64> {
-        let from = self.text.iter().position(|byte| *byte == LOADS)? + 1;
-        let rest = &self.text[from..];
-        let to = rest.iter().position(|byte| *byte == LOADED)?;
-        std::str::from_utf8(&rest[..to]).ok()?.parse().ok()
-    }
-
-    fn done(&self) -> Option<u8> {
-        let at = self.text.iter().position(|byte| *byte == DONE)?;
-        self.text.get(at + 1).copied()
+    /// Waits for messages for `pause` at most. Returns false if nothing has arrived.
+    fn read(&mut self, pause: Duration) -> bool {
+        let text = |content: &[u8]| String::from_utf8_lossy(content).into_owned();
+        self.channel.read(pause, |kind, content| {
+            self.heard_at = Instant::now();
+            match kind {
+                ENDLESS => self.is_endless = true,
+                LOADS => self.loaded = content.try_into().ok().map(u64::from_le_bytes),
+                ANSWER => (self.hear)(content),
+                PANICS => drop(self.panic.get_or_insert_with(|| text(content))),
+                CATCHES => self.panic = None,
+                DONE => self.done = content.first().copied(),
+                _ => {} // ALIVE
+            }
+        })
     }
 }
 
@@ -449,37 +494,13 @@ fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
     Reader { printed, end }
 }
 
-/// Data that the parent passes to [`enter`].
-struct Spec {
-    told: PathBuf,
-    limits: Limits,
-    output: Output,
-}
-
-impl Spec {
-    fn write(&self) -> String {
-        let Limits { call, memory, file, .. } = self.limits;
-        let shown = u8::from(self.output == Output::Shown);
-        format!("{},{memory},{file},{shown},{}", call.as_millis(), self.told.display())
-    }
-
-    fn read(text: &str) -> Option<Spec> {
-        let mut parts = text.splitn(5, ',');
-        let call = Duration::from_millis(parts.next()?.parse().ok()?);
-        let (memory, file) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
-        let output = if parts.next()? == "1" { Output::Shown } else { Output::Kept };
-        let told = parts.next()?.into();
-        Some(Spec { told, limits: Limits { call, total: None, memory, file }, output })
-    }
-}
-
 // ---------------------------------------------------------------- the child
 
 /// Data of a guarded process.
 struct Guarded {
-    told: File,
-    spec: Spec,
-    /// stdin, stdout and stderr as they were given.
+    channel: channel::Process,
+    limits: Limits,
+    /// The pipe for what the binary prints, and stdout and stderr as they were given.
     #[cfg(unix)]
     streams: Option<[File; 3]>,
 }
@@ -487,35 +508,27 @@ struct Guarded {
 static GUARDED: OnceLock<Guarded> = OnceLock::new();
 
 /// Makes this process the guarded one that [`run`] has started.
-pub fn enter(spec: &str) -> Result<()> {
-    let spec = Spec::read(spec).context("this is for hubslosh alone")?;
-    let told = File::options().append(true).open(&spec.told)?;
+pub fn enter() -> Result<()> {
+    let (channel, [call, memory, file], pipe) =
+        channel::Process::take().context("this is for hubslosh alone")?;
+    let limits = Limits { call: Duration::from_millis(call), total: None, memory, file };
     #[cfg(unix)]
-    let streams = match spec.output {
-        Output::Kept => None,
-        Output::Shown => {
-            use std::os::fd::AsFd;
-            let copy =
-                |stream: std::os::fd::BorrowedFd| stream.try_clone_to_owned().map(File::from);
-            let streams = [
-                copy(std::io::stdin().as_fd())?,
-                copy(std::io::stdout().as_fd())?,
-                copy(std::io::stderr().as_fd())?,
-            ];
-            rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
-            Some(streams)
-        }
+    let streams = match pipe {
+        Some(pipe) => Some([pipe, copy(std::io::stdout())?, copy(std::io::stderr())?]),
+        None => None,
     };
+    #[cfg(not(unix))]
+    let None::<File> = pipe else { bail!("a pipe cannot be handed over here") };
     #[cfg(unix)]
     restrict(rustix::process::Resource::Core, 0);
-    #[cfg(target_os = "linux")]
-    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let guarded = Guarded {
-        told,
-        spec,
+        channel,
+        limits,
         #[cfg(unix)]
         streams,
     };
+    #[cfg(target_os = "linux")]
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     if GUARDED.set(guarded).is_err() {
         bail!("it is guarded already");
     }
@@ -523,15 +536,36 @@ pub fn enter(spec: &str) -> Result<()> {
     Ok(())
 }
 
-fn tell(what: &[u8]) {
+#[cfg(unix)]
+fn copy(stream: impl std::os::fd::AsFd) -> std::io::Result<File> {
+    Ok(stream.as_fd().try_clone_to_owned()?.into())
+}
+
+fn tell(kind: u8, content: &[u8]) {
     if let Some(guarded) = GUARDED.get() {
-        let _ = (&guarded.told).write_all(what);
+        guarded.channel.send(kind, content);
     }
+}
+
+/// Answers the caller of [`run`].
+pub fn answer(content: &[u8]) {
+    tell(ANSWER, content);
 }
 
 /// Tells the parent that all is done, with this exit code. Without a parent it is nothing.
 pub fn done(code: u8) {
-    tell(&[DONE, code]);
+    tell(DONE, &[code]);
+}
+
+/// Reports a panic of our own code to the parent. Returns false if this process is not guarded.
+pub fn panics(report: &str) -> bool {
+    tell(PANICS, report.as_bytes());
+    GUARDED.get().is_some()
+}
+
+/// Takes the report of a panic back.
+pub fn catches() {
+    tell(CATCHES, &[]);
 }
 
 /// stdout and stderr of a guarded process, which a binary does not know.
@@ -556,12 +590,12 @@ fn tell_of_life() {
             };
             let before = known.iter().find(|(k, n, _)| k.ptr_eq(calls) && *n == count);
             let since = before.map_or(now, |(.., since)| *since);
-            if count % 2 == 1 && now - since > guarded.spec.limits.call {
-                return tell(&[ENDLESS]);
+            if count % 2 == 1 && now - since > guarded.limits.call {
+                return tell(ENDLESS, &[]);
             }
             seen.push((calls.clone(), count, since));
         }
-        tell(&[ALIVE]);
+        tell(ALIVE, &[]);
         std::thread::sleep(Duration::from_millis(250));
     }
 }
@@ -606,12 +640,11 @@ pub(crate) fn before_loading() {
     static ONCE: Once = Once::new();
     let Some(guarded) = GUARDED.get() else { return };
     ONCE.call_once(|| {
-        let there = stored(&std::env::temp_dir()).to_string();
-        tell(&[&[LOADS], there.as_bytes(), &[LOADED]].concat());
+        tell(LOADS, &stored(&std::env::temp_dir()).to_le_bytes());
         #[cfg(target_os = "linux")]
         {
             use rustix::process::Resource;
-            let memory = guarded.spec.limits.memory;
+            let memory = guarded.limits.memory;
             restrict(Resource::Data, in_use("VmData:").saturating_add(memory));
             // What is shared does not count as data. Each thread reserves more than it uses.
             let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
@@ -620,7 +653,7 @@ pub(crate) fn before_loading() {
         }
         #[cfg(unix)]
         {
-            restrict(rustix::process::Resource::Fsize, guarded.spec.limits.file);
+            restrict(rustix::process::Resource::Fsize, guarded.limits.file);
             if let Some([pipe, ..]) = &guarded.streams {
                 let _ = std::io::stdout().flush();
                 let _ = rustix::stdio::dup2_stdout(pipe);

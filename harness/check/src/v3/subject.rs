@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 
 use super::{Description, Variable};
+use crate::trace::{self, Crash};
 use crate::under_test::Unusable;
 use host::c_abi::Called;
 use host::description::{Type, Value};
@@ -28,7 +29,6 @@ pub struct Subject {
     binaries: Vec<(Interface, Fmu)>,
     /// Model description of the FMU.
     pub description: Description,
-    tell: Box<dyn Fn(&str)>,
     doing: RefCell<String>,
     deadline: Instant,
 }
@@ -72,14 +72,9 @@ impl Use {
 }
 
 impl Subject {
-    /// Loads the FMU that is unpacked in `directory`, for each interface that rules call. `tell` hears what comes
-    /// next. Makes no instances after `deadline`.
-    pub fn open(
-        directory: &Path,
-        path: &Path,
-        tell: Box<dyn Fn(&str)>,
-        deadline: Instant,
-    ) -> Result<Subject> {
+    /// Loads the FMU that is unpacked in `directory`, for each interface that rules call. Makes
+    /// no instances after `deadline`.
+    pub fn open(directory: &Path, path: &Path, deadline: Instant) -> Result<Subject> {
         let xml = std::fs::read(directory.join("modelDescription.xml"))?;
         let description = Description::new(Element::parse(&xml).map_err(anyhow::Error::msg)?);
         let mut binaries = Vec::new();
@@ -94,13 +89,13 @@ impl Subject {
             bail!("it offers neither Co-Simulation nor Model Exchange, which alone are called");
         }
         let doing = RefCell::default();
-        Ok(Subject { binaries, description, tell, doing, deadline })
+        Ok(Subject { binaries, description, doing, deadline })
     }
 
     /// Tells what comes next: the place of what goes wrong then.
     pub fn doing(&self, what: impl Into<String>) {
         let what = what.into();
-        (self.tell)(&what);
+        trace::doing(&what, Crash::Error);
         *self.doing.borrow_mut() = what;
     }
 

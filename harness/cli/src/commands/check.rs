@@ -59,7 +59,6 @@ pub struct CheckCallsArgs {
     rule: String,
     directory: PathBuf,
     fmu: PathBuf,
-    answer: PathBuf,
     limit: f64,
 }
 
@@ -103,6 +102,9 @@ impl CheckArgs {
         if let warnings @ 1.. = report.count(Severity::Warning) {
             terminal::warn(format_args!("{} draws {warnings} warnings", fmu.display()));
         }
+        if let Some(bug) = report.bug {
+            bail!(bug);
+        }
         if let Some(why) = report.unchecked {
             return Err(Unchecked(format!("{}: {why}", fmu.display())).into());
         }
@@ -117,6 +119,6 @@ impl CheckCallsArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let limit = Duration::try_from_secs_f64(self.limit).context("no time limit")?;
-        process::answer(&self.rule, &self.directory, &self.fmu, &self.answer, limit)
+        process::answer(&self.rule, &self.directory, &self.fmu, limit)
     }
 }

@@ -17,13 +17,41 @@
 #undef fmi2DoStep
 #undef fmi2GetReal
 
-enum { EXIT = 1, ABORT, CRASH, LOOP, SLEEP, MEMORY, SHARED, STACK, DISK, PRINT, CHILDREN, STOP, FLUSH, NONE, FILES, UNLINKED, MEMFD, SHM };
+enum { EXIT = 1, ABORT, CRASH, LOOP, SLEEP, MEMORY, SHARED, STACK, DISK, PRINT, CHILDREN, STOP, FLUSH, NONE, FILES, UNLINKED, MEMFD, SHM, FORGE };
 
 static int deeper(int n)
 {
     volatile char page[4096];
     page[n % 4096] = (char)n;
     return n < 0 ? 0 : deeper(n + 1) + page[0];
+}
+
+/* Answers of a run that is done and of a rule that finds nothing, as a process with another connection would write them. */
+static void forge(int file)
+{
+    static const char text[] = "{\"Done\":{\"severity\":\"Error\",\"list\":[],\"more\":0,\"skipped\":null,\"told_by\":null}}\n";
+    static const char run[] = "=\0";
+    write(file, text, sizeof text - 1);
+    write(file, run, sizeof run - 1);
+}
+
+/* Writes answers to each path on the command line, except for the FMU, and to each open file. */
+static void forge_all(void)
+{
+    static char line[1 << 16];
+    int file = open("/proc/self/cmdline", O_RDONLY);
+    ssize_t length = read(file, line, sizeof line - 1);
+    close(file);
+    for (char *at = line; at < line + length; at += strlen(at) + 1) {
+        char *path = strchr(at, '/');
+        if (path && !strstr(path, ".fmu") && (file = open(path, O_WRONLY | O_APPEND)) >= 0) {
+            forge(file);
+            close(file);
+        }
+    }
+    for (file = 3; file < 100; file++)
+        if (fcntl(file, F_GETFD) >= 0)
+            forge(file);
 }
 
 static void harm(void)
@@ -76,6 +104,9 @@ static void harm(void)
                     pause();
             }
         exit(0);
+    case FORGE:
+        forge_all();
+        _exit(0);
     case STOP:
         raise(SIGSTOP);
         break;

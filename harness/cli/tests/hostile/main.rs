@@ -372,6 +372,23 @@ fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says
 }
 
 #[test]
+fn a_forged_answer_is_not_believed() {
+    const FORGE: u32 = 19;
+    let sandbox = Sandbox::new();
+    for when in ["AT_LOAD", "AT_STEP"] {
+        std::fs::write(sandbox.path("a.fmu"), harmful(FORGE, when)).unwrap();
+        let run = ["run", "--profile", "zero", "--stop", "0.1", "--fmu", "a.fmu", "--out", "a.csv"];
+        let said = sandbox.fails(&run);
+        assert!(said.contains("the FMU has written to the connection"), "{when}: {said}");
+        let only = if when == "AT_LOAD" { "load.opens" } else { "steps.run" };
+        let output = sandbox.hubslosh(&["check", "a.fmu", "--only", only]);
+        let report = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{when}: {report}");
+        assert!(report.contains("it writes to a connection of the host"), "{when}: {report}");
+    }
+}
+
+#[test]
 fn temporary_files_and_shared_memory_count_against_the_budget() {
     const FIRST: u32 = 15;
     let sandbox = Sandbox::new();
