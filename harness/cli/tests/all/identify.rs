@@ -61,6 +61,27 @@ fn what_was_identified_is_fed_back_to_a_run() {
 }
 
 #[test]
+fn one_unknown_all_unknowns_at_bounds_and_no_input_are_answered() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, "data.csv", &["hub.I=0.5"]);
+    let asked = |command: &str, free: &str, more: &[&str]| {
+        let asked = [command, "data.csv", "--free", free, "--outputs", "omega"];
+        let asked = [&asked[..], &["--exchange", "--set", "slosh.model=frozen"], more].concat();
+        hubslosh(folder, &asked).unwrap()
+    };
+    let fitted = ["--inputs", "tau_cmd", "--tries", "0", "--out", "result.json"];
+    let said = asked("identify", "hub.I=0.55:0.3:2", &fitted);
+    let row = said.lines().find(|line| line.starts_with("hub.I ")).unwrap();
+    let value: f64 = row.split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!((value - 0.5).abs() < 0.01, "{said}");
+    let said = asked("identify", "hub.I=0.1:0.1:0.12", &fitted);
+    assert!(said.contains("hub.I is at its upper bound, 0.12"), "{said}");
+    let said = asked("design", "hub.I=0.5", &["--noise", "omega=1e-4"]);
+    assert!(said.contains("Nothing will be known of hub.I from these inputs"), "{said}");
+}
+
+#[test]
 fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
