@@ -418,7 +418,7 @@ fn a_browser_hovers_zooms_and_switches_what_it_shows() {
     let directory = tempfile::tempdir().unwrap();
     let report = directory.path().join("report.html");
     std::fs::write(&report, &TEN.0).unwrap();
-    let script = pack::root().join("harness/python/check_report.py");
+    let script = pack::root().join(".ci/check_report.py");
     let done = Command::new(python).arg(script).arg(&report).output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
 }

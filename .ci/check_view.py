@@ -275,7 +275,7 @@ CASES = (
 
 def in_sphere(binary: Path, folder: Path) -> Case:
     """Return a run of a sphere filled to 0.14 m, by the modes that the tank solver finds."""
-    tank = Path(__file__).parents[1] / "tank/examples/sphere.toml"
+    tank = Path(__file__).parents[1] / "harness/tank/examples/sphere.toml"
     file, fill, radius, density = folder / "sphere.toml", 0.14, 0.3, 1004.0
     command = [binary, "tank", tank, "--fill", str(fill), "--modes", "2", "--parameters", file]
     subprocess.run([*command, "--model", "SloshTank"], check=True, stdout=subprocess.DEVNULL)

@@ -1,6 +1,6 @@
 """Installs a wheel of this package as a user does, where no Rust is, and uses all of it.
 
-    python3 harness/python/check_wheel.py dist/hubslosh-….whl [--find-links FOLDER]
+    python3 .ci/check_wheel.py dist/hubslosh-….whl [--find-links FOLDER]
 
 In a new virtual environment, with nothing on PATH but it and the system's own programs: how long
 until the first plot; ``import hubslosh``; the command ``hubslosh`` with its FMUs beside it (run,
@@ -20,7 +20,7 @@ import tempfile
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 
 IMPORT = 0.2
 """s of CPU time for ``import hubslosh``."""
