@@ -4,8 +4,8 @@ Makes five runs: a sweep with rotary slosh, four modes of the liquid, a slew in 
 tanks, a tank that drains, a sphere. Of each, at three instants, the bobs that are drawn are read
 back and compared with where the table's numbers put them; so is the wave at the wall, with the
 FMU's wave_height, too. The surface has to move the liquid's centre of mass as far as the pendulums
-do. Contrast and the rest of WCAG 2 AA are axe-core's to judge. Leaves fifteen screenshots and a
-film.
+do. Contrast and the rest of WCAG 2 AA are axe-core's to judge. A unit of the FMU that looks like
+markup is shown as text. Leaves fifteen screenshots and a film.
 
 Needs Playwright (``requirements-browser.txt``), Debian's Chromium and ffmpeg; ``.ci/browser`` gets
 them.
@@ -13,6 +13,7 @@ them.
 
 import argparse
 import csv
+import html
 import itertools
 import json
 import math
@@ -21,6 +22,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -460,6 +462,31 @@ def film(binary: Path, run: Path, fmu: Path, out: Path) -> str:
     return f"film: {len(frames)} frames of 1280 x 720, {out.stat().st_size} bytes"
 
 
+def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str:
+    """Show a run whose FMU has a unit that opens a comment and a script; the page shows it as text.
+
+    A browser that reads both as markup does not see the end of the page's data: nothing is drawn.
+    """
+    unit, hostile = "<!--<script>rad/s", folder / "hostile_unit.fmu"
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(hostile, "w") as out:
+        for name in source.namelist():
+            data = source.read(name)
+            if name == "modelDescription.xml":
+                assert b'"rad/s"' in data
+                data = data.replace(b'"rad/s"', f'"{html.escape(unit)}"'.encode())
+            out.writestr(name, data)
+    run, file = hostile.with_suffix(".parquet"), hostile.with_suffix(".html")
+    of = ["--fmu", hostile, "--out"]
+    drive = ["--profile", "sine:duration=10", "--columns", "theta,omega,slosh_angle"]
+    subprocess.run([binary, "run", *drive, *of, run], check=True)
+    subprocess.run([binary, "view", run, *of, file], check=True)
+    page = opened(browser, file, *VIEWS[0])
+    shown = page.evaluate("document.body.innerText")
+    page.close()
+    assert unit in shown, f"the page does not show the unit {unit}"
+    return f"the unit {unit} of a hostile FMU is shown as text"
+
+
 def main() -> None:
     """Check all cases; exit with 1 and a sentence if one is not drawn as its table says."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
@@ -505,11 +532,11 @@ def main() -> None:
                 f"{case.name}: at {times} s bobs and waves are within {worst[0]:.1e} m of the "
                 f"table, liquid moved by the surface within {worst[1]:.1e} of that by the pendulums"
             )
+        hub = arguments.fmus / "HubSlosh.fmu"
+        print(hostile_unit(browser, arguments.binary, hub, arguments.out))
         browser.close()
     sweep = arguments.out / "sweep.parquet"
-    print(
-        film(arguments.binary, sweep, arguments.fmus / "HubSlosh.fmu", arguments.out / "film.mp4")
-    )
+    print(film(arguments.binary, sweep, hub, arguments.out / "film.mp4"))
 
 
 if __name__ == "__main__":
