@@ -252,6 +252,31 @@ fn what_is_foreseen_is_refused_where_the_solver_decides_and_is_the_stated_uncert
     }
 }
 
+/// Model Exchange has no slopes, so the host's solver turned a spacecraft without its wheels' torque. That passed for an error of
+/// its own solver, which decided every estimate of a flight with wheels.
+#[test]
+fn the_slope_of_the_wheels_momentum_is_no_error_of_the_solver() {
+    let fmu = pack::packed_model_for_tests(&pack::MODELS[1]);
+    let model = Model::open(fmu, Solver::Own).unwrap();
+    let time: Vec<f64> = (0..200).map(|row| 0.1 * f64::from(row)).collect();
+    // N.m.s: to and fro
+    let momentum = time.iter().map(|t| 5.0 * (1.0 - (0.5 * t).cos())).collect();
+    let record = Record {
+        outputs: vec![vec![0.0; time.len()]],
+        inputs: vec![momentum],
+        time,
+        ..Record::default()
+    };
+    let question = Question {
+        free: vec!["craft.Jzz=640:200:2500".parse().unwrap()],
+        inputs: vec!["h_wheels[3]".into()],
+        outputs: vec!["omega[3]".into()],
+        ..question(Solver::Own)
+    };
+    let bounds = foresee(&model, &question, &[record], &[1e-5]).unwrap();
+    assert!(!bounds[0].decided_by_solver && bounds[0].std > 0.0, "{bounds:?}");
+}
+
 fn with_free(free: &[&str], solver: Solver) -> Question {
     Question { free: free.iter().map(|text| text.parse().unwrap()).collect(), ..question(solver) }
 }
