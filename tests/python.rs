@@ -1,4 +1,4 @@
-//! The FMU in Python's hands: runs the tests of `harness/python` with pytest,
+//! The FMU in Python's hands: runs the tests of `harness/python`, the studies' short forms and the examples with pytest,
 //! in a virtual environment of their own in the target directory.
 
 use std::path::Path;
@@ -30,13 +30,7 @@ fn pytest(arguments: &mut Command, sentence: &str) {
 }
 
 /// Tests of `harness/python` that need no wheel, enough of them to run beside the others, which would otherwise be one long test.
-const BESIDE: [&str; 5] = [
-    "test_analysis.py",
-    "test_cluster.py",
-    "test_liquid.py",
-    "test_measured.py",
-    "test_model_exchange.py",
-];
+const BESIDE: [&str; 2] = ["test_liquid.py", "test_model_exchange.py"];
 
 /// pytest with what the package's tests are given: FMU and command.
 fn of_the_package() -> Command {
@@ -63,12 +57,18 @@ fn fmpy_drives_the_fmu_as_the_harness_does() {
 }
 
 #[test]
-fn the_package_analyses_runs_liquids_and_recordings() {
+fn the_package_finds_modes_of_liquids_and_drives_model_exchange() {
     let tests = pack::root().join("harness/python/tests");
     pytest(
         of_the_package().args(BESIDE.map(|file| tests.join(file))),
         "the tests in Python failed",
     );
+}
+
+#[test]
+fn the_studies_compute_the_numbers_of_the_book() {
+    MODELS.each_ref().map(pack::packed_model_for_tests);
+    pytest(of_the_package().arg(pack::root().join("harness/studies")), "a study failed");
 }
 
 #[test]

@@ -2,8 +2,8 @@
 
 As a program: ``python3 environment.py DIRECTORY REQUIREMENTS`` prints the interpreter's path.
 
-``requirements*.in`` say what the scripts here ask for. ``requirements*.txt`` follow from them: all
-packages with version and SHA-256, those for other systems and Pythons too, so that an index
+``requirements*.in`` say what the project's scripts ask for. ``requirements*.txt`` follow from them:
+all packages with version and SHA-256, those for other systems and Pythons too, so that an index
 cannot hand out anything else. After a change of the former run the command that stands in the
 first lines of the latter (PyPI's uv), from the project's root.
 """
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NoReturn
 
 OLDEST = (3, 11)
-"""Oldest Python that the scripts here run on."""
+"""Oldest Python that the project's scripts run on."""
 
 
 def target() -> Path:
@@ -43,7 +43,7 @@ def ensure(directory: Path, requirements: Path, *, hashes: bool = True) -> Path:
 
 
 def run_again_in(name: str, missing: ModuleNotFoundError) -> NoReturn:
-    """Run the script that is running again, in the environment of ``requirements-<name>.txt``.
+    """Run this program again, in the environment of the ``requirements-<name>.txt`` next to it.
 
     ``missing`` is what it could not import; where it is in that environment already, the
     environment is damaged, and the script ends with that.
@@ -51,7 +51,7 @@ def run_again_in(name: str, missing: ModuleNotFoundError) -> NoReturn:
     here = target() / "python" / name
     if Path(sys.prefix) == here:
         sys.exit(f"error: {here} is damaged ({missing}); delete it and try again")
-    python = ensure(here, Path(__file__).with_name(f"requirements-{name}.txt"))
+    python = ensure(here, Path(sys.argv[0]).with_name(f"requirements-{name}.txt"))
     sys.exit(subprocess.run([python, *sys.argv]).returncode)
 
 

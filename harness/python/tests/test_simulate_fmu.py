@@ -81,7 +81,7 @@ def test_held_input_is_what_the_harness_holds(fmu: Path) -> None:
 
 
 def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
-    """Runs example.py.
+    """Runs harness/hosts/fmpy_example.py.
 
     Held values are late by half a step: ωH/2 = 0.15 of the torque. Taken half a step early, what
     is left is of second order: (ωH)²/24 = 0.004 of the torque's fundamental is missing, and
@@ -99,7 +99,7 @@ def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
 def test_fmpy_still_allots_nine_derivatives(fmu: Path) -> None:
     """With fmpy 0.3.32, its latest, ``set_input_derivatives`` needs exactly nine inputs.
 
-    When this fails, fmpy has been repaired: drop the fixture `repaired`, and let example.py
+    When this fails, fmpy has been repaired: drop the fixture `repaired`, and let fmpy_example.py
     and README say ``set_input_derivatives=True``.
     """
     with pytest.raises(ValueError, match="same size"):
@@ -136,7 +136,7 @@ def test_wrong_start_values_stop_the_simulation(fmu: Path) -> None:
 
 def test_the_example_runs(fmu: Path) -> None:
     """It is what the documentation shows."""
-    example = Path(__file__).resolve().parents[1] / "example.py"
+    example = Path(__file__).resolve().parents[2] / "hosts" / "fmpy_example.py"
     done = subprocess.run(
         [sys.executable, str(example), str(fmu)], capture_output=True, text=True, check=False
     )

@@ -1,6 +1,6 @@
 """Hold models of the liquid, damping that grows with amplitude, and seeds against a bench.
 
-    python3 harness/python/bench_damping.py [--jobs N] [--out FILE.csv]
+    PYTHONPATH=harness/python python3 harness/studies/bench_damping.py [--jobs N] [--out FILE.csv]
 
 needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt. Sine
 sweeps of 1.25 to 3.5 Hz in 2700 s, both fills of the bench, by

@@ -1,6 +1,6 @@
 """Draw what rotary slosh does to the bench: book/rotary.svg, the picture in README.
 
-    python3 harness/python/rotary_branch.py
+    PYTHONPATH=harness/python python3 harness/studies/rotary_branch.py
 
 needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt. One
 sine sweep of 0.2 N·m, 1.25 to 3.5 Hz in 2700 s, through the linear and the spherical model; seconds
@@ -164,14 +164,14 @@ def picture(frequency: np.ndarray, linear: pd.DataFrame, spherical: pd.DataFrame
     return f"{opening}<style>{STYLE}</style>{background}{''.join(parts)}</svg>\n"
 
 
-def main() -> None:
+def draw() -> str:
     """Simulate and draw."""
     time = np.arange(round(DURATION / STEP) + 1) * STEP
     frequency, torque = sweep(time)
     inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
-    PICTURE.write_text(picture(frequency, drive("linear", inputs), drive("spherical", inputs)))
-    print(f"wrote {PICTURE}")
+    return picture(frequency, drive("linear", inputs), drive("spherical", inputs))
 
 
 if __name__ == "__main__":
-    main()
+    PICTURE.write_text(draw(), encoding="utf-8")
+    print(f"wrote {PICTURE}")

@@ -1,6 +1,6 @@
 """Draws the work-precision diagram: error over the thesis's sweep against cost.
 
-    python3 harness/python/work_precision.py
+    PYTHONPATH=harness/python python3 harness/studies/work_precision.py
 
 needs Rust, dist/HubSlosh.fmu (``cargo run --release -- pack``), Python 3.11 or newer and, for
 the instruction counts, valgrind; the first run makes a virtual environment in the target
@@ -60,8 +60,8 @@ SCIPY = {"SciPy RK45": ("RK45", [1e-4, 1e-6]), "SciPy LSODA": ("LSODA", [1e-5, 1
 
 
 def build() -> Path:
-    """Build the Rust side and return its program."""
-    command = ["cargo", "build", "--release", "-p", "experiments", "--example", "work_precision"]
+    """Build the Rust side and return its program; not by ``-p``, which compiles most again."""
+    command = ["cargo", "build", "--release", "--workspace", "--example", "work_precision"]
     done = subprocess.run(
         [*command, "--message-format=json"], cwd=ROOT, stdout=subprocess.PIPE, text=True
     )
@@ -249,7 +249,7 @@ def main() -> None:
     page = [
         "# Work and precision",
         "",
-        "<!-- Written by harness/python/work_precision.py. -->",
+        "<!-- Written by harness/studies/work_precision.py. -->",
         "",
         *(__doc__ or "").split("\n\n")[3].splitlines(),
         "",
@@ -279,7 +279,7 @@ def main() -> None:
         "| --- | --- | --- |",
         *(f"| {step} | {error:.1e} | {cost:.1f} |" for step, cost, error in basilisk()),
         "",
-        "Made by `python3 harness/python/work_precision.py`.",
+        "Made by `PYTHONPATH=harness/python python3 harness/studies/work_precision.py`.",
         "",
     ]
     (PAGES / "work_precision.md").write_text("\n".join(page))

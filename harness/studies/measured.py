@@ -1,6 +1,6 @@
 """Holds the models against published measurements: book/measured.md and its pictures.
 
-    python3 harness/python/measured.py
+    PYTHONPATH=harness/python python3 harness/studies/measured.py
 
 needs dist/HubSlosh.fmu and dist/SloshTank.fmu (``cargo run --release -- pack``, the second with
 ``--model SloshTank``), the program ``hubslosh`` and the packages in requirements.txt. Two minutes.
@@ -799,7 +799,7 @@ FIELDS = ("experiment", "quantity", "kind", "unit", "measured", "error", "ours",
 def write_results(rows: list[Row]) -> None:
     """Keep the comparisons."""
     with RESULTS.open("w", newline="", encoding="utf-8") as file:
-        file.write("# Written by harness/python/measured.py.\n")
+        file.write("# Written by harness/studies/measured.py.\n")
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(FIELDS)
         for row in rows:

@@ -1,6 +1,6 @@
 """Compares Spacecraft.fmu with Basilisk's spacecraft in six degrees of freedom and writes a page.
 
-    python3 harness/python/basilisk_six.py
+    PYTHONPATH=harness/python python3 harness/studies/basilisk_six.py
 
 needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft --out
 dist/Spacecraft.fmu``) and Python 3.11 or newer; the first run makes a virtual environment in the
@@ -304,7 +304,7 @@ def cost_table(fmu: Path, exact: Signals) -> list[str]:
 def page(cases: list[str], cost: list[str], worst: float) -> str:
     """Return the page."""
     return "\n".join([
-        "<!-- Written by harness/python/basilisk_six.py; do not edit. -->",
+        "<!-- Written by harness/studies/basilisk_six.py; do not edit. -->",
         "# Comparison with Basilisk",
         "",
         f"Basilisk {version('bsk')} (AVS Lab, University of Colorado) has a spacecraft in six",
@@ -313,7 +313,7 @@ def page(cases: list[str], cost: list[str], worst: float) -> str:
         "20 s. Made with",
         "",
         "    cargo run --release -- pack --model Spacecraft --out dist/Spacecraft.fmu",
-        "    python3 harness/python/basilisk_six.py",
+        "    PYTHONPATH=harness/python python3 harness/studies/basilisk_six.py",
         "",
         f"which fails, and leaves this page alone, if a difference is larger than {ALLOWED:.0e}.",
         "",

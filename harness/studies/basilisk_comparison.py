@@ -1,6 +1,6 @@
 """Compares the spherical model with Basilisk's ``sphericalPendulum`` and writes a page about it.
 
-    python3 harness/python/basilisk_comparison.py
+    PYTHONPATH=harness/python python3 harness/studies/basilisk_comparison.py
 
 needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and Python 3.11 or newer; the first run
 makes a virtual environment in the target directory and needs the network. It takes minutes.
@@ -338,7 +338,7 @@ def page(
     far, very = ulp["release far"], ulp["very far"]
     described = "\n".join(f"* *{name}*: {start.text}." for name, start in starts(1.0).items())
     return "\n".join([
-        "<!-- Written by harness/python/basilisk_comparison.py; do not edit. -->",
+        "<!-- Written by harness/studies/basilisk_comparison.py; do not edit. -->",
         "# Comparison with Basilisk: the spherical model",
         "",
         f"Basilisk {version('bsk')} (AVS Lab, University of Colorado) has a spherical pendulum for",
@@ -348,7 +348,7 @@ def page(
         "undamped, near rest and far from it. Made with",
         "",
         "    cargo run --release -- pack",
-        "    python3 harness/python/basilisk_comparison.py",
+        "    PYTHONPATH=harness/python python3 harness/studies/basilisk_comparison.py",
         "",
         f"which fails, and leaves this page alone, if a difference is larger than {ALLOWED:.0e}.",
         "",

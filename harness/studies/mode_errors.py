@@ -1,6 +1,6 @@
 """Draw the force's error against the number of modes: book/mode_errors.svg.
 
-    python3 harness/python/mode_errors.py
+    PYTHONPATH=harness/python python3 harness/studies/mode_errors.py
 
 needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt.
 Figure 4.4 of Rubaga's thesis, for the bench's two fills, and beside it the error within the band
@@ -16,16 +16,17 @@ import hubslosh
 from hubslosh import plot
 
 ROOT = Path(__file__).resolve().parents[2]
+FMU = ROOT / "dist" / "HubSlosh.fmu"
 PICTURE = ROOT / "book" / "mode_errors.svg"
 BELOW = 3.5  # Hz, the end of the sweeps
 
 
-def main() -> None:
-    """Compute and draw."""
+def draw(picture: Path) -> None:
+    """Compute, print and draw."""
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")
     for fill, color in ((0.1, plot.COLORS[0]), (0.05, plot.COLORS[1])):
-        errors = hubslosh.mode_errors({"tank.h": fill}, BELOW, ROOT / "dist" / "HubSlosh.fmu")
+        errors = hubslosh.mode_errors({"tank.h": fill}, BELOW, FMU)
         fewer = errors.iloc[:-1]
         label = f"{100 * fill:g} cm"
         axes.semilogy(
@@ -48,9 +49,9 @@ def main() -> None:
     axes.set_title("What fewer modes cost: much after an impulse, little in a band")
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=9)
-    figure.savefig(PICTURE, metadata={"Date": None, "Creator": None})
-    print(f"wrote {PICTURE}")
+    figure.savefig(picture, metadata={"Date": None, "Creator": None})
+    print(f"wrote {picture}")
 
 
 if __name__ == "__main__":
-    main()
+    draw(PICTURE)

@@ -1,6 +1,6 @@
 """Draw how tilt changes the slosh frequencies of an upright cylinder: book/tilted_tank.svg.
 
-    python3 harness/python/tilted_tank.py
+    PYTHONPATH=harness/python python3 harness/studies/tilted_tank.py
 
 needs the packages in requirements.txt (``pip install 'hubslosh[fem,plot]'``). Three fills, each at
 eleven angles between the tank's axis and gravity; a minute of work.

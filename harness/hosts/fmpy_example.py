@@ -1,6 +1,6 @@
 """A minute of torque near the slosh frequency through fmpy's own loop.
 
-As a program: ``python example.py dist/HubSlosh.fmu``.
+As a program: ``python harness/hosts/fmpy_example.py dist/HubSlosh.fmu``.
 """
 
 import sys

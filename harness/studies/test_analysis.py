@@ -29,12 +29,11 @@ analyse = functools.cache(check_analysis.analyse)
 
 
 @pytest.fixture(scope="module")
-def campaign(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Path:
+def campaign(program: Path, fmu: Path, tmp_path_factory) -> Path:
     """Return the directory of a campaign of four short sweeps."""
     directory = tmp_path_factory.mktemp("analysis")
     (directory / "plan.toml").write_text(PLAN, encoding="utf-8")
-    binary = request.config.getoption("--hubslosh").absolute()
-    command = [binary, "campaign", "--plan", "plan.toml", "--fmu", fmu, "--out", "out"]
+    command = [program, "campaign", "--plan", "plan.toml", "--fmu", fmu, "--out", "out"]
     done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return directory / "out"

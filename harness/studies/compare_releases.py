@@ -1,6 +1,7 @@
 """Compares the motion of two builds of HubSlosh.fmu: the newest release and the present one.
 
-    python3 harness/python/compare_releases.py [--before FMU] [--now FMU] [--short]
+    export PYTHONPATH=harness/python
+    python3 harness/studies/compare_releases.py [--before FMU] [--now FMU] [--short]
 
 needs dist/HubSlosh.fmu and the library for runs in one call (``cargo run --release -- pack``,
 ``cargo build --release -p hubslosh-batch``) and Python 3.11 or newer; the first run makes a
@@ -34,6 +35,7 @@ except ModuleNotFoundError as missing:
     environment.run_again_in("cluster", missing)
 
 ROOT = Path(__file__).resolve().parents[2]
+RELEASE = next((ROOT / "dist/release").glob("HubSlosh-*[0-9].fmu"))
 STEP = 0.02  # s
 TOLERANCE = 1e-8
 ALLOWED = 1e-13
@@ -106,7 +108,7 @@ def sensitivity(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: 
 def main() -> int:
     """Compare, print a table in Markdown, return 1 if something is too far apart."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--before", type=Path, default=ROOT / "dist/release/HubSlosh-0.5.0.fmu")
+    parser.add_argument("--before", type=Path, default=RELEASE)
     parser.add_argument("--now", type=Path, default=ROOT / "dist/HubSlosh.fmu")
     parser.add_argument("--short", action="store_true", help="sweeps of 300 s")
     given = parser.parse_args()

@@ -1,6 +1,7 @@
 """Makes a plan's runs twice and says how far the tables differ: by the harness, and by Dask.
 
-    python3 harness/python/cluster_comparison.py --plan monte_carlo --workers 2
+    export PYTHONPATH=harness/python
+    python3 harness/studies/cluster_comparison.py --plan monte_carlo --workers 2
 
 The Dask workers host the FMU through fmpy; as soon as there is a run, one of them is killed in
 the middle of another. Compared are all columns of features.csv, features_spa.csv and runs.csv and

@@ -1,6 +1,6 @@
 """The cost of one fmi2DoStep of HubSlosh in instructions, as a table in Markdown.
 
-    python3 harness/step_cost/table.py dist/HubSlosh.fmu FOLDER_WITH_fmi2Functions.h
+    python3 harness/studies/step_cost.py dist/HubSlosh.fmu FOLDER_WITH_fmi2Functions.h
 
 Compiles step_cost.c, which says how it counts, and runs it for slosh models, modes, friction laws
 and communication steps. Linux, x86-64 or another processor that its kernel can step.
@@ -36,7 +36,7 @@ def main() -> None:
         root = ElementTree.parse(Path(folder, "modelDescription.xml")).getroot()
         references = {v.get("name"): v.get("valueReference") for v in root.iter("ScalarVariable")}
         program = Path(folder, "step_cost")
-        source = Path(__file__).with_name("step_cost.c")
+        source = Path(__file__).with_suffix(".c")
         options = ["-std=gnu11", "-O2", "-Wall", "-Wextra", "-I", headers]
         subprocess.run(["cc", *options, source, "-ldl", "-lm", "-o", program], check=True)
         library = Path(folder, "binaries", "linux64", "HubSlosh.so")

@@ -1,6 +1,6 @@
 """Draw what a thrust reversal does to the liquid of Spacecraft: book/ball.svg.
 
-    python3 harness/python/reversal.py
+    PYTHONPATH=harness/python python3 harness/studies/reversal.py
 
 needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft``) and the packages in
 requirements.txt. The default craft, 1180 kg with 382 kg of liquid in a half-full upright cylinder
@@ -18,6 +18,7 @@ import hubslosh
 from hubslosh import plot
 
 ROOT = Path(__file__).resolve().parents[2]
+FMU = ROOT / "dist" / "Spacecraft.fmu"
 PICTURE = ROOT / "book" / "ball.svg"
 DRY, BACK, FORWARD = 1180.0, -11.8, 60.0  # kg, N, N
 REVERSED, RESUMED, END = 10.0, 50.0, 100.0  # s
@@ -37,12 +38,11 @@ def simulate() -> pd.DataFrame:
     # Off the axis by 0.2 % forwards, so that the liquid does not come back in the middle.
     along = [FORWARD, FORWARD, BACK, BACK, FORWARD, FORWARD]
     inputs = pd.DataFrame({"time": times, "force[3]": along, "force[1]": 0.002 * np.abs(along)})
-    fmu = ROOT / "dist" / "Spacecraft.fmu"
-    return hubslosh.simulate(fmu, PARAMETERS, inputs, step=0.1, outputs=OUTPUTS, tolerance=1e-8)
+    return hubslosh.simulate(FMU, PARAMETERS, inputs, step=0.1, outputs=OUTPUTS, tolerance=1e-8)
 
 
-def main() -> None:
-    """Compute and draw."""
+def draw(picture: Path) -> None:
+    """Compute, print and draw."""
     run = simulate()
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     figure, axes = plt.subplots(3, figsize=(7.2, 7.2), sharex=True, layout="constrained")
@@ -67,15 +67,15 @@ def main() -> None:
     axes[2].set_ylabel("J")
     axes[2].set_xlabel("time, s")
     axes[2].legend(loc="upper left", fontsize=9)
-    figure.savefig(PICTURE, metadata={"Date": None, "Creator": None})
+    figure.savefig(picture, metadata={"Date": None, "Creator": None})
     changes = run[state.diff() != 0]
     print(changes[["time", "tank[1].ball.state", "dissipated"]].to_string(index=False))
     flying = run[(state == 2) & (time < RESUMED)]
     speed = flying["tank[1].ball.velocity[3]"].max()
     print(f"fastest {speed:.4f} m/s, {381.704 * speed:.1f} N·s")
     print(f"energy balance {np.ptp(gone - run['dissipated']):.1e} J")
-    print(f"wrote {PICTURE}")
+    print(f"wrote {picture}")
 
 
 if __name__ == "__main__":
-    main()
+    draw(PICTURE)

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import option
 from distributed import Client
 
 import cluster
@@ -37,13 +36,13 @@ def client() -> Iterator[Client]:
 
 
 @pytest.fixture
-def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path):
+def harness(program: Path, fmu: Path, tmp_path: Path):
     """Return a function that makes a `cluster.Harness` of a plan's text and a directory's name."""
 
     def make(plan: str, out: str) -> cluster.Harness:
         path = tmp_path / "plan.toml"
         path.write_text(plan)
-        return cluster.Harness(option(request, "--hubslosh"), fmu, str(path), tmp_path / out)
+        return cluster.Harness(program, fmu, str(path), tmp_path / out)
 
     return make
 

@@ -1,7 +1,7 @@
 """Makes the runs of a campaign's plan on a Dask cluster, with fmpy as the FMU's host.
 
-    python3 harness/python/cluster.py --plan monte_carlo --workers 4
-    python3 harness/python/cluster.py --plan mine.toml --scheduler tcp://head:8786
+    PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan monte_carlo --workers 4
+    PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan mine.toml --scheduler tcp://head:8786
 
 needs dist/HubSlosh.fmu and the program hubslosh (``cargo run --release -- pack`` makes both) and
 Python 3.11 or newer; the first start makes a virtual environment in the target directory and

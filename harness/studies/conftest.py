@@ -1,0 +1,50 @@
+"""Fixtures of the studies' short forms: packed FMUs and the program.
+
+    for model in HubSlosh Spacecraft SloshTank; do
+        cargo run --release -- pack --model $model --out dist/$model.fmu
+    done
+    pytest -c harness/python/pyproject.toml harness/studies
+
+``cargo test --release`` runs them with the FMUs that it packs.
+"""
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+NUMBER = re.compile(r"-?\d+\.?\d*")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Say where the FMUs and the program are."""
+    exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
+    parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
+    parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
+
+
+@pytest.fixture(scope="session")
+def fmu(request: pytest.FixtureRequest) -> Path:
+    """Return HubSlosh.fmu; Spacecraft.fmu and SloshTank.fmu are in the same folder."""
+    path: Path = request.config.getoption("--fmu").absolute()
+    return path
+
+
+@pytest.fixture(scope="session", autouse=True)
+def program(request: pytest.FixtureRequest) -> Path:
+    """Return the program, which the package finds from here on."""
+    path: Path = request.config.getoption("--hubslosh").absolute()
+    os.environ["HUBSLOSH"] = os.fspath(path)
+    return path
+
+
+def same_picture(drawing: str, committed: Path) -> None:
+    """Compare a drawing with the book's: the same text, places to 0.2 px."""
+    texts = (drawing, committed.read_text(encoding="utf-8"))
+    assert NUMBER.sub("0", texts[0]) == NUMBER.sub("0", texts[1])
+    places = [np.array(NUMBER.findall(text), float) for text in texts]
+    np.testing.assert_allclose(*places, atol=0.2)

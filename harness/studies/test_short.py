@@ -1,0 +1,180 @@
+"""Short forms of the studies: the book's numbers and pictures are those that the studies compute.
+
+Studies that run as a whole within seconds have their own files: `test_measured`, `test_cluster`,
+`test_analysis`.
+"""
+
+import os
+import re
+import shutil
+import sys
+from decimal import Decimal
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.random import default_rng
+
+import bench_damping
+import compare_releases
+import flight_twin
+import identify_twins
+import mode_errors
+import reversal
+import rotary_branch
+import tilted_tank
+import work_precision
+from conftest import ROOT, same_picture
+
+BOOK = ROOT / "book"
+
+
+def lines(page: str) -> list[str]:
+    """Return the lines of a page of the book."""
+    return (BOOK / page).read_text(encoding="utf-8").splitlines()
+
+
+def cells(page: str, first: str) -> list[str]:
+    """Return the cells of the page's only table row that begins with ``first``, without those."""
+    (row,) = (line for line in lines(page) if line.startswith(f"| {first} |"))
+    return [cell.strip() for cell in row.removeprefix(f"| {first} |").strip("| ").split("|")]
+
+
+def half_digit(text: str) -> float:
+    """Return half a unit of the last digit of a number."""
+    return 0.5 * 10.0 ** Decimal(text).as_tuple().exponent
+
+
+@pytest.fixture(autouse=True)
+def style() -> None:
+    """Undo what studies set of matplotlib."""
+    plt.rcdefaults()
+
+
+def test_rotary_slosh_of_the_readme(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The picture of two sweeps of 2700 s."""
+    monkeypatch.setattr(rotary_branch, "FMU", fmu)
+    same_picture(rotary_branch.draw(), rotary_branch.PICTURE)
+
+
+@pytest.mark.parametrize(("study", "model"), [(mode_errors, "HubSlosh"), (reversal, "Spacecraft")])
+def test_a_picture_of_the_book(
+    study, model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`mode_errors` and `reversal`, whole."""
+    monkeypatch.setattr(study, "FMU", fmu.with_name(f"{model}.fmu"))
+    study.draw(tmp_path / "picture.svg")
+    same_picture((tmp_path / "picture.svg").read_text(encoding="utf-8"), study.PICTURE)
+
+
+def test_tilt_slows_slosh_along_the_slope() -> None:
+    """The three changes at 60 degrees of book/liquid.md, to their printed digits.
+
+    One tilt of the study's eleven.
+    """
+    text = " ".join(lines("liquid.md"))
+    shallow = re.search(r"here it is −([\d.]+) % for a liquid that is half a radius deep", text)
+    deeper = re.search(r"and −(\d+) to −(\d+) % for deeper ones", text)
+    upright, tilted = (
+        np.array([tilted_tank.frequencies(depth, tilt)[0] for depth in tilted_tank.DEPTHS])
+        for tilt in (0, 60)
+    )
+    change = -100 * (tilted / upright - 1)
+    assert change[0] == pytest.approx(float(shallow[1]), abs=0.05)
+    assert change[1:] == pytest.approx([float(deeper[1]), float(deeper[2])], abs=0.5)
+
+
+@pytest.mark.parametrize("case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "tilt")])
+def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two of the 78 rows of book/damping.md, in all printed digits."""
+    monkeypatch.setattr(bench_damping, "FMU", fmu)
+    table = bench_damping.text(pd.DataFrame([bench_damping.case(case)])).splitlines()
+    (row,) = (line for line in table if line.startswith(f"| {case[0]} |"))
+    page = lines("damping.md")
+    # the rows of 5 cm stand before those of 10 cm
+    start = page.index(next(line for line in page if line.startswith("| 10 cm: model")))
+    assert row in (page[:start] if case[2] == 0.05 else page[start:])
+
+
+def test_the_motion_is_that_of_the_last_release(
+    fmu: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Every model and friction law of 0.1.0 for 300 s, and sweeps of 300 s.
+
+    The 2700 s and release 0.1.0 are by hand.
+    """
+    monkeypatch.setattr(sys, "argv", ["", "--short", "--now", os.fspath(fmu)])
+    assert compare_releases.main() == 0, capsys.readouterr().out
+
+
+@pytest.mark.parametrize("model", ["linear", "spherical"])
+def test_errors_of_work_and_precision(
+    model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The FMU's errors over 2700 s at two tolerances, in the printed digits.
+
+    Costs depend on the machine; other methods and instructions are by hand.
+    """
+    program = work_precision.build()
+    (tmp_path / "dist").mkdir()
+    shutil.copy(fmu, tmp_path / "dist" / "HubSlosh.fmu")
+    monkeypatch.setattr(work_precision, "ROOT", tmp_path)
+    seconds, exact = str(work_precision.SWEEP), str(tmp_path / "exact.f64")
+    work_precision.run(program, model, "1e-13", seconds, "1", "--write", exact)
+    for tolerance in ("1e-4", "1e-8"):
+        _, error = work_precision.run(program, model, tolerance, seconds, "1", exact)
+        printed = cells("work_precision.md", f"HubSlosh, {model} | {tolerance}")[0]
+        assert error == pytest.approx(float(printed), abs=1.01 * half_digit(printed))
+
+
+def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
+    """Seed 1 with the good gyro, all rows of the table in book/flight.md.
+
+    Beyond the printed digits estimates may differ by 0.1 of their standard deviations, and these by
+    5 %: far below what decides an interval.
+    """
+    spacecraft = os.fspath(fmu.with_name("Spacecraft.fmu"))
+    truth, found, _ = flight_twin.twin(1, "good", os.fspath(program), spacecraft, tmp_path)
+    assert found["fits"] and found["converged"]
+    page = lines("flight.md")
+    start = page.index("| | truth | good gyro | MEMS gyro |") + 2
+    rows = page[start : page.index("", start)]
+    assert len(rows) == 8
+    for row in rows:
+        head, true, good = (cell.strip() for cell in row.split("|")[1:4])
+        name = head.split("`")[1]
+        value, std = good.split(" ± ")
+        estimate = found["parameters"][name]
+        assert truth[name] == pytest.approx(float(true), abs=half_digit(true))
+        slack = half_digit(std) + 0.05 * float(std)
+        assert estimate["std"] == pytest.approx(float(std), abs=slack)
+        slack = half_digit(value) + 0.1 * float(std)
+        assert estimate["value"] == pytest.approx(float(value), abs=slack)
+
+
+def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -> None:
+    """Five twins of HubSlosh in book/any_fmu.md: 17 of 20 intervals hold the truth.
+
+    Chance makes 17 or more of 20 of 95 % in 98 of 100 cases; seeds are fixed. Stated deviations
+    are within a factor of two of the page's medians: inertia and friction are drawn within 30 %.
+    """
+    case = identify_twins.CASES["Hub"]
+    case.fmu = os.fspath(fmu)
+    page = BOOK.joinpath("any_fmu.md").read_text(encoding="utf-8")
+    inside, stated = 0, {}
+    for seed in range(1, 6):
+        twin = case.make(default_rng(seed))
+        found = identify_twins.run(case, twin, os.fspath(program), os.fspath(tmp_path))
+        assert found["fits"] and found["converged"]
+        for unknown, e in (found["parameters"] | found["measurement"]).items():
+            low, high = e["interval"]
+            inside += low <= twin.truth[unknown] <= high
+            stated.setdefault(unknown, []).append(e["std"])
+    assert inside >= 17
+    section = page[page.index("| HubSlosh, stick and slip") :]
+    for unknown, deviations in stated.items():
+        row = next(line for line in section.splitlines() if f"`{unknown}`" in line)
+        median = float(row.strip("| ").split("|")[-1])
+        assert 0.5 < np.median(deviations) / median < 2
