@@ -4,12 +4,11 @@
 //! with it: an array is the row of its elements, by rows, as long as its structural parameters say at present. An
 //! element that is beyond keeps its start value.
 
-use super::{Fmi3, time_reference, type_of};
+use super::references::{scalar_reference, time_reference, type_of};
 use crate::call::CType;
 use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Dimension, Value, Variable};
-use crate::version::Version;
 
 /// The scalars behind each variable, at the present sizes.
 #[derive(Clone, Debug, Default)]
@@ -40,7 +39,7 @@ impl Arrays {
                 let is_there = is_within(variable, element, &lengths);
                 if is_there {
                     place += 1;
-                    arrays.scalars.push(Fmi3::reference(scalar));
+                    arrays.scalars.push(scalar_reference(scalar));
                     if matches!(scalar.access, Access::Derivative(_)) {
                         arrays.states.push(first + element - first_derivative::<M>());
                     }

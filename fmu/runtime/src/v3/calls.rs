@@ -1,0 +1,137 @@
+//! The functions of FMI 3.0 with the states in which each may be called, and what differs from FMI 2.0.
+
+use super::host::Host;
+use super::references::{scalar_reference, type_of, wrong_reference};
+use crate::call::states::*;
+use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
+use crate::model::Model;
+use crate::table::{Layout, Scalar};
+use crate::version::Version;
+
+pub(super) const fn both(name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed)
+}
+
+pub(super) const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed).of(c_type)
+}
+
+/// Restricts a call to Co-Simulation.
+const fn cs(call: Call) -> Call {
+    call.only_in(Interface::CoSimulation)
+}
+
+/// Restricts a call to Model Exchange.
+const fn me(call: Call) -> Call {
+    call.only_in(Interface::ModelExchange)
+}
+
+/// In which states values are got and set.
+pub(super) const GET: u16 = ANY;
+pub(super) const SET: u16 = I | M | S | E | C;
+
+/// The functions that one operation of an instance has several of, and those that are the C interface's own.
+#[allow(missing_docs)]
+#[rustfmt::skip]
+mod list {
+    use super::*;
+    pub static SET_DEBUG_LOGGING:   Call = both("fmi3SetDebugLogging", ANY | CONFIGURATION);
+    pub static GET_FLOAT64:         Call = of(CType::Real, "fmi3GetFloat64", GET | INTERMEDIATE);
+    pub static GET_INT32:           Call = of(CType::Integer, "fmi3GetInt32", GET);
+    pub static GET_INT64:           Call = of(CType::Enumeration, "fmi3GetInt64", GET);
+    pub static GET_BOOLEAN:         Call = of(CType::Boolean, "fmi3GetBoolean", GET);
+    pub static SET_FLOAT64:         Call = of(CType::Real, "fmi3SetFloat64", SET | INTERMEDIATE);
+    pub static SET_INT32:           Call = of(CType::Integer, "fmi3SetInt32", SET);
+    pub static SET_INT64:           Call = of(CType::Enumeration, "fmi3SetInt64", SET);
+    pub static SET_BOOLEAN:         Call = of(CType::Boolean, "fmi3SetBoolean", SET);
+    pub static GET_UINT64:          Call = of(CType::Size, "fmi3GetUInt64", GET | CONFIGURATION);
+    pub static SET_UINT64:          Call = of(CType::Size, "fmi3SetUInt64", SET | CONFIGURATION);
+    // The same where there is a structural parameter, which is an integer in the table.
+    pub static GET_SIZE:            Call = of(CType::Integer, "fmi3GetUInt64", GET | CONFIGURATION);
+    pub static SET_SIZE:            Call = of(CType::Integer, "fmi3SetUInt64", CONFIGURATION);
+    pub static NUMBER_OF_DEPENDENCIES: Call = of(CType::Real, "fmi3GetNumberOfVariableDependencies", ANY);
+    pub static DEPENDENCIES:        Call = of(CType::Real, "fmi3GetVariableDependencies", ANY);
+    pub static GET_STATE:           Call = both("fmi3GetFMUState", ANY);
+    pub static FREE_STATE:          Call = both("fmi3FreeFMUState", ANY | CONFIGURATION | FATAL);
+    pub static SERIALIZED_SIZE:     Call = both("fmi3SerializedFMUStateSize", ANY);
+    pub static SERIALIZE:           Call = both("fmi3SerializeFMUState", ANY);
+    pub static DESERIALIZE:         Call = both("fmi3DeserializeFMUState", ANY);
+    pub static ADJOINT_DERIVATIVE:  Call = both("fmi3GetAdjointDerivative", M | RUN);
+    pub static ENTER_CONFIGURATION: Call = both("fmi3EnterConfigurationMode", I);
+    pub static EXIT_CONFIGURATION:  Call = both("fmi3ExitConfigurationMode", CONFIGURATION);
+    pub static EVALUATE_DISCRETE_STATES: Call = both("fmi3EvaluateDiscreteStates", M | E);
+    // The standard has the two numbers in fewer states; fmusim 0.8 asks in continuous-time mode.
+    pub static NUMBER_OF_INDICATORS: Call = me(both("fmi3GetNumberOfEventIndicators", ANY | CONFIGURATION));
+    pub static NUMBER_OF_STATES:    Call = me(both("fmi3GetNumberOfContinuousStates", ANY | CONFIGURATION));
+    pub static ENTER_STEP:          Call = cs(both("fmi3EnterStepMode", E));
+}
+pub use list::*;
+
+/// FMI 3.0
+#[derive(Clone, Copy, Debug)]
+pub struct Fmi3;
+
+#[rustfmt::skip]
+impl Version for Fmi3 {
+    const PREFIX: &'static str = "fmi3";
+
+    type Host<M: Model> = Host<M>;
+
+    const AFTER_ERROR: Option<InstanceState> = Some(InstanceState::Terminated);
+    const OUT_OF_RANGE: Severity = Severity::Discard;
+    const FIRST_EVENT: InstanceState = InstanceState::Event;
+    const SETS_STATES: bool = true;
+
+    // There is no such function: what it tells is told with initialization.
+    const SETUP_EXPERIMENT:       &'static Call = &both("fmi3EnterInitializationMode", I);
+    const ENTER_INITIALIZATION:   &'static Call = &both("fmi3EnterInitializationMode", I);
+    const EXIT_INITIALIZATION:    &'static Call = &both("fmi3ExitInitializationMode", M);
+    const TERMINATE:              &'static Call = &both("fmi3Terminate", S | E | C);
+    const RESET:                  &'static Call = &both("fmi3Reset", ANY | CONFIGURATION);
+    const SET_STATE:              &'static Call = &both("fmi3SetFMUState", ANY);
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &of(CType::Real, "fmi3GetDirectionalDerivative", M | RUN);
+
+    // Inputs have slopes by intermediate update.
+    const SET_INPUT_DERIVATIVES:  &'static Call = &cs(of(CType::Real, "fmi3SetFloat64", INTERMEDIATE));
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(of(CType::Real, "fmi3GetOutputDerivatives", S | T | INTERMEDIATE));
+    const DO_STEP:                &'static Call = &cs(both("fmi3DoStep", S));
+
+    const ENTER_EVENT:            &'static Call = &both("fmi3EnterEventMode", S | C);
+    const NEW_DISCRETE_STATES:    &'static Call = &both("fmi3UpdateDiscreteStates", E);
+    const ENTER_CONTINUOUS_TIME:  &'static Call = &me(both("fmi3EnterContinuousTimeMode", E));
+    const COMPLETED_STEP:         &'static Call = &me(both("fmi3CompletedIntegratorStep", C));
+    const SET_TIME:               &'static Call = &me(both("fmi3SetTime", C));
+    const SET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi3SetContinuousStates", C));
+    const GET_DERIVATIVES:        &'static Call = &me(both("fmi3GetContinuousStateDerivatives", M | E | C | T));
+    const GET_EVENT_INDICATORS:   &'static Call = &me(both("fmi3GetEventIndicators", M | E | C | T));
+    const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi3GetContinuousStates", M | E | C | T));
+    const GET_NOMINALS:           &'static Call = &me(both("fmi3GetNominalsOfContinuousStates", ANY));
+
+    fn token<M: Model>(layout: Layout) -> &'static str {
+        M::table().token(layout)
+    }
+
+    fn events(interface: Interface) -> Events {
+        match interface {
+            Interface::ModelExchange => Events::ByHost,
+            Interface::CoSimulation => Events::InStep,
+        }
+    }
+
+    fn allows(interface: Interface, events: Events) -> bool {
+        let reported = interface == Interface::CoSimulation && events == Events::Reported;
+        reported || events == Self::events(interface)
+    }
+
+    fn reference<M: Model>(scalar: &Scalar<M>) -> u32 {
+        scalar_reference(scalar)
+    }
+
+    #[inline]
+    fn scalar<M: Model>(reference: u32, c_type: Option<CType>) -> Result<&'static Scalar<M>, String> {
+        match M::table().scalars.get(reference.wrapping_sub(1) as usize) {
+            Some(scalar) if c_type == Some(type_of(scalar)) => Ok(scalar),
+            other => Err(wrong_reference(reference, other, c_type)),
+        }
+    }
+}

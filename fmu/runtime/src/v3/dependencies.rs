@@ -1,0 +1,114 @@
+//! Dependencies of variables on each other.
+
+#![allow(unsafe_code)]
+
+use super::calls::*;
+use super::elements::wrong_variable;
+use super::references::wrong_reference;
+use super::types::*;
+use crate::c_abi::{Component, array_mut, on, place};
+use crate::call::{Call, Fault};
+use crate::model::Model;
+use crate::variable::Causality;
+
+/// Dependency of one element of a variable on an element of another.
+struct Dependency {
+    element: usize,
+    independent: fmi3ValueReference,
+    independent_element: usize,
+}
+
+/// Dependencies of a variable.
+fn dependencies<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+) -> Result<Vec<Dependency>, Fault> {
+    let Component { instance, host, .. } = component;
+    let scalars = match &host.arrays {
+        None => std::slice::from_ref(&reference),
+        Some(arrays) => arrays
+            .of(reference)
+            .ok_or_else(|| call.error(wrong_variable::<M>(arrays, reference)))?,
+    };
+    let mut all = Vec::new();
+    for (scalar, element) in scalars.iter().zip(1..) {
+        let found = M::table().scalars.get(scalar.wrapping_sub(1) as usize);
+        let wrong = || call.error(wrong_reference::<M>(*scalar, found, None));
+        let scalar = found.ok_or_else(wrong)?;
+        if matches!(scalar.variable.causality, Causality::Input | Causality::Parameter) {
+            let name = scalar.name();
+            return Err(
+                call.error(format_args!("{name} is set by the host and depends on nothing"))
+            );
+        }
+        for known in instance.dependencies(call, scalar)? {
+            let place = match &host.arrays {
+                None => Some((known, 1)),
+                Some(arrays) => arrays.place(known),
+            };
+            let of = |(independent, independent_element)| Dependency {
+                element,
+                independent,
+                independent_element,
+            };
+            all.extend(place.map(of));
+        }
+    }
+    Ok(all)
+}
+
+/// Number of dependencies of a variable.
+pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
+    instance: fmi3Instance,
+    valueReference: fmi3ValueReference,
+    nDependencies: *mut usize,
+) -> fmi3Status {
+    let call = &NUMBER_OF_DEPENDENCIES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let count = place(call, "nDependencies", nDependencies)?;
+            *count = dependencies(component, call, valueReference)?.len();
+            Ok(())
+        })
+    }
+}
+
+/// Dependencies of a variable: initial ones before the end of initialization mode, then the present ones.
+pub unsafe fn fmi3GetVariableDependencies<M: Model>(
+    instance: fmi3Instance,
+    dependent: fmi3ValueReference,
+    elementIndicesOfDependent: *mut usize,
+    independents: *mut fmi3ValueReference,
+    elementIndicesOfIndependents: *mut usize,
+    dependencyKinds: *mut fmi3DependencyKind,
+    nDependencies: usize,
+) -> fmi3Status {
+    let call = &DEPENDENCIES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let all = dependencies(component, call, dependent)?;
+            if all.len() != nDependencies {
+                return Err(call.error(format_args!(
+                    "nDependencies = {nDependencies} (allowed: {})",
+                    all.len()
+                )));
+            }
+            let n = nDependencies;
+            let elements =
+                array_mut(call, "elementIndicesOfDependent", elementIndicesOfDependent, n)?;
+            let independents = array_mut(call, "independents", independents, n)?;
+            let independent_elements =
+                array_mut(call, "elementIndicesOfIndependents", elementIndicesOfIndependents, n)?;
+            for (n, dependency) in all.iter().enumerate() {
+                elements[n] = dependency.element;
+                independents[n] = dependency.independent;
+                independent_elements[n] = dependency.independent_element;
+            }
+            array_mut(call, "dependencyKinds", dependencyKinds, n)?.fill(fmi3Dependent);
+            Ok(())
+        })
+    }
+}

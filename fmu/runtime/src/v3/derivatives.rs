@@ -1,0 +1,97 @@
+//! Directional and adjoint derivatives.
+
+#![allow(unsafe_code)]
+
+use super::calls::*;
+use super::elements::{check_numbers, scalars_of};
+use super::references::time_reference;
+use super::types::*;
+use crate::c_abi::{array, array_mut, on};
+use crate::model::Model;
+use crate::variable::{is_finite, text as number};
+use crate::version::Version;
+
+/// Derivative of the unknowns along a direction of the knowns.
+pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
+    instance: fmi3Instance,
+    unknowns: *const fmi3ValueReference,
+    nUnknowns: usize,
+    knowns: *const fmi3ValueReference,
+    nKnowns: usize,
+    seed: *const fmi3Float64,
+    nSeed: usize,
+    sensitivity: *mut fmi3Float64,
+    nSensitivity: usize,
+) -> fmi3Status {
+    let call = Fmi3::DIRECTIONAL_DERIVATIVE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let unknowns = scalars_of(component, call, unknowns)?;
+            let knowns = array(call, "knowns", knowns, nKnowns)?;
+            let knowns = scalars_of(component, call, knowns)?;
+            check_numbers(call, "nSeed", nSeed, knowns.len())?;
+            check_numbers(call, "nSensitivity", nSensitivity, unknowns.len())?;
+            let seed = array(call, "seed", seed, nSeed)?;
+            let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
+            // the independent variable, on which nothing depends but by states and inputs, is left out of the knowns
+            let time = time_reference::<M>();
+            if !knowns.contains(&time) {
+                return component
+                    .instance
+                    .directional_derivative(&unknowns, &knowns, seed, answers);
+            }
+            let others = knowns.iter().zip(seed).filter(|(known, _)| **known != time);
+            let (knowns, seed): (Vec<u32>, Vec<f64>) = others.unzip();
+            component.instance.directional_derivative(&unknowns, &knowns, &seed, answers)
+        })
+    }
+}
+
+/// Derivative of a weighted sum of the unknowns by each known: column by column, each a directional derivative.
+pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
+    instance: fmi3Instance,
+    unknowns: *const fmi3ValueReference,
+    nUnknowns: usize,
+    knowns: *const fmi3ValueReference,
+    nKnowns: usize,
+    seed: *const fmi3Float64,
+    nSeed: usize,
+    sensitivity: *mut fmi3Float64,
+    nSensitivity: usize,
+) -> fmi3Status {
+    let call = &ADJOINT_DERIVATIVE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let unknowns = scalars_of(component, call, unknowns)?;
+            let knowns = array(call, "knowns", knowns, nKnowns)?;
+            let knowns = scalars_of(component, call, knowns)?;
+            check_numbers(call, "nSeed", nSeed, unknowns.len())?;
+            check_numbers(call, "nSensitivity", nSensitivity, knowns.len())?;
+            let seed = array(call, "seed", seed, nSeed)?;
+            for weight in seed {
+                if !is_finite(*weight) {
+                    let weight = number(*weight);
+                    return Err(
+                        call.error(format_args!("seed[] = {weight} (allowed: any finite number)"))
+                    );
+                }
+            }
+            let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
+            let mut column = vec![0.0; unknowns.len()];
+            for (known, answer) in knowns.iter().zip(answers) {
+                *answer = 0.0;
+                if *known == time_reference::<M>() {
+                    continue;
+                }
+                let (known, one) = (std::slice::from_ref(known), &[1.0]);
+                component.instance.directional_derivative(&unknowns, known, one, &mut column)?;
+                *answer = seed.iter().zip(&column).map(|(weight, d)| weight * d).sum();
+            }
+            Ok(())
+        })
+    }
+}

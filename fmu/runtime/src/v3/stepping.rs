@@ -1,0 +1,284 @@
+//! Co-Simulation: steps, intermediate update and early return.
+
+#![allow(unsafe_code)]
+
+use std::borrow::Cow;
+use std::cmp::Ordering::{Equal, Greater};
+
+use super::calls::*;
+use super::elements::{check_count, check_elements, expand};
+use super::host::Phase;
+use super::types::*;
+use super::values::check_intermediate;
+use crate::c_abi::{Component, array, array_mut, null, on};
+use crate::call::{Call, Fault, InstanceState};
+use crate::instance::StepInfo;
+use crate::model::Model;
+use crate::version::Version;
+
+/// Steps follow.
+pub unsafe fn fmi3EnterStepMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, &ENTER_STEP, |component| {
+            component.instance.enter_step_mode(&ENTER_STEP)
+        })
+    }
+}
+
+/// The derivatives of some outputs.
+pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    orders: *const fmi3Int32,
+    values: *mut fmi3Float64,
+    nValues: usize,
+) -> fmi3Status {
+    let call = Fmi3::GET_OUTPUT_DERIVATIVES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            let orders = array(call, "orders", orders, nValueReferences)?;
+            let (mut scalars, mut orders) = (Cow::Borrowed(references), Cow::Borrowed(orders));
+            match &component.host.arrays {
+                None => check_count(call, nValueReferences, nValues)?,
+                Some(arrays) => {
+                    let each = references.iter().zip(orders.iter());
+                    let each = each
+                        .flat_map(|(r, order)| vec![*order; arrays.of(*r).map_or(0, <[u32]>::len)]);
+                    let each: Vec<i32> = each.collect();
+                    scalars = Cow::Owned(expand::<M>(arrays, call, references)?);
+                    orders = Cow::Owned(each);
+                    check_elements(component, call, references, scalars.len(), nValues)?;
+                }
+            }
+            let places = array_mut(call, "values", values, nValues)?;
+            if component.instance.state() == InstanceState::Intermediate {
+                for reference in scalars.iter() {
+                    check_intermediate(component, call, *reference, Phase::Get)?;
+                }
+            }
+            component.instance.output_derivatives(&scalars, &orders, places)
+        })
+    }
+}
+
+/// Answer of the host to an intermediate update.
+#[derive(Clone, Copy)]
+struct Wish {
+    /// To return early, at this time.
+    early_return: Option<f64>,
+}
+
+/// Lets the host look into a step, at `time`. No reference into the instance lives meanwhile: the host calls back.
+unsafe fn intermediate_update<M: Model>(
+    instance: fmi3Instance,
+    time: f64,
+    phase: Phase,
+) -> Result<Wish, fmi3Status> {
+    let call = Fmi3::DO_STEP;
+    let mut prepared = None;
+    let status = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let host = &mut component.host;
+            let Some(update) = host.intermediate_update else { return Ok(()) };
+            (host.phase, host.ends) = (phase, M::Inputs::default());
+            host.set.clear();
+            prepared = Some((update, host.environment, host.early_return_allowed));
+            component.instance.enter_intermediate();
+            Ok(())
+        })
+    };
+    if status != fmi3OK {
+        return Err(status);
+    }
+    let Some((update, environment, can_return)) = prepared else {
+        return Ok(Wish { early_return: None });
+    };
+    let sets = phase == Phase::Set;
+    let (mut requested, mut at): (fmi3Boolean, fmi3Float64) = (0, time);
+    unsafe {
+        update(
+            environment,
+            time,
+            sets.into(),
+            (!sets).into(),
+            (!sets).into(),
+            can_return.into(),
+            &mut requested,
+            &mut at,
+        );
+    }
+    let status = unsafe {
+        on::<M, Fmi3>(instance, call, |component| component.instance.leave_intermediate(call))
+    };
+    if status != fmi3OK {
+        return Err(status);
+    }
+    Ok(Wish { early_return: Some(at).filter(|_| requested != 0 && can_return) })
+}
+
+/// Targets of a step's results.
+#[derive(Clone, Copy)]
+struct Answers {
+    event: *mut fmi3Boolean,
+    terminate: *mut fmi3Boolean,
+    early: *mut fmi3Boolean,
+    last: *mut fmi3Float64,
+}
+
+impl Answers {
+    /// Answers as they are before the step, as far as there is a place for them; or which place is missing.
+    unsafe fn begin(&self, call: &Call, time: f64) -> Result<(), Fault> {
+        let Answers { event, terminate, early, last } = *self;
+        let flags = [
+            ("eventHandlingNeeded", event),
+            ("terminateSimulation", terminate),
+            ("earlyReturn", early),
+        ];
+        for (_, flag) in flags {
+            if let Some(flag) = unsafe { flag.as_mut() } {
+                *flag = 0;
+            }
+        }
+        if let Some(last) = unsafe { last.as_mut() } {
+            *last = time;
+        }
+        let flag = flags.iter().find(|(_, flag)| flag.is_null()).map(|(name, _)| *name);
+        match flag.or(last.is_null().then_some("lastSuccessfulTime")) {
+            Some(name) => Err(null(call, name)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// One step. It may stop at an event where the host allows it; then, and where the host is told of events at its
+/// end, something discrete waits for event mode. `noSetFMUStatePriorToCurrentPoint` changes nothing here: no past is
+/// kept.
+pub unsafe fn fmi3DoStep<M: Model>(
+    instance: fmi3Instance,
+    currentCommunicationPoint: fmi3Float64,
+    communicationStepSize: fmi3Float64,
+    _noSetFMUStatePriorToCurrentPoint: fmi3Boolean,
+    eventHandlingNeeded: *mut fmi3Boolean,
+    terminateSimulation: *mut fmi3Boolean,
+    earlyReturn: *mut fmi3Boolean,
+    lastSuccessfulTime: *mut fmi3Float64,
+) -> fmi3Status {
+    let (at, h) = (currentCommunicationPoint, communicationStepSize);
+    let answers = Answers {
+        event: eventHandlingNeeded,
+        terminate: terminateSimulation,
+        early: earlyReturn,
+        last: lastSuccessfulTime,
+    };
+    let mut looks_in = false;
+    let status = unsafe {
+        on::<M, Fmi3>(instance, Fmi3::DO_STEP, |component| {
+            answers.begin(Fmi3::DO_STEP, component.instance.time())?;
+            component.instance.check(Fmi3::DO_STEP)?;
+            looks_in = component.host.intermediate_update.is_some();
+            if looks_in {
+                return Ok(());
+            }
+            let (before, stops) =
+                (component.instance.event_count(), component.host.early_return_allowed);
+            let step = component.instance.step_to_event(at, h, stops)?;
+            stepped(component, before, step, answers);
+            Ok(())
+        })
+    };
+    if status != fmi3OK || !looks_in {
+        return status;
+    }
+    unsafe { step_looked_into::<M>(instance, at, h, answers) }
+}
+
+/// Writes results and messages after a step; `before` is the number of events before it.
+#[inline(always)]
+unsafe fn stepped<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    before: i32,
+    step: StepInfo,
+    answers: Answers,
+) {
+    let Component { instance, log, .. } = component;
+    unsafe {
+        *answers.event = step.event.into();
+        *answers.early |= fmi3Boolean::from(step.early);
+        *answers.last = instance.time();
+    }
+    log.report_event(Fmi3::DO_STEP, before, instance);
+    log.report_step_warning(instance);
+}
+
+/// A step of which the host is told where it begins, when it may set inputs for its end and wish to return earlier, and
+/// where it has ended.
+unsafe fn step_looked_into<M: Model>(
+    instance: fmi3Instance,
+    at: f64,
+    mut h: f64,
+    answers: Answers,
+) -> fmi3Status {
+    let (call, whole) = (Fmi3::DO_STEP, h);
+    let checked = unsafe {
+        on::<M, Fmi3>(instance, call, |component| component.instance.check_step(call, at, h))
+    };
+    if checked != fmi3OK {
+        return checked;
+    }
+    let wish = match unsafe { intermediate_update::<M>(instance, at + h, Phase::Set) } {
+        Ok(wish) => wish,
+        Err(status) => return status,
+    };
+    let ramps = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let Component { instance, host, .. } = component;
+            instance.ramp_to(call, &host.set, &host.ends, h)
+        })
+    };
+    if ramps != fmi3OK {
+        return ramps;
+    }
+    // Anywhere in the step; before it begins is at once, and so is NaN.
+    if let Some(time) = wish
+        .early_return
+        .filter(|time| !matches!(time.partial_cmp(&(at + h)), Some(Greater | Equal)))
+    {
+        h = time - at;
+        unsafe { *answers.early = 1 };
+        let moves = h > 0.0;
+        if !moves {
+            let drop_ramps = |component: &mut Component<M, Fmi3>| {
+                component.instance.drop_ramps();
+                Ok(())
+            };
+            return unsafe { on::<M, Fmi3>(instance, call, drop_ramps) };
+        }
+    }
+    let status = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let Component { instance, host, .. } = component;
+            let before = instance.event_count();
+            let step = instance.step_to_event(at, h, host.early_return_allowed);
+            match &step {
+                Ok(step) if !step.early && h == whole => {
+                    instance.end_ramps(&host.set, &host.ends);
+                }
+                Ok(_) => {}
+                Err(_) => instance.drop_ramps(),
+            }
+            stepped(component, before, step?, answers);
+            Ok(())
+        })
+    };
+    if status != fmi3OK {
+        return status;
+    }
+    let end = unsafe { *answers.last };
+    match unsafe { intermediate_update::<M>(instance, end, Phase::Get) } {
+        Ok(_) => fmi3OK,
+        Err(status) => status,
+    }
+}

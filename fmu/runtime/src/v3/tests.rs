@@ -1,0 +1,610 @@
+//! Tests with a host that knows scalars.
+
+#![allow(unsafe_code)]
+
+use std::ffi::c_void;
+use std::ptr;
+use std::sync::Mutex;
+
+use super::*;
+use crate::c_abi::{c_string, text};
+use crate::call::Interface;
+use crate::instance::Instance;
+use crate::model::Model;
+use crate::spring::Spring;
+use crate::table::Layout;
+use crate::v2::{self, Fmi2};
+use crate::variable::Value;
+
+fn token() -> std::ffi::CString {
+    c_string(Spring::table().token(Layout::Scalars))
+}
+
+/// The value reference of a name.
+fn reference(name: &str) -> u32 {
+    Spring::table().find(name).unwrap() + 1
+}
+
+/// Data of a test's host, behind its environment.
+#[derive(Default)]
+struct TestHost {
+    instance: Option<usize>,
+    lines: Vec<(fmi3Status, String, String)>,
+    /// Times of intermediate updates, and whether inputs could be set then.
+    updates: Vec<(f64, bool)>,
+    /// The force that it sets at a piece's end.
+    force: Option<f64>,
+    /// Time at which the host requests an early return.
+    wish: Option<f64>,
+    statuses: Vec<fmi3Status>,
+    x: f64,
+}
+
+unsafe extern "C" fn log(
+    environment: *mut c_void,
+    status: fmi3Status,
+    category: fmi3String,
+    message: fmi3String,
+) {
+    let host = unsafe { &*environment.cast::<Mutex<TestHost>>() };
+    let line = unsafe { (status, text(category).unwrap(), text(message).unwrap()) };
+    host.lock().unwrap().lines.push(line);
+}
+
+unsafe extern "C" fn update(
+    environment: *mut c_void,
+    time: f64,
+    set: fmi3Boolean,
+    get: fmi3Boolean,
+    finished: fmi3Boolean,
+    can_return: fmi3Boolean,
+    requested: *mut fmi3Boolean,
+    at: *mut f64,
+) {
+    let host = unsafe { &*environment.cast::<Mutex<TestHost>>() };
+    let (instance, force, wish) = {
+        let mut host = host.lock().unwrap();
+        host.updates.push((time, set != 0));
+        (host.instance.unwrap() as *mut c_void, host.force, host.wish)
+    };
+    assert_eq!((get, finished), (1 - set, 1 - set));
+    unsafe {
+        assert_eq!((*requested, *at), (0, time), "they come with values");
+        let mut statuses = Vec::new();
+        if set != 0
+            && let Some(force) = force
+        {
+            let set = fmi3SetFloat64::<Spring>(instance, &reference("F"), 1, &force, 1);
+            statuses.push(set);
+            if can_return != 0
+                && let Some(wish) = wish
+            {
+                (*requested, *at) = (1, wish);
+            }
+        }
+        let mut x = 0.0;
+        if get != 0 {
+            statuses.push(fmi3GetFloat64::<Spring>(instance, &reference("x"), 1, &mut x, 1));
+        }
+        let mut host = host.lock().unwrap();
+        host.x = x;
+        host.statuses.append(&mut statuses);
+    }
+}
+
+/// An instance in Step Mode, and its host.
+fn stepping(early_return: bool) -> (fmi3Instance, Box<Mutex<TestHost>>) {
+    let host = Box::new(Mutex::new(TestHost::default()));
+    let environment = ptr::from_ref(&*host).cast_mut().cast();
+    let required = [reference("F"), reference("x")];
+    let instance = unsafe {
+        let instance = fmi3InstantiateCoSimulation::<Spring>(
+            c"one".as_ptr(),
+            token().as_ptr(),
+            ptr::null(),
+            0,
+            1,
+            0,
+            early_return.into(),
+            required.as_ptr(),
+            required.len(),
+            environment,
+            Some(log),
+            Some(update),
+        );
+        assert!(!instance.is_null(), "{:?}", host.lock().unwrap().lines);
+        assert_eq!(
+            fmi3EnterInitializationMode::<Spring>(instance, 0, f64::NAN, 0.0, 0, f64::NAN),
+            fmi3OK
+        );
+        assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
+        instance
+    };
+    host.lock().unwrap().instance = Some(instance as usize);
+    (instance, host)
+}
+
+/// A step, its status, whether it returned early, and the last successful time.
+fn step(instance: fmi3Instance, at: f64, h: f64) -> (fmi3Status, bool, f64) {
+    let (mut event, mut terminate, mut early, mut last) = (7, 7, 7, f64::NAN);
+    let status = unsafe {
+        fmi3DoStep::<Spring>(instance, at, h, 1, &mut event, &mut terminate, &mut early, &mut last)
+    };
+    assert_eq!((event, terminate), (0, 0));
+    (status, early == 1, last)
+}
+
+#[test]
+fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bit() {
+    let (instance, host) = stepping(false);
+    let mut two = Instance::<Spring, Fmi2>::new(Interface::CoSimulation);
+    two.enter_initialization_mode().unwrap();
+    two.exit_initialization_mode().unwrap();
+    let (force, x) = (reference("F") - 1, reference("x") - 1);
+    let at_knot = |n: usize| 0.3 * (n as f64).sin();
+    for n in 0..20 {
+        let (at, h) = (n as f64 * 0.1, 0.1);
+        host.lock().unwrap().force = Some(at_knot(n + 1));
+        assert_eq!(step(instance, at, h), (fmi3OK, false, at + h));
+        let slope = (at_knot(n + 1) - at_knot(n)) / h;
+        two.set(&v2::SET_REAL, &[force], |_| Value::Real(at_knot(n))).unwrap();
+        two.set_input_derivatives(&[force], &[1], &[slope]).unwrap();
+        two.do_step(at, h).unwrap();
+        let Value::Real(expected) = two.get(&v2::GET_REAL, x).unwrap() else { panic!() };
+        let host = host.lock().unwrap();
+        assert_eq!(host.x.to_bits(), expected.to_bits(), "step {n}");
+        assert_eq!(host.updates[2 * n..], [(at + h, true), (at + h, false)]);
+    }
+    let mut force_now = 0.0;
+    unsafe {
+        fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force_now, 1);
+        assert_eq!(force_now, at_knot(20), "the ramp ends where the host put it");
+        // Nothing set: held.
+        host.lock().unwrap().force = None;
+        assert_eq!(step(instance, 20.0 * 0.1, 0.1).0, fmi3OK);
+        fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force_now, 1);
+        assert_eq!(force_now, at_knot(20));
+        fmi3FreeInstance::<Spring>(instance);
+    }
+    assert!(host.lock().unwrap().statuses.iter().all(|status| *status == fmi3OK));
+}
+
+#[test]
+fn an_early_return_that_the_host_asks_for_is_where_it_wants_if_it_may() {
+    let (instance, host) = stepping(true);
+    host.lock().unwrap().force = Some(1.0);
+    host.lock().unwrap().wish = Some(0.25);
+    assert_eq!(step(instance, 0.0, 1.0), (fmi3OK, true, 0.25));
+    // Before the step, or nowhere: at once.
+    for wish in [0.1, f64::NAN] {
+        host.lock().unwrap().wish = Some(wish);
+        assert_eq!(step(instance, 0.25, 0.5), (fmi3OK, true, 0.25));
+    }
+    // Behind the end: not early.
+    host.lock().unwrap().wish = Some(9.0);
+    assert_eq!(step(instance, 0.25, 0.5), (fmi3OK, false, 0.75));
+    unsafe { fmi3FreeInstance::<Spring>(instance) };
+    let (instance, host) = stepping(false);
+    host.lock().unwrap().force = Some(1.0);
+    host.lock().unwrap().wish = Some(0.25);
+    assert_eq!(step(instance, 0.0, 1.0), (fmi3OK, false, 1.0), "it may not");
+    unsafe { fmi3FreeInstance::<Spring>(instance) };
+}
+
+/// The force is to run to 1 within the step; but the host wants to return at once, and sets nothing in the next one.
+#[test]
+fn after_an_early_return_at_once_inputs_are_held() {
+    let (instance, host) = stepping(true);
+    (host.lock().unwrap().force, host.lock().unwrap().wish) = (Some(1.0), Some(-1.0));
+    assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, true, 0.0));
+    (host.lock().unwrap().force, host.lock().unwrap().wish) = (None, None);
+    assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, false, 0.5));
+    let mut force = 9.0;
+    unsafe {
+        fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force, 1);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+    assert_eq!(force, 0.0);
+}
+
+#[test]
+fn a_value_out_of_range_within_a_step_is_discarded_and_another_variable_is_an_error() {
+    let (instance, host) = stepping(false);
+    host.lock().unwrap().force = Some(f64::NAN);
+    assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, false, 0.5));
+    assert_eq!(host.lock().unwrap().statuses, [fmi3Discard, fmi3OK]);
+    unsafe {
+        // Not required, and not the time for it: outside of a step all is as always.
+        assert_eq!(fmi3SetFloat64::<Spring>(instance, &reference("F"), 1, &2.0, 1), fmi3OK);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+}
+
+#[test]
+fn after_an_error_values_can_be_read_and_the_instance_reset() {
+    let (instance, host) = stepping(false);
+    unsafe {
+        let mut x = 0.0;
+        assert_eq!(fmi3GetFloat64::<Spring>(instance, &999, 1, &mut x, 1), fmi3Error);
+        assert_eq!(step(instance, 0.0, 0.1).0, fmi3Error, "terminated");
+        assert_eq!(fmi3GetFloat64::<Spring>(instance, &reference("x"), 1, &mut x, 1), fmi3OK);
+        assert_eq!(fmi3Terminate::<Spring>(instance), fmi3Error);
+        assert_eq!(fmi3Reset::<Spring>(instance), fmi3OK);
+        assert_eq!(fmi3EnterInitializationMode::<Spring>(instance, 0, 0.0, 5.0, 0, 0.0), fmi3OK);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+    let lines = &host.lock().unwrap().lines;
+    assert!(lines[0].2.contains("fmi3GetFloat64") && lines[0].2.contains("999"), "{lines:?}");
+    assert!(lines.iter().all(|(_, category, _)| category == "logStatusError"), "{lines:?}");
+}
+
+#[test]
+fn counts_types_and_references_are_checked_before_anything_is_written() {
+    for case in 0..6 {
+        let (instance, host) = stepping(false);
+        let references = [reference("x"), reference("v")];
+        let mut room = [7.0; 3];
+        let status = unsafe {
+            match case {
+                0 => {
+                    fmi3GetFloat64::<Spring>(instance, references.as_ptr(), 2, room.as_mut_ptr(), 1)
+                }
+                1 => {
+                    fmi3GetFloat64::<Spring>(instance, references.as_ptr(), 2, room.as_mut_ptr(), 3)
+                }
+                2 => fmi3GetFloat64::<Spring>(instance, &0, 1, room.as_mut_ptr(), 1),
+                3 => fmi3GetInt32::<Spring>(instance, references.as_ptr(), 1, &mut 0, 1),
+                4 => fmi3GetFloat64::<Spring>(instance, ptr::null(), 1, room.as_mut_ptr(), 1),
+                _ => fmi3GetString::<Spring>(instance, references.as_ptr(), 1, ptr::null_mut(), 1),
+            }
+        };
+        assert_eq!((status, room), (fmi3Error, [7.0; 3]), "{case}");
+        let said = host.lock().unwrap().lines[0].2.clone();
+        let part = ["allowed: 2", "allowed: 2", "reference 0", "Float64", "NULL", "Float64"][case];
+        assert!(said.contains(part), "{said}");
+        unsafe { fmi3FreeInstance::<Spring>(instance) };
+    }
+    // Nothing of a type that no variable has is fine, and so is nothing behind NULL.
+    let (instance, _host) = stepping(false);
+    unsafe {
+        assert_eq!(fmi3GetUInt64::<Spring>(instance, ptr::null(), 0, ptr::null_mut(), 0), fmi3OK);
+        assert_eq!(fmi3SetFloat64::<Spring>(instance, ptr::null(), 0, ptr::null(), 0), fmi3OK);
+        assert_eq!(fmi3GetClock::<Spring>(instance, ptr::null(), 0, ptr::null_mut()), fmi3OK);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+}
+
+#[test]
+fn time_is_a_variable_behind_the_table_s() {
+    let (instance, _host) = stepping(false);
+    let (mut time, reference) = (0.0, time_reference::<Spring>());
+    step(instance, 0.0, 0.125);
+    unsafe {
+        assert_eq!(fmi3GetFloat64::<Spring>(instance, &reference, 1, &mut time, 1), fmi3OK);
+        assert_eq!(time, 0.125);
+        assert_eq!(fmi3SetFloat64::<Spring>(instance, &reference, 1, &time, 1), fmi3Error);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+}
+
+#[test]
+fn no_instance_without_name_token_or_for_scheduled_execution() {
+    let host = Mutex::new(TestHost::default());
+    let environment = ptr::from_ref(&host).cast_mut().cast();
+    let guid = c_string(Spring::table().guid());
+    let (name, token) = (c"one".as_ptr(), token());
+    let make = |name, token, logger: fmi3LogMessageCallback| unsafe {
+        fmi3InstantiateModelExchange::<Spring>(name, token, ptr::null(), 0, 0, environment, logger)
+    };
+    assert!(make(ptr::null(), token.as_ptr(), Some(log)).is_null());
+    assert!(make(name, ptr::null(), Some(log)).is_null());
+    assert!(make(name, guid.as_ptr(), Some(log)).is_null(), "the other version's");
+    assert!(make(name, guid.as_ptr(), None).is_null());
+    let scheduled = unsafe {
+        fmi3InstantiateScheduledExecution::<Spring>(
+            name,
+            token.as_ptr(),
+            ptr::null(),
+            0,
+            0,
+            environment,
+            Some(log),
+            None,
+            None,
+            None,
+        )
+    };
+    assert!(scheduled.is_null());
+    let said = host.lock().unwrap().lines.iter().map(|line| line.2.clone()).collect::<Vec<_>>();
+    for (said, part) in
+        said.iter().zip(["instanceName", "NULL", "expected", "no Scheduled Execution"])
+    {
+        assert!(said.contains(part), "{said}");
+    }
+    assert_eq!(said.len(), 4);
+    let made = make(name, token.as_ptr(), None);
+    assert!(!made.is_null());
+    unsafe { fmi3FreeInstance::<Spring>(made) };
+}
+
+#[test]
+fn a_number_sign_is_doubled_and_a_percent_sign_is_not() {
+    let host = Mutex::new(TestHost::default());
+    let environment = ptr::from_ref(&host).cast_mut().cast();
+    unsafe {
+        let made = fmi3InstantiateModelExchange::<Spring>(
+            c"one".as_ptr(),
+            c"#1 %s".as_ptr(),
+            ptr::null(),
+            0,
+            0,
+            environment,
+            Some(log),
+        );
+        assert!(made.is_null());
+    }
+    let said = &host.lock().unwrap().lines[0].2;
+    assert!(said.contains("##1 %s;"), "{said}");
+}
+
+#[test]
+fn the_version_is_3_0() {
+    assert_eq!(unsafe { text(fmi3GetVersion()) }, Some("3.0".into()));
+}
+
+#[test]
+fn a_derivative_has_a_number_for_each_of_its_variables() {
+    for (seed, sensitivity, said) in
+        [(2, 2, "nSeed = 2 (allowed: 1)"), (1, 1, "nSensitivity = 1 (allowed: 2)")]
+    {
+        let (instance, host) = stepping(false);
+        let (unknowns, known) = (["a", "der(v)"].map(reference), reference("F"));
+        let (numbers, mut room) = ([1.0; 2], [7.0; 2]);
+        let status = unsafe {
+            fmi3GetDirectionalDerivative::<Spring>(
+                instance,
+                unknowns.as_ptr(),
+                2,
+                &known,
+                1,
+                numbers.as_ptr(),
+                seed,
+                room.as_mut_ptr(),
+                sensitivity,
+            )
+        };
+        unsafe { fmi3FreeInstance::<Spring>(instance) };
+        assert_eq!((status, room), (fmi3Error, [7.0; 2]));
+        let lines = &host.lock().unwrap().lines;
+        assert!(lines[0].2.contains(said), "{lines:?}");
+    }
+}
+
+/// w.(J v) = (J^T w).v: both sum the same products, in another order.
+#[test]
+fn adjoint_derivatives_are_the_transposed_directional_ones() {
+    let (instance, _host) = stepping(false);
+    let unknowns = ["a", "der(x)", "der(v)"].map(reference);
+    let knowns = [reference("F"), reference("x"), reference("v"), time_reference::<Spring>()];
+    let (seed, weights) = ([0.3, -1.2, 0.7, 5.0], [0.9, 0.4, -2.0]);
+    let (mut forward, mut adjoint) = ([0.0; 3], [0.0; 4]);
+    unsafe {
+        assert_eq!(
+            fmi3GetDirectionalDerivative::<Spring>(
+                instance,
+                unknowns.as_ptr(),
+                3,
+                knowns.as_ptr(),
+                4,
+                seed.as_ptr(),
+                4,
+                forward.as_mut_ptr(),
+                3,
+            ),
+            fmi3OK
+        );
+        assert_eq!(
+            fmi3GetAdjointDerivative::<Spring>(
+                instance,
+                unknowns.as_ptr(),
+                3,
+                knowns.as_ptr(),
+                4,
+                weights.as_ptr(),
+                3,
+                adjoint.as_mut_ptr(),
+                4,
+            ),
+            fmi3OK
+        );
+        fmi3FreeInstance::<Spring>(instance);
+    }
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (one, other) = (dot(&weights, &forward), dot(&adjoint, &seed));
+    assert!((one - other).abs() <= 1e-13 * one.abs(), "{one} {other}");
+    assert_eq!(adjoint[3], 0.0, "nothing depends on time but by states and inputs");
+}
+
+#[test]
+fn dependencies_are_those_of_the_start_until_it_is_over_and_then_those_declared() {
+    let host = Mutex::new(TestHost::default());
+    unsafe {
+        let instance = model_exchange(&host);
+        let of = |instance, name: &str| {
+            let mut count = 99;
+            let status = fmi3GetNumberOfVariableDependencies::<Spring>(
+                instance,
+                reference(name),
+                &mut count,
+            );
+            assert_eq!(status, fmi3OK, "{:?}", host.lock().unwrap().lines);
+            let (mut elements, mut known) = (vec![9; count], vec![0; count]);
+            let (mut known_elements, mut kinds) = (vec![9; count], vec![9; count]);
+            let status = fmi3GetVariableDependencies::<Spring>(
+                instance,
+                reference(name),
+                elements.as_mut_ptr(),
+                known.as_mut_ptr(),
+                known_elements.as_mut_ptr(),
+                kinds.as_mut_ptr(),
+                count,
+            );
+            assert_eq!(status, fmi3OK);
+            assert!(elements.iter().chain(&known_elements).all(|element| *element == 1));
+            assert!(kinds.iter().all(|kind| *kind == fmi3Dependent));
+            known
+        };
+        let mut expected = ["F", "x0", "m", "d", "k"].map(reference);
+        expected.sort_unstable();
+        let mut found = of(instance, "a");
+        found.sort_unstable();
+        assert_eq!(found, expected);
+        fmi3EnterInitializationMode::<Spring>(instance, 0, 0.0, 0.0, 0, 0.0);
+        fmi3ExitInitializationMode::<Spring>(instance);
+        let mut found = of(instance, "a");
+        found.sort_unstable();
+        let mut expected = ["F", "x", "v"].map(reference);
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+        assert_eq!(of(instance, "der(x)"), [reference("v")]);
+        assert_eq!(of(instance, "f"), []);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+}
+
+/// An instance of Model Exchange that tells its messages to `host`.
+fn model_exchange(host: &Mutex<TestHost>) -> fmi3Instance {
+    let environment = ptr::from_ref(host).cast_mut().cast();
+    let (name, token) = (c"one".as_ptr(), token());
+    unsafe {
+        fmi3InstantiateModelExchange::<Spring>(
+            name,
+            token.as_ptr(),
+            ptr::null(),
+            0,
+            0,
+            environment,
+            Some(log),
+        )
+    }
+}
+
+#[test]
+fn model_exchange_goes_through_its_modes_and_takes_single_states() {
+    let host = Mutex::new(TestHost::default());
+    unsafe {
+        let instance = model_exchange(&host);
+        assert_eq!(fmi3EnterConfigurationMode::<Spring>(instance), fmi3OK);
+        assert_eq!(fmi3ExitConfigurationMode::<Spring>(instance), fmi3OK);
+        let mut count = 0;
+        assert_eq!(fmi3GetNumberOfContinuousStates::<Spring>(instance, &mut count), fmi3OK);
+        assert_eq!(count, 2);
+        assert_eq!(fmi3GetNumberOfEventIndicators::<Spring>(instance, &mut count), fmi3OK);
+        assert_eq!(count, 0);
+        fmi3EnterInitializationMode::<Spring>(instance, 0, 0.0, 1.0, 0, 0.0);
+        assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
+        let mut b = [9; 5];
+        let [b0, b1, b2, b3, b4] = &mut b;
+        let mut next = 0.0;
+        let status = fmi3UpdateDiscreteStates::<Spring>(instance, b0, b1, b2, b3, b4, &mut next);
+        assert_eq!((status, b, next), (fmi3OK, [0; 5], 0.0));
+        assert_eq!(fmi3EvaluateDiscreteStates::<Spring>(instance), fmi3OK);
+        assert_eq!(fmi3EnterContinuousTimeMode::<Spring>(instance), fmi3OK);
+        // A state by its reference; its derivative follows.
+        let force = [0.25, 0.5];
+        let references = ["x", "v"].map(reference);
+        assert_eq!(
+            fmi3SetFloat64::<Spring>(instance, references.as_ptr(), 2, force.as_ptr(), 2),
+            fmi3OK
+        );
+        let mut x = [0.0; 2];
+        assert_eq!(fmi3GetContinuousStates::<Spring>(instance, x.as_mut_ptr(), 2), fmi3OK);
+        assert_eq!(x, force);
+        assert_eq!(
+            fmi3GetContinuousStateDerivatives::<Spring>(instance, x.as_mut_ptr(), 2),
+            fmi3OK
+        );
+        assert_eq!(x[0], 0.5);
+        assert_eq!(
+            fmi3SetFloat64::<Spring>(instance, references.as_ptr(), 1, &f64::NAN, 1),
+            fmi3Discard
+        );
+        // Back to the event, and no further.
+        assert_eq!(fmi3SetTime::<Spring>(instance, 2.0), fmi3OK);
+        assert_eq!(fmi3SetTime::<Spring>(instance, 1.0), fmi3OK);
+        assert_eq!(fmi3SetTime::<Spring>(instance, 0.9), fmi3Error);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+}
+
+#[test]
+fn within_steps_hosts_see_real_outputs_and_inputs_that_follow_no_others() {
+    let vessels = crate::tests::vessels::TABLE.variables.iter();
+    let seen = vessels.filter(|variable| has_intermediate_update(variable));
+    let names: Vec<_> = seen.map(|variable| variable.name).collect();
+    assert_eq!(names, ["level", "sum", "q", "w"]);
+}
+
+#[test]
+fn a_bool_may_be_any_byte() {
+    assert_eq!(size_of::<fmi3Boolean>(), 1);
+    let (instance, _host) = stepping(false);
+    unsafe {
+        assert_eq!(fmi3SetDebugLogging::<Spring>(instance, 0xFF, 0, ptr::null()), fmi3OK);
+        fmi3FreeInstance::<Spring>(instance);
+        fmi3FreeInstance::<Spring>(ptr::null_mut());
+    }
+}
+
+#[test]
+fn times_come_with_initialization_and_those_that_are_not_defined_may_be_nan() {
+    let host = Mutex::new(TestHost::default());
+    unsafe {
+        let instance = fmi3InstantiateCoSimulation::<Spring>(
+            c"one".as_ptr(),
+            token().as_ptr(),
+            ptr::null(),
+            0,
+            0,
+            0,
+            0,
+            ptr::null(),
+            0,
+            ptr::from_ref(&host).cast_mut().cast(),
+            Some(log),
+            None,
+        );
+        let begin = |tolerance, at, stop_defined, stop| {
+            fmi3EnterInitializationMode::<Spring>(instance, 0, tolerance, at, stop_defined, stop)
+        };
+        assert_eq!(begin(f64::NAN, 2.0, 1, 1.0), fmi3Error, "it stops before it starts");
+        assert_eq!(fmi3Reset::<Spring>(instance), fmi3OK);
+        assert_eq!(begin(f64::NAN, 2.0, 1, 3.0), fmi3OK);
+        assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
+        assert_eq!(step(instance, 2.0, 1.0), (fmi3OK, false, 3.0));
+        assert_eq!(step(instance, 3.0, 0.1).0, fmi3Error, "past the stop time");
+        assert_eq!(fmi3Reset::<Spring>(instance), fmi3OK);
+        assert_eq!(begin(f64::NAN, -1.0, 0, f64::NAN), fmi3OK);
+        assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
+        assert_eq!(step(instance, -1.0, 5.0), (fmi3OK, false, 4.0));
+        fmi3FreeInstance::<Spring>(instance);
+    }
+}
+
+/// fmusim 0.8 asks in continuous-time mode, where the standard's table has neither.
+#[test]
+fn fmusim_may_ask_for_the_numbers_of_states_and_indicators_in_continuous_time_mode() {
+    let host = Mutex::new(TestHost::default());
+    unsafe {
+        let instance = model_exchange(&host);
+        fmi3EnterInitializationMode::<Spring>(instance, 0, 0.0, 0.0, 0, 0.0);
+        fmi3ExitInitializationMode::<Spring>(instance);
+        assert_eq!(fmi3EnterContinuousTimeMode::<Spring>(instance), fmi3OK);
+        let mut count = 9;
+        assert_eq!(fmi3GetNumberOfContinuousStates::<Spring>(instance, &mut count), fmi3OK);
+        assert_eq!(count, 2);
+        assert_eq!(fmi3GetNumberOfEventIndicators::<Spring>(instance, &mut count), fmi3OK);
+        assert_eq!(count, 0);
+        fmi3FreeInstance::<Spring>(instance);
+    }
+}

@@ -1,0 +1,519 @@
+//! Values of variables: get and set by type, also within steps. Clocks and binary variables have no values.
+
+#![allow(unsafe_code)]
+
+use super::calls::*;
+use super::elements::{check_count, check_elements, scalars_of, start_resized, wrong_variable};
+use super::host::Phase;
+use super::references::{Extra, extra, wrong_reference};
+use super::types::*;
+use crate::c_abi::{Component, array, array_mut, on};
+use crate::call::states::*;
+use crate::call::{CType, Call, Fault, InstanceState};
+use crate::model::Model;
+use crate::table::Scalar;
+use crate::variable::{Access, Value};
+use crate::version::Version;
+
+/// The values of all references, each turned into its C type by `as_c`.
+#[inline]
+unsafe fn get<M: Model, T>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (references, count): (*const fmi3ValueReference, usize),
+    (values, value_count): (*mut T, usize),
+    as_c: impl Fn(Value) -> Option<T>,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", references, count)?;
+            if component.host.arrays.is_some() {
+                let found = array_values(component, call, references, value_count)?;
+                let places = array_mut(call, "values", values, value_count)?;
+                for (value, place) in found.into_iter().zip(places) {
+                    *place = as_c(value).ok_or_else(|| call.error("wrong type"))?;
+                }
+                return Ok(());
+            }
+            check_count(call, count, value_count)?;
+            let places = array_mut(call, "values", values, value_count)?;
+            for (reference, place) in references.iter().zip(places) {
+                let value = as_c(value(component, call, *reference)?);
+                *place = value.ok_or_else(|| call.error("wrong type"))?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// The values of all elements of arrays, `count` of them.
+#[cold]
+fn array_values<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    references: &[fmi3ValueReference],
+    count: usize,
+) -> Result<Vec<Value>, Fault> {
+    let scalars = scalars_of(component, call, references)?;
+    check_elements(component, call, references, scalars.len(), count)?;
+    let call = if call.c_type == Some(CType::Size) { &GET_SIZE } else { call };
+    scalars.iter().map(|reference| value(component, call, *reference)).collect()
+}
+
+#[inline(always)]
+fn value<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+) -> Result<Value, Fault> {
+    if reference as usize > M::table().scalars.len() {
+        return extra_value(component, call, reference);
+    }
+    if component.instance.state() == InstanceState::Intermediate {
+        check_intermediate(component, call, reference, Phase::Get)?;
+    }
+    component.instance.value(call, reference)
+}
+
+#[cold]
+fn extra_value<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+) -> Result<Value, Fault> {
+    let Component { instance, host, .. } = component;
+    match extra::<M>(reference).filter(|_| call.c_type == Some(CType::Real)) {
+        Some(Extra::Time) => Ok(Value::Real(instance.time())),
+        Some(Extra::Indicator(n)) => {
+            instance.indicators_for(call, &mut host.indicators)?;
+            Ok(Value::Real(host.indicators[n]))
+        }
+        None => Err(call.error(wrong_reference::<M>(reference, None, call.c_type))),
+    }
+}
+
+/// Within a step hosts may get and set what they said before, when it is the time for it.
+#[cold]
+pub(super) fn check_intermediate<M: Model>(
+    component: &Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+    phase: Phase,
+) -> Result<(), Fault> {
+    let host = &component.host;
+    if host.phase != phase {
+        let (now, then) = match host.phase {
+            Phase::Set => ("set", "intermediateVariableSetRequested"),
+            Phase::Get => ("got", "intermediateVariableGetAllowed"),
+        };
+        return Err(call.error(format_args!(
+            "within this intermediate update variables can only be {now}: {then} alone is true"
+        )));
+    }
+    let name = || Fmi3::scalar::<M>(reference, call.c_type).map_or_else(|why| why, Scalar::name);
+    if !host.required.contains(&reference) {
+        return Err(call.error(format_args!(
+            "{} is not among the requiredIntermediateVariables of this instance",
+            name()
+        )));
+    }
+    Ok(())
+}
+
+/// Sets all references, each from its C type by `from_c`, or says why one can't be.
+#[inline]
+unsafe fn set<M: Model, T: Copy>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (references, count): (*const fmi3ValueReference, usize),
+    (values, value_count): (*const T, usize),
+    from_c: impl Fn(T) -> Value,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", references, count)?;
+            if component.host.arrays.is_some() {
+                let values = array(call, "values", values, value_count)?;
+                let values: Vec<_> = values.iter().map(|value| from_c(*value)).collect();
+                return set_arrays(component, call, references, &values);
+            }
+            check_count(call, count, value_count)?;
+            let values = array(call, "values", values, value_count)?;
+            if component.instance.state() == InstanceState::Intermediate {
+                return set_ends(component, call, references, |n| from_c(values[n]));
+            }
+            component.instance.set(call, references, |n| from_c(values[n]))
+        })
+    }
+}
+
+/// Sets all elements of arrays.
+#[cold]
+fn set_arrays<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &'static Call,
+    references: &[fmi3ValueReference],
+    values: &[Value],
+) -> Result<(), Fault> {
+    let scalars = scalars_of(component, call, references)?;
+    check_elements(component, call, references, scalars.len(), values.len())?;
+    let value = |n: usize| values[n];
+    if component.instance.state() == InstanceState::Intermediate {
+        return set_ends(component, call, &scalars, value);
+    }
+    let before = (call.c_type == Some(CType::Size)).then(|| component.instance.parameters.clone());
+    let call = if before.is_some() { &SET_SIZE } else { call };
+    component.instance.set(call, &scalars, value)?;
+    if let Some(before) = before {
+        start_resized(component, call, &scalars, &before);
+    }
+    Ok(())
+}
+
+/// Within a step: what inputs are at the end of the piece that comes.
+#[cold]
+fn set_ends<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    references: &[fmi3ValueReference],
+    value: impl Fn(usize) -> Value,
+) -> Result<(), Fault> {
+    for (n, reference) in references.iter().enumerate() {
+        let scalar = Fmi3::scalar::<M>(*reference, call.c_type).map_err(|why| call.error(why))?;
+        check_intermediate(component, call, *reference, Phase::Set)?;
+        if !matches!(scalar.access, Access::Input(_)) {
+            let name = scalar.name();
+            return Err(call.error(format_args!("{name} is computed; only inputs can be set")));
+        }
+        if let Some(problem) = scalar.problem(value(n)) {
+            return Err(call.discard(problem));
+        }
+    }
+    let host = &mut component.host;
+    for (n, reference) in references.iter().enumerate() {
+        let scalar = Fmi3::scalar::<M>(*reference, call.c_type).map_err(|why| call.error(why))?;
+        if let (Access::Input(ramp), Value::Real(x)) = (scalar.access, value(n)) {
+            *ramp(&mut host.ends, scalar.element)[0] = x;
+        }
+        if !host.set.contains(reference) {
+            host.set.push(*reference);
+        }
+    }
+    Ok(())
+}
+
+/// Reads reals.
+pub unsafe fn fmi3GetFloat64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Float64,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Real(x) => Some(x),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_FLOAT64, references, values, as_c) }
+}
+
+/// Reads integers.
+pub unsafe fn fmi3GetInt32<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Int32,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Integer(n) => Some(n),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_INT32, references, values, as_c) }
+}
+
+/// Reads enumerations.
+pub unsafe fn fmi3GetInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Int64,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Integer(n) => Some(n.into()),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_INT64, references, values, as_c) }
+}
+
+/// Reads Booleans: 0 or 1.
+pub unsafe fn fmi3GetBoolean<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Boolean,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Boolean(b) => Some(b.into()),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_BOOLEAN, references, values, as_c) }
+}
+
+/// Sets reals.
+pub unsafe fn fmi3SetFloat64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Float64,
+    nValues: usize,
+) -> fmi3Status {
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_FLOAT64, references, values, Value::Real) }
+}
+
+/// Sets integers.
+pub unsafe fn fmi3SetInt32<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Int32,
+    nValues: usize,
+) -> fmi3Status {
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_INT32, references, values, Value::Integer) }
+}
+
+/// Sets enumerations.
+pub unsafe fn fmi3SetInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Int64,
+    nValues: usize,
+) -> fmi3Status {
+    // 0 is no item of any enumeration.
+    let from_c = |n| Value::Integer(i32::try_from(n).unwrap_or(0));
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_INT64, references, values, from_c) }
+}
+
+/// Sets Booleans: everything but 0 is true.
+pub unsafe fn fmi3SetBoolean<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Boolean,
+    nValues: usize,
+) -> fmi3Status {
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_BOOLEAN, references, values, |b| Value::Boolean(b != 0)) }
+}
+
+/// Gets or sets variables of a type that no variable has: fine when there are none.
+fn of_no_variable<M: Model>(
+    component: &Component<M, Fmi3>,
+    call: &Call,
+    references: &[fmi3ValueReference],
+    value_count: usize,
+) -> Result<(), Fault> {
+    match references.first() {
+        Some(reference) => Err(call.error(match &component.host.arrays {
+            Some(arrays) => wrong_variable::<M>(arrays, *reference),
+            None => {
+                let scalar = M::table().scalars.get(reference.wrapping_sub(1) as usize);
+                wrong_reference::<M>(*reference, scalar, call.c_type)
+            }
+        })),
+        None => check_count(call, 0, value_count),
+    }
+}
+
+/// The same as a call.
+unsafe fn call_of_no_variable<M: Model>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (references, count): (*const fmi3ValueReference, usize),
+    value_count: usize,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", references, count)?;
+            of_no_variable(component, call, references, value_count)
+        })
+    }
+}
+
+/// Reads structural parameters, which there are with arrays.
+pub unsafe fn fmi3GetUInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3UInt64,
+    nValues: usize,
+) -> fmi3Status {
+    let call = &GET_UINT64;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            if component.host.arrays.is_none() {
+                return of_no_variable(component, call, references, nValues);
+            }
+            let found = array_values(component, call, references, nValues)?;
+            let places = array_mut(call, "values", values, nValues)?;
+            for (value, place) in found.into_iter().zip(places) {
+                *place = match value {
+                    Value::Integer(n) => u64::try_from(n).unwrap_or(0),
+                    _ => return Err(call.error("wrong type")),
+                };
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Sets structural parameters, which there are with arrays.
+pub unsafe fn fmi3SetUInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3UInt64,
+    nValues: usize,
+) -> fmi3Status {
+    let call = &SET_UINT64;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            if component.host.arrays.is_none() {
+                return of_no_variable(component, call, references, nValues);
+            }
+            // More than the largest integer is more than any size may be.
+            let size = |n: &u64| Value::Integer(i32::try_from(*n).unwrap_or(i32::MAX));
+            let values = array(call, "values", values, nValues)?;
+            let values: Vec<_> = values.iter().map(size).collect();
+            set_arrays(component, call, references, &values)
+        })
+    }
+}
+
+/// Functions for types that no variable has.
+macro_rules! of_no_variable {
+    ($($name:ident($value:ty), $allowed:expr;)*) => {$(
+        /// No variable is of this type.
+        pub unsafe fn $name<M: Model>(
+            instance: fmi3Instance,
+            valueReferences: *const fmi3ValueReference,
+            nValueReferences: usize,
+            _values: $value,
+            nValues: usize,
+        ) -> fmi3Status {
+            static CALL: Call = both(stringify!($name), $allowed);
+            let references = (valueReferences, nValueReferences);
+            unsafe { call_of_no_variable::<M>(instance, &CALL, references, nValues) }
+        }
+    )*};
+}
+
+of_no_variable! {
+    fmi3GetFloat32(*mut fmi3Float32), GET;
+    fmi3GetInt8(*mut i8), GET;
+    fmi3GetUInt8(*mut u8), GET;
+    fmi3GetInt16(*mut i16), GET;
+    fmi3GetUInt16(*mut u16), GET;
+    fmi3GetUInt32(*mut u32), GET;
+    fmi3GetString(*mut fmi3String), GET;
+    fmi3SetFloat32(*const fmi3Float32), SET;
+    fmi3SetInt8(*const i8), SET;
+    fmi3SetUInt8(*const u8), SET;
+    fmi3SetInt16(*const i16), SET;
+    fmi3SetUInt16(*const u16), SET;
+    fmi3SetUInt32(*const u32), SET;
+    fmi3SetString(*const fmi3String), SET;
+}
+
+/// No variable is binary.
+pub unsafe fn fmi3GetBinary<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    _valueSizes: *mut usize,
+    _values: *mut fmi3Binary,
+    nValues: usize,
+) -> fmi3Status {
+    static CALL: Call = both("fmi3GetBinary", GET);
+    unsafe {
+        call_of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
+    }
+}
+
+/// No variable is binary.
+pub unsafe fn fmi3SetBinary<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    _valueSizes: *const usize,
+    _values: *const fmi3Binary,
+    nValues: usize,
+) -> fmi3Status {
+    static CALL: Call = both("fmi3SetBinary", SET);
+    unsafe {
+        call_of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
+    }
+}
+
+/// Functions for clocks, of which there are none.
+macro_rules! of_no_clock {
+    ($($name:ident($($argument:ident: $type:ty),*);)*) => {$(
+        /// There are no clocks.
+        pub unsafe fn $name<M: Model>(
+            instance: fmi3Instance,
+            valueReferences: *const fmi3ValueReference,
+            nValueReferences: usize,
+            $($argument: $type),*
+        ) -> fmi3Status {
+            static CALL: Call = both(stringify!($name), ANY);
+            let _ = ($($argument,)*);
+            let references = (valueReferences, nValueReferences);
+            unsafe { call_of_no_variable::<M>(instance, &CALL, references, nValueReferences) }
+        }
+    )*};
+}
+
+of_no_clock! {
+    fmi3GetClock(values: *mut fmi3Clock);
+    fmi3SetClock(values: *const fmi3Clock);
+    fmi3GetIntervalDecimal(intervals: *mut fmi3Float64, qualifiers: *mut fmi3IntervalQualifier);
+    fmi3GetIntervalFraction(counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64, qualifiers: *mut fmi3IntervalQualifier);
+    fmi3GetShiftDecimal(shifts: *mut fmi3Float64);
+    fmi3GetShiftFraction(counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64);
+    fmi3SetIntervalDecimal(intervals: *const fmi3Float64);
+    fmi3SetIntervalFraction(counters: *const fmi3UInt64, resolutions: *const fmi3UInt64);
+    fmi3SetShiftDecimal(shifts: *const fmi3Float64);
+    fmi3SetShiftFraction(counters: *const fmi3UInt64, resolutions: *const fmi3UInt64);
+}
+
+/// There are no model partitions.
+pub unsafe fn fmi3ActivateModelPartition<M: Model>(
+    instance: fmi3Instance,
+    _clockReference: fmi3ValueReference,
+    _activationTime: fmi3Float64,
+) -> fmi3Status {
+    static CALL: Call = both("fmi3ActivateModelPartition", ANY);
+    unsafe {
+        on::<M, Fmi3>(instance, &CALL, |component| {
+            component.instance.check(&CALL)?;
+            Err(CALL.error("this FMU has no Scheduled Execution"))
+        })
+    }
+}
