@@ -1,6 +1,6 @@
 //! `hubslosh check`: does an FMU keep the rules of FMI 2.0 or 3.0, and those that hosts add?
 //!
-//! Every rule is an entry of a table, [`RULES`] for FMI 2.0, [`v3::RULES`] for 3.0, with the function that looks. Rules of the
+//! Every rule is an entry of a table, [`RULES`] for FMI 2.0, [`rules::fmi3::RULES`] for 3.0, with the function that looks. Rules of the
 //! archive, the description and the binaries look at the file. Rules of calls load the binary for
 //! this platform and call it as hosts do, each in a process of its own: an FMU that crashes or hangs
 //! is a finding, not the end of the check.
@@ -13,6 +13,7 @@ pub mod dependencies;
 pub mod description;
 pub mod events;
 pub mod exchange;
+pub mod findings;
 pub mod integrate;
 pub mod json;
 pub mod junit;
@@ -20,10 +21,13 @@ pub mod kinds;
 pub mod life;
 pub mod log;
 pub mod memory;
+pub mod options;
 pub mod portable;
 pub mod process;
 pub mod ranges;
 pub mod reading;
+pub mod report;
+pub mod rule;
 pub mod rules;
 pub mod sarif;
 pub mod schema;
@@ -39,40 +43,25 @@ pub mod values;
 pub mod variables;
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
 use host::fmi2::PLATFORM;
 use host::xml::Element;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+
+use self::rules::fmi3;
 
 pub use self::archive::Archive;
 pub use self::binaries::Binaries;
 pub use self::description::Description;
-pub use self::rules::RULES;
+pub use self::findings::{Finding, Findings, Severity};
+pub use self::options::Options;
+pub use self::report::{Outcome, Report};
+pub use self::rule::{Check, Rule};
+pub use self::rules::fmi2::RULES;
 pub use self::under_test::FmuUnderTest;
-
-/// How bad it is to break a rule.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// The standard forbids it, or hosts fail.
-    Error,
-    /// Some host stumbles, or people are left in the dark.
-    Warning,
-}
-
-impl Severity {
-    /// As reports write it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
-        }
-    }
-}
 
 /// What a rule says, for programs.
 #[derive(Debug, serde::Serialize)]
@@ -94,165 +83,7 @@ pub fn rules() -> Vec<Statement> {
         severity: rule.severity.name(),
     };
     let second = RULES.iter().map(|rule| statement("2.0", rule));
-    second.chain(v3::RULES.iter().map(|rule| statement("3.0", rule))).collect()
-}
-
-/// One rule: what must hold, who says so, and how to look.
-pub struct Rule {
-    /// Group and name, `group.name`.
-    pub id: &'static str,
-    /// What must hold.
-    pub title: &'static str,
-    /// The section of FMI 2.0.5 or 3.0.2, or the host that trips over it.
-    pub source: &'static str,
-    /// How bad it is to break it; a crash or an endless call is an error whatever is written here.
-    pub severity: Severity,
-    /// How to look.
-    pub check: Check,
-}
-
-/// A rule as a line of a table.
-const fn rule(
-    id: &'static str,
-    severity: Severity,
-    title: &'static str,
-    source: &'static str,
-    check: Check,
-) -> Rule {
-    Rule { id, title, source, severity, check }
-}
-
-/// The function behind a rule, by what it looks at.
-pub enum Check {
-    /// The zip archive.
-    Archive(fn(&Archive, &mut Findings)),
-    /// modelDescription.xml.
-    Description(fn(&Description, &mut Findings)),
-    /// The files under `binaries/`.
-    Binaries(fn(&Binaries, &mut Findings)),
-    /// The loaded FMU, in a process of its own. A call that fails although it must not is a finding.
-    Calls(fn(&FmuUnderTest, &mut Findings) -> Result<()>),
-    /// modelDescription.xml of FMI 3.0.
-    Description3(fn(&v3::Description, &mut Findings)),
-    /// The files under `binaries/` of an FMU 3.0.
-    Binaries3(fn(&v3::Binaries, &mut Findings)),
-    /// The loaded FMU 3.0, in a process of its own.
-    Calls3(fn(&v3::Subject, &mut Findings) -> Result<()>),
-}
-
-impl Rule {
-    /// Whether it calls the FMU.
-    pub fn is_of_calls(&self) -> bool {
-        matches!(self.check, Check::Calls(_) | Check::Calls3(_))
-    }
-}
-
-/// A rule that is broken.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Finding {
-    /// How bad it is.
-    pub severity: Severity,
-    /// Where: a file, a line, a variable, a call.
-    pub place: String,
-    /// What is wrong and what is allowed.
-    pub text: String,
-}
-
-/// What came of looking at one rule.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Findings {
-    severity: Severity,
-    /// What is wrong, the first [`KEPT`]; empty if nothing is.
-    pub list: Vec<Finding>,
-    /// How many more there are.
-    pub more: usize,
-    /// Why the rule does not apply, or could not be looked at.
-    pub skipped: Option<String>,
-    /// The rule that must tell the fault for which this one could not be looked at.
-    told_by: Option<String>,
-}
-
-impl Findings {
-    /// Nothing found yet; what will be found is this bad.
-    pub fn new(severity: Severity) -> Findings {
-        Findings { severity, list: Vec::new(), more: 0, skipped: None, told_by: None }
-    }
-
-    /// The rule is broken.
-    pub fn add(&mut self, place: impl Into<String>, text: impl Into<String>) {
-        if self.list.len() >= KEPT {
-            self.more += 1;
-            return;
-        }
-        self.list.push(Finding { severity: self.severity, place: place.into(), text: text.into() });
-    }
-
-    /// The rule is broken, and that is an error whatever the rule says.
-    pub fn fail(&mut self, place: impl Into<String>, text: impl Into<String>) {
-        let finding = Finding { severity: Severity::Error, place: place.into(), text: text.into() };
-        if self.list.len() >= KEPT {
-            self.list.pop(); // an error shows, however many warnings there are
-            self.more += 1;
-        }
-        self.list.push(finding);
-    }
-
-    /// The rule is bent: a warning, whatever the rule says.
-    pub fn warn(&mut self, place: impl Into<String>, text: impl Into<String>) {
-        let kept = self.list.len();
-        self.add(place, text);
-        if let Some(last) = self.list.get_mut(kept) {
-            last.severity = Severity::Warning;
-        }
-    }
-
-    /// Whether an error was found.
-    fn has_error(&self) -> bool {
-        self.list.iter().any(|finding| finding.severity == Severity::Error)
-    }
-
-    /// The rule does not apply.
-    pub fn skip(&mut self, why: impl Into<String>) {
-        self.skipped = Some(why.into());
-    }
-
-    /// The rule cannot be looked at, for a fault that another rule tells.
-    pub fn skip_for(&mut self, rule: &str, why: impl Into<String>) {
-        self.skip(why);
-        self.told_by = Some(rule.into());
-    }
-}
-
-/// What came of a rule.
-pub struct Outcome {
-    /// The rule.
-    pub rule: &'static Rule,
-    /// What was found.
-    pub findings: Findings,
-    /// How long it took.
-    pub time: Duration,
-}
-
-/// How to check.
-pub struct Options {
-    /// The program that makes the calls, `hubslosh`, run with the hidden subcommand `check-calls`.
-    pub program: PathBuf,
-    /// Rules or groups of rules to look at, by the beginning of their names; empty for all.
-    pub only: Vec<String>,
-    /// Time that the calls of one rule may take.
-    pub limit: Duration,
-}
-
-/// Everything that was looked at.
-pub struct Report {
-    /// The FMU.
-    pub path: PathBuf,
-    /// One for each rule, in the table's order.
-    pub outcomes: Vec<Outcome>,
-    /// The error that no selected rule was checked, if that is so: such a report says nothing about the FMU.
-    pub unchecked: Option<String>,
-    /// Report of a bug of this program for which a rule could not be checked.
-    pub bug: Option<String>,
+    second.chain(fmi3::RULES.iter().map(|rule| statement("3.0", rule))).collect()
 }
 
 /// Rules that say why a file cannot be opened as an FMU. If it cannot, those that are broken are in the report even
@@ -277,11 +108,11 @@ const OPENING: [&str; 10] = [
 /// If the file cannot be read, a rule asked for is unknown, or there is no place to unpack. Whatever
 /// is wrong with the FMU is no error but a finding.
 pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) -> Result<Report> {
-    let known = |name: &str| RULES.iter().chain(v3::RULES).any(|rule| is_selected(rule, name));
+    let known = |name: &str| RULES.iter().chain(fmi3::RULES).any(|rule| is_selected(rule, name));
     let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
     if !unknown.is_empty() {
         let mut groups: Vec<_> =
-            RULES.iter().chain(v3::RULES).filter_map(|rule| rule.id.split('.').next()).collect();
+            RULES.iter().chain(fmi3::RULES).filter_map(|rule| rule.id.split('.').next()).collect();
         groups.sort_unstable();
         groups.dedup();
         bail!(
@@ -309,7 +140,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         true => rule.id == "xml.fmi_version",
         false => options.only.is_empty() || options.only.iter().any(|o| is_selected(rule, o)),
     };
-    let table = if third.is_some() { v3::RULES } else { RULES };
+    let table = if third.is_some() { fmi3::RULES } else { RULES };
     let selected: Vec<&'static Rule> = table.iter().filter(is_wanted).collect();
     let calls = selected.iter().filter(|rule| rule.is_of_calls()).count();
     let callable = match (&description, &third) {
@@ -425,80 +256,6 @@ fn is_selected(rule: &Rule, name: &str) -> bool {
     rule.id == name || rule.id.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'))
 }
 
-/// Findings of one rule that are kept: a file with a hundred thousand variables, all of them wrong,
-/// shall not fill the memory with sentences.
-const KEPT: usize = 1000;
-/// Findings of one rule that a person is shown; those kept are in the JUnit file.
-const SHOWN: usize = 8;
-
-impl Report {
-    /// How many findings are as bad as this.
-    pub fn count(&self, severity: Severity) -> usize {
-        let more = self.outcomes.iter().map(|outcome| &outcome.findings);
-        let more = more.filter(|f| f.severity == severity).map(|f| f.more).sum::<usize>();
-        more + self.all().filter(|(_, finding)| finding.severity == severity).count()
-    }
-
-    /// All findings, each with its rule.
-    pub fn all(&self) -> impl Iterator<Item = (&'static Rule, &Finding)> {
-        self.outcomes.iter().flat_map(|o| o.findings.list.iter().map(move |f| (o.rule, f)))
-    }
-
-    /// For people: every finding, what was skipped and why, and a sum.
-    pub fn text(&self) -> String {
-        let mut text = String::new();
-        for outcome in &self.outcomes {
-            let Outcome { rule, findings, .. } = outcome;
-            for finding in findings.list.iter().take(SHOWN) {
-                let _ = writeln!(
-                    text,
-                    "{} {}: {}: {}",
-                    finding.severity.name(),
-                    rule.id,
-                    finding.place,
-                    finding.text
-                );
-            }
-            let more = findings.more + findings.list.len().saturating_sub(SHOWN);
-            if more > 0 {
-                let _ = writeln!(text, "  and {more} more like these");
-            }
-            if !findings.list.is_empty() {
-                let _ = writeln!(text, "  rule: {} [{}]", rule.title, rule.source);
-            }
-        }
-        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-        for outcome in &self.outcomes {
-            let Some(why) = outcome.findings.skipped.as_deref() else { continue };
-            match reasons.iter_mut().find(|(known, _)| *known == why) {
-                Some((_, rules)) => rules.push(outcome.rule.id),
-                None => reasons.push((why, vec![outcome.rule.id])),
-            }
-        }
-        for (why, rules) in reasons {
-            match rules.len() {
-                1 => _ = writeln!(text, "skipped {}: {why}", rules[0]),
-                n => {
-                    _ = writeln!(text, "skipped {n} rules, {} to {}: {why}", rules[0], rules[n - 1])
-                }
-            }
-        }
-        let skipped = self.outcomes.iter().filter(|o| o.findings.skipped.is_some()).count();
-        let _ = writeln!(
-            text,
-            "{}: {} errors, {} warnings; {} rules looked at, {skipped} skipped",
-            self.path.display(),
-            self.count(Severity::Error),
-            self.count(Severity::Warning),
-            self.outcomes.len() - skipped,
-        );
-        if let Some(why) = &self.unchecked {
-            let _ = writeln!(text, "error: {why}");
-        }
-        text
-    }
-}
-
 /// The table of rules of one version as Markdown, as the documentation shows it.
 pub fn table(rules: &[Rule]) -> String {
     let mut text = String::new();
@@ -529,7 +286,7 @@ mod tests {
 
     #[test]
     fn rules_have_names_of_their_own_and_stand_in_groups() {
-        for rules in [RULES, v3::RULES] {
+        for rules in [RULES, fmi3::RULES] {
             let names: BTreeSet<_> = rules.iter().map(|rule| rule.id).collect();
             assert_eq!(names.len(), rules.len());
             let mut groups: Vec<_> =

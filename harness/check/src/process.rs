@@ -176,7 +176,7 @@ pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Resul
             Element::parse(&xml).ok().and_then(|root| root.get("fmiVersion").map(String::from));
         version.is_some_and(|version| version.starts_with("3."))
     });
-    let rules = if is_fmi3 { v3::RULES } else { RULES };
+    let rules = if is_fmi3 { super::rules::fmi3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
     trace::doing(LOADING, Crash::Error);
     let before = life::surroundings();

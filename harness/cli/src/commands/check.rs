@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use check::{Options, RULES, Severity, check, json, junit, process, sarif, table, v3};
+use check::{Options, RULES, Severity, check, json, junit, process, rules::fmi3, sarif, table};
 use host::output;
 
 use crate::{fmu, progress, terminal};
@@ -69,7 +69,7 @@ impl CheckArgs {
             match self.json {
                 Some(_) => terminal::say_json(&check::rules())?,
                 None => {
-                    print!("## FMI 2.0\n\n{}\n## FMI 3.0\n\n{}", table(RULES), table(v3::RULES));
+                    print!("## FMI 2.0\n\n{}\n## FMI 3.0\n\n{}", table(RULES), table(fmi3::RULES));
                 }
             }
             return Ok(());

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use ::check::{self, Options, Report, v3};
+use ::check::rules::fmi3;
+use ::check::{self, Options, Report};
 use host::fmi3::PLATFORM;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
@@ -81,7 +82,7 @@ fn an_fmu_3_without_a_fault_keeps_every_rule() {
     let folder = tempfile::tempdir().unwrap();
     let report = look(&model(folder.path()), &[]);
     assert_eq!(report.all().count(), 0, "{}", report.text());
-    assert_eq!(report.outcomes.len(), v3::RULES.len());
+    assert_eq!(report.outcomes.len(), fmi3::RULES.len());
     let skipped = report.outcomes.iter().filter(|o| o.findings.skipped.is_some());
     let skipped: Vec<_> = skipped.map(|o| o.rule.id).collect();
     // it has no licence, no terminals, no layered standard

@@ -1,13 +1,13 @@
-//! The table of rules. The documentation shows it; a test compares the two.
+//! The rules for FMUs 2.0.
 
-use super::Severity::{Error, Warning};
-use super::{
-    Check, Rule, archive, arrays, binaries, definitions, dependencies, events, exchange, kinds,
-    life, log, memory, portable, ranges, reading, rule, schema, states, steps, structure, tunable,
-    units, values, variables,
+use crate::findings::Severity::{Error, Warning};
+use crate::rule::Check::{Archive, Binaries, Calls, Description};
+use crate::rule::{Rule, rule};
+use crate::{
+    archive, arrays, binaries, definitions, dependencies, events, exchange, kinds, life, log,
+    memory, portable, ranges, reading, schema, states, steps, structure, tunable, units, values,
+    variables,
 };
-
-use Check::{Archive, Binaries, Calls, Description};
 
 /// Every rule, group by group.
 #[rustfmt::skip]
