@@ -7,7 +7,9 @@
 //!
 //! (5.1 and 5.3 to 5.6; the difference as printed, ω_{k+1} − ω_k over two steps, is half of the acceleration).
 //! It needs no simulation and no liquid that moves: its torque is not in the equation. Starts come from linear least squares on a
-//! grid of Stribeck speeds (`starts.rs`); the law says nothing of a hub that sticks, so such rows are left out.
+//! grid of Stribeck speeds (`starts.rs`). The friction law does not hold for a hub that sticks: such rows are left out of it, and the
+//! readings of a hub at rest are residuals of the gyro's bias. Without them the bias is known 20 times less well, and the choice of
+//! rows by bias and the bias from these rows may alternate without an end.
 //! Rows closer than 10 ms are taken together first. The noise's share of the power of y goes with the cube of the sampling rate;
 //! I (ω̄_{k+1} − ω̄_{k−1}) = T̄_{k+1} − T̄_{k−1} holds for means over blocks of rows as it does for rows, T the integral of the torque.
 //! Three things make the estimate biased, and here each is dealt with:
@@ -39,6 +41,7 @@ use crate::uncertainty::{self, Combination, Covariance, Sources, one_way};
 use crate::unknown::{self, Scale};
 use crate::verdict::DOES_NOT_FIT;
 use analysis::least_squares::{self, Minimum};
+use starts::State;
 
 /// Weights of the rows (thesis 5.2.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -217,7 +220,9 @@ struct Rows {
     noise: f64,
     /// sqrt(w_k) of the rows 1 to n − 2; 0 where the hub sticks.
     weight: Vec<f64>,
-    /// The same of all rows.
+    /// sqrt(w_k) of the rows where the hub rests, else 0.
+    resting: Vec<f64>,
+    /// sqrt(w_k) of all rows.
     all: Vec<f64>,
     /// Only every so many of them counts.
     every: usize,
@@ -247,6 +252,7 @@ impl Rows {
             step: block as f64 * recording.step(),
             noise: noise_level(&rate).max(analysis::gauss_markov::FLOOR),
             weight: Vec::new(),
+            resting: Vec::new(),
             all: Vec::new(),
             every: 1,
             rate,
@@ -259,7 +265,7 @@ impl Rows {
 
     /// A signal's slope from t_{k−1} to t_{k+1}.
     fn slope(&self, signal: &[f64], k: usize) -> f64 {
-        (signal[k + 1] - signal[k - 1]) / (self.time[k + 1] - self.time[k - 1])
+        (signal[k + 1] - signal[k - 1]) / self.interval(k)
     }
 
     /// y_k.
@@ -275,10 +281,20 @@ impl Rows {
         }
     }
 
-    /// Mean of w_k y_k² from noise alone.
+    /// Mean square of a residual over I from noise alone.
     fn noise_power(&self, k: usize) -> f64 {
-        let interval = self.time[k + 1] - self.time[k - 1];
-        2.0 * (self.weight[k - 1] * self.noise / interval).powi(2)
+        let weight = self.weight[k - 1] + self.resting[k - 1];
+        2.0 * (weight * self.noise / self.interval(k)).powi(2)
+    }
+
+    /// Time from the row before to the one after, s.
+    fn interval(&self, k: usize) -> f64 {
+        self.time[k + 1] - self.time[k - 1]
+    }
+
+    /// Weight of a reading at rest, 1/s: its noise makes the residual that the noise of two readings makes of y_k.
+    fn rest_weight(&self, k: usize) -> f64 {
+        std::f64::consts::SQRT_2 * self.resting[k - 1] / self.interval(k)
     }
 
     /// Instants within the interval where the friction is taken, and the weights of the three rows in the parabola through
@@ -323,11 +339,12 @@ impl Problem {
             let n = rows.inner().len() as f64;
             let each = if each_alike { count as f64 / n / recordings } else { 1.0 };
             let weight = rows.inner().map(|k| match timed {
-                true => each * (rows.time[k + 1] - rows.time[k - 1]) / (2.0 * rows.step),
+                true => each * rows.interval(k) / (2.0 * rows.step),
                 false => each,
             });
             rows.all = weight.map(f64::sqrt).collect();
             rows.weight.clone_from(&rows.all);
+            rows.resting = vec![0.0; rows.all.len()];
         }
         let largest = |of: &dyn Fn(&Rows) -> f64| rows.iter().map(of).fold(0.0, f64::max);
         let torque = largest(&|r| peak(&r.torque));
@@ -403,15 +420,19 @@ impl Problem {
         }
     }
 
-    /// Leaves out the rows of a hub that sticks by these biases; whether that changes anything.
+    /// Leaves out the rows of a hub that sticks by these biases; where it rests, they show the bias. Returns true if that changes
+    /// anything.
     fn leave_out_stuck(&mut self, biases: &[f64]) -> bool {
         let mut changed = false;
         for (rows, bias) in self.rows.iter_mut().zip(biases) {
-            let stuck = rows.stuck(*bias);
-            let weight = |(k, weight): (usize, &f64)| if stuck[k + 1] { 0.0 } else { *weight };
-            let weights: Vec<f64> = rows.all.iter().enumerate().map(weight).collect();
-            changed |= weights != rows.weight;
-            rows.weight = weights;
+            let states = rows.states(*bias);
+            let weights_in = |state: State| -> Vec<f64> {
+                let inner = states[1..].iter().zip(&rows.all);
+                inner.map(|(of, weight)| if *of == state { *weight } else { 0.0 }).collect()
+            };
+            let (weight, resting) = (weights_in(State::Slips), weights_in(State::Rests));
+            changed |= weight != rows.weight || resting != rows.resting;
+            (rows.weight, rows.resting) = (weight, resting);
         }
         changed
     }
@@ -423,7 +444,9 @@ impl Problem {
 
     /// Rows that count.
     fn used(&self) -> usize {
-        let of = |rows: &Rows| rows.inner().filter(|k| rows.weight[k - 1] > 0.0).count();
+        let of = |rows: &Rows| {
+            rows.inner().filter(|k| rows.weight[k - 1] + rows.resting[k - 1] > 0.0).count()
+        };
         self.rows.iter().map(of).sum()
     }
 
@@ -476,7 +499,14 @@ impl Problem {
             let bias = n - self.rows.len() + index;
             for k in rows.inner() {
                 if rows.weight[k - 1] == 0.0 {
-                    residuals.push(0.0);
+                    let weight = match self.form {
+                        Form::AtRow => 0.0,
+                        Form::Averaged => rows.rest_weight(k),
+                    };
+                    if let Some(jacobian) = jacobian.as_deref_mut() {
+                        jacobian[(residuals.len(), bias)] = -weight;
+                    }
+                    residuals.push(weight * (rows.rate[k] - p[bias]));
                     continue;
                 }
                 let (instants, parts) = rows.instants(self.form, k);
@@ -562,19 +592,17 @@ impl Problem {
     }
 
     /// Covariance of the sum of scores Jᵀe that the gyro's white noise makes: the noise of one row is in the differences of the rows before
-    /// and after it, with opposite signs. The sandwich alone says too little of what shows in a few windows, as d does.
+    /// and after it, with opposite signs, and in its own reading at rest. The sandwich alone says too little of what shows in a few windows, as d does.
     fn noise_scores(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
         let n = jacobian.ncols();
         let (mut sum, mut first) = (DMatrix::zeros(n, n), 0);
         for rows in &self.rows {
             let count = rows.inner().len();
             // row i of the recording is the difference i − 1 of the inner rows
-            let score = |k: usize| {
-                let part = rows.weight[k] / (rows.time[k + 2] - rows.time[k]);
-                jacobian.row(first + k) * (part * rows.noise)
-            };
+            let score = |k: usize, weight: f64| jacobian.row(first + k) * (weight * rows.noise);
+            let sloped = |k: usize| score(k, rows.weight[k] / rows.interval(k + 1));
             for i in 1..count.saturating_sub(1) {
-                let of_row = score(i - 1) - score(i + 1);
+                let of_row = sloped(i - 1) - sloped(i + 1) + score(i, rows.rest_weight(i + 1));
                 sum += of_row.transpose() * of_row;
             }
             first += count;

@@ -115,31 +115,24 @@ fn wrong(seed: u64, harmonics: usize, bias: f64) -> Vec<String> {
         // one of 370 is further off by chance, and the seeds are fixed
         wrong
             .extend((off.abs() >= 3.0).then(|| format!("{seed}, {harmonics}: {name} {off:+.1} σ")));
-        let sure = name.starts_with("gyro") || p.std < 0.3 * truth;
+        // the hub rests for 4 s before the ramp breaks it away: 5e-5 rad/s
+        let sure = p.std < if name.starts_with("gyro") { 1e-4 } else { 0.3 * truth };
         assert!(sure, "{seed}: {name} {p:?}");
     }
     wrong
 }
 
+/// Seed 2 failed while the rows at rest did not count: two choices of rows that stick alternated, each by the bias that the other
+/// one gives. `friction.d` was 3.4 standard deviations off and the bias of the ramp 4.9, and the fit was accepted.
 #[test]
-fn friction_of_a_ramp_a_step_and_a_sweep_ends_in_no_false_minimum() {
-    assert_eq!(wrong(1, 0, 0.002), [""; 0]);
-    // 5 deg/s
-    assert_eq!(wrong(4, 0, 0.087), [""; 0]);
-}
-
-#[test]
-fn the_preferential_direction_has_its_sign_with_harmonics_of_the_angle_too() {
-    assert_eq!(wrong(3, 1, 0.002), [""; 0]);
-}
-
-/// Eight seeds, without harmonics and with one. Seed 2 without harmonics still fails: the bias of the ramp is 4.9 standard deviations off, and
-/// `friction.d` with it 3.4. The other fifteen cases pass.
-#[test]
-#[ignore = "30 s of CPU time, and seed 2 without harmonics is 3.4 standard deviations off in friction.d"]
 fn friction_of_eight_recordings_ends_in_no_false_minimum() {
     let all = (1..=8).flat_map(|seed| [wrong(seed, 0, 0.002), wrong(seed, 1, 0.002)].concat());
     assert_eq!(all.collect::<Vec<_>>(), [""; 0]);
+}
+
+#[test]
+fn a_bias_of_five_degrees_a_second_leads_to_no_false_minimum() {
+    assert_eq!(wrong(4, 0, 0.087), [""; 0]);
 }
 
 /// A start far off does not lead astray, and a start of what is no unknown is refused.

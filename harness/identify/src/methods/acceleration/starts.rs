@@ -26,36 +26,61 @@ const REST: f64 = 0.5;
 /// Inertia, b, c, d and a constant torque, and the sum of squares.
 type Linear = ([f64; 5], f64);
 
+/// What the hub does at a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// It turns.
+    Slips,
+    /// It sticks, or nearly: the row says nothing.
+    Sticks,
+    /// It stands still: the row shows the gyro's bias.
+    Rests,
+}
+
 impl Rows {
-    /// Whether each row belongs to a run in which the hub sticks, or is next to one. The Stribeck law says nothing of
-    /// the torque of a bearing that sticks.
-    pub(super) fn stuck(&self, bias: f64) -> Vec<bool> {
+    /// Which rows belong to a run in which the hub sticks by this bias, or are next to one: the Stribeck law says nothing of the
+    /// torque of a bearing that sticks. In the middle half of a long run the hub rests; at its ends it may still creep.
+    pub(super) fn states(&self, bias: f64) -> Vec<State> {
         let still = |rate: &f64| (rate - bias).abs() < STILL * self.noise;
-        let mut stuck = vec![false; self.rate.len()];
+        let count = self.rate.len();
+        let mut states = vec![State::Slips; count];
         let mut from = 0;
         for part in self.rate.chunk_by(|a, b| still(a) == still(b)) {
             let to = from + part.len();
             if still(&part[0]) && part.len() >= RUN {
-                stuck[from.saturating_sub(1)..(to + 1).min(self.rate.len())].fill(true);
+                states[from.saturating_sub(1)..(to + 1).min(count)].fill(State::Sticks);
+                let end = part.len() / 4;
+                let middle = &part[end..part.len() - end];
+                if middle.len() >= self.shortest_rest() && self.is_flat(middle) {
+                    states[from + end..to - end].fill(State::Rests);
+                }
             }
             from = to;
         }
-        stuck
+        states
+    }
+
+    /// Rows of the shortest part in which the hub rests.
+    fn shortest_rest(&self) -> usize {
+        (REST / self.step).ceil().max(RUN as f64) as usize
+    }
+
+    /// Returns true if these rates are one value and the gyro's noise. A drift shows in the difference of the halves.
+    fn is_flat(&self, rate: &[f64]) -> bool {
+        let (first, last) = rate.split_at(rate.len() / 2);
+        let drift = (mean(last) - mean(first)).abs();
+        deviation(rate) < 2.0 * self.noise
+            && drift < STILL * self.noise * (4.0 / rate.len() as f64).sqrt()
     }
 
     /// Reading of the gyro while the hub rests without torque, rad/s; `None` without such a part.
     fn reading_at_rest(&self) -> Option<f64> {
-        let length = (REST / self.step).ceil().max(RUN as f64) as usize;
+        let length = self.shortest_rest();
         let largest = self.torque.iter().fold(0.0_f64, |most, t| most.max(t.abs()));
         let parts = self.rate.chunks_exact(length).zip(self.torque.chunks_exact(length));
         let rest = parts.filter_map(|(rate, torque)| {
             let is_free = torque.iter().all(|t| t.abs() <= FREE * largest);
-            // a drift along the part shows in the difference of its halves
-            let (first, last) = rate.split_at(length / 2);
-            let drift = (mean(last) - mean(first)).abs();
-            let is_flat = deviation(rate) < 2.0 * self.noise
-                && drift < STILL * self.noise * (4.0 / length as f64).sqrt();
-            (is_free && is_flat).then(|| mean(rate))
+            (is_free && self.is_flat(rate)).then(|| mean(rate))
         });
         median(&rest.collect::<Vec<f64>>())
     }
