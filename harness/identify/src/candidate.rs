@@ -124,7 +124,7 @@ pub fn fit<'a>(
     });
     let mut polished = search.run(sibling.as_ref())?;
     let Search { mut problem, speeds, others, .. } = search;
-    problem.renew_noise(&mut polished);
+    problem.renew_noise(&mut polished)?;
     let fit = summary(&problem, &polished, options, (model, law))?;
     progress(News::Step(fit.line()));
     Ok(Fitted { problem, polished, fit, speeds, others })

@@ -77,7 +77,7 @@ pub fn intervals(problem: &Problem, at: &Minimum) -> Result<Option<Intervals>> {
     jacobian.set_column(places[0], &(e_d + e_h - &e_hub * (3.0 * a)));
     jacobian.set_column(places[1], &((density - &e_hub * a) * 4.0));
     jacobian.set_column(places[2], &(&e_hub * (seen.inertia / inertia)));
-    let Some(covariance) = Covariance::of(&jacobian) else { return Ok(None) };
+    let Some(covariance) = Covariance::of(&jacobian, &problem.names())? else { return Ok(None) };
     let step = -(&covariance.x * jacobian.tr_mul(at.e));
     let by_tolerances = at.tolerances.iter().map(|change| {
         let moved = &covariance.x * jacobian.tr_mul(change);

@@ -376,7 +376,10 @@ impl<'a> Problem<'a> {
 
     /// The noise from the residual at a minimum; whether it is so much another one that the minimum is, too. Sum of squares, sensitivities
     /// and covariance there are then of that noise.
-    pub fn renew_noise(&mut self, found: &mut Polished) -> bool {
+    ///
+    /// # Errors
+    /// If a sensitivity is not finite.
+    pub fn renew_noise(&mut self, found: &mut Polished) -> Result<bool> {
         let before = self.channels.clone();
         self.estimate_noise(&found.answer);
         found.cost = self.stacked(&found.answer, &found.x).norm_squared();
@@ -389,10 +392,11 @@ impl<'a> Problem<'a> {
                 found.jacobian.rows_mut(first, rows(now)).scale_mut(factor);
                 first += rows(now);
             }
-            found.covariance =
-                Covariance::of(&found.jacobian).unwrap_or_else(|| found.covariance.clone());
+            if let Some(covariance) = Covariance::of(&found.jacobian, &self.names())? {
+                found.covariance = covariance;
+            }
         }
-        is_other(&before, &self.channels)
+        Ok(is_other(&before, &self.channels))
     }
 
     /// Innovations of all channels, and how far the unknowns are from what is known of them.
@@ -585,7 +589,8 @@ impl<'a> Problem<'a> {
         base: &[Motion],
         known: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>> {
-        let (directions, _) = uncertainty::directions(&known.select_columns(mixed));
+        let names: Vec<String> = mixed.iter().map(|&j| self.unknowns[j].quantity.name()).collect();
+        let (directions, _) = uncertainty::directions(&known.select_columns(mixed), &names)?;
         let fastest = fastest(base);
         let column = |k: usize| {
             let direction = directions.column(k);
@@ -873,15 +878,19 @@ impl<'a> Problem<'a> {
 
     /// The covariance for sensitivities.
     pub fn covariance(&self, jacobian: &DMatrix<f64>) -> Result<Covariance> {
-        Covariance::of(jacobian).with_context(|| {
-            let names: Vec<String> =
-                self.unknowns.iter().map(|unknown| unknown.quantity.name()).collect();
+        let names = self.names();
+        Covariance::of(jacobian, &names)?.with_context(|| {
             format!(
                 "some combination of the unknowns ({}) has no influence on the recording: fewer must be \
                  estimated",
                 names.join(", ")
             )
         })
+    }
+
+    /// Names of the unknowns.
+    pub fn names(&self) -> Vec<String> {
+        self.unknowns.iter().map(|unknown| unknown.quantity.name()).collect()
     }
 
     /// Levenberg and Marquardt's search; ends when the sum of squares falls by less than `tolerance`, relatively.

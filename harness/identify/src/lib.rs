@@ -4,6 +4,7 @@ pub mod any_fmu;
 pub mod between;
 pub mod budget;
 pub mod candidate;
+pub mod decomposition;
 pub mod deep_tank;
 pub mod design;
 pub mod estimate;

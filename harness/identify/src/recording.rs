@@ -8,8 +8,9 @@
 use std::path::Path;
 
 use analysis::innovations;
-use analysis::statistics::{about_mean, correlation, deviation, mean, median, noise_level, peak};
+use analysis::statistics::{about_mean, correlation, deviation, mean, noise_level, peak};
 use anyhow::{Context, Result, bail, ensure};
+use host::budget;
 use signals::recording::{self as files, Between, Columns, Signal, Wanted};
 
 use crate::spikes;
@@ -149,8 +150,35 @@ impl Recording {
         Some(Recording { fresh: Some(fresh.collect()), from_rest: true, ..part })
     }
 
+    /// Returns the usual step from row to row, s.
+    ///
+    /// # Errors
+    /// If times or values are out of range.
+    pub fn check(&self) -> Result<f64> {
+        let of_file = || format!("{} cannot be used", self.name);
+        ensure!(self.time.len() > 2, "{}: {} rows are too few", self.name, self.time.len());
+        let step = check_times(&self.time).with_context(of_file)?;
+        let signals = [
+            ("tau_cmd", Some(&self.torque)),
+            ("omega", Some(&self.rate)),
+            ("theta", self.angle.as_ref()),
+            ("g_axial", self.gravity.as_ref()),
+            ("wheel_speed", self.wheel_speed.as_ref()),
+            ("omega_x", self.off_axis[0].as_ref()),
+            ("omega_y", self.off_axis[1].as_ref()),
+        ];
+        for (name, signal) in signals {
+            check_values(name, signal.into_iter().flatten().copied()).with_context(of_file)?;
+        }
+        Ok(step)
+    }
+
     /// Torque and rate on an even grid of the mean step, joined by lines: for spectra alone.
-    pub fn even(&self) -> (f64, Vec<f64>, Vec<f64>) {
+    ///
+    /// # Errors
+    /// If times or values are out of range.
+    pub fn even(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {
+        self.check()?;
         let step = self.step();
         let mut row = 0;
         let (mut torque, mut rate) = (Vec::new(), Vec::new());
@@ -164,7 +192,7 @@ impl Recording {
             torque.push(at(&self.torque));
             rate.push(at(&self.rate));
         }
-        (step, torque, rate)
+        Ok((step, torque, rate))
     }
 }
 
@@ -249,7 +277,7 @@ pub fn read_decay(
     let (time, signal) = (column("time")?, column(found)?);
     let torque = vec![0.0; time.len()];
     let all = trimmed(Recording::of(&name, time, torque, signal), source.trim, done);
-    check_growth(&all)?;
+    all.check()?;
     let seconds = all.duration();
     ensure!(
         seconds >= SHORTEST,
@@ -383,26 +411,40 @@ fn describe(part: &Recording) -> String {
     )
 }
 
-/// Fails unless there are rows and their time grows.
-fn check_growth(all: &Recording) -> Result<()> {
-    let name = &all.name;
-    ensure!(all.time.len() > 2, "{name}: {} rows are too few", all.time.len());
-    if let Some(row) = all.time.windows(2).position(|pair| pair[1] <= pair[0]) {
-        bail!(
-            "{name}, row {}: time must grow, but {} s follows {} s",
-            row + 2,
-            all.time[row + 1],
-            all.time[row]
+/// Largest value of a signal: the squares of all rows have a finite sum.
+const LARGEST: f64 = 1e100;
+
+/// Fails unless times are finite and grow, and their span is a reasonable number of the usual steps. Returns that step, s.
+pub fn check_times(time: &[f64]) -> Result<f64> {
+    ensure!(time.len() > 1, "there are {} rows (allowed: at least 2)", time.len());
+    if let Some(row) = time.iter().position(|t| !t.is_finite()) {
+        bail!("row {}: time is {}", row + 1, time[row]);
+    }
+    if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        bail!("row {}: time must grow, but {} s follows {} s", row + 2, time[row + 1], time[row]);
+    }
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = (steps.len() - 1) / 2;
+    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    budget::steps(time[time.len() - 1] - time[0], step).context("times of the rows")?;
+    Ok(step)
+}
+
+/// Fails if a value is not a number within ±[`LARGEST`].
+pub fn check_values(name: &str, values: impl Iterator<Item = f64>) -> Result<()> {
+    for (row, value) in values.enumerate() {
+        ensure!(
+            value.abs() <= LARGEST,
+            "row {}: {name} is {value:e} (allowed: up to {LARGEST:e})",
+            row + 1
         );
     }
     Ok(())
 }
 
 fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
-    check_growth(all)?;
+    let step = all.check()?;
     let name = &all.name;
-    let steps: Vec<f64> = all.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let step = median(&steps).unwrap_or(0.0);
     ensure!(
         step <= coarsest,
         "{name}: rows are {step} s apart, at most {coarsest:.3} s are allowed, a fifth of the slosh's expected period{}",
@@ -464,7 +506,7 @@ fn check_signals(part: &Recording) -> Result<()> {
     );
     ensure!(deviation(&part.rate) > 0.0, "{name}: omega is constant ({} rad/s)", part.rate[0]);
     // An inertia: torque goes with the rate's derivative, so torque leads the rate by 90 degrees.
-    let (torque, rate) = smoothed(part);
+    let (torque, rate) = smoothed(part)?;
     let slope = |x: &[f64]| -> Vec<f64> { (1..x.len() - 1).map(|k| x[k + 1] - x[k - 1]).collect() };
     let inner = |x: &[f64]| x[1..x.len() - 1].to_vec();
     let leading = correlation(&inner(&torque), &slope(&rate));
@@ -493,11 +535,11 @@ fn is_stuck(part: &Recording) -> bool {
 }
 
 /// Torque and rate averaged over 0.1 s, to tame the noise of differences.
-fn smoothed(part: &Recording) -> (Vec<f64>, Vec<f64>) {
-    let (step, torque, rate) = part.even();
+fn smoothed(part: &Recording) -> Result<(Vec<f64>, Vec<f64>)> {
+    let (step, torque, rate) = part.even()?;
     let width = ((0.1 / step) as usize).max(1);
     let averaged = |x: &[f64]| x.windows(width).map(mean).collect();
-    (averaged(&torque), averaged(&rate))
+    Ok((averaged(&torque), averaged(&rate)))
 }
 
 #[cfg(test)]
@@ -519,7 +561,7 @@ mod tests {
     fn refusal(change: impl Fn(&mut Recording)) -> String {
         let mut bad = rigid();
         change(&mut bad);
-        prepare(bad, COARSEST, &mut |_| {}).unwrap_err().to_string()
+        format!("{:#}", prepare(bad, COARSEST, &mut |_| {}).unwrap_err())
     }
 
     #[test]
@@ -530,7 +572,7 @@ mod tests {
     #[test]
     fn each_fault_has_a_sentence_of_its_own() {
         type Change = fn(&mut Recording);
-        let faults: [(Change, &str); 7] = [
+        let faults: [(Change, &str); 8] = [
             (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N·m)"),
             (|r| *r = r.rows(0, 500), "10 s of data are too few"),
             (|r| std::mem::swap(&mut r.torque, &mut r.rate), "swapped"),
@@ -544,6 +586,7 @@ mod tests {
                 "the hub does not turn: omega is noise of 6",
             ),
             (|r| r.time[7] = r.time[6], "row 8: time must grow"),
+            (|r| r.time.iter_mut().for_each(|t| *t *= 1e-9), "Time must be in seconds"),
         ];
         for (change, word) in faults {
             let error = refusal(change);

@@ -291,7 +291,7 @@ impl<'a> Search<'a, '_> {
             }
         }
         // the noise from the residual and, if it is another one, the minimum with its filter
-        if self.problem.renew_noise(&mut best) {
+        if self.problem.renew_noise(&mut best)? {
             let again = self.polish_from((&best.x, best.answer), Some(&best.jacobian), ROUNDS)?;
             best = self.friction(again)?;
         }

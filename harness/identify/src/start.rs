@@ -63,7 +63,7 @@ pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64
 
 /// Frequency response of torque to rate over the band that the torque excites.
 pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
-    let (step, torque, rate) = recording.even();
+    let (step, torque, rate) = recording.even()?;
     let band = excited_band(step, &torque, &rate).context("the torque has no spectrum")?;
     ensure!(
         band.1 > 1.15 * band.0,
@@ -196,7 +196,7 @@ fn balances(
 
 /// Frequencies between which the torque of a recording has its power, Hz.
 fn excited(recording: &Recording) -> Option<(f64, f64)> {
-    let (step, torque, rate) = recording.even();
+    let (step, torque, rate) = recording.even().ok()?;
     excited_band(step, &torque, &rate)
 }
 
@@ -286,7 +286,7 @@ const FINENESS: f64 = 1e-3;
 /// motion: it is divided by |jΩ(I0 + m r² G)|. Since nothing is simulated, a multisine's lines make no wrong minima, and
 /// since dry friction is in it, small amplitudes do not pass for damping.
 pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<Balance> {
-    let (step, torque, rate) = recording.even();
+    let (step, torque, rate) = recording.even().ok()?;
     let n = rate.len();
     let mean = mean(&rate);
     let noise = recording.rate_noise();

@@ -8,9 +8,11 @@
 
 use std::collections::BTreeMap;
 
+use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use crate::decomposition;
 use crate::estimate::{Estimated, prose};
 use crate::unknown::Unknown;
 
@@ -32,11 +34,14 @@ pub struct Covariance {
 }
 
 impl Covariance {
-    /// From sensitivities; `None` if some combination of unknowns has no influence at all.
-    pub fn of(jacobian: &DMatrix<f64>) -> Option<Self> {
-        let (l, condition) = directions(jacobian);
+    /// From sensitivities to unknowns with these names; `None` if some combination of unknowns has no influence at all.
+    ///
+    /// # Errors
+    /// If a sensitivity is not finite.
+    pub fn of(jacobian: &DMatrix<f64>, names: &[String]) -> Result<Option<Self>> {
+        let (l, condition) = directions(jacobian, names)?;
         let all_act = jacobian.column_iter().all(|column| column.norm() > 0.0);
-        (all_act && condition < 1e9).then(|| Covariance { x: &l * l.transpose(), condition })
+        Ok((all_act && condition < 1e9).then(|| Covariance { x: &l * l.transpose(), condition }))
     }
 
     /// The sandwich for innovations that are not white; `windows` are ranges of rows.
@@ -68,18 +73,22 @@ impl Covariance {
 
 /// L = V S⁻¹ of sensitivities U S Vᵀ, from columns of unit length: each column moves the answer by one standard
 /// deviation, at right angles to the others, and L Lᵀ is the covariance (JᵀJ)⁻¹. Also the condition number.
-pub fn directions(jacobian: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
-    let norms: Vec<f64> = jacobian.column_iter().map(|c| c.norm().max(1e-9)).collect();
+///
+/// # Errors
+/// If a sensitivity is not finite.
+pub fn directions(jacobian: &DMatrix<f64>, names: &[String]) -> Result<(DMatrix<f64>, f64)> {
+    let lengths = decomposition::lengths(jacobian, names)?;
+    let norms: Vec<f64> = lengths.iter().map(|length| length.max(1e-9)).collect();
     let mut scaled = jacobian.clone();
     scaled.column_iter_mut().zip(&norms).for_each(|(mut column, norm)| column /= *norm);
-    let svd = scaled.qr().r().svd(false, true);
+    let svd = decomposition::singular(scaled.qr().r())?;
     let (largest, smallest) = (svd.singular_values.max(), svd.singular_values.min());
     let mut l = svd.v_t.map_or_else(DMatrix::default, |v| v.transpose());
     for (mut column, value) in l.column_iter_mut().zip(&svd.singular_values) {
         column /= value.max(1e-9 * largest);
     }
     l.row_iter_mut().zip(&norms).for_each(|(mut row, norm)| row /= *norm);
-    (l, largest / smallest)
+    Ok((l, largest / smallest))
 }
 
 /// Windows of `seconds` for [`Covariance::sandwich`], of recordings with so many rows, so many seconds apart.
@@ -295,10 +304,10 @@ mod tests {
     fn a_straight_line_has_its_textbook_covariance() {
         // y = a + b t at t = -2..2, unit noise: var a = 1/5, var b = 1/10, no correlation
         let jacobian = DMatrix::from_fn(5, 2, |k, j| if j == 0 { 1.0 } else { k as f64 - 2.0 });
-        let found = Covariance::of(&jacobian).unwrap();
+        let found = Covariance::of(&jacobian, &[]).unwrap().unwrap();
         assert!((found.x[(0, 0)] - 0.2).abs() < 1e-15 && (found.x[(1, 1)] - 0.1).abs() < 1e-15);
         assert!(found.x[(0, 1)].abs() < 1e-15 && (found.condition - 1.0).abs() < 1e-12);
         // two columns that are the same have no covariance
-        assert!(Covariance::of(&DMatrix::from_element(5, 2, 1.0)).is_none());
+        assert!(Covariance::of(&DMatrix::from_element(5, 2, 1.0), &[]).unwrap().is_none());
     }
 }

@@ -60,7 +60,7 @@ pub fn identify(
     start: (f64, f64, f64),
     bench: Bench,
 ) -> Result<f64> {
-    let (step, torque, rate) = recording.even();
+    let (step, torque, rate) = recording.even()?;
     let actual: Vec<f64> =
         torque.iter().zip(&rate).map(|(tau, w)| tau + friction.torque(*w)).collect();
     let simulated = |x: &[f64]| {

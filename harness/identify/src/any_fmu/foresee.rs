@@ -69,8 +69,8 @@ pub fn foresee(
     problem.jacobian(&x, &motion, &mut steps)?;
     let jacobian = problem.jacobian(&x, &motion, &mut steps)?;
     let all: Vec<usize> = (0..x.len()).collect();
-    let solver = measure(&problem, &x, &motion, &jacobian, &steps, &all);
-    let known = knowledge(&problem, &jacobian, &all, &solver);
+    let solver = measure(&problem, &x, &motion, &jacobian, &steps, &all)?;
+    let known = knowledge(&problem, &jacobian, &all, &solver)?;
     let covariance = &known.covariance;
     let bound = |j: usize| {
         let unknown = &problem.unknowns[j];

@@ -183,7 +183,7 @@ pub fn identify(
     // the last noise is that of the last minimum
     minimum.answer.e = problem.stacked(&minimum.answer.motion, &minimum.x);
     told(&News::Step("intervals from the profiles of the likelihood".into()));
-    let mut found = answer(&problem, &minimum, question);
+    let mut found = answer(&problem, &minimum, question)?;
     found.details.starts = starts;
     found.done = done;
     Ok(found)
@@ -205,9 +205,9 @@ pub(crate) fn knowledge(
     jacobian: &DMatrix<f64>,
     which: &[usize],
     solver: &SolverError,
-) -> Knowledge {
+) -> Result<Knowledge> {
     let n = problem.unknowns.len();
-    let curvature = Curvature::of(jacobian, which);
+    let curvature = Curvature::of(jacobian, &problem.names(), which)?;
     let inverse = curvature.inverse();
     let mut covariance = DMatrix::zeros(n, n);
     for (a, &i) in which.iter().enumerate() {
@@ -244,7 +244,7 @@ pub(crate) fn knowledge(
         let std = covariance[(j, j)].sqrt();
         decided_by_solver[j] |= std.is_finite() && solver.shift[j] > DECIDES * std;
     }
-    Knowledge { covariance, inseparable, decided_by_solver }
+    Ok(Knowledge { covariance, inseparable, decided_by_solver })
 }
 
 /// What makes the solver's errors smaller.
@@ -265,7 +265,7 @@ fn remedy(problem: &Problem, solver: &SolverError) -> String {
     }
 }
 
-fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identification {
+fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<Identification> {
     let n = minimum.x.len();
     let inner = minimum.inner(&problem.unknowns);
     let solver = solver_error::measure(
@@ -275,9 +275,9 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
         &minimum.jacobian,
         &minimum.steps,
         &inner,
-    );
+    )?;
     let Knowledge { covariance, inseparable, decided_by_solver } =
-        knowledge(problem, &minimum.jacobian, &inner, &solver);
+        knowledge(problem, &minimum.jacobian, &inner, &solver)?;
     let curvature_alone = |j: usize| 1.0 / minimum.jacobian.column(j).norm();
     // where differences end before the minimum, how far it may be off is part of how sure it is
     let widened = (1.0 + minimum.decrement.powi(2)).sqrt();
@@ -294,7 +294,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
             if solver.shift[j] > ADDED * std { std.hypot(solver.shift[j]) } else { std }
         })
         .collect();
-    let intervals = profile::intervals(problem, minimum, &std);
+    let intervals = profile::intervals(problem, minimum, &std)?;
     let outputs = outputs(problem, &minimum.answer.motion, &minimum.x, question);
     let mut found = Identified::new(Details {
         outputs,
@@ -311,7 +311,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
             .map(|i| covariance.row(i).iter().copied().map(finite).collect())
             .collect(),
     });
-    let names: Vec<String> = problem.unknowns.iter().map(|u| u.name.clone()).collect();
+    let names = problem.names();
     let correlation = |i: usize, j: usize| {
         let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
         if size > 0.0 && size.is_finite() { covariance[(i, j)] / size } else { f64::from(i == j) }
@@ -417,7 +417,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
             }
         })
         .collect();
-    found
+    Ok(found)
 }
 
 /// JSON knows no infinity.

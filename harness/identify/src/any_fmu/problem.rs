@@ -115,6 +115,11 @@ impl<'a> Problem<'a> {
         Problem { model, setup, records, unknowns, channels }
     }
 
+    /// Names of the unknowns.
+    pub fn names(&self) -> Vec<String> {
+        self.unknowns.iter().map(|unknown| unknown.name.clone()).collect()
+    }
+
     /// The starts.
     pub fn start(&self) -> Vec<f64> {
         self.unknowns.iter().map(|unknown| unknown.start).collect()

@@ -5,6 +5,7 @@
 //! looked at there, on both sides; where it is another one the ends are searched for. An interval that reaches its bound, or
 //! [`FARTHEST`] standard deviations, without an end has none.
 
+use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -34,20 +35,23 @@ pub struct Interval {
 }
 
 /// Intervals of the unknowns; `std` are their standard deviations.
-pub fn intervals(problem: &Problem, minimum: &Minimum, std: &[f64]) -> Vec<Interval> {
+///
+/// # Errors
+/// If a derivative is not finite.
+pub fn intervals(problem: &Problem, minimum: &Minimum, std: &[f64]) -> Result<Vec<Interval>> {
     (0..std.len()).into_par_iter().map(|j| interval(problem, minimum, j, std[j])).collect()
 }
 
-fn interval(problem: &Problem, minimum: &Minimum, j: usize, std: f64) -> Interval {
+fn interval(problem: &Problem, minimum: &Minimum, j: usize, std: f64) -> Result<Interval> {
     let (low, high) = problem.unknowns[j].bounds;
     let x = minimum.x[j];
     if !std.is_finite() || std == 0.0 {
         let ends = [low, high].map(|end| if end.is_finite() { end } else { f64::NAN });
-        return Interval { ends, ended: [false; 2], quadratic: false };
+        return Ok(Interval { ends, ended: [false; 2], quadratic: false });
     }
     let others: Vec<usize> =
         minimum.inner(&problem.unknowns).into_iter().filter(|k| *k != j).collect();
-    let profile = Profile::new(problem, minimum, j, others);
+    let profile = Profile::new(problem, minimum, j, others)?;
     let mut sides = [-1.0, 1.0].map(|sign| {
         let room = if sign < 0.0 { x - low } else { high - x };
         profile.end(sign, std, room)
@@ -58,11 +62,11 @@ fn interval(problem: &Problem, minimum: &Minimum, j: usize, std: f64) -> Interva
             side.at = x + sign * Z * std;
         }
     }
-    Interval {
+    Ok(Interval {
         ends: [sides[0].at, sides[1].at],
         ended: [sides[0].ended, sides[1].ended],
         quadratic,
-    }
+    })
 }
 
 struct Side {
@@ -83,12 +87,17 @@ struct Profile<'a> {
 }
 
 impl<'a> Profile<'a> {
-    fn new(problem: &'a Problem, minimum: &'a Minimum, j: usize, others: Vec<usize>) -> Self {
-        let curvature = Curvature::of(&minimum.jacobian, &others);
+    fn new(
+        problem: &'a Problem,
+        minimum: &'a Minimum,
+        j: usize,
+        others: Vec<usize>,
+    ) -> Result<Self> {
+        let curvature = Curvature::of(&minimum.jacobian, &problem.names(), &others)?;
         let picked: DMatrix<f64> = minimum.jacobian.select_columns(&others);
         let crossed = picked.tr_mul(&minimum.jacobian.column(j)).column(0).into_owned();
         let slope = -curvature.solve(&crossed, 0.0);
-        Profile { problem, minimum, j, others, curvature, slope }
+        Ok(Profile { problem, minimum, j, others, curvature, slope })
     }
 
     /// √Δ at a distance from the minimum; infinite where the FMU refuses.

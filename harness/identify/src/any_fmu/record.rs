@@ -8,6 +8,7 @@ use host::description::ModelDescription;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
 use super::question::Question;
+use crate::recording::{check_times, check_values};
 
 /// Values of an output below which nothing is estimated from them.
 const FEWEST: usize = 10;
@@ -69,17 +70,20 @@ impl Record {
 
     /// Refuses what cannot be fitted.
     pub fn check(&self, question: &Question) -> Result<()> {
-        if let Some(row) = self.time.windows(2).position(|t| t[1] <= t[0]) {
-            let [before, after] = [self.time[row], self.time[row + 1]];
-            anyhow::bail!("row {}: time must grow, but {after} s follows {before} s", row + 2);
-        }
         for (name, values) in question.outputs.iter().zip(&self.outputs) {
             let count = values.iter().filter(|y| !y.is_nan()).count();
             ensure!(count >= FEWEST, "{name} has {count} values (allowed: at least {FEWEST})");
         }
-        let all = self.time.iter().chain(self.inputs.iter().flatten());
-        let outputs = self.outputs.iter().flatten().filter(|y| !y.is_nan());
-        ensure!(all.chain(outputs).all(|value| value.is_finite()), "it has infinite values");
+        if self.time.len() > 1 {
+            check_times(&self.time)?;
+        }
+        for (name, values) in question.inputs.iter().zip(&self.inputs) {
+            check_values(name, values.iter().copied())?;
+        }
+        for (name, values) in question.outputs.iter().zip(&self.outputs) {
+            // NaN: not read
+            check_values(name, values.iter().map(|y| if y.is_nan() { 0.0 } else { *y }))?;
+        }
         Ok(())
     }
 

@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::problem::{Answer, Problem, Step};
 use super::record::Record;
 use super::unknown::Unknown;
+use crate::decomposition;
 use crate::news::News;
 use analysis::random::Random;
 
@@ -79,17 +80,23 @@ pub struct Curvature {
 }
 
 impl Curvature {
-    /// Of JᵀJ.
-    pub fn of(jacobian: &DMatrix<f64>, which: &[usize]) -> Self {
+    /// Of JᵀJ over the columns `which` of J; `names`: of all columns.
+    ///
+    /// # Errors
+    /// If a derivative is not finite.
+    pub fn of(jacobian: &DMatrix<f64>, names: &[String], which: &[usize]) -> Result<Self> {
         let picked = jacobian.select_columns(which);
+        let picked_names: Vec<String> =
+            which.iter().filter_map(|&j| names.get(j).cloned()).collect();
+        decomposition::lengths(&picked, &picked_names)?;
         let a = picked.tr_mul(&picked);
         let scale = a.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
         if which.is_empty() {
-            return Curvature { values: DVector::zeros(0), vectors: a, scale };
+            return Ok(Curvature { values: DVector::zeros(0), vectors: a, scale });
         }
         let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
-        let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
-        Curvature { values: eigenvalues, vectors: eigenvectors, scale }
+        let SymmetricEigen { eigenvalues, eigenvectors } = decomposition::symmetric(scaled)?;
+        Ok(Curvature { values: eigenvalues, vectors: eigenvectors, scale })
     }
 
     /// The eigenvalue below which a direction is flat.
@@ -160,7 +167,7 @@ pub fn search(
         let jacobian = problem.jacobian(&x, &answer.motion, &mut steps)?;
         let gradient = jacobian.tr_mul(&answer.e);
         let which = inner(&problem.unknowns, &x, &gradient);
-        let curvature = Curvature::of(&jacobian, &which);
+        let curvature = Curvature::of(&jacobian, &problem.names(), &which)?;
         let picked =
             |g: &DVector<f64>| DVector::from_iterator(which.len(), which.iter().map(|&j| g[j]));
         let g = picked(&gradient);

@@ -12,6 +12,7 @@
 //! against the standard deviation. A solver that has the same errors in all of these runs shows none of them.
 
 use analysis::statistics::peak;
+use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -82,6 +83,9 @@ fn roughness(
 }
 
 /// Measures the solver's errors at x, where the motion is `base` and `which` unknowns are not at a bound.
+///
+/// # Errors
+/// If a derivative is not finite.
 pub fn measure(
     problem: &Problem,
     x: &[f64],
@@ -89,12 +93,12 @@ pub fn measure(
     jacobian: &DMatrix<f64>,
     steps: &[Step],
     which: &[usize],
-) -> SolverError {
+) -> Result<SolverError> {
     let found: Vec<Option<Roughness>> = (0..x.len())
         .into_par_iter()
         .map(|j| roughness(problem, x, j, base, steps[j].size))
         .collect();
-    let curvature = Curvature::of(jacobian, which);
+    let curvature = Curvature::of(jacobian, &problem.names(), which)?;
     let picked = jacobian.select_columns(which);
     let shift = |e: &DVector<f64>| curvature.solve(&picked.tr_mul(e), 0.0);
     // noise is another one at each point: the mean square over the samples
@@ -135,10 +139,10 @@ pub fn measure(
         let noise = r.noise.norm() / (std::f64::consts::SQRT_2 * r.step * norm);
         (noise, noise.hypot(r.third / (6.0 * r.step * norm)))
     };
-    SolverError {
+    Ok(SolverError {
         shift: all,
         derivative: (0..x.len()).map(derivative).collect(),
         heeds_tolerance: motions[0].as_ref().is_some_and(is_changed),
         is_seen: motions.iter().flatten().any(is_changed),
-    }
+    })
 }

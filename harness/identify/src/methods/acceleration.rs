@@ -33,6 +33,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::{Identified, Method, Needs, Task};
+use crate::decomposition;
 use crate::estimate::Estimated;
 use crate::news::News;
 use crate::nominal::{self, Nominal};
@@ -195,6 +196,8 @@ const FIRST: [&str; 6] =
 
 /// Rows that are closer are taken together, s. The mean of a sine of 3.5 Hz over it is 0.2 % less than its peak.
 const BLOCK: f64 = 0.01;
+/// Blocks of the shortest recording.
+const FEWEST: usize = 100;
 /// Rows by which the starts are told apart; the best is followed over all.
 const ROUGH: usize = 20_000;
 /// Stride over the grid of Stribeck speeds for intervals.
@@ -379,7 +382,13 @@ impl Problem {
         for (place, name) in names.iter().enumerate().skip(1) {
             let Ok(variable) = fmu.description().variable(name) else { continue };
             let [low, high] = unknown::range(variable);
-            bounds[place] = (bounds[place].0.max(low), bounds[place].1.min(high));
+            let (least, most) = bounds[place];
+            bounds[place] = (least.max(low), most.min(high));
+            ensure!(
+                bounds[place].0 < bounds[place].1,
+                "by the sizes of torque and rate {name} is {least:.2e} to {most:.2e} (allowed by the FMU: {low} to {high}): are \
+                 their units right?"
+            );
         }
         for (name, low, high) in &options.bounds {
             let Some(place) = names.iter().position(|n| n == name) else {
@@ -571,7 +580,10 @@ impl Problem {
     }
 
     /// What is known at a minimum of the variables that are not `held`; `None` if some combination has no influence.
-    fn known(&self, minimum: &Minimum, held: &[usize]) -> Option<Known> {
+    ///
+    /// # Errors
+    /// If a derivative is not finite.
+    fn known(&self, minimum: &Minimum, held: &[usize]) -> Result<Option<Known>> {
         let p = self.values(&minimum.x);
         // how sure the others are must not depend on a value that only a bound keeps from going on
         let whole = self.jacobian(&p);
@@ -580,14 +592,19 @@ impl Problem {
         let acting = all.clone().filter(|&j| whole.column(j).norm() > 0.0).collect();
         let inner = all.filter(|&j| !self.is_at_bound(j, p[j])).collect();
         let e = self.evaluate(&p, None);
-        [acting, inner].into_iter().find_map(|shown: Vec<usize>| {
+        let of = |shown: Vec<usize>| -> Result<Option<Known>> {
             let jacobian = whole.select_columns(&shown);
-            let covariance = Covariance::of(&jacobian)?;
+            let names: Vec<String> = shown.iter().map(|&j| self.names[j].clone()).collect();
+            let Some(covariance) = Covariance::of(&jacobian, &names)? else { return Ok(None) };
             let noise = &covariance.x * self.noise_scores(&jacobian) * &covariance.x;
             let sandwich = covariance.sandwich(&jacobian, &e, &windows(self));
             let scatter = Sources::least(&noise, &sandwich);
             let of_values = uncertainty::spread_out(&scatter, &shown, p.len());
-            Some(Known { covariance, jacobian, shown, scatter, of_values })
+            Ok(Some(Known { covariance, jacobian, shown, scatter, of_values }))
+        };
+        Ok(match of(acting)? {
+            None => of(inner)?,
+            known => known,
         })
     }
 
@@ -620,7 +637,7 @@ impl Problem {
     }
 
     /// Minima at the Stribeck speeds of the grid, and the 95 % intervals of b, c, d and ω_s over them.
-    fn profile(&self, minimum: &Minimum, held: &[usize]) -> Profile {
+    fn profile(&self, minimum: &Minimum, held: &[usize]) -> Result<Profile> {
         let held: Vec<usize> = held.iter().copied().chain([STRIBECK]).collect();
         let p = self.values(&minimum.x);
         let biases = self.biases(&p);
@@ -640,7 +657,7 @@ impl Problem {
             points.iter().map(|point| point.cost - least < LIMIT * variance).collect();
         let mut intervals = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
         for (point, _) in points.iter().zip(&is_in).filter(|(_, is_in)| **is_in) {
-            let (p, known) = (self.values(&point.x), self.known(point, &held));
+            let (p, known) = (self.values(&point.x), self.known(point, &held)?);
             for (k, interval) in intervals.iter_mut().enumerate() {
                 let std =
                     known.as_ref().map_or(0.0, |known| known.of_values[(k + 1, k + 1)].sqrt());
@@ -653,7 +670,7 @@ impl Problem {
         let last = is_in.iter().rposition(|is_in| *is_in).unwrap_or(0);
         let end = |k: Option<usize>, bound: f64| k.and_then(|k| points.get(k)).map_or(bound, speed);
         let speeds = [end(first.checked_sub(1), low), end(Some(last + 1), high)];
-        Profile { points, intervals, speeds }
+        Ok(Profile { points, intervals, speeds })
     }
 
     /// Mean of the sum of w_k y_k² from the gyro's noise.
@@ -713,6 +730,16 @@ fn given(problem: &Problem, options: &Options, liquid: f64) -> Result<Vec<(usize
 /// Estimates friction and inertia from recordings whose liquid does not move.
 pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Result<Found> {
     ensure!(!recordings.is_empty(), "there is no recording");
+    for recording in recordings {
+        recording.check()?;
+        ensure!(
+            recording.duration() > FEWEST as f64 * BLOCK,
+            "{}: it lasts {:e} s (allowed: more than {} s)",
+            recording.name,
+            recording.duration(),
+            FEWEST as f64 * BLOCK
+        );
+    }
     ensure!(
         options.harmonics <= 2,
         "the FMU has 2 harmonics of the angle, not {}",
@@ -748,7 +775,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     }
     minimum = problem.solve(&[off_the_bounds(&minimum.x)], &[]);
     let mut held = Vec::new();
-    let mut known = problem.known(&minimum, &held);
+    let mut known = problem.known(&minimum, &held)?;
     let way = problem.way(&minimum.x);
     let is_vague = |known: &Option<Known>, place: usize, part: f64| {
         known.as_ref().is_none_or(|known| {
@@ -766,11 +793,12 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         x[ASYMMETRY] = problem.scales[ASYMMETRY].variable(problem.inside(ASYMMETRY, 0.0));
         held.push(ASYMMETRY);
         minimum = problem.solve(&[x], &held);
-        known = problem.known(&minimum, &held);
+        known = problem.known(&minimum, &held)?;
     }
     let values = problem.values(&minimum.x);
     let vague = |place: usize| is_vague(&known, place, VAGUE * values[place]);
-    let profile = (vague(3) || vague(STRIBECK)).then(|| problem.profile(&minimum, &held));
+    let is_profiled = vague(3) || vague(STRIBECK);
+    let profile = is_profiled.then(|| problem.profile(&minimum, &held)).transpose()?;
     if let Some(profile) = &profile {
         // where a bound alone keeps friction or speed from going on, a minimum within the bounds may explain the recording as well
         let is_inside = |x: &[f64]| {
@@ -788,7 +816,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         if !held.contains(&STRIBECK) {
             held.push(STRIBECK);
         }
-        known = problem.known(&minimum, &held);
+        known = problem.known(&minimum, &held)?;
     }
     let p = problem.values(&minimum.x);
     let n = p.len();
@@ -861,7 +889,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let named = |keep: &dyn Fn(usize) -> bool| -> Vec<String> {
         (0..n).filter(|&j| keep(j)).map(|j| problem.names[j].clone()).collect()
     };
-    let si = jacobian.clone().qr().r().svd(false, false).singular_values;
+    let si = decomposition::singular(jacobian.clone().qr().r())?.singular_values;
     let mut settings: BTreeMap<String, String> = options.settings.iter().cloned().collect();
     settings.insert("slosh.model".into(), "frozen".into());
     settings.insert("friction.model".into(), "stribeck".into());

@@ -92,16 +92,14 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
         let mean = mean(&signal);
         signal.into_iter().map(|v| v - mean).collect()
     };
-    let (step, u, y) = recording.even();
+    let (step, u, y) = recording.even()?;
     let (u, y) = (centred(u), centred(y));
     let cut = match held_out {
         Some(_) => u.len(),
         None => (u.len() as f64 * FITTED) as usize,
     };
-    let other = held_out.map(|other| {
-        let (other_step, u, y) = other.even();
-        (other_step, centred(u), centred(y))
-    });
+    let other = held_out.map(Recording::even).transpose()?;
+    let other = other.map(|(other_step, u, y)| (other_step, centred(u), centred(y)));
     if let Some((other_step, ..)) = &other {
         ensure!(
             (other_step / step - 1.0).abs() < 1e-3,

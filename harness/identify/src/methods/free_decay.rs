@@ -63,6 +63,9 @@ impl Method for FreeDecay {
 
     fn identify(&self, task: &Task, _: &mut dyn FnMut(&News)) -> Result<Found> {
         let [unit, inverse, squared] = self.units();
+        for recording in task.recordings {
+            recording.check()?;
+        }
         let records: Vec<Record> =
             task.recordings.iter().map(|r| Record { time: &r.time, signal: &r.rate }).collect();
         let found = free_decay::FreeDecay::of(&records).with_context(|| {

@@ -161,7 +161,7 @@ fn spectrum(signal: &[f64], bins: &std::ops::RangeInclusive<usize>) -> Vec<Compl
 pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -> Result<Found> {
     let measured = start::response(recording)?;
     let rough = TransferFunction::fit(&measured).context("no transfer function fits")?;
-    let (step, torque, rate) = recording.even();
+    let (step, torque, rate) = recording.even()?;
     let count = torque.len();
     let bin = 1.0 / (step * count as f64);
     let band = (measured.frequency[0], measured.frequency[measured.frequency.len() - 1]);
@@ -216,7 +216,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         sigma = variances(&problem.residual(&x), x.len()).into_iter().map(f64::sqrt).collect();
     }
     let jacobian = differences(&|x| weighted(x, &sigma), &x, &steps);
-    let covariance = Covariance::of(&jacobian)
+    let covariance = Covariance::of(&jacobian, &[])?
         .with_context(|| format!("{}: poles and zeros are not determined", recording.name))?;
 
     let physical = |x: &[f64]| translated(x, unit, step, bench);

@@ -101,7 +101,7 @@ impl Method for Multisine {
 
 /// Analyses a recording of several periods, s each.
 pub fn analyse(recording: &Recording, period: f64) -> Result<Found> {
-    let (step, torque, rate) = recording.even();
+    let (step, torque, rate) = recording.even()?;
     let rows = (period / step).round() as usize;
     let name = &recording.name;
     ensure!(

@@ -267,7 +267,7 @@ fn finish(
     }
     let mut polished = problem.polish_from((&x, polished.answer), Some(&known), ROUNDS)?;
     // a search that ended elsewhere has taken what it left for noise
-    if problem.renew_noise(&mut polished) {
+    if problem.renew_noise(&mut polished)? {
         polished = problem.polish_on(&polished, ROUNDS)?;
     }
     polished = problem.polish_at_kink(polished, ROUNDS)?;
@@ -312,9 +312,11 @@ fn finish(
     say("higher slosh modes", &problem);
     fit.simulations = problem.simulations();
     let tolerances = budget::of_tolerances(&error_budget, x.len());
-    let noise_only = place(&problem)
-        .and_then(|scale| without(&jacobian, scale))
-        .unwrap_or_else(|| covariance.x.clone());
+    let noise_only = match place(&problem) {
+        Some(scale) => without(&problem, &jacobian, scale)?,
+        None => None,
+    };
+    let noise_only = noise_only.unwrap_or_else(|| covariance.x.clone());
     let values = problem.values(&x);
     let slopes: Vec<f64> =
         problem.unknowns.iter().zip(&x).map(|(u, &x)| u.scale.slope(x)).collect();
@@ -471,7 +473,8 @@ fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>
     }
     let unknown = &problem.unknowns[place];
     let slope = unknown.scale.slope(found.x[place]).abs();
-    let std = Covariance::of(&jacobian).map(|c| c.x[(place, place)].sqrt() * slope);
+    let std =
+        Covariance::of(&jacobian, &problem.names())?.map(|c| c.x[(place, place)].sqrt() * slope);
     if std.is_some_and(|std| std < ONE_WAY) || unknown.prior.is_some() {
         return Ok(None);
     }
@@ -651,7 +654,13 @@ fn windows(problem: &Problem) -> Vec<(usize, usize)> {
 }
 
 /// The covariance if the unknown at `place` were known exactly; its row and column are 0.
-fn without(jacobian: &DMatrix<f64>, place: usize) -> Option<DMatrix<f64>> {
-    let rest = Covariance::of(&jacobian.clone().remove_column(place))?.x;
-    Some(rest.insert_row(place, 0.0).insert_column(place, 0.0))
+fn without(
+    problem: &Problem,
+    jacobian: &DMatrix<f64>,
+    place: usize,
+) -> Result<Option<DMatrix<f64>>> {
+    let mut names = problem.names();
+    names.remove(place);
+    let rest = Covariance::of(&jacobian.clone().remove_column(place), &names)?;
+    Ok(rest.map(|rest| rest.x.insert_row(place, 0.0).insert_column(place, 0.0)))
 }

@@ -78,7 +78,7 @@ pub fn is_one_way(
     }
 }
 
-fn options(harmonics: usize) -> acceleration::Options {
+pub fn options(harmonics: usize) -> acceleration::Options {
     acceleration::Options {
         weights: Weights::Uniform,
         bounds: Vec::new(),

@@ -10,6 +10,7 @@ mod bench;
 mod draw;
 mod methods;
 mod other_bench;
+mod out_of_range;
 mod sensors;
 mod solver_noise;
 mod twin;

@@ -509,7 +509,7 @@ fn after_its_noise_is_renewed_a_minimum_is_of_that_noise() {
     let mut found = problem.polish(&problem.start(), None, 3).unwrap();
     let (before, was, deviations) =
         (found.cost, problem.channels[0].noise.white, found.covariance.x.diagonal());
-    assert!(problem.renew_noise(&mut found), "30 % more is another noise");
+    assert!(problem.renew_noise(&mut found).unwrap(), "30 % more is another noise");
     let rows = recordings[0].time.len() as f64;
     // the noise of maximum likelihood has a mean square of 1
     assert!((found.cost / rows - 1.0).abs() < 1e-9, "{} of {rows}, before {before}", found.cost);
@@ -518,7 +518,7 @@ fn after_its_noise_is_renewed_a_minimum_is_of_that_noise() {
     for (now, then) in found.covariance.x.diagonal().iter().zip(&deviations) {
         assert!((now / then / factor - 1.0).abs() < 1e-9, "{now} {then} {factor}");
     }
-    assert!(!problem.renew_noise(&mut found), "nothing has changed");
+    assert!(!problem.renew_noise(&mut found).unwrap(), "nothing has changed");
 }
 
 #[test]
