@@ -28,10 +28,6 @@ mod model_exchange;
 mod references;
 mod states;
 mod stepping;
-#[cfg(test)]
-mod tests;
-#[cfg(test)]
-mod tests_of_arrays;
 mod types;
 mod values;
 

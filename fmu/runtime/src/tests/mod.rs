@@ -9,6 +9,8 @@ mod snapshot;
 mod steps;
 mod table;
 pub(crate) mod trays;
+mod v3;
+mod v3_arrays;
 mod values;
 mod variable;
 mod version;

@@ -6,7 +6,6 @@ use std::ffi::c_void;
 use std::ptr;
 use std::sync::Mutex;
 
-use super::*;
 use crate::c_abi::{c_string, text};
 use crate::call::Interface;
 use crate::instance::Instance;
@@ -14,6 +13,7 @@ use crate::model::Model;
 use crate::spring::Spring;
 use crate::table::Layout;
 use crate::v2::{self, Fmi2};
+use crate::v3::*;
 use crate::variable::Value;
 
 fn token() -> std::ffi::CString {

@@ -5,11 +5,11 @@
 use std::ffi::c_void;
 use std::sync::Mutex;
 
-use super::*;
 use crate::c_abi::{c_string, text};
 use crate::model::Model;
 use crate::table::Layout;
 use crate::tests::trays::Trays;
+use crate::v3::*;
 
 type Lines = Mutex<Vec<String>>;
 
