@@ -17,7 +17,7 @@ use crate::version::Version;
 pub enum Topic {
     /// An event of the model.
     Event,
-    /// The parameters leave the range in which the model is known.
+    /// A parameter or state is outside the range in which the model was verified.
     Warning,
     /// A call has failed.
     Failure(Severity),

@@ -25,7 +25,7 @@ type Get3<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut T, usiz
 type DoStep3 =
     unsafe extern "C" fn(*mut c_void, f64, f64, u8, *mut u8, *mut u8, *mut u8, *mut f64) -> c_int;
 
-/// An instance of FMI 2.0 between two steps, and the functions of its FMU.
+/// Handle of an FMI 2.0 instance in Step Mode, and the addresses of its FMU's functions.
 #[repr(C)]
 pub struct CInstance {
     /// `fmi2Component`.

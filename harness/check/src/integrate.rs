@@ -29,7 +29,8 @@ const TOLERANCE: f64 = 1e-3;
 /// Steps of the explicit rule that are tried for one communication step before the FMU counts as
 /// stiff.
 const EXPLICIT_STEPS: usize = 40;
-/// Steps for one communication step. After them the host stays where it is, which a host may.
+/// Largest number of integrator steps for one communication step. The host then accepts the state that
+/// it has reached: FMI does not prescribe an accuracy.
 const MOST_STEPS: usize = 100;
 /// States up to which a Jacobian is taken from differences.
 const MOST_STATES: usize = 200;

@@ -325,7 +325,7 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
                 findings.add(
                     place,
                     format!(
-                        "\"{shown_name}\" does not measure what \"{name}\" does ({} against {})",
+                        "the units \"{shown_name}\" ({}) and \"{name}\" ({}) have different dimensions",
                         to[0].text(),
                         from[0].text()
                     ),
