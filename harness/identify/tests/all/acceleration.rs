@@ -41,11 +41,11 @@ fn recordings(seed: u64, bias: f64) -> Vec<Recording> {
     courses.iter().enumerate().map(record).collect()
 }
 
-/// A push of 0.1 N·m for 5 s forwards, and the free decay to rest.
-pub fn push(seed: u64) -> Recording {
+/// A push of 0.1 N·m for 5 s forwards (1) or backwards (−1), and the free decay to rest.
+pub fn push(seed: u64, way: f64) -> Recording {
     let time: Vec<f64> = (0..=3000).map(|k| 0.02 * f64::from(k)).collect();
     let tau: Vec<f64> =
-        time.iter().map(|t| if (1.0..6.0).contains(t) { 0.1 } else { 0.0 }).collect();
+        time.iter().map(|t| if (1.0..6.0).contains(t) { 0.1 * way } else { 0.0 }).collect();
     let bearing = Bearing { asymmetry: ASYMMETRY, ..Bench::default().bearing };
     let bench = Bench { liquid: Liquid::Frozen, bearing, ..Bench::default() };
     let motion = bench.motion(&Drive::Lines(&time, &tau), &time);
@@ -54,11 +54,12 @@ pub fn push(seed: u64) -> Recording {
     Recording::of("push", time, tau, rate)
 }
 
-/// The verdict calls the asymmetry not determined, and the friction forwards is within four standard deviations of the truth.
+/// The verdict calls the asymmetry not determined, and the friction of the one `way` is within four standard deviations of the truth.
 pub fn is_one_way(
     parameters: &BTreeMap<String, Estimated>,
     combinations: &[Combination],
     verdict: &[String],
+    way: f64,
 ) {
     for name in ["friction.asymmetry", "friction.c", "friction.d"] {
         let p = &parameters[name];
@@ -68,9 +69,10 @@ pub fn is_one_way(
     let [low, high] = parameters["friction.asymmetry"].interval;
     assert!((low..=high).contains(&ASYMMETRY));
     for (name, truth) in [("friction.c", bearing.c), ("friction.d", bearing.d)] {
-        let known = format!("{name} (1 + friction.asymmetry)");
+        let sign = if way > 0.0 { '+' } else { '-' };
+        let known = format!("{name} (1 {sign} friction.asymmetry)");
         let combination = combinations.iter().find(|c| c.name == known).unwrap();
-        let off = (combination.value - truth * (1.0 + ASYMMETRY)) / combination.std;
+        let off = (combination.value - truth * (1.0 + way * ASYMMETRY)) / combination.std;
         assert!(off.abs() < 4.0, "{combination:?}");
         assert!(verdict.iter().any(|line| line.contains(&known)), "{verdict:?}");
         let [low, high] = parameters[name].interval;
@@ -159,7 +161,10 @@ fn a_start_is_taken_besides_those_of_the_data() {
 #[test]
 fn a_hub_that_turns_one_way_determines_the_friction_of_that_way_alone() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let found = acceleration::identify(&fmu, &[push(1)], &options(0)).unwrap();
-    assert!(found.fits == Some(true), "{:?}", found.verdict);
-    is_one_way(&found.parameters, &found.details.combinations, &found.verdict);
+    for way in [1.0, -1.0] {
+        let recording = push(1, way);
+        let found = acceleration::identify(&fmu, &[recording], &options(0)).unwrap();
+        assert!(found.fits == Some(true), "{:?}", found.verdict);
+        is_one_way(&found.parameters, &found.details.combinations, &found.verdict, way);
+    }
 }

@@ -17,6 +17,8 @@ use identify::unknown::{Scale, Unknown};
 use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
+use crate::acceleration::{is_one_way, push};
+
 /// The thesis's sweep of 2700 s.
 const LONG: &str = "lin-sweep:amplitude=0.1";
 /// A faster one, where only gross faults matter.
@@ -641,15 +643,16 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
     }
 }
 
+/// A rigid liquid, forwards and backwards.
 #[test]
 fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let options = Options { models: vec!["frozen".into()], sensor_errors: true, ..options() };
-    let recordings = [crate::acceleration::push(1)];
-    let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
-    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
-    let details = &found.details;
-    crate::acceleration::is_one_way(&found.parameters, &details.combinations, &found.verdict);
+    for way in [1.0, -1.0] {
+        let options = Options { models: vec!["frozen".into()], sensor_errors: true, ..options() };
+        let found = identify(&fmu, &[push(1, way)], &options, &mut |_| {}).unwrap();
+        assert!(found.converged && found.fits == Some(true), "{way}: {:?}", found.verdict);
+        is_one_way(&found.parameters, &found.details.combinations, &found.verdict, way);
+    }
 }
 
 /// The damping is the largest that the FMU allows, and a difference from there leaves the range.
