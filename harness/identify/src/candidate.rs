@@ -151,7 +151,9 @@ fn problem<'a>(
     settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
     let setup =
         Setup { settings, intersample: options.intersample.unwrap_or(Intersample::FirstOrderHold) };
-    Ok(Problem::new(fmu, setup, recordings, unknowns))
+    let problem = Problem::new(fmu, setup, recordings, unknowns);
+    problem.refuse_overridden()?;
+    Ok(problem)
 }
 
 fn unknowns(

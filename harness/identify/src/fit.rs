@@ -39,7 +39,8 @@ use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::nominal::{Bench, Nominal};
+use crate::nominal::{self, Bench, Nominal};
+use crate::overridden::{beside, refuse};
 use crate::recording::Recording;
 use crate::simulate::{Motion, Read, Setup};
 use crate::stribeck;
@@ -246,6 +247,25 @@ impl<'a> Problem<'a> {
         let bench = Nominal::of(fmu, &setup.settings, &[]).ok().map(|nominal| nominal.bench);
         let driven = Arc::default();
         Problem { fmu, setup, recordings, unknowns, channels, differences, bench, driven }
+    }
+
+    /// Refuses unknowns that have no effect because of the settings.
+    ///
+    /// # Errors
+    /// For such an unknown, with the FMU's reason.
+    pub fn refuse_overridden(&self) -> Result<()> {
+        let parameters = self.unknowns.iter().filter_map(|unknown| match &unknown.quantity {
+            Quantity::Parameter(name) => {
+                let value = unknown.start;
+                Some((name, beside(value, (f64::MIN, f64::MAX), value.abs()).to_string()))
+            }
+            _ => None,
+        });
+        let parameters: Vec<_> = parameters.map(|(name, value)| (name.clone(), value)).collect();
+        let settings = [&self.setup.settings[..], &parameters].concat();
+        // what the FMU refuses here, the search tells
+        let warnings = nominal::warnings(self.fmu, &settings).unwrap_or_default();
+        parameters.iter().try_for_each(|(name, _)| refuse(name, &warnings))
     }
 
     /// Simulations so far, of all recordings; of a part of them they count as that part.

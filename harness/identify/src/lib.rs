@@ -17,6 +17,7 @@ pub mod missing;
 pub mod news;
 pub mod nominal;
 pub mod options;
+pub mod overridden;
 pub mod plausible;
 pub mod recording;
 pub mod search;

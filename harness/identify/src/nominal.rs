@@ -67,6 +67,13 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
     Ok(instance)
 }
 
+/// The FMU's warnings of a motion that begins with these settings.
+pub fn warnings(fmu: &Fmu, settings: &[(String, String)]) -> Result<Vec<String>> {
+    let mut instance = initialised(fmu, settings)?;
+    instance.exit_initialization_mode()?;
+    Ok(instance.take_warnings())
+}
+
 /// Settings in which a damping ratio counts: `slosh.zeta` turns `slosh.zeta_from_correlation` off, unless the settings say what
 /// that is.
 pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)> {

@@ -279,7 +279,9 @@ impl AnyFmuArgs {
             records.push(Record { outputs, ..read });
         }
         ensure!(!records.is_empty(), "name the tables of inputs that are planned");
-        let bounds = foresee(&model, &question, &records, &sizes)?;
+        let bounds = foresee(&model, &question, &records, &sizes, &mut |warning| {
+            terminal::warn(warning);
+        })?;
         if told.json {
             println!("{}", serde_json::to_string_pretty(&bounds)?);
         } else {

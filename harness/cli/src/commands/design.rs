@@ -121,6 +121,9 @@ impl DesignArgs {
             table::check_ending(out)?;
         }
         let fmu = open(&self.fmu)?;
+        for warning in nominal::warnings(&fmu, &self.settings)? {
+            terminal::warn(warning);
+        }
         let mut instance = nominal::initialised(&fmu, &self.settings)?;
         let mut real = |name: &str| instance.real(name);
         let wheel = Wheel {

@@ -358,6 +358,12 @@ impl IdentifyArgs {
         let nominal = fmu.as_ref().map(|fmu| self.options().nominal(fmu)).transpose()?;
         let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
         let mut notes = Vec::new();
+        if let Some(fmu) = &fmu {
+            for warning in nominal::warnings(fmu, &self.settings)? {
+                terminal::warn(&warning);
+                notes.push(format!("the FMU warns: {warning}"));
+            }
+        }
         let source = self.source(trim)?;
         let mut read = |paths: &[PathBuf]| -> Result<Vec<Recording>> {
             let mut all = Vec::new();

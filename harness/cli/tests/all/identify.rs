@@ -192,6 +192,15 @@ fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage
     let json = with(&both);
     let found: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_ne!(found["parameters"]["slosh.zeta"]["value"], 0.01, "{json}");
+    // by which the ratio has no effect, of which the FMU warns
+    record(folder.path(), "data.csv", &[]);
+    let method = ["--method", "acceleration", "--out", "a.json"];
+    let identify = [&["identify", "data.csv"], &method[..]].concat();
+    for command in [&asked[..], &identify] {
+        let said = run(folder.path(), &[command, &both].concat()).stderr;
+        let said = String::from_utf8_lossy(&said).into_owned();
+        assert_eq!(said.matches("slosh.zeta has no effect: ").count(), 1, "{said}");
+    }
     let said = with(&[]);
     for name in ["friction.asymmetry", "delay", "gyro_bias[1]"] {
         let line = said.lines().find(|line| line.starts_with(name)).unwrap();

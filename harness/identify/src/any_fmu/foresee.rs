@@ -38,6 +38,7 @@ pub struct Bound {
 }
 
 /// Foresees what recordings with these inputs tell at the starts; `noise`: of a row of each output. Their outputs are not looked at.
+/// `warn` hears the FMU's warnings.
 ///
 /// # Errors
 /// All that is wrong with what is asked; what the FMU refuses.
@@ -46,6 +47,7 @@ pub fn foresee(
     question: &Question,
     records: &[Record],
     noise: &[f64],
+    warn: &mut dyn FnMut(String),
 ) -> Result<Vec<Bound>> {
     ensure!(!records.is_empty(), "there is no table of planned inputs");
     for record in records {
@@ -62,6 +64,7 @@ pub fn foresee(
         channel.noise = Noise::white(noise[channel.output]);
         channel.sampled.fill(true);
     }
+    problem.warnings()?.into_iter().for_each(warn);
     let x = problem.start();
     let motion = problem.answer(&x)?.motion;
     let mut steps = problem.first_steps();

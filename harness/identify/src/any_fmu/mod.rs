@@ -162,6 +162,9 @@ pub fn identify(
         records.len(),
         problem.runs_of_jacobian()
     )));
+    for warning in problem.warnings()? {
+        told(&News::Step(format!("the FMU warns: {warning}")));
+    }
     let (mut minimum, starts) = search::best(&problem, question.starts, &mut told)?;
     let mut problem = problem;
     for turn in 1..=TURNS {

@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use super::record::Record;
 use super::simulate::{Model, Setup, Value};
 use super::unknown::{Unknown, What};
+use crate::overridden::{beside, refuse};
 use analysis::gauss_markov::{Noise, Whitening};
 use analysis::statistics::median;
 
@@ -143,6 +144,43 @@ impl<'a> Problem<'a> {
 
     fn run(&self, x: &[f64], number: usize) -> Result<Vec<Vec<f64>>> {
         self.setup.run(self.model, &self.values(x, number), number, &self.records[number])
+    }
+
+    /// The FMU's warnings of the motions that begin at the starts, each once.
+    ///
+    /// # Errors
+    /// If an unknown has no effect in any recording because of another parameter.
+    pub fn warnings(&self) -> Result<Vec<String>> {
+        let start = self.start();
+        let moved: Vec<f64> =
+            self.unknowns.iter().map(|u| beside(u.start, u.bounds, u.reach)).collect();
+        let of = |(number, record): (usize, &Record)| {
+            let with = |x: &[f64]| {
+                self.setup.warnings(self.model, &self.values(x, number), number, record)
+            };
+            // what the FMU refuses here, the search tells
+            with(&moved).or_else(|_| with(&start)).unwrap_or_default()
+        };
+        let warnings: Vec<Vec<String>> = self.records.iter().enumerate().map(of).collect();
+        for unknown in &self.unknowns {
+            let What::Parameter { recording, .. } = unknown.what else { continue };
+            let own = warnings.iter().enumerate();
+            let own = own.filter(|(number, _)| recording.is_none_or(|of| of == *number));
+            let name = recording.and_then(|_| unknown.name.rsplit_once('@'));
+            let name = name.map_or(&*unknown.name, |(name, _)| name);
+            let refused: Vec<Result<()>> = own.map(|(_, said)| refuse(name, said)).collect();
+            // an unknown that has an effect in one recording can be estimated
+            if refused.iter().all(Result::is_err) {
+                refused.into_iter().collect::<Result<()>>()?;
+            }
+        }
+        let mut once: Vec<String> = Vec::new();
+        for warning in warnings.into_iter().flatten() {
+            if !once.contains(&warning) {
+                once.push(warning);
+            }
+        }
+        Ok(once)
     }
 
     /// The FMU's answer for x.

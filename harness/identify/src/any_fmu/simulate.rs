@@ -151,6 +151,14 @@ impl Output {
     }
 }
 
+/// An instance that is ready for its first step.
+enum Initialised<'m> {
+    /// It steps itself.
+    Own(Instance<'m>),
+    /// The host integrates.
+    Host(exchange::Run<'m>),
+}
+
 /// An unknown's value: its reference.
 pub type Value = (u32, f64);
 
@@ -277,6 +285,36 @@ impl Setup {
         number: usize,
         record: &Record,
     ) -> Result<Vec<Vec<f64>>> {
+        match self.initialised(model, values, number, record)? {
+            Initialised::Own(mut instance) => self.step(&mut instance, model.description(), record),
+            Initialised::Host(run) => self.integrate(run, record),
+        }
+    }
+
+    /// The FMU's warnings of the motion that begins in the recording of this number.
+    ///
+    /// # Errors
+    /// What the FMU refuses.
+    pub fn warnings(
+        &self,
+        model: &Model,
+        values: &[Value],
+        number: usize,
+        record: &Record,
+    ) -> Result<Vec<String>> {
+        Ok(match self.initialised(model, values, number, record)? {
+            Initialised::Own(instance) => instance.take_warnings(),
+            Initialised::Host(mut run) => run.instance().take_warnings(),
+        })
+    }
+
+    fn initialised<'m>(
+        &self,
+        model: &'m Model,
+        values: &[Value],
+        number: usize,
+        record: &Record,
+    ) -> Result<Initialised<'m>> {
         let first = self.course(record, 0).0;
         let start = record.time[0];
         let settings = || {
@@ -297,7 +335,7 @@ impl Setup {
                     instance.set_real(&self.inputs, &first)?;
                 }
                 instance.exit_initialization_mode()?;
-                self.step(&mut instance, fmu.description(), record)
+                Ok(Initialised::Own(instance))
             }
             Model::Host { fmu, sizes, .. } => {
                 let with = fmu.instantiation("identify");
@@ -318,14 +356,9 @@ impl Setup {
                     instance.set_real(&self.inputs, &first)?;
                 }
                 instance.exit_initialization_mode()?;
-                let run = exchange::Run::new(
-                    instance,
-                    *sizes,
-                    self.tolerance.unwrap_or(FINE),
-                    start,
-                    self.most_steps,
-                )?;
-                self.integrate(run, record)
+                let tolerance = self.tolerance.unwrap_or(FINE);
+                let run = exchange::Run::new(instance, *sizes, tolerance, start, self.most_steps)?;
+                Ok(Initialised::Host(run))
             }
         }
     }

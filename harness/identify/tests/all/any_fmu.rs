@@ -192,7 +192,7 @@ fn what_is_foreseen_is_what_a_fit_states() {
     let question = question(&at_truth);
     let model = Model::open(packed_for_tests(), question.solver).unwrap();
     let records = [record(1, 0.0, 0.0), record(2, 0.0, 0.0)];
-    let bounds = foresee(&model, &question, &records, &[NOISE]).unwrap();
+    let bounds = foresee(&model, &question, &records, &[NOISE], &mut |_| {}).unwrap();
     let found = identify(&model, &question, &records, &mut |_| {}).unwrap();
     for bound in bounds.iter().filter(|bound| bound.is_parameter) {
         let stated = found.parameters[&bound.name].std;
@@ -248,4 +248,43 @@ fn the_page_is_whole() {
     if let Some(path) = std::env::var_os("HUBSLOSH_PAGE") {
         atomically(path.as_ref(), |file| Ok(file.write_all(page.as_bytes())?)).unwrap();
     }
+}
+
+/// slosh.zeta counts where slosh.zeta_from_correlation is false alone.
+#[test]
+fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() {
+    let records = [record(1, 0.0, 0.0), record(2, 0.0, 0.0)];
+    let noise = [NOISE];
+    let model = |solver| Model::open(packed_for_tests(), solver).unwrap();
+    let with = |free: &[&str], set: &[&str], solver| {
+        let mut question = Question { solver, starts: 1, ..question(free) };
+        question.settings = set.iter().map(|text| text.parse().unwrap()).collect();
+        question
+    };
+    let said = "slosh.zeta is free, but slosh.zeta has no effect while slosh.zeta_from_correlation is true";
+    let free = ["hub.I=0.35:0.1:1", "slosh.zeta=0.003"];
+    for (free, set) in [
+        (free, &["slosh.model=linear"][..]),
+        (["hub.I=0.35:0.1:1", "slosh.zeta@each=0.01:0:0.01"], &["slosh.model=linear"]),
+    ] {
+        for solver in [Solver::Own, Solver::Host(1e-8)] {
+            let (model, question) = (model(solver), with(&free, set, solver));
+            let error = identify(&model, &question, &records, &mut |_| {}).unwrap_err();
+            assert!(format!("{error:#}").starts_with(said), "{error:#}");
+            let error = foresee(&model, &question, &records, &noise, &mut |_| {}).unwrap_err();
+            assert!(format!("{error:#}").starts_with(said), "{error:#}");
+        }
+    }
+    let model = model(Solver::Own);
+    // it has an effect in the second recording
+    let some = with(&free, &["slosh.zeta_from_correlation@2=false"], Solver::Own);
+    foresee(&model, &some, &records, &noise, &mut |_| {}).unwrap();
+    let set = ["slosh.model=linear", "slosh.zeta=0.01"];
+    let question = with(&["hub.I=0.35:0.1:1"], &set, Solver::Own);
+    let warns = |line: &String| line.contains("slosh.zeta has no effect: slosh.zeta_from_corr");
+    let mut heard = Vec::new();
+    foresee(&model, &question, &records, &noise, &mut |line| heard.push(line)).unwrap();
+    assert_eq!(heard.iter().filter(|line| warns(line)).count(), 1, "{heard:?}");
+    let found = identify(&model, &question, &records, &mut |_| {}).unwrap();
+    assert_eq!(found.done.iter().filter(|line| warns(line)).count(), 1, "{:?}", found.done);
 }

@@ -239,7 +239,7 @@ fn what_is_foreseen_is_refused_where_the_solver_decides_and_is_the_stated_uncert
     let question = |solver| Question { free: at_truth.clone(), ..question(solver) };
     let bounds = |solver| {
         let model = Model::open(&fmu.path(), solver).unwrap();
-        foresee(&model, &question(solver), &[record(1, 1.0)], &NOISE).unwrap()
+        foresee(&model, &question(solver), &[record(1, 1.0)], &NOISE, &mut |_| {}).unwrap()
     };
     for bound in bounds(Solver::Own).iter().filter(|bound| ["k", "d"].contains(&&*bound.name)) {
         assert!(bound.decided_by_solver && bound.std.is_nan(), "{bound:?}");
@@ -304,7 +304,7 @@ fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() 
         let said = result.verdict.iter().any(|l| l.starts_with("d, k, m cannot be told apart"));
         assert!(said, "{:?}", result.verdict);
         let model = Model::open(&fmu.path(), solver).unwrap();
-        for bound in foresee(&model, &question, &[record(1, 1.0)], &NOISE).unwrap() {
+        for bound in foresee(&model, &question, &[record(1, 1.0)], &NOISE, &mut |_| {}).unwrap() {
             let is_lost = ["k", "m", "d"].contains(&bound.name.as_str());
             assert_eq!((bound.std.is_nan(), bound.inseparable_from.len() == 2), (is_lost, is_lost));
         }
@@ -339,7 +339,7 @@ fn one_unknown_none_inside_its_bounds_and_one_without_effect_are_answered() {
                 );
             }
             for records in [&[record(1, 1.0)][..], std::slice::from_ref(&one_row)] {
-                let bounds = foresee(&model, &question, records, &NOISE).unwrap();
+                let bounds = foresee(&model, &question, records, &NOISE, &mut |_| {}).unwrap();
                 assert_eq!(bounds.len(), free.len());
             }
         }
@@ -356,8 +356,8 @@ fn one_unknown_none_inside_its_bounds_and_one_without_effect_are_answered() {
             assert!(format!("{error:#}").contains("allowed: at least"), "{error:#}");
         }
         let empty = Record { outputs: vec![Vec::new(); 2], ..Record::default() };
-        assert!(foresee(&model, &question, &[empty], &NOISE).is_err());
-        assert!(foresee(&model, &question, &[], &NOISE).is_err());
+        assert!(foresee(&model, &question, &[empty], &NOISE, &mut |_| {}).is_err());
+        assert!(foresee(&model, &question, &[], &NOISE, &mut |_| {}).is_err());
     }
 }
 

@@ -7,7 +7,7 @@ use identify::budget;
 use identify::estimate::Estimated;
 use identify::fit::{Differences, Problem, ROUNDS};
 use identify::methods::output_error::identify;
-use identify::nominal::COARSEST;
+use identify::nominal::{self, COARSEST};
 use identify::options::Options;
 use identify::recording::{Recording, prepare};
 use identify::simulate::{Intersample, Setup};
@@ -653,6 +653,22 @@ fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
         assert!(found.converged && found.fits == Some(true), "{way}: {:?}", found.verdict);
         is_one_way(&found.parameters, &found.details.combinations, &found.verdict, way);
     }
+}
+
+#[test]
+fn a_damping_ratio_that_the_correlation_replaces_is_not_estimated() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recording = sweep(&fmu, "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=60", &[]);
+    let settings = vec![("slosh.zeta_from_correlation".to_string(), "true".to_string())];
+    let options = Options { models: vec!["linear".into()], settings, ..options() };
+    let error = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap_err();
+    let said = "slosh.zeta is free, but slosh.zeta has no effect while slosh.zeta_from_correlation is true";
+    assert!(format!("{error:#}").contains(said), "{error:#}");
+    let with_zeta = [&options.settings[..], &[("slosh.zeta".into(), "0.01".into())]].concat();
+    let warnings = nominal::warnings(&fmu, &with_zeta).unwrap();
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(warnings[0].starts_with("slosh.zeta has no effect"), "{warnings:?}");
+    assert!(nominal::warnings(&fmu, &[]).unwrap().is_empty());
 }
 
 /// The damping is the largest that the FMU allows, and a difference from there leaves the range.
