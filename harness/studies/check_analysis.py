@@ -1,6 +1,6 @@
 """Computes the features of a campaign of sweeps again, from its stored runs, with numpy and scipy.
 
-It is written from the definitions in book/campaigns.md, not
+It is written from the definitions in book/campaign_methods.md, not
 from the harness's code, and shares no part of it: another Fourier transform, another least-squares
 solver, another discretisation. Where the two differ by more than the tolerances below, one of them
 does not do what the documentation says.

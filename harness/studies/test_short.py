@@ -70,13 +70,13 @@ def test_a_picture_of_the_book(
 
 
 def test_tilt_slows_slosh_along_the_slope() -> None:
-    """The three changes at 60 degrees of book/liquid.md, to their printed digits.
+    """The three changes at 60 degrees of book/liquid_accuracy.md, to their printed digits.
 
     One tilt of the study's eleven.
     """
-    text = " ".join(lines("liquid.md"))
-    shallow = re.search(r"here it is −([\d.]+) % for a liquid that is half a radius deep", text)
-    deeper = re.search(r"and −(\d+) to −(\d+) % for deeper ones", text)
+    text = " ".join(lines("liquid_accuracy.md"))
+    shallow = re.search(r"Here it is −([\d.]+) % at a depth of half a radius", text)
+    deeper = re.search(r"and −(\d+) to −(\d+) % in deeper liquid", text)
     upright, tilted = (
         np.array([tilted_tank.frequencies(depth, tilt)[0] for depth in tilted_tank.DEPTHS])
         for tilt in (0, 60)
@@ -86,9 +86,9 @@ def test_tilt_slows_slosh_along_the_slope() -> None:
     assert change[1:] == pytest.approx([float(deeper[1]), float(deeper[2])], abs=0.5)
 
 
-@pytest.mark.parametrize("case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "tilt")])
+@pytest.mark.parametrize("case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "noise")])
 def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two of the 78 rows of book/damping.md, in all printed digits."""
+    """Two rows of book/damping.md, in all printed digits."""
     monkeypatch.setattr(bench_damping, "FMU", fmu)
     table = bench_damping.text(pd.DataFrame([bench_damping.case(case)])).splitlines()
     (row,) = (line for line in table if line.startswith(f"| {case[0]} |"))
@@ -130,7 +130,7 @@ def test_errors_of_work_and_precision(
 
 
 def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Seed 1 with the good gyro, all rows of the table in book/flight.md.
+    """Seed 1 with the good gyro, all rows of the table in book/flight_accuracy.md.
 
     Beyond the printed digits estimates may differ by 0.1 of their standard deviations, and these by
     5 %: far below what decides an interval.
@@ -138,7 +138,7 @@ def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
     spacecraft = os.fspath(fmu.with_name("Spacecraft.fmu"))
     truth, found, _ = flight_twin.twin(1, "good", os.fspath(program), spacecraft, tmp_path)
     assert found["fits"] and found["converged"]
-    page = lines("flight.md")
+    page = lines("flight_accuracy.md")
     start = page.index("| | truth | good gyro | MEMS gyro |") + 2
     rows = page[start : page.index("", start)]
     assert len(rows) == 8
@@ -155,14 +155,14 @@ def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
 
 
 def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Five twins of HubSlosh in book/any_fmu.md: 17 of 20 intervals hold the truth.
+    """Five twins of HubSlosh in book/any_fmu_method.md: 17 of 20 intervals hold the truth.
 
     Chance makes 17 or more of 20 of 95 % in 98 of 100 cases; seeds are fixed. Stated deviations
     are within a factor of two of the page's medians: inertia and friction are drawn within 30 %.
     """
     case = identify_twins.CASES["Hub"]
     case.fmu = os.fspath(fmu)
-    page = BOOK.joinpath("any_fmu.md").read_text(encoding="utf-8")
+    page = BOOK.joinpath("any_fmu_method.md").read_text(encoding="utf-8")
     inside, stated = 0, {}
     for seed in range(1, 6):
         twin = case.make(default_rng(seed))
