@@ -86,7 +86,9 @@ def test_tilt_slows_slosh_along_the_slope() -> None:
     assert change[1:] == pytest.approx([float(deeper[1]), float(deeper[2])], abs=0.5)
 
 
-@pytest.mark.parametrize("case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "noise")])
+@pytest.mark.parametrize(
+    "case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "noise")]
+)
 def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two rows of book/damping.md, in all printed digits."""
     monkeypatch.setattr(bench_damping, "FMU", fmu)

@@ -273,7 +273,7 @@ fn the_slope_of_the_wheels_momentum_is_no_error_of_the_solver() {
         outputs: vec!["omega[3]".into()],
         ..question(Solver::Own)
     };
-    let bounds = foresee(&model, &question, &[record], &[1e-5]).unwrap();
+    let bounds = foresee(&model, &question, &[record], &[1e-5], &mut |_| {}).unwrap();
     assert!(!bounds[0].decided_by_solver && bounds[0].std > 0.0, "{bounds:?}");
 }
 
