@@ -40,7 +40,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::nominal::{self, Bench, Nominal};
-use crate::overridden::{beside, refuse};
+use crate::overridden::{near, refuse};
 use crate::recording::Recording;
 use crate::simulate::{Motion, Read, Setup};
 use crate::stribeck;
@@ -257,7 +257,7 @@ impl<'a> Problem<'a> {
         let parameters = self.unknowns.iter().filter_map(|unknown| match &unknown.quantity {
             Quantity::Parameter(name) => {
                 let value = unknown.start;
-                Some((name, beside(value, (f64::MIN, f64::MAX), value.abs()).to_string()))
+                Some((name, near(value, (f64::MIN, f64::MAX), value.abs()).to_string()))
             }
             _ => None,
         });

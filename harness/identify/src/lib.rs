@@ -14,6 +14,7 @@ pub mod friction;
 pub mod goodness;
 pub mod methods;
 pub mod missing;
+pub mod names;
 pub mod news;
 pub mod nominal;
 pub mod options;

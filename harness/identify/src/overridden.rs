@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::any_fmu::question::list;
+use crate::names::list;
 
 /// Fails if the FMU's warnings name an unknown as one without effect: nothing can be estimated.
 ///
@@ -22,7 +22,7 @@ pub fn refuse(unknown: &str, warnings: &[String]) -> Result<()> {
 }
 
 /// A value near `start` within `bounds` that is not `start`: the FMU warns of no value that it starts with itself.
-pub fn beside(start: f64, (low, high): (f64, f64), reach: f64) -> f64 {
+pub fn near(start: f64, (low, high): (f64, f64), reach: f64) -> f64 {
     let by = 1e-6 * reach;
     if start + by <= high { start + by } else { (start - by).max(low) }
 }

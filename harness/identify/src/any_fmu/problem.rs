@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use super::record::Record;
 use super::simulate::{Model, Setup, Value};
 use super::unknown::{Unknown, What};
-use crate::overridden::{beside, refuse};
+use crate::overridden::{near, refuse};
 use analysis::gauss_markov::{Noise, Whitening};
 use analysis::statistics::median;
 
@@ -153,7 +153,7 @@ impl<'a> Problem<'a> {
     pub fn warnings(&self) -> Result<Vec<String>> {
         let start = self.start();
         let moved: Vec<f64> =
-            self.unknowns.iter().map(|u| beside(u.start, u.bounds, u.reach)).collect();
+            self.unknowns.iter().map(|u| near(u.start, u.bounds, u.reach)).collect();
         let of = |(number, record): (usize, &Record)| {
             let with = |x: &[f64]| {
                 self.setup.warnings(self.model, &self.values(x, number), number, record)

@@ -7,6 +7,8 @@ use experiments::sensors::Sensor;
 use experiments::sensors::quantity::Quantity;
 use host::description::{ModelDescription, Type, Variable};
 
+use crate::names::list;
+
 /// Ends the name of an unknown that each recording has one of.
 pub const EACH: &str = "@each";
 
@@ -237,16 +239,6 @@ pub fn real<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Var
     let variable = description.variable(name)?;
     ensure!(variable.kind() == Type::Real, "{name} is a {:?} (allowed: Real)", variable.kind());
     Ok(variable)
-}
-
-/// Items between commas, of which those in brackets separate nothing: `a,inertia[1,2]` are two.
-pub fn list(text: &str) -> impl Iterator<Item = &str> {
-    let mut depth = 0i32;
-    let items = text.split(move |c| {
-        depth += i32::from(matches!(c, '[' | '(')) - i32::from(matches!(c, ']' | ')'));
-        c == ',' && depth == 0
-    });
-    items.map(str::trim).filter(|item| !item.is_empty())
 }
 
 fn named(text: &str) -> Result<(&str, &str)> {
