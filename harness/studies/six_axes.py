@@ -92,7 +92,7 @@ def parameters(case: str) -> dict[str, float | str]:
 
 
 def arguments(folder: Path, case: str, tolerance: float) -> list[str]:
-    """Return what six_axes.c is told of a case, but for the steps, which are third."""
+    """Return the arguments of six_axes.c for a case, without the number of steps (the third)."""
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     variables = {v.get("name"): v for v in root.iter("ScalarVariable")}
     items = {

@@ -19,7 +19,7 @@
 //! p'' = -(1 - p p^T - b b^T) G/l - |p'|^2 p                  p.b = p'.b = 0
 //! ```
 //!
-//! Such a tank does not drain. Perpendicular to its plane the bob moves as rigid liquid. With modes along two
+//! A tank with planar modes does not drain. Perpendicular to its plane the bob moves as rigid liquid. With modes along two
 //! directions m_0 is the liquid less the masses of both and may be negative.
 //!
 //! Mass leaves a bob with the bob's velocity, and leaves the craft with the velocity of the tank at the outlet, r_out =

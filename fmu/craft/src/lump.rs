@@ -984,8 +984,8 @@ mod tests {
         assert_eq!(next(&lump), None);
     }
 
-    /// From halfway down, 3 m/s take the lump to the top in half a second; from the wall, which it leaves with 4 m/s,
-    /// as well. The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump that
+    /// A lump halfway down with 3 m/s reaches the top in half a second, as does one that leaves the wall with 4 m/s.
+    /// The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump that
     /// falls away from rest never meets the wall.
     #[test]
     fn a_lump_in_flight_meets_the_wall_before_it() {

@@ -191,8 +191,8 @@ mod tests {
         assert!((below[0] - 1.0 / XI[0]).abs() < 1e-14 && (below[1] - 1.0 / XI[0]).abs() < 1e-9);
     }
 
-    /// From the length at which it no longer depends on the fill, the tank has 0.995 of the deepest tanh: tanh(2 xi
-    /// h/d) = 0.995.
+    /// If the length no longer determines the fill, the tank is taken to have tanh(2 xi h/d) = 0.995, where the limit
+    /// for deep liquid is 1.
     #[test]
     fn a_tank_too_deep_to_tell_is_taken_as_nearly_deep() {
         let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);

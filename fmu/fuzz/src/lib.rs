@@ -93,7 +93,7 @@ fn set<M: Model, V: Values>(
     instance.set(V::SET[place(scalar)], &[V::reference(scalar)], |_| value)
 }
 
-/// One step, which stops at an event if the instance's host is told of such; the host handles it then.
+/// Makes one step. If the instance's host handles events, the step stops at an event and the host handles it.
 fn step<M: Model, V: Version>(
     instance: &mut Instance<M, V>,
     at: f64,

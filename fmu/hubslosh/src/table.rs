@@ -540,11 +540,11 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Bond number: gravity over surface tension; the model holds far above 1")
         .depends_on(&["g_axial"]).initial_depends_on(&["tank.", "fluid."]),
     V::calculated("slosh.mass", |m, n| m.calculated().mass[n], "kg",
-        "Mass of a slosh mode's pendulum (modal mass), on a tilted bench of the oblique pendulum; 0 for unused modes")
+        "Mass of a slosh mode's pendulum (modal mass); on a tilted bench, of the equivalent oblique pendulum; 0 for unused modes")
         .shape(PER_MODE)
         .initial_depends_on(LIQUID_MODES),
     V::calculated("slosh.length", |m, n| m.calculated().length[n], "m",
-        "Length of a slosh mode's pendulum, on a tilted bench of the oblique pendulum; 0 for unused modes")
+        "Length of a slosh mode's pendulum; on a tilted bench, of the equivalent oblique pendulum; 0 for unused modes")
         .shape(PER_MODE)
         .display_unit("mm").initial_depends_on(LIQUID_MODES),
     V::calculated("slosh.frequency", |m, n| m.calculated().frequency[n], "Hz",

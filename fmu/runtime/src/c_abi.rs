@@ -305,8 +305,8 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no text")
 }
 
-/// Panics are told to the host's logger and printed nowhere. The hook belongs to
-/// this library's own copy of std, not to the host.
+/// Stops std from printing panics: the host's logger reports them. The hook belongs to this library's own copy of
+/// std, not to the host.
 pub fn silence_panics() {
     // In this crate's own tests std is the test runner's.
     #[cfg(not(test))]

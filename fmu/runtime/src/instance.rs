@@ -836,7 +836,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.step_reported(call, at, h, stops)
     }
 
-    /// The same where the host is told of events.
+    /// Makes a step for a host that handles events.
     fn step_reported(
         &mut self,
         call: &Call,

@@ -276,7 +276,7 @@ pub unsafe fn fmi2SetDebugLogging<M: Model>(
     }
 }
 
-/// Makes an instance. NULL on failure, and the logger is told why.
+/// Makes an instance. On failure it returns NULL and logs the reason.
 pub unsafe fn fmi2Instantiate<M: Model>(
     instanceName: fmi2String,
     fmuType: fmi2Type,

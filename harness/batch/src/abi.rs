@@ -345,7 +345,7 @@ pub unsafe extern "C" fn hubslosh_batch_loop(
     .unwrap_or(BAD_ARGUMENTS)
 }
 
-/// What C is told of a run's end.
+/// Converts the end of a run into the C interface's return code.
 fn answer(result: Result<(), Stop>, stop: &mut Stop) -> c_int {
     match result {
         Ok(()) => DONE,

@@ -1,5 +1,4 @@
-//! Events in Model Exchange (FMI 2.0.5, sections 3.1.1 and 3.2.2): whether the host is told of each one,
-//! and of what it changes.
+//! Events in Model Exchange (FMI 2.0.5, sections 3.1.1 and 3.2.2): the FMU must report each one and what it changes.
 //!
 //! A host may enter event mode whenever it likes. Where no event indicator has changed its sign, no
 //! time event is due and fmi2CompletedIntegratorStep has not asked for it, there is no event, and

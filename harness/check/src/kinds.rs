@@ -111,7 +111,7 @@ fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Facto
         .then_some(Factor { value, rounding: 1e3 * f64::EPSILON * size / dx.abs() }))
 }
 
-/// Factors of all pairs at points of one session; the first that does not hold its factor is told.
+/// Factors of all pairs at points of one session; the first pair that does not hold its factor is reported.
 /// Returns the factors of the first point.
 fn at_points(
     session: &mut Session,

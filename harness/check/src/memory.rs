@@ -19,7 +19,7 @@ const LONGEST: Duration = Duration::from_millis(500);
 const FEWEST: usize = 10;
 /// Windows that must take memory, each, after the first.
 const WINDOWS: usize = 3;
-/// Bytes for each step that are told: an FMU may keep a short history.
+/// Growth of memory that is a finding, bytes a step: an FMU may keep a short history.
 const PER_STEP: u64 = 1024;
 
 /// Bytes of memory that this process can write to; none where the system does not tell.

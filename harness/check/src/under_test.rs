@@ -24,7 +24,7 @@ pub use self::sight::Sight;
 pub const STEPS: usize = 20;
 /// Calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
-/// Events in succession after which an FMU that always wants the next one at once is told.
+/// Largest number of events in succession: an FMU that always requests the next one at once is a finding.
 const IMMEDIATE: usize = 3;
 /// Events for which only fmi2CompletedIntegratorStep asks that are looked at.
 const ASKED: usize = 20;
@@ -200,7 +200,7 @@ impl FmuUnderTest {
         *self.doing.borrow_mut() = what;
     }
 
-    /// Makes calls whose crash is told by another rule, which makes them as well.
+    /// Makes calls whose crash another rule reports, which makes them as well.
     pub fn told_by<T>(&self, rule: &str, calls: impl FnOnce() -> T) -> T {
         self.with_crash(Crash::ToldBy(rule.into()), calls)
     }

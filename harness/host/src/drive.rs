@@ -10,7 +10,7 @@ use crate::fmu::Instance;
 /// The Real inputs that a host drives.
 pub struct Inputs {
     references: Vec<u32>,
-    /// The FMU is told slopes.
+    /// The FMU takes slopes of inputs.
     sloped: bool,
 }
 

@@ -1,5 +1,5 @@
-//! Foreign code in a process of its own, with limits: what an FMU's binary does there ends with that
-//! process, and is told.
+//! Runs foreign code in a process of its own, with limits. Whatever an FMU's binary does ends with that process, and
+//! the parent reports it.
 //!
 //! The parent ([`run`]) starts the process in a group of its own, with a folder for temporary files,
 //! reads what it prints up to a limit, and ends it, and whatever it started, when it takes too long.

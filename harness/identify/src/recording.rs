@@ -26,7 +26,7 @@ pub const SHORTEST: f64 = 20.0;
 /// damping and mass, and its intervals are as wide as that.
 pub const LONG: f64 = 120.0;
 
-/// Times of spikes that are told.
+/// Number of spikes whose times are listed.
 const LISTED: usize = 8;
 
 /// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.

@@ -43,7 +43,7 @@ pub struct Search<'a, 'h> {
     pub others: Option<between::Others>,
     /// Cost of the lines so far.
     pub since: Since,
-    /// Is told what happens.
+    /// Receives progress messages.
     pub progress: &'h mut dyn FnMut(String),
 }
 

@@ -10,7 +10,7 @@ use crate::missing::Missing;
 use crate::uncertainty::Combination;
 use analysis::innovations::{self, Tests};
 
-/// Newton decrement from which on it is told.
+/// Newton decrement above which the verdict reports it.
 const TOLD: f64 = 0.1;
 
 /// Beginning of the sentence about an invalidated model.

@@ -432,8 +432,8 @@ mod tests {
         }
     }
 
-    /// From hanging to 20 degrees from straight up, p and v describe the same motion as the
-    /// coordinates.
+    /// The direction p and its velocity v describe the same motion as the coordinates, for angles between hanging and
+    /// 20 degrees from straight up.
     #[test]
     fn direction_and_velocity_move_as_lagrange_has_the_coordinates() {
         let mut rng = fastrand::Rng::with_seed(3);

@@ -35,7 +35,7 @@ fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     -(amplitude2(&plant) / before).ln() / (2.0 * TAU * 10.0)
 }
 
-/// From 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency, and with it the damping of a laminar layer,
+/// The specific force falls from 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency, and with it the damping of a laminar layer,
 /// reach a finite limit. Without it they continue as g^(1/2) and g^(-1/4).
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {

@@ -1,5 +1,5 @@
-//! Co-Simulation of FMI 3.0 by a host that is told of events: they happen within the steps, what is discrete is shown when
-//! the host says that it has come to that.
+//! Co-Simulation of FMI 3.0 by a host that handles events. Events happen within the steps; discrete outputs change when
+//! the host updates discrete states.
 
 use super::*;
 use crate::call::{Events, InstanceState};

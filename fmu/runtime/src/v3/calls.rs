@@ -82,7 +82,7 @@ impl Version for Fmi3 {
     const FIRST_EVENT: InstanceState = InstanceState::Event;
     const SETS_STATES: bool = true;
 
-    // There is no such function: what it tells is told with initialization.
+    // FMI 3.0 has no setupExperiment: fmi3EnterInitializationMode takes its arguments.
     const SETUP_EXPERIMENT:       &'static Call = &both("fmi3EnterInitializationMode", I);
     const ENTER_INITIALIZATION:   &'static Call = &both("fmi3EnterInitializationMode", I);
     const EXIT_INITIALIZATION:    &'static Call = &both("fmi3ExitInitializationMode", M);

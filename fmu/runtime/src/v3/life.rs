@@ -62,7 +62,7 @@ fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) 
     }))
 }
 
-/// Makes an instance. NULL on failure, and the logger is told why.
+/// Makes an instance. On failure it returns NULL and logs the reason.
 unsafe fn instantiate<M: Model>(
     function: &str,
     (name, token): (fmi3String, fmi3String),
@@ -91,8 +91,8 @@ unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// What the variables are in the model description of this token, or why there can be no instance of this name, for
-/// this model description.
+/// Returns the layout of the variables, scalars or arrays, in the model description with this token. Fails if the
+/// token or the instance's name is not acceptable.
 fn check_token<M: Model>(name: Option<String>, token: Option<String>) -> Result<Layout, String> {
     let [scalars, with_arrays] = Layout::ALL.map(|layout| M::table().token(layout));
     if name.is_none_or(|name| name.trim().is_empty()) {

@@ -153,9 +153,8 @@ impl Answers {
     }
 }
 
-/// One step. It may stop at an event where the host allows it; then, and where the host is told of events at its
-/// end, something discrete waits for event mode. `noSetFMUStatePriorToCurrentPoint` changes nothing here: no past is
-/// kept.
+/// Makes one step. The step stops at an event if the host allows early return. It then sets `eventHandlingNeeded`, as
+/// it does for an event at its end. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has no effect.
 pub unsafe fn fmi3DoStep<M: Model>(
     instance: fmi3Instance,
     currentCommunicationPoint: fmi3Float64,
@@ -213,8 +212,8 @@ unsafe fn stepped<M: Model>(
     log.report_step_warning(instance);
 }
 
-/// A step of which the host is told where it begins, when it may set inputs for its end and wish to return earlier, and
-/// where it has ended.
+/// Makes one step with intermediate updates: at its beginning, when the host may set inputs for its end and request
+/// early return, and at its end.
 unsafe fn step_looked_into<M: Model>(
     instance: fmi3Instance,
     at: f64,

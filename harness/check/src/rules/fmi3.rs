@@ -106,7 +106,7 @@ pub static RULES: &[Rule] = &[
     rule("events.answers", Error, "fmi3UpdateDiscreteStates writes its answers; nextEventTime lies ahead", "2.3.5", Calls3(steps::event_answers)),
     rule("events.idempotent", Error, "another fmi3UpdateDiscreteStates at the same instant changes nothing", "2.3.5", Calls3(steps::idempotent)),
     rule("events.discrete_held", Error, "with event mode discrete variables change in event mode alone", "2.4.7.4", Calls3(steps::discrete_held)),
-    rule("events.same_trajectory", Warning, "event mode and early return change when events are told, not what happens", "4.2; hosts without event mode", Calls3(steps::same_trajectory)),
+    rule("events.same_trajectory", Warning, "event mode and early return change when events are reported, not the trajectory", "4.2; hosts without event mode", Calls3(steps::same_trajectory)),
 
     rule("intermediate.time", Error, "intermediateUpdate is called within the step, never before a time that is finished, and without early return where that is not allowed", "4.2.2", Calls3(steps::intermediate_time)),
     rule("intermediate.early_return", Error, "an early return that was offered and asked for is made", "4.2.2", Calls3(steps::intermediate_early_return)),

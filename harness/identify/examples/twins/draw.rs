@@ -239,7 +239,7 @@ impl Twin {
         Recording { angle, ..Recording::of("twin", time, tau, rate) }
     }
 
-    /// Identifies its recording as a user would, with these slosh models; `hear` is told what happens.
+    /// Identifies its recording as a user would, with these slosh models; `hear` receives each message.
     pub fn identify(
         &self,
         fmu: &Fmu,

@@ -138,7 +138,7 @@ pub trait Method {
     /// What it needs of a [`Task`].
     const NEEDS: Needs;
 
-    /// Does it. `progress` is told what happens.
+    /// Identifies; `progress` receives each message.
     fn identify(
         &self,
         task: &Task,

@@ -74,7 +74,7 @@ const SIMPLEST: [&str; 5] = ["frozen", "linear", "planar", "spherical", "parabol
 /// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
 const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 
-/// Identifies the FMU from recordings. `progress` is told what happens.
+/// Identifies the FMU from recordings. `progress` receives each message.
 pub fn identify(
     fmu: &Fmu,
     recordings: &[Recording],
@@ -558,7 +558,7 @@ fn shares(
     })
 }
 
-/// Share of the variance from which on it is told.
+/// Share of the variance above which the report names it.
 const TOLD_SHARE: f64 = 0.2;
 
 /// What the torque between rows is, if that was free.
