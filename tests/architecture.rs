@@ -149,8 +149,8 @@ fn unsafe_code_stands_in_the_files_of_the_c_interface() {
         "fmu/runtime/src/v3/stepping.rs",
         "fmu/runtime/src/v3/values.rs",
         "harness/batch/src/abi.rs",
-        "harness/host/src/c_abi.rs",
-        "harness/host/src/fmi2.rs", // and its submodules
+        "harness/host/src/c_abi.rs", // and its submodules
+        "harness/host/src/fmi2.rs",  // and its submodules
         "harness/host/src/fmi3.rs",
         "harness/tank/page/src/abi.rs",
     ];

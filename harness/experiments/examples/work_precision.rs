@@ -22,7 +22,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
-use host::fmi2::Fmu;
+use experiments::rest;
+use host::fmu::Fmu;
 use ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 
 const STEP: f64 = 0.02;
@@ -63,10 +64,9 @@ type Solution = (Vec<f64>, Vec<f64>);
 
 fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<Solution> {
     let fmu = Fmu::open(Path::new("dist/HubSlosh.fmu"))?;
-    let mut instance = fmu.instantiate_at_rest("work_precision")?;
+    let mut instance = rest::instantiate(&fmu, "work_precision")?;
     instance.set("slosh.model", model)?;
-    instance.setup_experiment(Some(tolerance), 0.0, None)?;
-    instance.enter_initialization_mode()?;
+    instance.enter_initialization_mode(Some(tolerance), 0.0, None)?;
     instance.exit_initialization_mode()?;
     let reference =
         |name: &str| Ok::<u32, anyhow::Error>(fmu.description().variable(name)?.reference);
@@ -82,8 +82,7 @@ fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<So
         for k in begin..(begin + PIECE).min(torque.len() - 1) {
             let slope = (torque[k + 1] - torque[k]) / STEP;
             instance.set_real(&[tau], &torque[k..k + 1])?;
-            instance.set_real_input_derivatives(&[tau], &[1], &[slope])?;
-            instance.do_step(k as f64 * STEP, STEP)?;
+            instance.do_step_along(k as f64 * STEP, STEP, &[tau], &torque[k..k + 1], &[slope])?;
             instance.get_real(&read, &mut values)?;
             rates[k + 1] = values[0];
         }

@@ -6,6 +6,7 @@ pub mod gyro;
 pub mod plan;
 pub mod profile;
 pub mod progress;
+pub mod rest;
 pub mod rounding;
 pub mod run;
 pub mod scaling;

@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::profile::Torque;
+use crate::rest;
 use host::budget;
 use host::description::{ModelDescription, Type, Value, Variable};
 use host::drive::Inputs;
@@ -243,7 +244,7 @@ impl Run {
 
     fn initialise_until<'fmu>(&self, fmu: &'fmu Fmu, stop: Option<f64>) -> Result<Instance<'fmu>> {
         self.check()?;
-        let mut instance = fmu.instantiate_at_rest("run")?;
+        let mut instance = rest::instantiate(fmu, "run")?;
         for (name, value) in &self.settings {
             let variable = fmu.description().variable(name)?;
             match variable.causality.as_str() {
@@ -309,7 +310,7 @@ impl Run {
         let points = steps + 1;
         let mut time = Vec::with_capacity(points);
         let mut given: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(points)).collect();
-        let inputs = self.inputs(instance.fmu().description())?;
+        let inputs = self.inputs(instance.description())?;
         inputs.drive(instance, self.start(), |instance, t, course| {
             let step = time.len();
             let next = (step < steps).then(|| self.time(step + 1));
@@ -360,7 +361,7 @@ impl Recorder {
         let (mut reals, mut others) = (Vec::new(), Vec::new());
         let (mut real_places, mut other_places) = (Vec::new(), Vec::new());
         for (place, name) in names.iter().enumerate() {
-            let variable = instance.fmu().description().variable(name)?;
+            let variable = instance.description().variable(name)?;
             match variable.kind() {
                 Type::Real => {
                     reals.push(variable.reference);

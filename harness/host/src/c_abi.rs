@@ -4,8 +4,9 @@
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
+use std::ptr::null;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -14,6 +15,8 @@ use libloading::Library;
 
 use crate::guard::{self, Calls};
 use crate::output::sha256;
+
+pub mod version;
 
 /// `fmi2Status` and `fmi3Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -150,19 +153,36 @@ pub(crate) extern "C" fn log_message(
     text: *const c_char,
 ) {
     let Some(sink) = sink_of(environment) else { return };
-    let string = |text: *const c_char| match text.is_null() {
-        true => String::new(),
-        // SAFETY: a terminated string of the FMU, or of the shim.
-        false => unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned(),
-    };
     if category.is_null() {
         sink.uncategorised.fetch_add(1, Ordering::Relaxed);
     }
     let mut messages = sink.lock();
     if messages.len() < MESSAGES_KEPT {
-        let (category, text) = (string(category), string(text));
+        // SAFETY: terminated strings of the FMU, or of the shim.
+        let (category, text) = unsafe { (copied(category), copied(text)) };
         messages.push(Message { status: status.into(), category, text });
     }
+}
+
+/// Copies a text of an FMU, which lives only until the next call; NULL becomes an empty text.
+///
+/// # Safety
+/// The pointer is NULL or points to a terminated string.
+pub(crate) unsafe fn copied(text: *const c_char) -> String {
+    match text.is_null() {
+        true => String::new(),
+        false => unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned(),
+    }
+}
+
+/// Returns a text for a C function; `None` becomes NULL.
+pub(crate) fn c_string(text: Option<&str>) -> Option<CString> {
+    text.map(|text| CString::new(text).unwrap_or_default())
+}
+
+/// Returns the pointer to such a text, which must outlive it.
+pub(crate) fn pointer(text: &Option<CString>) -> *const c_char {
+    text.as_ref().map_or(null(), |text| text.as_ptr())
 }
 
 /// One message of the FMU's logger.
@@ -225,19 +245,37 @@ impl std::error::Error for CallError {}
 /// Result of a call.
 pub type Called<T = ()> = Result<T, CallError>;
 
-/// Declares a table of C functions once: field, symbol, type.
-macro_rules! functions {
-    ($table:ident: $($field:ident $symbol:literal $type:ty;)*) => {
-        pub(crate) struct $table { $($field: $type,)* }
+/// A C function of an FMU and its name.
+#[derive(Clone, Copy)]
+pub(crate) struct Function<T> {
+    pub name: &'static str,
+    pub call: T,
+}
 
-        impl $table {
-            /// Names of all the functions.
-            pub(crate) const SYMBOLS: &[&str] = &[$($symbol),*];
+/// Declares a table of C functions once: field, symbol, type. A table for both versions of FMI has a symbol for each.
+macro_rules! functions {
+    ($table:ident $(<$boolean:ident>)?: $($field:ident $($symbol:literal)+, $type:ty;)*) => {
+        pub(crate) struct $table $(<$boolean>)? {
+            $(pub(crate) $field: $crate::c_abi::Function<$type>,)*
+        }
+
+        impl $(<$boolean>)? $table $(<$boolean>)? {
+            /// Names of all the functions, in the version of that number among the symbols.
+            pub(crate) fn symbols(version: usize) -> Vec<&'static str> {
+                vec![$([$($symbol),+][version],)*]
+            }
 
             /// # Safety
             /// The library must be a binary of that version of FMI: the types are taken on trust.
-            pub(crate) unsafe fn load(library: &Library) -> Result<Self, libloading::Error> {
-                Ok($table { $($field: *unsafe { library.get::<$type>($symbol)? },)* })
+            pub(crate) unsafe fn load(
+                library: &libloading::Library,
+                version: usize,
+            ) -> Result<Self, libloading::Error> {
+                Ok($table { $($field: {
+                    let name = [$($symbol),+][version];
+                    let call = *unsafe { library.get::<$type>(name)? };
+                    $crate::c_abi::Function { name, call }
+                },)* })
             }
         }
     };

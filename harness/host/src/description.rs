@@ -40,6 +40,8 @@ pub struct ModelDescription {
     pub default_experiment: DefaultExperiment,
     /// The variables, in the order of the file; the elements of an array one after the other, by rows.
     pub variables: Vec<Variable>,
+    /// Continuous states and event indicators, as an FMU 2.0 declares them.
+    pub(crate) sizes: (usize, usize),
     arrays: BTreeMap<u32, Array>,
     elements: BTreeMap<u32, ArrayElement>,
 }
@@ -622,17 +624,6 @@ const MOST_ELEMENTS: usize = 100_000;
 const NAMED: usize = 20;
 
 impl ModelDescription {
-    /// The parameters and inputs by which this project's FMUs move when nobody sets anything, for a host's first
-    /// plot; 0 is at rest. None in FMUs of others.
-    pub fn moving_starts(&self) -> &'static [&'static str] {
-        match self.model_name.as_str() {
-            "HubSlosh" => &["init.slosh_angle"],
-            name if name.starts_with("Spacecraft") => &["init.omega[1]", "init.omega[3]"],
-            "SloshTank" => &["a[1]", "a[3]"],
-            _ => &[],
-        }
-    }
-
     /// Reads the description of a packed FMU; nothing is unpacked or loaded.
     pub fn of_packed(path: &Path) -> Result<Self> {
         let name = path.display();
@@ -662,11 +653,6 @@ impl ModelDescription {
     /// Position of an array element by its variable's reference; `None` for a variable that is not an element.
     pub fn element(&self, reference: u32) -> Option<ArrayElement> {
         self.elements.get(&reference).copied()
-    }
-
-    /// Returns true if there are arrays.
-    pub fn has_arrays(&self) -> bool {
-        !self.arrays.is_empty()
     }
 
     /// The array of that value reference.
@@ -746,6 +732,10 @@ impl ModelDescription {
                 },
             },
             variables: Vec::new(),
+            sizes: (
+                root.child("ModelStructure").map_or(0, |s| s.list("Derivatives").count()),
+                root.number("numberOfEventIndicators").unwrap_or(0.0) as usize,
+            ),
             arrays: BTreeMap::new(),
             elements: BTreeMap::new(),
         };

@@ -26,6 +26,7 @@ use std::collections::BTreeMap;
 
 use analysis::innovations::Tests;
 use anyhow::{Context, Result, bail};
+use experiments::rest;
 use host::fmu::Fmu;
 use identify::methods::identification::Identification;
 use identify::methods::output_error::identify;
@@ -121,7 +122,7 @@ fn arguments() -> Result<Arguments> {
 
 /// True values of the twin, by the names of the estimates.
 fn truths(fmu: &Fmu, twin: &Twin) -> Result<BTreeMap<String, f64>> {
-    let mut instance = fmu.instantiate_at_rest("truth")?;
+    let mut instance = rest::instantiate(fmu, "truth")?;
     for (name, value) in &twin.settings {
         instance.set(name, value)?;
     }

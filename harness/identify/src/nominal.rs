@@ -1,6 +1,7 @@
 //! The bench as the FMU is set up, before anything is estimated.
 
 use anyhow::{Result, ensure};
+use experiments::rest;
 use formulas::cylinder::pendulum;
 use host::fmu::{Fmu, Instance};
 
@@ -54,7 +55,7 @@ pub struct Nominal {
 
 /// The FMU with settings, initialised.
 pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Result<Instance<'fmu>> {
-    let mut instance = fmu.instantiate_at_rest("identify")?;
+    let mut instance = rest::instantiate(fmu, "identify")?;
     for (name, value) in settings {
         let variable = fmu.description().variable(name)?;
         ensure!(

@@ -1,6 +1,7 @@
 //! The FMU's answer to a recording's torque, at the recording's instants.
 
 use anyhow::Result;
+use experiments::rest;
 use host::drive::Inputs;
 use host::fmu::Fmu;
 
@@ -121,7 +122,7 @@ impl Setup {
     ) -> Result<Motion> {
         let reference =
             |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
-        let mut instance = fmu.instantiate_at_rest("identify")?;
+        let mut instance = rest::instantiate(fmu, "identify")?;
         for (name, value) in &self.settings {
             instance.set(name, value)?;
         }

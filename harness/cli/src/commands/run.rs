@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use experiments::campaign::{Range, WAVE, stored_columns};
 use experiments::profile::{self, Written};
+use experiments::rest;
 use experiments::run::{self, Run, driven, histories};
 use experiments::sensors::{self, Sensor, Sensors};
 use experiments::weight::{Tanks, WATER_TENSION};
@@ -122,7 +123,8 @@ impl RunArgs {
         let named: Vec<String> =
             run.input.iter().chain(run.others.iter().map(|(name, _)| name)).cloned().collect();
         // at rest, but for what is set
-        let rest = description.moving_starts().iter().map(|name| (name.to_string(), "0".into()));
+        let rest =
+            rest::moving_starts(description).iter().map(|name| (name.to_string(), "0".into()));
         let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
         let parameters = run::parameters(description, &settings, &named);
         let columns = match self.columns.is_empty() {

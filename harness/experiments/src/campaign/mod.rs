@@ -36,6 +36,7 @@ pub use self::outcome::{
 pub use self::rows::{FeatureRow, MadeFrom};
 use crate::plan::{Case, Plan};
 use crate::progress::Progress;
+use crate::rest;
 use crate::run::Run;
 use crate::sensors::Sensors;
 
@@ -291,7 +292,7 @@ impl Campaign {
                     columns.push(name.to_string());
                 }
             }
-            let starts = description.moving_starts().iter();
+            let starts = rest::moving_starts(description).iter();
             let at_rest = starts.filter(|name| Some(**name) != run.input.as_deref());
             let mut settings: serde_json::Map<_, _> =
                 at_rest.map(|name| (name.to_string(), json!(0.0))).collect();

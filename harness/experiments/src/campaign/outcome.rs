@@ -607,8 +607,7 @@ impl Outcome {
         reused: bool,
     ) -> Result<Outcome> {
         let linear = exact_linear(instance)?;
-        let mut range =
-            Range::of(instance.fmu().description(), instance)?.context("not the bench")?;
+        let mut range = Range::of(instance.description(), instance)?.context("not the bench")?;
         if case.recording.is_some() {
             range.model = RECORDING.into();
         }
@@ -854,7 +853,7 @@ impl Range {
 /// Returns the item of an enumeration of an initialised instance, or of its integer twin `kind` if that is
 /// not 0. Returns `None` if the FMU has no such enumeration, because it is of an older version.
 fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String>> {
-    let description = instance.fmu().description();
+    let description = instance.description();
     let Ok(variable) = description.variable(name) else { return Ok(None) };
     let mut number = instance.value(variable)?;
     if let Ok(kind) = description.variable(kind) {

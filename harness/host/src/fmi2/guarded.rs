@@ -2,6 +2,7 @@
 //! given, or into what it shall only read.
 
 use super::*;
+use crate::c_abi::version::{GetVector, State};
 
 /// Bytes on either side of an array.
 const MARGIN: usize = 1024;
@@ -118,6 +119,7 @@ impl Instance<'_> {
     /// What the calls answer does not count.
     pub fn writes_beside(&mut self, lists: &Lists) -> Vec<Beside> {
         let mut found = Vec::new();
+        self.begin_call();
         self.values_beside(lists, &mut found);
         self.derivatives_beside(lists, &mut found);
         self.vectors_beside(lists, &mut found);
@@ -130,54 +132,45 @@ impl Instance<'_> {
     }
 
     fn values_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
-        let (f, c) = (self.functions(), self.component);
-        for n in lengths(lists.reals.len()) {
-            let (mut vr, mut x) = (Guarded::input(&lists.reals[..n]), Guarded::output::<Real>(n));
-            // SAFETY: arrays of n values each; so in all calls of this file.
-            unsafe { (f.get_real)(c, vr.pointer(), n, x.pointer()) };
-            note(found, "fmi2GetReal", n, &[("vr", &vr), ("value", &x)]);
-        }
-        for n in lengths(lists.integers.len()) {
-            let (mut vr, mut x) =
-                (Guarded::input(&lists.integers[..n]), Guarded::output::<c_int>(n));
-            // SAFETY: see above.
-            unsafe { (f.get_integer)(c, vr.pointer(), n, x.pointer()) };
-            note(found, "fmi2GetInteger", n, &[("vr", &vr), ("value", &x)]);
-        }
-        for n in lengths(lists.booleans.len()) {
-            let (mut vr, mut x) =
-                (Guarded::input(&lists.booleans[..n]), Guarded::output::<c_int>(n));
-            // SAFETY: see above.
-            unsafe { (f.get_boolean)(c, vr.pointer(), n, x.pointer()) };
-            note(found, "fmi2GetBoolean", n, &[("vr", &vr), ("value", &x)]);
-        }
-        for n in lengths(lists.strings.len()) {
-            let (mut vr, mut x) =
-                (Guarded::input(&lists.strings[..n]), Guarded::output::<*const c_char>(n));
-            // SAFETY: see above.
-            unsafe { (f.get_string)(c, vr.pointer(), n, x.pointer()) };
-            note(found, "fmi2GetString", n, &[("vr", &vr), ("value", &x)]);
-        }
-        let (references, values): (Vec<u32>, Vec<Real>) = lists.inputs.iter().copied().unzip();
+        let f = self.functions();
+        self.reads_beside(f.get_real, &lists.reals, found);
+        self.reads_beside(f.get_integer, &lists.integers, found);
+        self.reads_beside(f.get_boolean, &lists.booleans, found);
+        self.reads_beside(f.get_string, &lists.strings, found);
+        let (references, values): (Vec<u32>, Vec<f64>) = lists.inputs.iter().copied().unzip();
         for n in lengths(references.len()) {
             let (mut vr, mut x) = (Guarded::input(&references[..n]), Guarded::input(&values[..n]));
-            // SAFETY: see above.
-            unsafe { (f.set_real)(c, vr.pointer(), n, x.pointer()) };
-            note(found, "fmi2SetReal", n, &[("vr", &vr), ("value", &x)]);
+            // SAFETY: arrays of n values each; so in all calls of this file.
+            unsafe { (f.set_real.call)(self.component, vr.pointer(), n, x.pointer()) };
+            note(found, f.set_real.name, n, &[("vr", &vr), ("value", &x)]);
+        }
+    }
+
+    fn reads_beside<T>(
+        &self,
+        function: Function<Get<T>>,
+        references: &[u32],
+        found: &mut Vec<Beside>,
+    ) {
+        for n in lengths(references.len()) {
+            let (mut vr, mut x) = (Guarded::input(&references[..n]), Guarded::output::<T>(n));
+            // SAFETY: see values_beside.
+            unsafe { (function.call)(self.component, vr.pointer(), n, x.pointer()) };
+            note(found, function.name, n, &[("vr", &vr), ("value", &x)]);
         }
     }
 
     fn derivatives_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
-        let (f, c) = (self.functions(), self.component);
+        let (f, c) = (self.functions().get_directional_derivative, self.component);
         for n in lengths(lists.unknowns.len()) {
             let m = lists.knowns.len();
             let (mut unknown, mut known) =
                 (Guarded::input(&lists.unknowns[..n]), Guarded::input(&lists.knowns));
             let (mut along, mut answer) =
-                (Guarded::input(&vec![1.0; m]), Guarded::output::<Real>(n));
+                (Guarded::input(&vec![1.0; m]), Guarded::output::<f64>(n));
             // SAFETY: see values_beside.
             unsafe {
-                (f.get_directional_derivative)(
+                (f.call)(
                     c,
                     unknown.pointer(),
                     n,
@@ -193,83 +186,82 @@ impl Instance<'_> {
                 ("dvKnown", &along),
                 ("dvUnknown", &answer),
             ];
-            note(found, "fmi2GetDirectionalDerivative", n, &arrays);
+            note(found, f.name, n, &arrays);
         }
-        let Some(f) = &self.fmu.stepping else { return };
+        let Some(stepping) = &self.fmu.own.stepping else { return };
+        let f = stepping.get_real_output_derivatives;
         for n in lengths(lists.outputs.len()) {
             let (mut vr, mut order) =
                 (Guarded::input(&lists.outputs[..n]), Guarded::input(&vec![1 as c_int; n]));
-            let mut x = Guarded::output::<Real>(n);
+            let mut x = Guarded::output::<f64>(n);
             // SAFETY: see values_beside.
-            unsafe {
-                (f.get_real_output_derivatives)(c, vr.pointer(), n, order.pointer(), x.pointer())
-            };
+            unsafe { (f.call)(c, vr.pointer(), n, order.pointer(), x.pointer()) };
             let arrays = [("vr", &vr), ("order", &order), ("value", &x)];
-            note(found, "fmi2GetRealOutputDerivatives", n, &arrays);
+            note(found, f.name, n, &arrays);
         }
     }
 
     fn vectors_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
         let c = self.component;
-        let Some(f) = &self.fmu.exchange else { return };
-        let vectors: [(&'static str, GetVector, Option<usize>); 4] = [
-            ("fmi2GetContinuousStates", f.get_continuous_states, lists.states),
-            ("fmi2GetDerivatives", f.get_derivatives, lists.states),
-            ("fmi2GetNominalsOfContinuousStates", f.get_nominals, lists.states),
-            ("fmi2GetEventIndicators", f.get_event_indicators, lists.indicators),
+        let (Some(f), Some(events)) = (&self.fmu.exchange, &self.fmu.own.events) else { return };
+        let vectors: [(Function<GetVector>, Option<usize>); 4] = [
+            (f.get_continuous_states, lists.states),
+            (f.get_derivatives, lists.states),
+            (f.get_nominals, lists.states),
+            (f.get_event_indicators, lists.indicators),
         ];
-        for (call, function, count) in vectors {
+        for (function, count) in vectors {
             let Some(n) = count else { continue };
-            let mut x = Guarded::output::<Real>(n);
+            let mut x = Guarded::output::<f64>(n);
             // SAFETY: see values_beside.
-            unsafe { function(c, x.pointer(), n) };
-            note(found, call, n, &[("the vector", &x)]);
+            unsafe { (function.call)(c, x.pointer(), n) };
+            note(found, function.name, n, &[("the vector", &x)]);
         }
         if let Some(n) = lists.states.filter(|n| *n > 0) {
             let mut now = vec![0.0; n];
             // SAFETY: see values_beside.
-            unsafe { (f.get_continuous_states)(c, now.as_mut_ptr(), n) };
+            unsafe { (f.get_continuous_states.call)(c, now.as_mut_ptr(), n) };
             let mut x = Guarded::input(&now);
             // SAFETY: see values_beside.
-            unsafe { (f.set_continuous_states)(c, x.pointer(), n) };
-            note(found, "fmi2SetContinuousStates", n, &[("x", &x)]);
+            unsafe { (f.set_continuous_states.call)(c, x.pointer(), n) };
+            note(found, f.set_continuous_states.name, n, &[("x", &x)]);
         }
         if lists.states.is_some() {
             let (mut enter, mut end) = (Guarded::output::<c_int>(1), Guarded::output::<c_int>(1));
             // SAFETY: see values_beside.
-            unsafe { (f.completed_integrator_step)(c, 1, enter.pointer(), end.pointer()) };
+            unsafe { (f.completed_integrator_step.call)(c, 1, enter.pointer(), end.pointer()) };
             let arrays = [("enterEventMode", &enter), ("terminateSimulation", &end)];
-            note(found, "fmi2CompletedIntegratorStep", 1, &arrays);
+            note(found, f.completed_integrator_step.name, 1, &arrays);
             let mut info = Guarded::output::<EventInfo>(1);
             // SAFETY: see values_beside; the host goes back to continuous-time mode.
             unsafe {
-                (f.enter_event_mode)(c);
-                (f.new_discrete_states)(c, info.pointer());
-                (f.enter_continuous_time_mode)(c);
+                (events.enter_event_mode.call)(c);
+                (events.new_discrete_states.call)(c, info.pointer());
+                (f.enter_continuous_time_mode.call)(c);
             }
-            note(found, "fmi2NewDiscreteStates", 1, &[("fmi2EventInfo", &info)]);
+            note(found, events.new_discrete_states.name, 1, &[("fmi2EventInfo", &info)]);
         }
     }
 
     fn states_beside(&mut self, found: &mut Vec<Beside>) {
-        let (f, c) = (self.functions(), self.component);
+        let (f, c) = (&self.fmu.common, self.component);
         let Ok(state) = self.get_state() else { return };
         let mut size = Guarded::output::<usize>(1);
         // SAFETY: see values_beside.
-        let status = unsafe { (f.serialized_fmu_state_size)(c, state.0, size.pointer()) };
-        note(found, "fmi2SerializedFMUstateSize", 1, &[("size", &size)]);
+        let status = unsafe { (f.serialized_fmu_state_size.call)(c, state.0, size.pointer()) };
+        note(found, f.serialized_fmu_state_size.name, 1, &[("size", &size)]);
         let n = size.words[MARGIN / 8] as usize;
         if status == 0 && n < 1 << 30 {
             let mut bytes = Guarded::output::<u8>(n);
             // SAFETY: see values_beside.
-            let status = unsafe { (f.serialize_fmu_state)(c, state.0, bytes.pointer(), n) };
-            note(found, "fmi2SerializeFMUstate", n, &[("serializedState", &bytes)]);
+            let status = unsafe { (f.serialize_fmu_state.call)(c, state.0, bytes.pointer(), n) };
+            note(found, f.serialize_fmu_state.name, n, &[("serializedState", &bytes)]);
             if status == 0 {
                 let mut bytes = Guarded::input(&bytes.content());
                 let mut copy: State = null_mut();
                 // SAFETY: see values_beside.
-                unsafe { (f.deserialize_fmu_state)(c, bytes.pointer(), n, &mut copy) };
-                note(found, "fmi2DeSerializeFMUstate", n, &[("serializedState", &bytes)]);
+                unsafe { (f.deserialize_fmu_state.call)(c, bytes.pointer(), n, &mut copy) };
+                note(found, f.deserialize_fmu_state.name, n, &[("serializedState", &bytes)]);
                 let _ = self.free_state(FmuState(copy));
             }
         }
@@ -299,13 +291,13 @@ mod tests {
         // SAFETY: inside the margin.
         unsafe { array.pointer::<u8>().add(12).write(1) };
         assert_eq!(array.fault().as_deref(), Some("it writes up to 1 bytes past its end"));
-        let mut array = Guarded::output::<Real>(1);
+        let mut array = Guarded::output::<f64>(1);
         // SAFETY: inside the margin.
         unsafe { array.pointer::<u8>().sub(8).write(1) };
         assert_eq!(array.fault().as_deref(), Some("it writes up to 8 bytes before its beginning"));
         let mut array = Guarded::input(&[1.0, 2.0]);
         // SAFETY: inside the array.
-        unsafe { array.pointer::<Real>().write(3.0) };
+        unsafe { array.pointer::<f64>().write(3.0) };
         assert_eq!(array.fault().as_deref(), Some("it changes what it shall only read"));
     }
 }

@@ -6,7 +6,7 @@
 //! chattering, each one still moves time on by [`APART`] of the way to the next row, so that the run ends.
 
 use anyhow::{Result, bail, ensure};
-use host::fmi2::Instance;
+use host::fmu::Instance;
 
 /// Part of a step to which an event is located.
 const LOCATED: f64 = 1e-13;
@@ -64,21 +64,20 @@ pub struct Run<'fmu> {
 }
 
 impl<'fmu> Run<'fmu> {
-    /// From an instance in event mode, as initialization leaves it; `sizes`: states and event indicators; `most_steps`: from one row
-    /// to the next.
+    /// From an instance in event mode, as initialization leaves it; `most_steps`: from one row to the next.
     pub fn new(
-        instance: Instance<'fmu>,
-        sizes: (usize, usize),
+        mut instance: Instance<'fmu>,
         tolerance: f64,
         start: f64,
         most_steps: usize,
     ) -> Result<Self> {
+        let (states, indicators) = instance.sizes()?;
         let mut run = Run {
             instance,
             t: start,
-            x: vec![0.0; sizes.0],
-            z: vec![0.0; sizes.1],
-            nominals: vec![1.0; sizes.0],
+            x: vec![0.0; states],
+            z: vec![0.0; indicators],
+            nominals: vec![1.0; states],
             tolerance,
             h: f64::INFINITY,
             next_event: None,
@@ -86,7 +85,7 @@ impl<'fmu> Run<'fmu> {
             inputs: (Vec::new(), Vec::new(), Vec::new(), start),
         };
         run.update()?;
-        if sizes.0 > 0 {
+        if states > 0 {
             run.instance.nominals(&mut run.nominals)?;
         }
         Ok(run)
@@ -125,11 +124,10 @@ impl<'fmu> Run<'fmu> {
     /// Leaves event mode once the discrete states have settled.
     fn update(&mut self) -> Result<()> {
         for _ in 0..1000 {
-            let info = self.instance.new_discrete_states()?;
-            ensure!(info.terminate_simulation == 0, "the FMU ends the run at t = {} s", self.t);
-            if info.new_discrete_states_needed == 0 {
-                let defined = info.next_event_time_defined != 0;
-                self.next_event = defined.then_some(info.next_event_time);
+            let updated = self.instance.update_discrete_states()?;
+            ensure!(!updated.terminate, "the FMU ends the run at t = {} s", self.t);
+            if !updated.again {
+                self.next_event = updated.next_event;
                 self.instance.enter_continuous_time_mode()?;
                 if !self.x.is_empty() {
                     self.instance.continuous_states(&mut self.x)?;

@@ -261,8 +261,8 @@ fn remedy(problem: &Problem, solver: &SolverError) -> String {
         }
         Model::Own(_) if solver.heeds_tolerance => finer.into(),
         Model::Own(_) => {
-            "the FMU ignores the tolerance that a host gives: export it with a finer solver, or for Model Exchange (FMI 2.0) and \
-             use --exchange"
+            "the FMU ignores the tolerance that a host gives: export it with a finer solver, or for Model Exchange and use \
+             --exchange"
                 .into()
         }
     }

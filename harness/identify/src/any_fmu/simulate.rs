@@ -3,14 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
+use experiments::rest;
 use experiments::sensors::Sensor;
 use experiments::sensors::quantity::Quantity;
-use host::archive::Archive;
 use host::description::{ModelDescription, Type};
-use host::fmi2::{self, MODEL_EXCHANGE};
-use host::fmu::{Fmu, Instance};
-use host::temporary::Folder;
-use host::xml::Element;
+use host::fmu::{Fmu, Instance, Interface};
 
 use super::exchange;
 use super::question::{Question, Setting, Solver, real};
@@ -20,15 +17,8 @@ use super::record::Record;
 pub enum Model {
     /// It steps itself (Co-Simulation).
     Own(Fmu),
-    /// The host integrates (Model Exchange of FMI 2.0).
-    Host {
-        /// The FMU.
-        fmu: fmi2::Fmu,
-        /// Continuous states and event indicators.
-        sizes: (usize, usize),
-        /// Where it is unpacked; dropped after it.
-        folder: Folder,
-    },
+    /// The host integrates (Model Exchange).
+    Host(Fmu),
 }
 
 impl Model {
@@ -37,54 +27,30 @@ impl Model {
     /// # Errors
     /// If it is no FMU, or has not what the solver needs.
     pub fn open(path: &Path, solver: Solver) -> Result<Self> {
-        if solver == Solver::Own {
-            return Ok(Model::Own(Fmu::open(path)?));
-        }
-        let archive = Archive::open(path)?;
-        let folder = Folder::new()?;
-        archive
-            .unpack(folder.path())
-            .with_context(|| format!("{} is not an FMU", path.display()))?;
-        let root = Element::parse(archive.description()?.as_bytes())
-            .map_err(|why| anyhow::anyhow!("modelDescription.xml cannot be read: {why}"))?;
-        let structure = root.child("ModelStructure");
-        let states = structure.map_or(0, |structure| structure.list("Derivatives").count());
-        let indicators = root.number("numberOfEventIndicators").unwrap_or(0.0) as usize;
-        let version = root.get("fmiVersion").unwrap_or_default();
-        ensure!(
-            version.starts_with("2."),
-            "{} is an FMU {version} (allowed for the host's solver: FMI 2.0); its own solver can step it",
-            path.display()
-        );
-        let fmu = fmi2::Fmu::load_for(MODEL_EXCHANGE, folder.path(), path)?;
-        ensure!(
-            fmu.has_exchange(),
-            "{} offers no model exchange: only its own solver can step it",
-            path.display()
-        );
-        Ok(Model::Host { fmu, sizes: (states, indicators), folder })
+        Ok(match solver {
+            Solver::Own => Model::Own(Fmu::open(path)?),
+            Solver::Host(_) => Model::Host(Fmu::open_for(Interface::ModelExchange, path, &[])?),
+        })
+    }
+
+    fn fmu(&self) -> &Fmu {
+        let (Model::Own(fmu) | Model::Host(fmu)) = self;
+        fmu
     }
 
     /// What it says of itself.
     pub fn description(&self) -> &ModelDescription {
-        match self {
-            Model::Own(fmu) => fmu.description(),
-            Model::Host { fmu, .. } => fmu.description(),
-        }
+        self.fmu().description()
     }
 
     /// Whether it steps itself, but the host's solver could.
     pub fn offers_exchange(&self) -> bool {
-        let Model::Own(fmu) = self else { return false };
-        fmu.description().model_exchange.is_some() && !fmu.description().is_fmi3()
+        matches!(self, Model::Own(fmu) if fmu.description().model_exchange.is_some())
     }
 
     /// What loading its binary has changed for this whole process.
     pub fn changed(&self) -> &[&'static str] {
-        match self {
-            Model::Own(fmu) => fmu.changed(),
-            Model::Host { fmu, .. } => fmu.changed(),
-        }
+        self.fmu().changed()
     }
 }
 
@@ -249,24 +215,22 @@ impl Setup {
     /// spacecraft. Model Exchange hands over no slopes: the host's solver would integrate another motion.
     fn slopes_act(&self, fmu: &Fmu) -> Result<bool> {
         let description = fmu.description();
-        let mut instance = fmu.instantiate_at_rest("identify")?;
+        let mut instance = rest::instantiate(fmu, "identify")?;
         for setting in self.settings.iter().filter(|setting| setting.recording.is_none()) {
             instance.set(&setting.name, &setting.value)?;
         }
         instance.enter_initialization_mode(self.tolerance, 0.0, None)?;
         instance.exit_initialization_mode()?;
-        let Instance::V2(instance, _) = &mut instance else { return Ok(false) };
         if !interpolates(description) {
             return Ok(false);
         }
         let outputs = description.variables.iter();
         let outputs = outputs.filter(|v| v.causality == "output" && v.kind() == Type::Real);
         let outputs: Vec<u32> = outputs.map(|v| v.reference).collect();
-        let orders = vec![1; self.inputs.len()];
         let mut read = |slope: f64| -> Result<Vec<f64>> {
             let slopes: Vec<f64> =
                 self.held.iter().map(|held| if *held { 0.0 } else { slope }).collect();
-            instance.set_real_input_derivatives(&self.inputs, &orders, &slopes)?;
+            instance.set_slopes(&self.inputs, &slopes)?;
             let mut values = vec![0.0; outputs.len()];
             instance.get_real(&outputs, &mut values)?;
             Ok(values)
@@ -303,7 +267,7 @@ impl Setup {
         record: &Record,
     ) -> Result<Vec<String>> {
         Ok(match self.initialised(model, values, number, record)? {
-            Initialised::Own(instance) => instance.take_warnings(),
+            Initialised::Own(mut instance) => instance.take_warnings(),
             Initialised::Host(mut run) => run.instance().take_warnings(),
         })
     }
@@ -317,50 +281,28 @@ impl Setup {
     ) -> Result<Initialised<'m>> {
         let first = self.course(record, 0).0;
         let start = record.time[0];
-        let settings = || {
-            let own = |setting: &&Setting| setting.recording.is_none_or(|of| of == number);
-            self.settings.iter().filter(own)
-        };
-        match model {
-            Model::Own(fmu) => {
-                let mut instance = fmu.instantiate_at_rest("identify")?;
-                for setting in settings() {
-                    instance.set(&setting.name, &setting.value)?;
-                }
-                for (reference, value) in values {
-                    instance.set_real(&[*reference], &[*value])?;
-                }
-                instance.enter_initialization_mode(self.tolerance, start, None)?;
-                if !first.is_empty() {
-                    instance.set_real(&self.inputs, &first)?;
-                }
-                instance.exit_initialization_mode()?;
-                Ok(Initialised::Own(instance))
-            }
-            Model::Host { fmu, sizes, .. } => {
-                let with = fmu.instantiation("identify");
-                let with = fmi2::Instantiation { kind: MODEL_EXCHANGE, ..with };
-                let mut instance = fmu.instantiate_with(&with)?;
-                for start in fmu.description().moving_starts() {
-                    instance.set(start, "0")?;
-                }
-                for setting in settings() {
-                    instance.set(&setting.name, &setting.value)?;
-                }
-                for (reference, value) in values {
-                    instance.set_real(&[*reference], &[*value])?;
-                }
-                instance.setup_experiment(None, start, None)?;
-                instance.enter_initialization_mode()?;
-                if !first.is_empty() {
-                    instance.set_real(&self.inputs, &first)?;
-                }
-                instance.exit_initialization_mode()?;
-                let tolerance = self.tolerance.unwrap_or(FINE);
-                let run = exchange::Run::new(instance, *sizes, tolerance, start, self.most_steps)?;
-                Ok(Initialised::Host(run))
-            }
+        let fmu = model.fmu();
+        let mut instance = rest::instantiate(fmu, "identify")?;
+        let own = |setting: &&Setting| setting.recording.is_none_or(|of| of == number);
+        for setting in self.settings.iter().filter(own) {
+            instance.set(&setting.name, &setting.value)?;
         }
+        for (reference, value) in values {
+            instance.set_real(&[*reference], &[*value])?;
+        }
+        let hosts = matches!(model, Model::Host(_));
+        let tolerance = if hosts { None } else { self.tolerance };
+        instance.enter_initialization_mode(tolerance, start, None)?;
+        if !first.is_empty() {
+            instance.set_real(&self.inputs, &first)?;
+        }
+        instance.exit_initialization_mode()?;
+        if !hosts {
+            return Ok(Initialised::Own(instance));
+        }
+        let tolerance = self.tolerance.unwrap_or(FINE);
+        let run = exchange::Run::new(instance, tolerance, start, self.most_steps)?;
+        Ok(Initialised::Host(run))
     }
 
     /// By the host's solver, from row to row.
@@ -390,7 +332,6 @@ impl Setup {
         record: &Record,
     ) -> Result<Vec<Vec<f64>>> {
         let is_sloped = interpolates(description) && self.held.iter().any(|held| !held);
-        let orders = vec![1; self.inputs.len()];
         let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
         for row in 0..record.time.len() {
             let (values, slopes) = self.course(record, row);
@@ -398,8 +339,8 @@ impl Setup {
                 instance.set_real(&self.inputs, &values)?;
             }
             // an output may follow an input's slope, which changes here: what is read is that of the row onwards
-            if let (true, Instance::V2(instance, _)) = (is_sloped, &mut *instance) {
-                instance.set_real_input_derivatives(&self.inputs, &orders, &slopes)?;
+            if is_sloped {
+                instance.set_slopes(&self.inputs, &slopes)?;
             }
             let mut at = vec![0.0; self.reads.len()];
             instance.get_real(&self.reads, &mut at)?;

@@ -1,0 +1,28 @@
+//! Runs that begin at rest.
+
+use anyhow::Result;
+use host::description::ModelDescription;
+use host::fmu::{Fmu, Instance};
+
+/// Parameters and inputs by which this project's FMUs move if nobody sets anything, for the first plot of any host; 0 is at
+/// rest. FMUs of others have none.
+pub fn moving_starts(description: &ModelDescription) -> &'static [&'static str] {
+    match description.model_name.as_str() {
+        "HubSlosh" => &["init.slosh_angle"],
+        name if name.starts_with("Spacecraft") => &["init.omega[1]", "init.omega[3]"],
+        "SloshTank" => &["a[1]", "a[3]"],
+        _ => &[],
+    }
+}
+
+/// Makes an instance in which all [`moving_starts`] are 0, so that only what is set moves it.
+///
+/// # Errors
+/// What the FMU refuses.
+pub fn instantiate<'fmu>(fmu: &'fmu Fmu, name: &str) -> Result<Instance<'fmu>> {
+    let mut instance = fmu.instantiate(name)?;
+    for start in moving_starts(fmu.description()) {
+        instance.set(start, "0")?;
+    }
+    Ok(instance)
+}

@@ -1,0 +1,875 @@
+//! An FMU of one version of FMI and its instances: everything that the versions have in common. [`Version`] is what
+//! differs; `fmi2.rs` and `fmi3.rs` implement it and add the calls that one version alone has.
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+use std::ptr::{null, null_mut};
+use std::slice;
+
+use anyhow::{Context, Result, bail};
+use libloading::Library;
+
+use super::{
+    CallError, Called, Environment, Function, Loaded, Message, Status, copied, functions, lacking,
+};
+use crate::archive::Archive;
+use crate::description::{CType, ModelDescription, Type, Value, Variable};
+use crate::guard::Calls;
+use crate::temporary;
+
+pub(crate) type Component = *mut c_void;
+pub(crate) type State = *mut c_void;
+pub(crate) type Refs = *const u32;
+pub(crate) type Call = unsafe extern "C" fn(Component) -> c_int;
+pub(crate) type GetVector = unsafe extern "C" fn(Component, *mut f64, usize) -> c_int;
+
+// What every FMU must export and has the same types in both versions, but for that of truth values.
+functions! { Common<B>:
+    get_version "fmi2GetVersion" "fmi3GetVersion", unsafe extern "C" fn() -> *const c_char;
+    set_debug_logging "fmi2SetDebugLogging" "fmi3SetDebugLogging", unsafe extern "C" fn(Component, B, usize, *const *const c_char) -> c_int;
+    free_instance "fmi2FreeInstance" "fmi3FreeInstance", unsafe extern "C" fn(Component);
+    exit_initialization_mode "fmi2ExitInitializationMode" "fmi3ExitInitializationMode", Call;
+    terminate "fmi2Terminate" "fmi3Terminate", Call;
+    reset "fmi2Reset" "fmi3Reset", Call;
+    get_fmu_state "fmi2GetFMUstate" "fmi3GetFMUState", unsafe extern "C" fn(Component, *mut State) -> c_int;
+    set_fmu_state "fmi2SetFMUstate" "fmi3SetFMUState", unsafe extern "C" fn(Component, State) -> c_int;
+    free_fmu_state "fmi2FreeFMUstate" "fmi3FreeFMUState", unsafe extern "C" fn(Component, *mut State) -> c_int;
+    serialized_fmu_state_size "fmi2SerializedFMUstateSize" "fmi3SerializedFMUStateSize", unsafe extern "C" fn(Component, State, *mut usize) -> c_int;
+    serialize_fmu_state "fmi2SerializeFMUstate" "fmi3SerializeFMUState", unsafe extern "C" fn(Component, State, *mut u8, usize) -> c_int;
+    deserialize_fmu_state "fmi2DeSerializeFMUstate" "fmi3DeserializeFMUState", unsafe extern "C" fn(Component, *const u8, usize, *mut State) -> c_int;
+}
+
+// The same of what a model exchange FMU must export besides.
+functions! { Exchange<B>:
+    enter_continuous_time_mode "fmi2EnterContinuousTimeMode" "fmi3EnterContinuousTimeMode", Call;
+    completed_integrator_step "fmi2CompletedIntegratorStep" "fmi3CompletedIntegratorStep", unsafe extern "C" fn(Component, B, *mut B, *mut B) -> c_int;
+    set_time "fmi2SetTime" "fmi3SetTime", unsafe extern "C" fn(Component, f64) -> c_int;
+    set_continuous_states "fmi2SetContinuousStates" "fmi3SetContinuousStates", unsafe extern "C" fn(Component, *const f64, usize) -> c_int;
+    get_derivatives "fmi2GetDerivatives" "fmi3GetContinuousStateDerivatives", GetVector;
+    get_event_indicators "fmi2GetEventIndicators" "fmi3GetEventIndicators", GetVector;
+    get_continuous_states "fmi2GetContinuousStates" "fmi3GetContinuousStates", GetVector;
+    get_nominals "fmi2GetNominalsOfContinuousStates" "fmi3GetNominalsOfContinuousStates", GetVector;
+}
+
+/// A C function that writes the values of variables into an array.
+pub(crate) trait Getter<T> {
+    /// # Safety
+    /// It is a function of the FMU of this instance.
+    unsafe fn get(self, component: Component, references: &[u32], values: &mut [T]) -> c_int;
+}
+
+/// A C function that reads the values of variables from an array.
+pub(crate) trait Setter<T> {
+    /// # Safety
+    /// It is a function of the FMU of this instance, and what the values point to is alive.
+    unsafe fn set(self, component: Component, references: &[u32], values: &[T]) -> c_int;
+}
+
+/// The interfaces that this host can drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// The FMU integrates.
+    CoSimulation,
+    /// The host integrates.
+    ModelExchange,
+}
+
+/// Result of updating the discrete states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Updated {
+    /// The host must update them again.
+    pub again: bool,
+    /// The FMU asks for the end of the simulation.
+    pub terminate: bool,
+    /// Time of the next time event, s.
+    pub next_event: Option<f64>,
+}
+
+/// What differs between versions of FMI: the functions of one version that is loaded, and what a host does by them.
+pub trait Version: Sized {
+    /// Folder of the binaries for the platform this program was built for.
+    const PLATFORM: &'static str;
+    /// Place of its symbols in tables of functions for both versions.
+    const NUMBER: usize;
+    /// `fmi2Boolean` or `fmi3Boolean`. A byte that is neither 0 nor 1 must not become a `bool`.
+    type Boolean: Copy + Default + PartialEq + From<bool>;
+    /// What an instance keeps besides.
+    type Kept;
+
+    /// Names of the functions that a binary must have, by the interfaces that it is declared for.
+    fn needed(steps: bool, exchanges: bool) -> Vec<&'static str>;
+
+    /// # Errors
+    /// If a function that every FMU has is missing.
+    ///
+    /// # Safety
+    /// The library must be a binary of that version of FMI: the types are taken on trust.
+    unsafe fn load(library: &Library) -> Result<Self, libloading::Error>;
+
+    /// Where the resources of the FMU that is unpacked in this folder are, as instances get it.
+    fn resources(directory: &Path) -> Option<String>;
+
+    /// Makes a plain instance, with logging on.
+    fn instantiate<'fmu>(fmu: &'fmu Fmu<Self>, name: &str) -> Called<Instance<'fmu, Self>>;
+
+    /// Enters initialization mode: times in s; `tolerance` is relative.
+    fn initialize(
+        instance: &mut Instance<'_, Self>,
+        tolerance: Option<f64>,
+        start: f64,
+        stop: Option<f64>,
+    ) -> Called;
+
+    /// Enters or leaves the mode in which structural parameters may be set.
+    fn configure(instance: &mut Instance<'_, Self>, enters: bool) -> Called;
+
+    /// Makes a step from `time` by `step`, s, inputs held.
+    fn step(instance: &mut Instance<'_, Self>, time: f64, step: f64) -> Called;
+
+    /// Tells the slopes of inputs from now on, per s, if the version has a call for that.
+    fn set_slopes(instance: &mut Instance<'_, Self>, references: &[u32], slopes: &[f64]) -> Called;
+
+    /// Makes a step through which these Reals, inputs that were set just now to `values`, go with `slopes`, per s.
+    fn step_along(
+        instance: &mut Instance<'_, Self>,
+        time: f64,
+        step: f64,
+        references: &[u32],
+        values: &[f64],
+        slopes: &[f64],
+    ) -> Called;
+
+    /// Enters event mode.
+    fn enter_event_mode(instance: &mut Instance<'_, Self>) -> Called;
+
+    /// Updates the discrete states, in event mode.
+    fn update(instance: &mut Instance<'_, Self>) -> Called<Updated>;
+
+    /// Numbers of continuous states and of event indicators.
+    fn sizes(instance: &mut Instance<'_, Self>) -> Called<(usize, usize)>;
+
+    /// All values of one variable or array by its value reference in the FMU.
+    fn values(
+        instance: &mut Instance<'_, Self>,
+        c_type: CType,
+        reference: u32,
+        count: usize,
+    ) -> Called<Vec<Value>>;
+
+    /// Sets all values of one variable or array by its value reference in the FMU.
+    fn set_values(
+        instance: &mut Instance<'_, Self>,
+        c_type: CType,
+        reference: u32,
+        values: &[Value],
+    ) -> Called;
+
+    /// Reads Reals of which none is an element of an array.
+    fn reals(instance: &mut Instance<'_, Self>, references: &[u32], values: &mut [f64]) -> Called;
+
+    /// Sets Reals of which none is an element of an array.
+    fn set_reals(instance: &mut Instance<'_, Self>, references: &[u32], values: &[f64]) -> Called;
+}
+
+/// An FMU whose binary is loaded.
+pub struct Fmu<V: Version> {
+    pub(crate) description: ModelDescription,
+    pub(crate) common: Common<V::Boolean>,
+    pub(crate) exchange: Option<Exchange<V::Boolean>>,
+    /// The functions of this version alone.
+    pub(crate) own: V,
+    /// Of the instances that are made without saying for which.
+    pub(crate) interface: Interface,
+    pub(crate) resources: Option<String>,
+    hash: String,
+    binary_hash: String,
+    path: PathBuf,
+    changed: Vec<&'static str>,
+    /// All Reals are Float64 and scalar.
+    is_plain: bool,
+    /// References of those that are, in order.
+    plain: Vec<u32>,
+    /// Structural parameters that every instance of [`Fmu::instantiate`] begins with, by reference.
+    structural: BTreeMap<u32, Value>,
+    // dropped in this order: first the code, then the files
+    library: Option<Library>,
+    _directory: Option<temporary::Folder>,
+}
+
+impl<V: Version> Drop for Fmu<V> {
+    fn drop(&mut self) {
+        let _calls = Calls::one();
+        self.library = None;
+    }
+}
+
+impl<V: Version> Fmu<V> {
+    /// Opens a packed FMU and loads the binary for this platform.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let archive = Archive::open(path)?;
+        let described = described(&archive, path)?;
+        Fmu::of_archive(&archive, described, path, Interface::CoSimulation, &[])
+    }
+
+    /// Opens the FMU of an archive for one interface. Of the settings it takes those that are structural parameters of FMI 3.0.
+    pub(crate) fn of_archive(
+        archive: &Archive,
+        (text, description): (String, ModelDescription),
+        path: &Path,
+        interface: Interface,
+        settings: &[(String, String)],
+    ) -> Result<Self> {
+        let name = path.display();
+        match interface {
+            Interface::CoSimulation if description.co_simulation.is_none() => {
+                bail!("{name} offers no co-simulation; this host drives nothing else")
+            }
+            Interface::ModelExchange if description.model_exchange.is_none() => {
+                bail!("{name} offers no model exchange: only its own solver can step it")
+            }
+            _ => {}
+        }
+        let directory = temporary::Folder::new()?;
+        archive.unpack(directory.path()).with_context(|| format!("{name} is not an FMU"))?;
+        let mut fmu = Fmu::load_described(description, Some(interface), directory.path(), path)?;
+        fmu.hash = archive.hash().with_context(|| format!("{name} cannot be read"))?;
+        fmu._directory = Some(directory);
+        fmu.configure(&text, settings)?;
+        Ok(fmu)
+    }
+
+    /// Loads the binary of an FMU that is unpacked in `directory`: that of Co-Simulation if there is one; errors
+    /// speak of `path`. [`Fmu::hash`] is empty.
+    pub fn load(directory: &Path, path: &Path) -> Result<Self> {
+        Fmu::load_binary(None, directory, path)
+    }
+
+    /// The same for one interface: the two may name different binaries.
+    pub(crate) fn load_binary(
+        interface: Option<Interface>,
+        directory: &Path,
+        path: &Path,
+    ) -> Result<Self> {
+        let name = path.display();
+        let xml = directory.join("modelDescription.xml");
+        if !xml.exists() {
+            bail!("{name} is not an FMU: it has no modelDescription.xml");
+        }
+        let text = std::fs::read_to_string(&xml)
+            .with_context(|| format!("modelDescription.xml in {name} cannot be read"))?;
+        let description =
+            ModelDescription::from_xml(&text).with_context(|| format!("{name} cannot be used"))?;
+        Fmu::load_described(description, interface, directory, path)
+    }
+
+    fn load_described(
+        description: ModelDescription,
+        interface: Option<Interface>,
+        directory: &Path,
+        path: &Path,
+    ) -> Result<Self> {
+        let name = path.display();
+        let stepping = description.co_simulation.as_ref().map(|i| &i.model_identifier);
+        let exchange = description.model_exchange.as_ref().map(|i| &i.model_identifier);
+        let identifier = match interface {
+            None => stepping.or(exchange),
+            Some(Interface::CoSimulation) => stepping,
+            Some(Interface::ModelExchange) => exchange,
+        };
+        let identifier = identifier
+            .with_context(|| format!("{name} offers neither co-simulation nor model exchange"))?;
+        let Loaded { library, hash, changed, binary } =
+            super::load(directory, path, V::PLATFORM, identifier)?;
+        let needed = V::needed(stepping == Some(identifier), exchange == Some(identifier));
+        let lacking = lacking(&library, &needed);
+        if !lacking.is_empty() {
+            bail!("{binary} in {name} lacks {}", lacking.join(", "));
+        }
+        // SAFETY: the binary says it follows this version of FMI, whose types the tables declare; an FMU of one interface
+        // lacks the other's functions, and nothing is wrong.
+        let (common, own, exchange) = unsafe {
+            let refused = || format!("{binary} in {name} cannot be used");
+            (
+                Common::load(&library, V::NUMBER).with_context(refused)?,
+                V::load(&library).with_context(refused)?,
+                Exchange::load(&library, V::NUMBER).ok(),
+            )
+        };
+        let (is_plain, plain) = plain(&description);
+        Ok(Fmu {
+            common,
+            exchange,
+            own,
+            interface: interface.unwrap_or(match description.co_simulation {
+                Some(_) => Interface::CoSimulation,
+                None => Interface::ModelExchange,
+            }),
+            description,
+            resources: V::resources(directory),
+            hash: String::new(),
+            binary_hash: hash,
+            path: path.to_path_buf(),
+            changed,
+            is_plain,
+            plain,
+            structural: BTreeMap::new(),
+            library: Some(library),
+            _directory: None,
+        })
+    }
+
+    /// Gives structural parameters other values than those that they start with: every instance of [`Fmu::instantiate`] sets
+    /// them first, in configuration mode, and [`Fmu::description`] has the sizes that follow. Of arrays whose size has changed
+    /// it has the start values that the FMU tells then. `text` is modelDescription.xml.
+    ///
+    /// # Errors
+    /// If the FMU refuses one.
+    fn configure(&mut self, text: &str, settings: &[(String, String)]) -> Result<()> {
+        let mut is_set = false;
+        for (name, value) in settings {
+            let of = |v: &&Variable| v.is_structural() && v.name == *name;
+            let Some(variable) = self.description.variables.iter().find(of) else { continue };
+            is_set = true;
+            let value = self.description.value(variable, value)?;
+            let start = variable.attributes().start.as_deref().unwrap_or_default();
+            // as declared: nothing is to be done
+            match self.description.value(variable, start).is_ok_and(|start| start == value) {
+                true => self.structural.remove(&variable.reference),
+                false => self.structural.insert(variable.reference, value),
+            };
+        }
+        if !is_set {
+            return Ok(());
+        }
+        // first: what is too large for the FMU may be too large for a description
+        let mut instance = self.instantiate("sizes")?;
+        let mut description = ModelDescription::from_xml_with(text, &self.structural)?;
+        let mut starts = Vec::new();
+        for (reference, array) in description.arrays().filter(|(_, array)| array.is_resized) {
+            starts.push((
+                reference,
+                V::values(&mut instance, array.c_type, reference, array.length)?,
+            ));
+        }
+        drop(instance);
+        for (array, values) in starts {
+            description.set_starts(array, &values);
+        }
+        (self.is_plain, self.plain) = plain(&description);
+        self.description = description;
+        Ok(())
+    }
+
+    /// Model description of the FMU.
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    /// SHA-256 of the `.fmu` file, in hexadecimal digits.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// SHA-256 of the binary that is loaded, in hexadecimal digits.
+    pub fn binary_hash(&self) -> &str {
+        &self.binary_hash
+    }
+
+    /// Changes of the whole process by loading the binary, such as the rounding mode.
+    pub fn changed(&self) -> &[&'static str] {
+        &self.changed
+    }
+
+    /// The file it was opened from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Result of fmi2GetVersion or fmi3GetVersion.
+    pub fn version(&self) -> String {
+        // SAFETY: takes nothing, returns a constant string.
+        unsafe { copied((self.common.get_version.call)()) }
+    }
+
+    /// Returns true if these Reals can be exchanged in one call: all are Float64, none an element of an array.
+    fn is_plain(&self, references: &[u32]) -> bool {
+        self.is_plain || references.iter().all(|r| self.plain.binary_search(r).is_ok())
+    }
+
+    /// A new instance with logging on, in the sizes of the description, for the interface of the binary: Co-Simulation if it has
+    /// both.
+    pub fn instantiate(&self, name: &str) -> Called<Instance<'_, V>> {
+        let mut instance = V::instantiate(self, name)?;
+        if !self.structural.is_empty() {
+            V::configure(&mut instance, true)?;
+            for (reference, value) in &self.structural {
+                let of = |v: &&Variable| v.is_structural() && v.reference == *reference;
+                if let Some(variable) = self.description.variables.iter().find(of) {
+                    let value = slice::from_ref(value);
+                    V::set_values(&mut instance, variable.c_type(), *reference, value)?;
+                }
+            }
+            V::configure(&mut instance, false)?;
+        }
+        Ok(instance)
+    }
+
+    /// Makes an instance by the function of this name, which `make` calls.
+    pub(crate) fn made(
+        &self,
+        name: &'static str,
+        environment: Environment,
+        kept: V::Kept,
+        make: impl FnOnce() -> Component,
+    ) -> Called<Instance<'_, V>> {
+        let calls = Calls::one();
+        environment.begin_call();
+        let component = make();
+        calls.end();
+        // a NULL component never reaches the FMU again
+        let instance = Instance {
+            fmu: self,
+            component,
+            environment,
+            kept,
+            warned: Cell::new(None),
+            calls,
+            arrays: RefCell::default(),
+            one_thread: PhantomData,
+        };
+        if component.is_null() {
+            let messages = instance.take_messages();
+            return Err(CallError { call: name, status: Status::Error, messages });
+        }
+        Ok(instance)
+    }
+
+    /// For tests: fmi2FreeInstance(NULL) or fmi3FreeInstance(NULL), which does nothing.
+    pub fn free_null_instance(&self) {
+        // SAFETY: the standard allows NULL here (FMI 2.0.5, section 2.1.5; FMI 3.0.2, section 2.3.1).
+        unsafe { (self.common.free_instance.call)(null_mut()) }
+    }
+}
+
+/// Reads modelDescription.xml of an archive.
+pub(crate) fn described(archive: &Archive, path: &Path) -> Result<(String, ModelDescription)> {
+    let name = path.display();
+    let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;
+    let refused = || format!("{name} cannot be used");
+    let description = ModelDescription::from_xml(&text).with_context(refused)?;
+    description.check_version().with_context(refused)?;
+    Ok((text, description))
+}
+
+/// True if all Reals are scalar Float64, and the references of those that are, in order.
+fn plain(description: &ModelDescription) -> (bool, Vec<u32>) {
+    let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
+    let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
+        .partition(|v| v.c_type() == CType::Float64 && description.element(v.reference).is_none());
+    let mut plain: Vec<u32> = plain.iter().map(|v| v.reference).collect();
+    plain.sort_unstable();
+    (others.is_empty(), plain)
+}
+
+/// One instance of an FMU; freed when dropped. Belongs to the thread that made it.
+pub struct Instance<'fmu, V: Version> {
+    pub(crate) fmu: &'fmu Fmu<V>,
+    pub(crate) component: Component,
+    environment: Environment,
+    pub(crate) kept: V::Kept,
+    warned: Cell<Option<&'static str>>,
+    pub(crate) calls: Calls,
+    /// Values of the arrays of which elements were set, before they can be read.
+    arrays: RefCell<BTreeMap<u32, Vec<Value>>>,
+    one_thread: PhantomData<*mut ()>,
+}
+
+impl<V: Version> Drop for Instance<'_, V> {
+    fn drop(&mut self) {
+        if !self.component.is_null() {
+            self.begin_call();
+            // SAFETY: made by the FMU, freed here alone; the environment and what is kept go after it, because it may still
+            // log.
+            unsafe { (self.fmu.common.free_instance.call)(self.component) };
+            self.calls.end();
+        }
+    }
+}
+
+/// A snapshot of an instance. Belongs to the instance it was taken from, and must be given back to it with
+/// [`Instance::free_state`]; otherwise its memory is lost.
+pub struct FmuState(pub(crate) State);
+
+impl<'fmu, V: Version> Instance<'fmu, V> {
+    /// The FMU it is an instance of.
+    pub fn fmu(&self) -> &'fmu Fmu<V> {
+        self.fmu
+    }
+
+    /// Everything logged since the last time somebody asked.
+    pub fn take_messages(&self) -> Vec<Message> {
+        self.environment.take()
+    }
+
+    /// Returns the FMU's warnings since the last call.
+    pub fn take_warnings(&self) -> Vec<String> {
+        let messages = self.take_messages().into_iter();
+        let warnings = messages.filter(|message| message.status == Status::Warning);
+        warnings.map(|message| message.text.trim().to_string()).collect()
+    }
+
+    /// Number of messages without a category (NULL).
+    pub fn uncategorised(&self) -> usize {
+        self.environment.uncategorised()
+    }
+
+    /// The last call that returned a warning since somebody asked.
+    pub fn take_warning(&self) -> Option<&'static str> {
+        self.warned.take()
+    }
+
+    pub(crate) fn begin_call(&self) {
+        self.environment.begin_call();
+        self.calls.begin();
+    }
+
+    /// Makes a call of a function of this instance and looks at its status.
+    pub(crate) fn call<T>(
+        &self,
+        function: Function<T>,
+        call: impl FnOnce(T, Component) -> c_int,
+    ) -> Called {
+        self.begin_call();
+        let status = call(function.call, self.component);
+        self.calls.end();
+        match Status::from(status) {
+            Status::Ok => Ok(()),
+            Status::Warning => {
+                self.warned.set(Some(function.name));
+                Ok(())
+            }
+            status => {
+                Err(CallError { call: function.name, status, messages: self.take_messages() })
+            }
+        }
+    }
+
+    /// Calls a function that takes the instance alone.
+    pub(crate) fn plain(&self, function: Function<Call>) -> Called {
+        // SAFETY: plain call on a live instance.
+        self.call(function, |f, c| unsafe { f(c) })
+    }
+
+    fn vector(&self, function: Function<GetVector>, x: &mut [f64]) -> Called {
+        // SAFETY: a slice of the length given.
+        self.call(function, |f, c| unsafe { f(c, x.as_mut_ptr(), x.len()) })
+    }
+
+    /// Calls one of the functions that write values into a slice.
+    pub(crate) fn read<T>(
+        &self,
+        function: Function<impl Getter<T>>,
+        references: &[u32],
+        values: &mut [T],
+    ) -> Called {
+        // SAFETY: a function of this FMU.
+        self.call(function, |f, c| unsafe { f.get(c, references, values) })
+    }
+
+    /// Calls one of the functions that read values from a slice.
+    pub(crate) fn write<T>(
+        &self,
+        function: Function<impl Setter<T>>,
+        references: &[u32],
+        values: &[T],
+    ) -> Called {
+        // SAFETY: a function of this FMU.
+        self.call(function, |f, c| unsafe { f.set(c, references, values) })
+    }
+
+    /// Calls the function that reads texts: `count` of them.
+    pub(crate) fn read_texts(
+        &self,
+        function: Function<impl Getter<*const c_char>>,
+        references: &[u32],
+        count: usize,
+    ) -> Called<Vec<String>> {
+        let mut pointers: Vec<*const c_char> = vec![null(); count];
+        self.read(function, references, &mut pointers)?;
+        // SAFETY: the FMU answered OK, so each points to a terminated string of the FMU.
+        Ok(pointers.into_iter().map(|text| unsafe { copied(text) }).collect())
+    }
+
+    /// Calls the function that sets texts.
+    pub(crate) fn write_texts(
+        &self,
+        function: Function<impl Setter<*const c_char>>,
+        references: &[u32],
+        values: &[&str],
+    ) -> Called {
+        let (_texts, pointers) = c_strings(values);
+        self.write(function, references, &pointers)
+    }
+
+    /// fmi2SetDebugLogging or fmi3SetDebugLogging.
+    pub fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Called {
+        let (_texts, pointers) = c_strings(categories);
+        let start = if pointers.is_empty() { null() } else { pointers.as_ptr() };
+        // SAFETY: pointers to strings that outlive the call.
+        self.call(self.fmu.common.set_debug_logging, |f, c| unsafe {
+            f(c, on.into(), pointers.len(), start)
+        })
+    }
+
+    /// Leaves initialization mode, ready for the first step.
+    pub fn exit_initialization_mode(&mut self) -> Called {
+        self.plain(self.fmu.common.exit_initialization_mode)
+    }
+
+    /// fmi2Terminate or fmi3Terminate.
+    pub fn terminate(&mut self) -> Called {
+        self.plain(self.fmu.common.terminate)
+    }
+
+    /// fmi2Reset or fmi3Reset.
+    pub fn reset(&mut self) -> Called {
+        self.arrays.borrow_mut().clear();
+        self.plain(self.fmu.common.reset)
+    }
+
+    /// fmi2EnterEventMode or fmi3EnterEventMode.
+    pub fn enter_event_mode(&mut self) -> Called {
+        V::enter_event_mode(self)
+    }
+
+    // ------------------------------------------------ variables of the description
+
+    fn variable(&self, reference: u32) -> &'fmu Variable {
+        let variables = &self.fmu.description.variables;
+        let of = variables.iter().find(|v| v.reference == reference && v.kind() == Type::Real);
+        of.expect("a reference of one of the FMU's Reals")
+    }
+
+    /// Reads Reals by reference.
+    pub fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Called {
+        if self.fmu.is_plain(references) {
+            return V::reals(self, references, values);
+        }
+        for (reference, value) in references.iter().zip(values.iter_mut()) {
+            if let Value::Real(x) = self.value(self.variable(*reference))? {
+                *value = x;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets Reals by reference.
+    pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Called {
+        if self.fmu.is_plain(references) {
+            return V::set_reals(self, references, values);
+        }
+        for (reference, value) in references.iter().zip(values) {
+            self.set_value(self.variable(*reference), Value::Real(*value))?;
+        }
+        Ok(())
+    }
+
+    /// The value of a variable, or of an element of an array.
+    pub fn value(&mut self, variable: &Variable) -> Called<Value> {
+        let description = &self.fmu.description;
+        let (reference, length, index) = match description.element(variable.reference) {
+            None => (variable.reference, 1, 0),
+            Some(element) => {
+                let length = description.array(element.array).map_or(0, |array| array.length);
+                (element.array, length, element.index)
+            }
+        };
+        let values = V::values(self, variable.c_type(), reference, length)?;
+        Ok(values.into_iter().nth(index).unwrap_or(Value::String(String::new())))
+    }
+
+    /// Sets a variable, or an element of an array: the others keep what was set last, or their start values.
+    pub fn set_value(&mut self, variable: &Variable, value: Value) -> Called {
+        let description = &self.fmu.description;
+        let Some(element) = description.element(variable.reference) else {
+            return V::set_values(self, variable.c_type(), variable.reference, &[value]);
+        };
+        let mut values = match self.arrays.borrow_mut().remove(&element.array) {
+            Some(values) => values,
+            None => {
+                let of_array = |v: &&Variable| {
+                    description.element(v.reference).is_some_and(|e| e.array == element.array)
+                };
+                let all = description.variables.iter().filter(of_array);
+                let start = |v: &Variable| {
+                    let start = v.attributes().start.as_deref().unwrap_or("0");
+                    description.value(v, start).unwrap_or(Value::Real(0.0))
+                };
+                all.map(start).collect()
+            }
+        };
+        if let Some(place) = values.get_mut(element.index) {
+            *place = value;
+        }
+        let set = V::set_values(self, variable.c_type(), element.array, &values);
+        self.arrays.borrow_mut().insert(element.array, values);
+        set
+    }
+
+    /// The value of a variable by name.
+    pub fn get(&mut self, name: &str) -> Result<Value> {
+        let variable = self.fmu.description.variable(name)?;
+        if matches!(variable.kind(), Type::Binary | Type::Clock) {
+            bail!("{name} is a {:?}, of which this host reads no values", variable.kind());
+        }
+        Ok(self.value(variable)?)
+    }
+
+    /// The value of a real variable.
+    pub fn real(&mut self, name: &str) -> Result<f64> {
+        match self.get(name)? {
+            Value::Real(value) => Ok(value),
+            other => bail!("{name} is not a Real but {other:?}"),
+        }
+    }
+
+    /// Sets a variable from text: a number, `true`/`false`, or an enumeration's value by name or number.
+    ///
+    /// # Errors
+    /// If the text is not of its type, or the FMU refuses it. A structural parameter of FMI 3.0 keeps the value that it has since
+    /// the FMU was opened.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
+        let description = &self.fmu.description;
+        let variable = description.variable(name)?;
+        let value = description.value(variable, text)?;
+        if variable.is_structural() {
+            let now = variable.attributes().start.as_deref().unwrap_or_default();
+            if description.value(variable, now).is_ok_and(|now| now == value) {
+                return Ok(());
+            }
+            bail!(
+                "{name} cannot be set to {text}: it is a structural parameter, by which arrays have their size, and that is \
+                 {now} for all that is done with the FMU here (`hubslosh run` and `step-cost` set it)"
+            );
+        }
+        self.set_value(variable, value).with_context(|| format!("{name}={text} was refused"))
+    }
+
+    // ------------------------------------------------ snapshots
+
+    /// Takes a new snapshot.
+    pub fn get_state(&mut self) -> Called<FmuState> {
+        let mut state = FmuState(null_mut());
+        self.get_state_into(&mut state)?;
+        Ok(state)
+    }
+
+    /// Takes a snapshot into one that is there already.
+    pub fn get_state_into(&mut self, state: &mut FmuState) -> Called {
+        // SAFETY: NULL or a handle from this FMU.
+        self.call(self.fmu.common.get_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
+    }
+
+    /// Goes back to a snapshot of this instance.
+    pub fn set_state(&mut self, state: &FmuState) -> Called {
+        // SAFETY: a handle from this FMU.
+        self.call(self.fmu.common.set_fmu_state, |f, c| unsafe { f(c, state.0) })
+    }
+
+    /// Gives a snapshot of this instance back.
+    pub fn free_state(&mut self, mut state: FmuState) -> Called {
+        // SAFETY: a handle from this FMU, gone after this call.
+        self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
+    }
+
+    /// Writes a snapshot as bytes.
+    pub fn serialize(&mut self, state: &FmuState) -> Called<Vec<u8>> {
+        let mut size = 0;
+        let common = &self.fmu.common;
+        // SAFETY: a handle from this FMU, a place for the size.
+        self.call(common.serialized_fmu_state_size, |f, c| unsafe { f(c, state.0, &mut size) })?;
+        let mut bytes = vec![0u8; size];
+        // SAFETY: `size` bytes are there.
+        self.call(common.serialize_fmu_state, |f, c| unsafe {
+            f(c, state.0, bytes.as_mut_ptr(), size)
+        })?;
+        Ok(bytes)
+    }
+
+    /// Makes a snapshot of such bytes.
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Called<FmuState> {
+        let mut state = FmuState(null_mut());
+        // SAFETY: `bytes.len()` bytes are there.
+        self.call(self.fmu.common.deserialize_fmu_state, |f, c| unsafe {
+            f(c, bytes.as_ptr(), bytes.len(), &mut state.0)
+        })?;
+        Ok(state)
+    }
+
+    // ------------------------------------------------ model exchange
+
+    fn exchange(&self) -> &'fmu Exchange<V::Boolean> {
+        self.fmu.exchange.as_ref().expect("the FMU exports the functions of model exchange")
+    }
+
+    /// Enters continuous-time mode. As all calls of this section it panics when the FMU does not have it.
+    pub fn enter_continuous_time_mode(&mut self) -> Called {
+        self.plain(self.exchange().enter_continuous_time_mode)
+    }
+
+    /// fmi2CompletedIntegratorStep or fmi3CompletedIntegratorStep: enterEventMode, terminateSimulation.
+    pub fn completed_integrator_step(&mut self) -> Called<(bool, bool)> {
+        let no = V::Boolean::default();
+        let (mut enter, mut terminate) = (no, no);
+        // SAFETY: places for the answers.
+        self.call(self.exchange().completed_integrator_step, |f, c| unsafe {
+            f(c, true.into(), &mut enter, &mut terminate)
+        })?;
+        Ok((enter != no, terminate != no))
+    }
+
+    /// Sets the time, s.
+    pub fn set_time(&mut self, time: f64) -> Called {
+        // SAFETY: plain value on a live instance.
+        self.call(self.exchange().set_time, |f, c| unsafe { f(c, time) })
+    }
+
+    /// Sets the continuous states.
+    pub fn set_continuous_states(&mut self, x: &[f64]) -> Called {
+        // SAFETY: a slice of the length given.
+        self.call(self.exchange().set_continuous_states, |f, c| unsafe {
+            f(c, x.as_ptr(), x.len())
+        })
+    }
+
+    /// Reads the continuous states.
+    pub fn continuous_states(&mut self, x: &mut [f64]) -> Called {
+        self.vector(self.exchange().get_continuous_states, x)
+    }
+
+    /// Reads the derivatives of the continuous states.
+    pub fn derivatives(&mut self, dx: &mut [f64]) -> Called {
+        self.vector(self.exchange().get_derivatives, dx)
+    }
+
+    /// Reads the event indicators.
+    pub fn event_indicators(&mut self, z: &mut [f64]) -> Called {
+        self.vector(self.exchange().get_event_indicators, z)
+    }
+
+    /// Reads the nominal values of the continuous states.
+    pub fn nominals(&mut self, x: &mut [f64]) -> Called {
+        self.vector(self.exchange().get_nominals, x)
+    }
+}
+
+/// Texts for a C function, and the pointers to them.
+fn c_strings(texts: &[&str]) -> (Vec<CString>, Vec<*const c_char>) {
+    let texts: Vec<CString> = texts.iter().map(|t| CString::new(*t).unwrap_or_default()).collect();
+    let pointers = texts.iter().map(|text| text.as_ptr()).collect();
+    (texts, pointers)
+}
