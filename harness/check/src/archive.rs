@@ -10,7 +10,7 @@ use zip::CompressionMethod;
 
 use super::Findings;
 
-/// What stands at the top of an FMU.
+/// Entries allowed at the top level of an FMU.
 const AT_THE_TOP: [&str; 9] = [
     "modelDescription.xml",
     "model.png",
@@ -30,9 +30,9 @@ pub struct Entry {
     method: CompressionMethod,
     encrypted: bool,
     link: bool,
-    /// What is in it, if a rule asks for that.
+    /// Its content, if a rule asks for it.
     content: Vec<u8>,
-    /// Why it cannot be unpacked.
+    /// Reason why it cannot be unpacked.
     fault: Option<String>,
 }
 
@@ -40,14 +40,14 @@ pub struct Entry {
 pub struct Archive {
     /// In the order of its directory, repeated names included.
     pub entries: Vec<Entry>,
-    /// Why the directory could not be read to its end, or is beyond what anybody should unpack.
+    /// Reason why the directory could not be read to its end, or is too large to unpack.
     broken: Option<String>,
-    /// Why no command opens the archive.
+    /// Reason why no command opens the archive.
     refusal: Option<String>,
     directory: temporary::Folder,
 }
 
-/// Whether a rule asks for what is in a file.
+/// True if a rule asks for the content of this file.
 fn is_read(name: &str) -> bool {
     name == host::archive::DESCRIPTION || name == INDEX || name.starts_with("binaries/")
 }
@@ -113,7 +113,7 @@ impl Archive {
         }
     }
 
-    /// What is in a file that rules read, if it is there and could be unpacked.
+    /// Content of a file that rules read, if it exists and could be unpacked.
     pub fn file(&self, name: &str) -> Option<&[u8]> {
         let entry = self.entries.iter().find(|entry| entry.name == name && is_read(name))?;
         entry.fault.is_none().then_some(entry.content.as_slice())
@@ -125,18 +125,18 @@ impl Archive {
         files.map(|entry| entry.name.as_str()).filter(move |name| name.starts_with(folder))
     }
 
-    /// Why no command opens the archive, if none does.
+    /// Reason why no command opens the archive, if none does.
     pub fn refusal(&self) -> Option<String> {
         self.refusal.clone()
     }
 
-    /// Where it is unpacked.
+    /// Directory into which it is unpacked.
     pub fn directory(&self) -> &Path {
         self.directory.path()
     }
 }
 
-/// What is wrong with a name, one piece of a sentence each.
+/// Faults of a name, each as part of a sentence.
 fn name_faults(name: &str) -> Vec<&'static str> {
     let mut faults = Vec::new();
     if name.is_empty() {

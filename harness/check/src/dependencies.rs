@@ -81,7 +81,7 @@ pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> R
     Ok(session)
 }
 
-/// Whether a value differs from another one by more than rounding.
+/// True if two values differ by more than rounding.
 fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
     match (a, b) {
         (Reading::Real(a), Reading::Real(b)) => {
@@ -92,7 +92,7 @@ fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
     }
 }
 
-/// What has been seen to move with what.
+/// Dependencies that were observed.
 struct Seen {
     /// (unknown, known), by index.
     pairs: BTreeSet<(usize, usize)>,
@@ -100,7 +100,7 @@ struct Seen {
     traces: BTreeSet<(usize, usize)>,
     /// Known variables that could be moved at all.
     moved: BTreeSet<usize>,
-    /// How many starts were looked at.
+    /// Number of starts that were tried.
     starts: u64,
 }
 
@@ -127,7 +127,7 @@ impl Seen {
         }
     }
 
-    /// Whether all feedthrough that is declared has been seen.
+    /// True if every declared feedthrough has been observed.
     fn is_complete(&self, feedthrough: &BTreeSet<(usize, usize)>) -> bool {
         feedthrough.iter().all(|pair| self.traces.contains(pair))
     }
@@ -314,8 +314,8 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `dependencies.directional`
 pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// What differences and the FMU's own answer may differ by, relative to the largest derivative
-    /// of the unknown: differences lose half of the digits, curvature takes more.
+    /// Allowed deviation of the FMU's derivatives from finite differences, relative to the largest derivative of the
+    /// unknown: differences lose half of the digits, and more where the function is curved.
     const AGREE: f64 = 1e-3;
     let d = fmu.description();
     if !fmu.interfaces().contains(&Interface::ModelExchange)

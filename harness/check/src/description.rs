@@ -58,17 +58,17 @@ pub struct Unknown {
     pub index: usize,
     /// What it depends on; none if that is not said: on everything.
     pub dependencies: Option<Vec<usize>>,
-    /// How.
+    /// Kinds of these dependencies.
     pub kinds: Option<Vec<String>>,
 }
 
 impl Variable {
-    /// Where it is, for findings.
+    /// Its place in the file, for findings.
     pub fn place(&self) -> String {
         format!("line {}, {}", self.line, self.name)
     }
 
-    /// Whether it is a Real that may change at any time.
+    /// True for a Real that may change at any time.
     pub fn is_continuous(&self) -> bool {
         self.kind == Type::Real && self.variability == "continuous"
     }
@@ -78,12 +78,12 @@ impl Variable {
         self.typed.get("derivative")?.trim().parse().ok()
     }
 
-    /// Whether its type is Real.
+    /// True if its type is Real.
     pub fn is_real(&self) -> bool {
         self.kind == Type::Real
     }
 
-    /// Whether a host sets it: a parameter or an input.
+    /// True for a parameter or an input, which a host sets.
     pub fn is_set_by_hosts(&self) -> bool {
         self.causality == "input"
             || (self.causality == "parameter" && self.variability != "constant")

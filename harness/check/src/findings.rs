@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// shall not fill the memory with sentences.
 const KEPT: usize = 1000;
 
-/// How bad it is to break a rule.
+/// Severity of a broken rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -17,7 +17,7 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// As reports write it.
+    /// The word that reports use.
     pub fn name(self) -> &'static str {
         match self {
             Severity::Error => "error",
@@ -29,23 +29,23 @@ impl Severity {
 /// A rule that is broken.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
-    /// Where: a file, a line, a variable, a call.
+    /// Location: a file, a line, a variable, a call.
     pub place: String,
-    /// What is wrong and what is allowed.
+    /// The fault, and what is allowed.
     pub text: String,
 }
 
-/// What came of looking at one rule.
+/// Result of one rule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     pub(crate) severity: Severity,
-    /// What is wrong, the first [`KEPT`]; empty if nothing is.
+    /// The first [`KEPT`] findings; empty if there are none.
     pub list: Vec<Finding>,
-    /// How many more there are.
+    /// Number of further findings.
     pub more: usize,
-    /// Why the rule does not apply, or could not be looked at.
+    /// Reason why the rule does not apply or could not be checked.
     pub skipped: Option<String>,
     /// The rule that must tell the fault for which this one could not be looked at.
     pub(crate) told_by: Option<String>,
@@ -85,7 +85,7 @@ impl Findings {
         }
     }
 
-    /// Whether an error was found.
+    /// True if an error was found.
     pub(crate) fn has_error(&self) -> bool {
         self.list.iter().any(|finding| finding.severity == Severity::Error)
     }

@@ -41,7 +41,7 @@ const LOCATED: f64 = 1e-3;
 /// A step is not divided further than to this share of the communication step.
 const SHORTEST: f64 = 1e-12;
 
-/// What came of a trial step.
+/// Result of a trial step.
 enum Trial {
     /// The new states and the error relative to what is allowed.
     Done(DVector<f64>, f64),

@@ -12,9 +12,9 @@ use super::{Finding, Outcome, Report, Severity};
 struct File<'r> {
     /// The FMU.
     fmu: String,
-    /// How many findings are errors.
+    /// Number of errors.
     errors: usize,
-    /// How many are warnings.
+    /// Number of warnings.
     warnings: usize,
     /// The error that no selected rule was checked; null if one was.
     unchecked: Option<&'r str>,
@@ -22,14 +22,14 @@ struct File<'r> {
     rules: Vec<Rule<'r>>,
 }
 
-/// What came of a rule.
+/// Result of a rule.
 #[derive(Serialize)]
 struct Rule<'r> {
     rule: &'static str,
     title: &'static str,
     source: &'static str,
     findings: &'r [Finding],
-    /// Why it was not looked at; null if it was.
+    /// Reason why it was not checked; null if it was.
     skipped: Option<&'r str>,
     seconds: f64,
 }

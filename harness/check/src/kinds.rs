@@ -17,7 +17,7 @@ use super::under_test::{FmuUnderTest, Interface, Reading, Session};
 
 /// Starts at which factors are measured: the first as declared, then with other parameters.
 const STARTS: u64 = 12;
-/// How far two measured factors may differ, relative to the larger one.
+/// Allowed difference of two measured factors, relative to the larger one.
 const AGREE: f64 = 1e-4;
 
 /// An unknown and a known that are declared to be linear in each other.

@@ -63,7 +63,7 @@ pub use self::rule::{Check, Rule};
 pub use self::rules::fmi2::RULES;
 pub use self::under_test::FmuUnderTest;
 
-/// What a rule says, for programs.
+/// Results of rules, for programs.
 #[derive(Debug, serde::Serialize)]
 pub struct Statement {
     fmi: &'static str,

@@ -449,7 +449,7 @@ pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// What of the process is looked at, with its name.
+/// Properties of the process that are compared, with their names.
 pub fn surroundings() -> Vec<(&'static str, String)> {
     let state = HostState::now();
     // under wine there is a /proc, too: that of wine's own process

@@ -8,7 +8,7 @@ use super::under_test::{FmuUnderTest, Interface, STEPS};
 use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
 
-/// What an FMU says to several mistakes.
+/// Messages of an FMU about several mistakes.
 fn complaints(fmu: &FmuUnderTest) -> Result<Vec<Message>> {
     let interface = first(fmu)?;
     let mut all = Vec::new();

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How to check.
+/// Options of a check.
 pub struct Options {
     /// The program that makes the calls, `hubslosh`, run with the hidden subcommand `check-calls`.
     pub program: PathBuf,

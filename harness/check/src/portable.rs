@@ -18,7 +18,7 @@ const LONGEST_PATH: usize = 259;
 /// as `C:\Users\a.long.user.name\AppData\Local\Temp\` and a folder in it named after the instance.
 const PORTABLE_PATH: usize = 160;
 
-/// What keeps Windows from writing a part of a path.
+/// Reason why Windows cannot write a part of a path.
 fn windows_faults(part: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let stem = part.split('.').next().unwrap_or(part).trim_end().to_uppercase();

@@ -29,12 +29,12 @@ const OPENS: &str = "load.opens";
 /// Bytes shown of what an FMU prints.
 const PRINTED: usize = 200;
 
-/// What the rules that were looked at say of the others.
+/// Reasons why other rules were not checked, from the results of those that were.
 #[derive(Default)]
 pub struct SoFar {
     /// Rules whose process had to be ended.
     hung: AtomicUsize,
-    /// Why the binary cannot be loaded by any of them.
+    /// Reason why none of them can load the binary.
     lost: OnceLock<String>,
     /// Report of a panic of our own code.
     pub bug: OnceLock<String>,
@@ -65,7 +65,7 @@ pub fn check(
     }
 }
 
-/// Whether it had to be killed.
+/// True if it had to be killed.
 fn run(
     rule: &'static Rule,
     directory: &Path,
@@ -166,7 +166,7 @@ fn tell_crash(findings: &mut Findings, doing: String, text: String, crash: Crash
     }
 }
 
-/// What the process does first.
+/// First task of the process.
 const LOADING: &str = "loading the binary";
 
 /// The other side: looks at the rule and answers with what it finds; it is ended after `limit`.

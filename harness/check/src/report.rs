@@ -10,13 +10,13 @@ use crate::rule::Rule;
 /// Findings of one rule that a person is shown; those kept are in the JUnit file.
 const SHOWN: usize = 8;
 
-/// What came of a rule.
+/// Result of a rule.
 pub struct Outcome {
     /// The rule.
     pub rule: &'static Rule,
-    /// What was found.
+    /// Findings.
     pub findings: Findings,
-    /// How long it took.
+    /// Time that it took.
     pub time: Duration,
 }
 
@@ -33,7 +33,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// How many findings are as bad as this.
+    /// Number of findings of this severity.
     pub fn count(&self, severity: Severity) -> usize {
         let more = self.outcomes.iter().map(|outcome| &outcome.findings);
         let more = more.filter(|f| f.severity == severity).map(|f| f.more).sum::<usize>();

@@ -13,13 +13,13 @@ use crate::v3;
 pub struct Rule {
     /// Group and name, `group.name`.
     pub id: &'static str,
-    /// What must hold.
+    /// Statement that must hold.
     pub title: &'static str,
     /// The section of FMI 2.0.5 or 3.0.2, or the host that trips over it.
     pub source: &'static str,
-    /// How bad it is to break it; a crash or an endless call is an error whatever is written here.
+    /// Severity when it is broken. A crash or an endless call is always an error.
     pub severity: Severity,
-    /// How to look.
+    /// Function that checks it.
     pub check: Check,
 }
 
@@ -53,7 +53,7 @@ pub enum Check {
 }
 
 impl Rule {
-    /// Whether it calls the FMU.
+    /// True if it calls the FMU.
     pub fn is_of_calls(&self) -> bool {
         matches!(self.check, Check::Calls(_) | Check::Calls3(_))
     }

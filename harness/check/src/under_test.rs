@@ -495,7 +495,7 @@ impl<'f> Session<'f> {
         })
     }
 
-    /// As above, at any time.
+    /// As above, with a given start time.
     pub fn initialise_at(
         &mut self,
         start: f64,

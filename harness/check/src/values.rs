@@ -26,8 +26,8 @@ fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
     Ok(session)
 }
 
-/// Whether a value is what modelDescription.xml says, written with the 15 digits that every decimal
-/// number keeps in binary: half a unit of the last one, and the rounding of both.
+/// True if a value agrees with the one in modelDescription.xml to the 15 digits that a double keeps of a decimal
+/// number: half a unit of the last digit, and the rounding of both.
 fn has_digits_of(value: &Reading, written: &Reading) -> bool {
     const HALF_A_UNIT: f64 = 5e-15;
     match (value, written) {

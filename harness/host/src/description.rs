@@ -107,7 +107,7 @@ pub struct Unit {
 pub struct BaseUnit {
     /// Exponents of [`BaseUnit::NAMES`].
     pub exponents: [i32; 8],
-    /// What multiplies the number.
+    /// Factor of the number.
     pub factor: f64,
     /// Offset, added after the factor.
     pub offset: f64,

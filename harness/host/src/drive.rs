@@ -53,7 +53,7 @@ impl Inputs {
     /// point, and when that is; `None` ends the run.
     ///
     /// # Errors
-    /// What `at` fails with; what the FMU refuses, with the time.
+    /// Errors of `at`; a call that the FMU refuses, with the time.
     pub fn drive<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,

@@ -1,4 +1,4 @@
-//! What FMI 2.0 has of its own in the C ABI, seen from the host: its types, the functions whose types differ from those of
+//! The part of the C ABI that only FMI 2.0 has, as a host sees it: its types, the functions whose types differ from those of
 //! FMI 3.0, and calls for tests. [`crate::c_abi::version`] has the rest.
 //!
 //! Unsafe code of the harness is here, in `c_abi.rs`, `fmi3.rs` and `harness/batch/src/abi.rs` (`tests/architecture.rs`).
@@ -294,7 +294,7 @@ impl Version for Fmi2 {
     }
 }
 
-/// What each function of a table answers to these arguments.
+/// Statuses that the functions of a table return for these arguments.
 macro_rules! answers {
     ($table:expr, $component:expr; $($function:ident($($argument:expr),*)),* $(,)?) => {
         [$((

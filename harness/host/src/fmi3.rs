@@ -1,4 +1,4 @@
-//! What FMI 3.0 has of its own in the C ABI, seen from the host: its types, the functions whose types differ from those of
+//! The part of the C ABI that only FMI 3.0 has, as a host sees it: its types, the functions whose types differ from those of
 //! FMI 2.0, event mode, early return and intermediate update of co-simulation. [`crate::c_abi::version`] has the rest. What
 //! only scheduled execution needs is not here.
 #![allow(unsafe_code)]
@@ -144,10 +144,10 @@ pub trait Exchanged: Copy + Default {
     #[allow(private_interfaces)]
     fn calls(functions: &Functions) -> (Function<Get<Self>>, Function<Set<Self>>);
 
-    /// As a value of any type.
+    /// The value as one of any type.
     fn value(self) -> Value;
 
-    /// Of a value that was read within the bounds of the type.
+    /// The number from a value that was read within the bounds of the type.
     fn of(value: &Value) -> Self;
 }
 
@@ -219,7 +219,7 @@ macro_rules! numbers {
 
 // ---------------------------------------------------------------- callbacks
 
-/// What happens within the steps of an instance.
+/// Callbacks and results of the steps of an instance.
 pub struct Stepping {
     component: Cell<Component>,
     functions: *const Functions,

@@ -250,7 +250,7 @@ fn watch(
 /// Time from the end of the connection to the end of the process, at most.
 const CLOSED: Duration = Duration::from_secs(1);
 
-/// How often temporary files and shared memory are counted.
+/// Interval at which temporary files and shared memory are counted.
 const COUNTING: Duration = Duration::from_millis(50);
 /// Most entries of a folder that are counted.
 const COUNTED: usize = 100_000;

@@ -126,9 +126,8 @@ impl Element {
     }
 }
 
-/// What of a file is more than is read, before a parser spends time and stack on it: some take time
-/// that grows with the square of the depth or of the number of attributes. The file need not be
-/// well-formed; that is the parser's business.
+/// The first limit that a file exceeds, found before a parser spends time and stack on it: some parsers take time that
+/// grows with the square of the depth or of the number of attributes. The file need not be well-formed: the parser checks that.
 fn excess(text: &str) -> Option<String> {
     let namespaces = text.matches("xmlns").count();
     if namespaces > MOST_NAMESPACES {

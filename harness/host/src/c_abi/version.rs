@@ -26,7 +26,7 @@ pub(crate) type Refs = *const u32;
 pub(crate) type Call = unsafe extern "C" fn(Component) -> c_int;
 pub(crate) type GetVector = unsafe extern "C" fn(Component, *mut f64, usize) -> c_int;
 
-// What every FMU must export and has the same types in both versions, but for that of truth values.
+// Functions that every FMU must export, with the same types in both versions except for the Boolean.
 functions! { Common<B>:
     get_version "fmi2GetVersion" "fmi3GetVersion", unsafe extern "C" fn() -> *const c_char;
     set_debug_logging "fmi2SetDebugLogging" "fmi3SetDebugLogging", unsafe extern "C" fn(Component, B, usize, *const *const c_char) -> c_int;
@@ -42,7 +42,7 @@ functions! { Common<B>:
     deserialize_fmu_state "fmi2DeSerializeFMUstate" "fmi3DeserializeFMUState", unsafe extern "C" fn(Component, *const u8, usize, *mut State) -> c_int;
 }
 
-// The same of what a model exchange FMU must export besides.
+// Functions that an FMU for Model Exchange must export in addition.
 functions! { Exchange<B>:
     enter_continuous_time_mode "fmi2EnterContinuousTimeMode" "fmi3EnterContinuousTimeMode", Call;
     completed_integrator_step "fmi2CompletedIntegratorStep" "fmi3CompletedIntegratorStep", unsafe extern "C" fn(Component, B, *mut B, *mut B) -> c_int;
@@ -88,18 +88,18 @@ pub struct Updated {
     pub next_event: Option<f64>,
 }
 
-/// What differs between versions of FMI: the functions of one version that is loaded, and what a host does by them.
+/// A version of FMI: the functions that were loaded, and the steps in which a host calls them.
 pub trait Version: Sized {
     /// Folder of the binaries for the platform this program was built for.
     const PLATFORM: &'static str;
-    /// Place of its symbols in tables of functions for both versions.
+    /// Column of its symbols in the tables of functions of both versions.
     const NUMBER: usize;
     /// `fmi2Boolean` or `fmi3Boolean`. A byte that is neither 0 nor 1 must not become a `bool`.
     type Boolean: Copy + Default + PartialEq + From<bool>;
-    /// What an instance keeps besides.
+    /// Data of an instance that this version needs.
     type Kept;
 
-    /// Names of the functions that a binary must have, by the interfaces that it is declared for.
+    /// Names of the functions that a binary must export for the interfaces that it declares.
     fn needed(steps: bool, exchanges: bool) -> Vec<&'static str>;
 
     /// # Errors
@@ -109,7 +109,7 @@ pub trait Version: Sized {
     /// The library must be a binary of that version of FMI: the types are taken on trust.
     unsafe fn load(library: &Library) -> Result<Self, libloading::Error>;
 
-    /// Where the resources of the FMU that is unpacked in this folder are, as instances get it.
+    /// Location of the resources of an FMU that is unpacked in this folder, as `instantiate` takes it.
     fn resources(directory: &Path) -> Option<String>;
 
     /// Makes a plain instance, with logging on.
@@ -126,13 +126,13 @@ pub trait Version: Sized {
     /// Enters or leaves the mode in which structural parameters may be set.
     fn configure(instance: &mut Instance<'_, Self>, enters: bool) -> Called;
 
-    /// Makes a step from `time` by `step`, s, inputs held.
+    /// Makes a step of `step` s from `time`, with constant inputs.
     fn step(instance: &mut Instance<'_, Self>, time: f64, step: f64) -> Called;
 
-    /// Tells the slopes of inputs from now on, per s, if the version has a call for that.
+    /// Sets the time derivatives of inputs, per s, if this version has a call for that.
     fn set_slopes(instance: &mut Instance<'_, Self>, references: &[u32], slopes: &[f64]) -> Called;
 
-    /// Makes a step through which these Reals, inputs that were set just now to `values`, go with `slopes`, per s.
+    /// Makes a step in which these inputs, set to `values` at its start, change with `slopes`, per s.
     fn step_along(
         instance: &mut Instance<'_, Self>,
         time: f64,
@@ -181,7 +181,7 @@ pub struct Fmu<V: Version> {
     pub(crate) exchange: Option<Exchange<V::Boolean>>,
     /// The functions of this version alone.
     pub(crate) own: V,
-    /// Of the instances that are made without saying for which.
+    /// Interface of instances for which none is given.
     pub(crate) interface: Interface,
     pub(crate) resources: Option<String>,
     hash: String,

@@ -116,7 +116,7 @@ fn lengths(all: usize) -> Vec<usize> {
 
 impl Instance<'_> {
     /// For tests: makes calls with margins around every array, and tells what was written there.
-    /// What the calls answer does not count.
+    /// The statuses of the calls do not matter.
     pub fn writes_beside(&mut self, lists: &Lists) -> Vec<Beside> {
         let mut found = Vec::new();
         self.begin_call();
