@@ -36,7 +36,7 @@ NEEDS_MORE = {"6_monte_carlo": "distributed", "7_one_loop": "the crate one-loop"
 
 
 class Machine:
-    """An environment with the wheel, and nothing else beside the system's programs."""
+    """An environment with the wheel and the system's programs, nothing else."""
 
     def __init__(self, folder: Path) -> None:
         """Make the environment."""
@@ -135,7 +135,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
         sys.exit(f"error: {report} has {report.stat().st_size} bytes")
     within("the campaign and its report", seconds, REPORT)
 
-    # the package finds the command that pip has put beside it
+    # the package finds the command that pip has installed with it
     plan = (
         'title = "Two pulses"\\nprofile = "pulse:amplitude=0.05,start=1,width=1,duration=10"\\n'
         '[vary]\\nslosh.model = ["linear", "spherical"]\\n'

@@ -48,7 +48,7 @@ class Bench:
     """The FMU at rest, with its linear models."""
 
     def __init__(self, fmu: str | Path = "HubSlosh", parameters: dict | None = None) -> None:
-        """Take the FMU and parameters beside `VISCOUS`."""
+        """Take the FMU, and parameters in addition to `VISCOUS`."""
         self.fmu = fmu
         self.parameters = VISCOUS | (parameters or {})
         self.linear = self._linearize({})

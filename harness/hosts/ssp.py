@@ -2,7 +2,7 @@
 
     python harness/hosts/ssp.py dist/HubSlosh.fmu dist/HubSlosh.ssp
 
-The folder ssp/ beside this file is the archive but for the FMU: edit its texts for a system of
+The folder ssp/ next to this file is the archive without the FMU: edit its texts for a system of
 your own. Needs nothing but Python.
 """
 

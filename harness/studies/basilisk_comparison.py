@@ -289,7 +289,7 @@ def masses_table(fmu: Path, pool: ProcessPoolExecutor) -> list[str]:
 
 
 def integrators_table(fmu: Path) -> list[str]:
-    """Show what each integrator leaves, and its cost beside ours."""
+    """Show the error of each integrator and its cost relative to ours."""
     given = case(fmu, "release far", 0.10, 0.003)
     own = ours(fmu, given)
     rows = []

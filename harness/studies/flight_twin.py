@@ -8,7 +8,7 @@ rule. Wheels turn it by 0.3° to and fro and hold it, thrusters pulse sideways. 
 scales, alignment and biases and an accelerometer are recorded at 10 Hz, in two flights. The search
 starts at what `hubslosh tank` says of the tanks' drawing; the truth is up to 10 % off.
 
-Prints estimates beside the truth; with more than one twin how many intervals hold it.
+Prints estimates and true values; for several twins the number of intervals that contain the truth.
 """
 
 import argparse

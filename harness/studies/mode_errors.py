@@ -3,7 +3,7 @@
     PYTHONPATH=harness/python python3 harness/studies/mode_errors.py
 
 needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt.
-Figure 4.4 of Rubaga's thesis, for the bench's two fills, and beside it the error within the band
+Figure 4.4 of Rubaga's thesis, for the bench's two fills, and in addition the error within the band
 of the bench's sweeps.
 """
 

@@ -144,7 +144,7 @@ def scipy(method: str, tolerance: float, exact: np.ndarray) -> tuple[float, floa
 
 
 def basilisk() -> list[tuple[str, float, float]]:
-    """Return what basilisk.md has of its RK4: step in ms, cost beside ours at 1e-8, error."""
+    """Return the row of RK4 in basilisk.md: step in ms, cost relative to ours at 1e-8, error."""
     rows = re.findall(
         r"^\| Basilisk's RK4 \| (\S+) \| (\S+) \| (\S+) \|$",
         (PAGES / "basilisk.md").read_text(),
@@ -159,7 +159,7 @@ def at_error(points: list[tuple], error: float) -> float:
 
 
 def draw(all_points: dict[str, list[tuple]], unit: float) -> None:
-    """Write the diagram; Basilisk's costs are beside ours of the spherical model at 1e-8."""
+    """Write the diagram; Basilisk's costs are relative to ours of the spherical model at 1e-8."""
     plt.rcParams.update({"svg.hashsalt": "hubslosh", "font.size": 10})
     figure, axes = plt.subplots(figsize=(8, 5.2), layout="constrained")
     for (name, points), marker in zip(all_points.items(), "osD<^vPX", strict=True):

@@ -76,7 +76,7 @@ impl Log {
         }
     }
 
-    /// Warns of what a call has done beside what it was called for.
+    /// Warns of side effects of a call.
     #[cold]
     pub fn report_effect(&self, call: &Call, effect: impl FnOnce() -> String) {
         self.write(WARNING, Topic::Warning, || format!("{}: {}", call.name, effect()));

@@ -2,7 +2,7 @@
 //! and no FMI. They meet in one trait, [`Model`].
 //!
 //! [`variable`] and [`table`] say what a model's variables are, [`call`] when a call is allowed,
-//! [`instance`] what the calls do, [`snapshot`] how a state is saved, [`log`] what is told to the
+//! [`instance`] what the calls do, [`snapshot`] how a state is saved, [`log`] what is logged to the
 //! host. What differs between the versions of FMI is the trait [`version::Version`]; each is one file
 //! ([`v2`], [`v3`]), with its C interface on top of what they share ([`c_abi`]): these hold the only unsafe
 //! code.

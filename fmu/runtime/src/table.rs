@@ -28,7 +28,7 @@ pub struct About {
     pub saved_words: usize,
 }
 
-/// Everything that is said about a model's variables. It takes no memory from the heap: a host may
+/// All data of a model's variables. It takes no memory from the heap: a host may
 /// load and unload the FMU as often as it likes.
 #[derive(Debug)]
 pub struct Table<M: Model> {

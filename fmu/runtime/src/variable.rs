@@ -610,7 +610,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// The order of magnitude of a quantity; 1 if nothing else is said.
+    /// The order of magnitude of a quantity; 1 unless set.
     pub const fn nominal_value(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { nominal: Some(nominal), .. }) => nominal,

@@ -1,4 +1,4 @@
-//! Writes of an FMU beside the arrays that it is given (FMI 2.0.5, section 2.1.7: their length is
+//! Writes of an FMU outside the arrays that it is given (FMI 2.0.5, section 2.1.7: their length is
 //! in the call).
 
 use anyhow::Result;

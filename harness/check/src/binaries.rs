@@ -224,7 +224,7 @@ pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
 
 /// `bin.name`
 pub fn name(binaries: &Binaries, findings: &mut Findings) {
-    // A library beside the binary is fine; a folder without the binary is not.
+    // Further libraries next to the binary are fine; a folder without the binary is not.
     let empty = |folder: &str| !binaries.placed.iter().any(|p| p.name.starts_with(folder));
     for (name, expected) in &binaries.elsewhere {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);

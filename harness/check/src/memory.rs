@@ -15,7 +15,7 @@ use super::under_test::{FmuUnderTest, Interface};
 const MOST: usize = 500;
 /// Time for the first window; the others have as many calls.
 const LONGEST: Duration = Duration::from_millis(500);
-/// Calls of a window from which something can be said.
+/// Calls in a window, enough for a result.
 const FEWEST: usize = 10;
 /// Windows that must take memory, each, after the first.
 const WINDOWS: usize = 3;

@@ -165,7 +165,7 @@ fn standard_spelling(name: &str) -> Option<String> {
 /// `zip.capitals`
 pub fn capitals(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
-        // beside the right one it is a name twice
+        // together with the right one it is a name twice
         let is_there = |name: &String| archive.entries.iter().any(|e| e.name == *name);
         if let Some(right) = standard_spelling(&entry.name).filter(|right| !is_there(right)) {
             findings.add(

@@ -14,7 +14,7 @@ use super::values::{items, mentions};
 use host::description::Type;
 
 /// How far values may be outside min and max, relative to the bound or the nominal value: an
-/// integrator leaves a state a little beside where it belongs.
+/// integrator leaves a state slightly off.
 const OVERSHOOT: f64 = 1e-3;
 
 /// `values.in_range`

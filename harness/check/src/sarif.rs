@@ -1,4 +1,4 @@
-//! The report as SARIF 2.1.0, which code hosts show beside the code.
+//! The report as SARIF 2.1.0, which code hosts show next to the code.
 
 use std::io::Write;
 

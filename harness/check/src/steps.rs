@@ -164,7 +164,7 @@ pub fn stop_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let stop = experiment.start + STEPS as f64 * experiment.step;
     let mut session = fmu.session(Interface::CoSimulation)?;
     session.initialise_at(experiment.start, Some(stop), experiment.tolerance)?;
-    // summing up leaves the last point some ulps beside the stop time
+    // the sum of the steps differs from the stop time by some ulps
     if let Err(error) = session.advance(STEPS) {
         findings.add(
             fmu.now(),

@@ -44,7 +44,7 @@ pub enum Interface {
     ModelExchange,
 }
 
-/// Nothing can be said on most rules: one rule tells why, the others are skipped.
+/// Most rules cannot be checked: one rule gives the reason, the others are skipped.
 #[derive(Debug)]
 pub struct Unusable {
     /// The rule that tells; empty if it is no fault.

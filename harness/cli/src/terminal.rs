@@ -44,7 +44,7 @@ pub fn is_quiet() -> bool {
     terminal().quiet
 }
 
-/// The choice of `--color` before the command line is understood, for what is said of it then.
+/// The choice of `--color` before the command line is parsed, for messages about the command line.
 pub fn color_of_arguments() -> ColorChoice {
     let arguments: Vec<_> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
     let flags = arguments.iter().take_while(|argument| *argument != "--");

@@ -773,7 +773,7 @@ impl ModelDescription {
         variable.attributes.unit.as_ref().or_else(declared).map_or("", String::as_str)
     }
 
-    /// The units in which people may give a variable, beside its own.
+    /// The units in which people may give a variable, in addition to its own.
     pub fn display_units(&self, variable: &Variable) -> &[DisplayUnit] {
         let own = self.unit(variable);
         let defined = self.units.iter().find(|unit| unit.name == own);

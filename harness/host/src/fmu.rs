@@ -1,8 +1,8 @@
 //! An FMU of either version, for a host that runs it by Co-Simulation or integrates it by Model Exchange.
 //!
 //! FMI 3.0 is driven without event mode and early return in Co-Simulation, as FMI 2.0: the FMU handles its events itself.
-//! Inputs that go in straight lines through a step are told by their derivatives in FMI 2.0; in FMI 3.0 they are set in
-//! intermediate update, where the FMU provides it.
+//! Inputs that change linearly within a step are set by their derivatives in FMI 2.0 and in intermediate update in FMI 3.0,
+//! where the FMU provides it.
 
 use std::path::Path;
 

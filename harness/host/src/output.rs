@@ -1,4 +1,4 @@
-//! Files appear whole or not at all: written beside their place under a temporary name, then
+//! Files appear whole or not at all: written to the same folder under a temporary name, then
 //! renamed. And what is in one, as a hash.
 
 use std::fs::File;

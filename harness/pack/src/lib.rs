@@ -33,7 +33,7 @@ pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     archive::write(&files(model, fmi, &[binary])?, out)
 }
 
-/// The same with a module for WebAssembly beside it, for pages and for hosts in a sandbox; returns the module's size.
+/// The same with a module for WebAssembly in addition, for web pages and sandboxed hosts; returns the module's size.
 pub fn pack_with_wasm(model: &Model, out: &Path) -> Result<usize> {
     let native = Packed::native(&build_in(model.package, &model.environment(), false)?)?;
     let module = wasm(model)?;

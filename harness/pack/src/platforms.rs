@@ -29,7 +29,7 @@ pub struct Platform {
     pub ending: &'static str,
     /// Build targets; several are joined into one universal binary.
     pub targets: &'static [Target],
-    /// Programs that building needs beside Rust.
+    /// Programs that the build needs in addition to Rust.
     tools: &'static [Tool],
     /// Subcommand of Cargo, or another program with the same arguments.
     cargo: Cargo,

@@ -22,7 +22,7 @@ slosh.model = ["linear", "spherical"]
 
 
 def test_a_campaign_comes_back_as_a_table(fmu: Path, tmp_path: Path, request) -> None:
-    """A row per run, and the report beside it."""
+    """A row per run, and the report in the same folder."""
     binary = option(request, "--hubslosh")
     table = hubslosh.campaign(PLAN, tmp_path / "out", model=fmu, program=binary)
     assert len(table) == 2
@@ -96,7 +96,7 @@ def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_method_of_an_identification_is_an_argument() -> None:
-    """Not a flag among the others, so that it is told which there are."""
+    """An unknown flag: the error lists those that exist."""
     for flags in (["--method", "multisine"], ["--method=frequency"]):
         with pytest.raises(FmuError, match="method="):
             hubslosh.identify("data.csv", None, *flags)

@@ -117,8 +117,8 @@ pub(super) fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     }
 }
 
-/// Structural parameters were others before: what they size has its start values from here on. A host that had set others is
-/// told.
+/// Sets what is sized by changed structural parameters to its start values. If a host had set other values, the FMU logs
+/// that they are lost.
 pub(super) fn start_resized<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,

@@ -104,7 +104,7 @@ pub static RULES: &[Rule] = &[
     rule("host.silent", Warning, "nothing is printed, to stdout above all, where it is an error; the logger is there for that", "2.1.5; hosts that read their own stdout", Calls(life::silent)),
     rule("host.untouched", Error, "floating-point control, locale, signal handlers, working directory, environment, threads and open files stay as they were", "the host's other models", Calls(life::untouched)),
     rule("host.memory", Error, "fmi2FreeInstance and fmi2FreeFMUstate give back all memory; steps take less than 1 kB each", "2.1.5, 2.1.8; the host's memory", Calls(memory::memory)),
-    rule("host.arrays", Error, "nothing is written beside an array that a call is given, nor into one that is only read", "2.1.7: the length is in the call; the host's memory", Calls(arrays::arrays)),
+    rule("host.arrays", Error, "nothing is written outside an array that a call is given, nor into one that is only read", "2.1.7: the length is in the call; the host's memory", Calls(arrays::arrays)),
 
     rule("log.environment", Error, "the logger is given the componentEnvironment of fmi2Instantiate", "2.1.5; hosts follow that pointer and crash", Calls(log::environment)),
     rule("log.percent", Error, "percent signs arrive as they are: the text is no format", "2.1.5; five exporters get it wrong, hosts crash", Calls(log::percent)),

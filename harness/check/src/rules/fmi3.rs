@@ -20,7 +20,7 @@ pub static RULES: &[Rule] = &[
     rule("zip.description", Error, "modelDescription.xml is at the root", "2.5.1", Archive(crate::archive::description)),
     rule("zip.folders", Warning, "only files and folders of FMI 3.0 at the top", "2.5.1", Archive(archive::folders)),
     rule("zip.licenses", Error, "documentation/licenses has license.spdx, license.txt or license.html", "2.5.1.1.1", Archive(archive::licenses)),
-    rule("zip.pictures", Error, "icon.svg and diagram.svg have a .png beside them", "2.5.1", Archive(archive::pictures)),
+    rule("zip.pictures", Error, "icon.svg and diagram.svg come with a .png", "2.5.1", Archive(archive::pictures)),
     rule("zip.terminals", Error, "terminalsAndIcons.xml is well-formed and of the description's fmiVersion", "2.4.9", Archive(archive::terminals)),
     rule("zip.extra", Warning, "extra/ holds folders in reverse domain notation", "2.5.1.6", Archive(archive::extra)),
     rule("zip.layered_standards", Error, "manifests of layered standards have name, version and description", "2.6", Archive(archive::layered_standards)),

@@ -48,7 +48,7 @@ pub fn pictures(archive: &Archive, findings: &mut Findings) {
         ("documentation/diagram.svg", "documentation/diagram.png"),
     ] {
         if has(archive, drawing) && !has(archive, picture) {
-            findings.add(drawing, format!("without {picture} (required beside it)"));
+            findings.add(drawing, format!("without {picture} (required with it)"));
         }
     }
 }

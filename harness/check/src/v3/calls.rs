@@ -11,7 +11,7 @@ use host::fmi3::Interface;
 
 /// `load.opens`
 pub fn opens(_: &Subject, _: &mut Findings) -> Result<()> {
-    Ok(()) // that it does not open is told where it is opened
+    Ok(()) // a failure to open is reported where it is opened
 }
 
 /// `load.version`
@@ -289,7 +289,7 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let all = subject.readable().filter(|v| v.c_type == CType::Float64);
     for v in all {
         let n = v.length();
-        // the FMU is told of n values and of one less; the array is longer
+        // nValues is n, then n - 1; the array is longer
         for told in [n, n.saturating_sub(1)] {
             subject.doing(format!("fmi3GetFloat64 of {} with nValues = {told}", v.name));
             let mut values = vec![CANARY; n + 8];

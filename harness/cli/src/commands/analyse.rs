@@ -10,7 +10,7 @@ use signals::recording::Columns;
 
 use super::{DEFAULT_FMU, campaign, open, setting};
 
-/// Analyses recordings of a bench as `campaign` does its runs, and the model's runs under the same torque beside them.
+/// Analyses recordings of a bench as `campaign` analyses its runs, and compares them with the model's runs under the same torque.
 ///
 /// A recording has torque and one to three rates: time (s), tau_cmd (N·m), omega (rad/s), and perhaps omega_x and omega_y;
 /// --columns takes other names and units. It leaves the tables and the report of a campaign.
@@ -92,7 +92,7 @@ impl AnalyseArgs {
         let (mut runs, mut step) = (String::new(), None);
         for path in &self.recordings {
             let recorded = Recorded { path: path.clone(), columns: self.columns.clone() };
-            // what is done to it is told when it is analysed
+            // its analysis prints what was changed
             let (each, table) = recorded::read(&recorded, &mut |_| {})?;
             ensure!(
                 each >= 1e-6,

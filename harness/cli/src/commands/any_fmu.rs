@@ -97,13 +97,13 @@ pub struct Out<'a> {
     pub result: &'a Path,
     /// HTML.
     pub report: Option<&'a Path>,
-    /// Each iteration is told.
+    /// Prints each iteration.
     pub verbose: bool,
     /// Points in place of a fit.
     pub points: &'a PointsArgs,
 }
 
-/// Items of a flag, each read; all that is wrong is said at once.
+/// Items of a flag; the error lists every item that is wrong.
 fn read<T: std::str::FromStr<Err = anyhow::Error>>(
     flags: &[String],
     problems: &mut Vec<String>,
@@ -324,7 +324,7 @@ fn foreseen(bounds: &[Bound]) {
         let with = match &b.with {
             _ if b.decided_by_solver => "(the errors of the solver decide)".into(),
             _ if !b.inseparable_from.is_empty() => {
-                format!("(cannot be told apart from {})", b.inseparable_from.join(", "))
+                format!("(cannot be separated from {})", b.inseparable_from.join(", "))
             }
             with => with.as_ref().map_or(String::new(), |(name, r)| format!("{name} ({r:+.3})")),
         };

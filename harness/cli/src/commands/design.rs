@@ -277,7 +277,7 @@ impl<'f> Bench<'f> {
 /// Name, expected value and standard deviation of every unknown.
 type Bounds = Vec<(String, f64, f64)>;
 
-/// A plain sweep beside an optimal multisine.
+/// A plain sweep, to compare an optimal multisine with.
 struct Sweep {
     profile: String,
     /// rad.

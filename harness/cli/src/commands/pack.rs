@@ -48,7 +48,7 @@ pub struct PackArgs {
     /// on a Debian machine harness/platforms/setup gets what that takes.
     #[arg(long)]
     all_platforms: bool,
-    /// With a module for WebAssembly beside this machine's binary, as binaries/wasm32/NAME.wasm, for web pages and Node.js
+    /// Adds a module for WebAssembly to this machine's binary, as binaries/wasm32/NAME.wasm, for web pages and Node.js
     /// (harness/web/fmu/host.js); harness/platforms/setup --wasm gets what that takes.
     #[arg(long, conflicts_with_all = ["python", "sdist", "all_platforms"])]
     wasm: bool,

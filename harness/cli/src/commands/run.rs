@@ -63,7 +63,7 @@ pub struct RunArgs {
     /// density is the tank's parameter [default: water's, 0.07213].
     #[arg(long, value_name = "N/M")]
     tension: Option<f64>,
-    /// Variables to record beside time and the driven inputs [default:
+    /// Variables to record in addition to time and the driven inputs [default:
     /// omega,omega_imu,slosh_angle,slosh_angle_radial; of an FMU without these all outputs and slosh
     /// angles; what `hubslosh view` draws slosh modes after the first and draining tanks by].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]

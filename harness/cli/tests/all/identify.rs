@@ -145,7 +145,7 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
         said.contains("within the wheel's limits") && said.contains("peak 0.260 N·m"),
         "{said}"
     );
-    // and with a linear sweep beside it, which is recommended where it tells more
+    // and compared with a linear sweep, which is recommended where it gives more information
     let mean = said.lines().find(|line| line.starts_with("Mean standard deviation")).unwrap();
     let numbers: Vec<f64> = mean.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     let recommended =

@@ -97,7 +97,7 @@ fn a_twin_shows_the_features_of_its_run_to_the_last_digit_and_other_forms_of_it_
         let [of, from] = ["found", "run"].map(|folder| rows(&directory.join(folder).join(table)));
         for name in SAME {
             assert_eq!(of[0][name], from[0][name], "{table}: {name}");
-            // and the model beside it is the run once more
+            // and the model it is compared with is the run itself
             assert_eq!(of[1][name], from[0][name], "{table}: {name} of the model");
         }
     }

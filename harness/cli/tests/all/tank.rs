@@ -139,7 +139,7 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
 }
 
 /// Omega_1^2 = 21.4397 at Bo = 10 and 30 degrees (the table's value), as the frequency that the FMU computes from the
-/// file; on the bench the same wetting liquid softens its surface, and what the FMU cannot take is told.
+/// file; on the bench the same wetting liquid softens its surface, and the command names what the FMU cannot model.
 #[test]
 fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
     let folder = tempfile::tempdir().unwrap();

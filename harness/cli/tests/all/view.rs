@@ -42,7 +42,7 @@ fn a_run_as_it_is_recorded_by_default_becomes_a_page_that_knows_its_parameters()
     let run = drawn(directory, "run.html");
     assert_eq!(run["time"]["count"], 251);
     assert_eq!(run["scene"]["geometry"]["tanks"][0]["shape"]["contour"][1][0], 0.1);
-    // what a CSV file cannot say is said on the command line, or missed
+    // data that a CSV file cannot hold is given on the command line, or the command asks for it
     assert!(hubslosh(directory, &[&RUN[..], &["--out", "run.csv"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "run.csv", "--out", "csv.html"]);
     assert!(said(&done).contains("does not say which parameters"), "{}", said(&done));
@@ -129,7 +129,7 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
             );
         }
     }
-    // recorded by default; without the states of the higher modes the first one is drawn, and it is said
+    // recorded by default; without the states of the higher modes the page draws the first one and says so
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5", "--set", "slosh.modes=3"];
     assert!(hubslosh(directory, &[&run[..], &["--out", "all.parquet"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "all.parquet"]);

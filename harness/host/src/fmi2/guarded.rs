@@ -1,4 +1,4 @@
-//! Calls whose arrays lie between two margins: they show whether an FMU writes beside what it is
+//! Calls whose arrays lie between two margins: they show whether an FMU writes outside what it is
 //! given, or into what it shall only read.
 
 use super::*;
@@ -68,7 +68,7 @@ impl Guarded {
     }
 }
 
-/// Something written beside an array.
+/// Something written outside an array.
 #[derive(Clone, Debug)]
 pub struct Beside {
     /// The C function.
@@ -269,7 +269,7 @@ impl Instance<'_> {
     }
 }
 
-/// Tells what was written beside the arrays of a call.
+/// Returns what was written outside the arrays of a call.
 fn note(found: &mut Vec<Beside>, call: &'static str, n: usize, arrays: &[(&str, &Guarded)]) {
     for (name, array) in arrays {
         if let Some(fault) = array.fault() {

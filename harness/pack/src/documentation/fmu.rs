@@ -1,5 +1,5 @@
 //! `documentation/index.html` of an FMU: its introduction and the pages that its introduction lists,
-//! as one file with everything in it but the figures, which are beside it.
+//! as one file with everything in it but the figures, which are in the same folder.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Times in the schema that Arrow stores beside Parquet's own, in the entry `ARROW:schema`: an IPC message in Base64,
+//! Times in Arrow's schema, which Arrow stores in addition to Parquet's own, in the entry `ARROW:schema`: an IPC message in Base64,
 //! a FlatBuffer (Apache Arrow, *Schema.fbs* and *Message.fbs*). Parquet has no type for durations and for times in
 //! whole seconds; pandas, Polars and arrow-rs store them as plain integers, and their unit stands here alone.
 

@@ -1,5 +1,5 @@
 //! Reads Parquet files: numbers of every type, and times in seconds by their logical type (TIMESTAMP, TIME, DATE,
-//! INTERVAL, INT96) or by the type that Arrow has stored beside the schema (durations of pandas and Polars). Nothing is
+//! INTERVAL, INT96) or by the type in Arrow's own schema (durations of pandas and Polars). Nothing is
 //! taken for a number that is none, and no unit is guessed.
 
 mod arrow;

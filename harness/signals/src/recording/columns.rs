@@ -51,7 +51,7 @@ pub fn quantity(signal: &str) -> Result<Quantity> {
 impl FromStr for Columns {
     type Err = Error;
 
-    /// All that is wrong with it is said at once.
+    /// The error lists everything that is wrong with it.
     fn from_str(text: &str) -> Result<Self> {
         Columns::parse(text.split(','), one)
     }

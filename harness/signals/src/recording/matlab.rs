@@ -302,7 +302,7 @@ fn structure(
         String::from_utf8_lossy(&name[..end]).into_owned()
     });
     let fields: Vec<String> = fields.collect();
-    // without fields nothing would be read of an element, however many there are said to be
+    // without fields nothing would be read of an element, whatever number of elements the file declares
     let elements = if fields.is_empty() { 0 } else { elements };
     ensure!(
         elements.saturating_mul(fields.len()) <= MOST,

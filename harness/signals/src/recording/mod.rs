@@ -1,6 +1,6 @@
-//! Recordings: signals in SI units from files that others wrote. Text in columns, Parquet and MATLAB's `.mat`
-//! are told apart by their endings; which column is which signal, in what unit, is said by [`Columns`], by a
-//! row of units or by units in the names of the columns (`gyro_z [deg/s]`).
+//! Recordings: signals in SI units from files that others wrote. The name's ending separates
+//! text in columns, Parquet and MATLAB's `.mat`. [`Columns`], a row of units or units in the names of the columns
+//! (`gyro_z [deg/s]`) give the signal and the unit of each column.
 //!
 //! The rows of a recording are those with a value of one signal, its rows' signal. Where another one has none,
 //! because it is slower or was lost, it is completed: held, or joined by lines. Nothing is resampled.
@@ -142,7 +142,7 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
 /// Reads a recording: `time` (s) and the signals that are there, in SI units. `done` hears what was done to it.
 ///
 /// # Errors
-/// If the file cannot be read so; all that is wrong with its columns is said at once.
+/// If the file cannot be read so. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
     read_as(path, wanted, &mut |words| done(format!("{name}: {words}")))
