@@ -16,6 +16,7 @@ use crate::description::{ModelDescription, Value, Variable};
 use crate::{fmi2, fmi3};
 
 /// An opened FMU: unpacked to a temporary directory, its binary loaded.
+#[allow(clippy::large_enum_variant)] // there is one per program
 pub enum Fmu {
     /// FMI 2.0.
     V2(fmi2::Fmu),
