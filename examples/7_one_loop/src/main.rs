@@ -97,7 +97,7 @@ fn started<'a>(fmu: &'a Fmu, settings: &[(&str, &str)]) -> Result<Instance<'a>> 
 }
 
 fn write(path: &Path, rows: &[Vec<f64>]) -> Result<()> {
-    host::output::atomically(path, |file| {
+    files::output::atomically(path, |file| {
         let mut csv = csv::Writer::from_writer(file);
         csv.write_record([&["time", "tau"], &RECORDED[..]].concat())?;
         for row in rows {

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use host::temporary;
+use files::temporary;
 use zip::CompressionMethod;
 
 use super::Findings;

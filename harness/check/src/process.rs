@@ -234,7 +234,7 @@ mod tests {
     fn a_panic_of_our_own_code_is_no_fault_of_the_fmu() {
         let program = std::env::current_exe().unwrap();
         if std::env::args().any(|argument| argument == CHILD) {
-            host::bug::keep_panics();
+            files::bug::keep_panics();
             guard::enter().unwrap();
             trace::doing(LOADING, Crash::Error);
             panic!("row 7 is odd");

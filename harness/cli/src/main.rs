@@ -38,7 +38,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use commands::*;
 use experiments::campaign::Campaign;
 use experiments::plan::Plan;
-use host::bug;
+use files::bug;
 use host::guard::{self, Cause, Limits, Output};
 use terminal::Terminal;
 
@@ -160,7 +160,7 @@ fn clean_up_on_signals() {
     std::thread::spawn(move || {
         for signal in signals.forever() {
             guard::end_all();
-            host::temporary::remove_all();
+            files::temporary::remove_all();
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
     });

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, ensure};
 use clap::ArgMatches;
 use clap::parser::ValueSource;
-use host::input;
+use files::input;
 
 /// Options whose values are files or directories that a command writes: command, option, and the endings of files that
 /// it writes there. Every other value that names a file is an input.

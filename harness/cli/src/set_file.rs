@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
+use files::input;
 use host::description::{BaseUnit, ModelDescription, Type, Value};
-use host::input;
 use host::xml::Element;
 
 /// Reads the description of the FMU that the parameters are for: units are converted to its own.

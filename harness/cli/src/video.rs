@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use base64ct::{Base64, Encoding};
-use host::temporary;
+use files::temporary;
 
 use crate::progress;
 
@@ -90,7 +90,7 @@ pub fn film(page: &str, film: &Film, out: &Path) -> Result<()> {
     );
     ensure!(found == frames as u64, "{browser} drew {found} of {frames} frames: has it no WebGL?");
     let bytes = std::fs::read(&draft).context("the film cannot be read")?;
-    host::output::atomically(out, |file| Ok(file.write_all(&bytes)?))
+    files::output::atomically(out, |file| Ok(file.write_all(&bytes)?))
 }
 
 /// Starts a browser that draws the frames of a page; its output has them, a line each.

@@ -9,9 +9,9 @@ use anyhow::{Context, Result};
 
 use crate::rounding::significant;
 use crate::run::{Run, histories};
+use files::output;
 use host::description::ModelDescription;
 use host::fmu::Fmu;
-use host::output;
 use signals::table::Table;
 
 /// The example of an FMU of this project.

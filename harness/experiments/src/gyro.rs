@@ -9,7 +9,7 @@ use crate::profile::{Torque, Written};
 use crate::progress::Progress;
 use crate::run::{Run, TORQUE};
 use analysis::allan::{self, Noise, Point};
-use host::budget;
+use files::budget;
 use host::fmu::Fmu;
 use signals::table::Table;
 

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::profile::Torque;
 use crate::rest;
-use host::budget;
+use files::budget;
 use host::description::{ModelDescription, Type, Value, Variable};
 use host::drive::Inputs;
 use host::fmu::{Fmu, Instance};

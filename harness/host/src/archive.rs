@@ -10,12 +10,13 @@ use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use files::input;
 use zip::read::Config;
 // Unstable by its own word, and the one reader that shows repeated names; the lock file pins it.
 use zip::unstable::read::ZipIterable;
 use zip::{CompressionMethod, ZipReadOptions, read::OwnedZipFileEntry};
 
-use crate::{input, xml};
+use crate::xml;
 
 /// Most entries of an archive.
 pub const MOST_ENTRIES: usize = 20_000;
@@ -204,7 +205,7 @@ impl Archive {
     pub fn hash(&self) -> Result<String> {
         let mut file = &self.file;
         file.seek(SeekFrom::Start(0))?;
-        crate::output::sha256_of(file)
+        files::output::sha256_of(file)
     }
 
     /// The text of modelDescription.xml.

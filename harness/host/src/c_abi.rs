@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use anyhow::{Context, Result, bail};
+use files::output::sha256;
 use libloading::Library;
 
 use crate::guard::{self, Calls};
-use crate::output::sha256;
 
 pub mod version;
 

@@ -30,8 +30,7 @@ use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-
-use crate::temporary;
+use files::{bug, temporary};
 
 /// The argument of `hubslosh` that makes it a guarded process.
 pub const OPTION: &str = "--guarded";
@@ -532,6 +531,10 @@ pub fn enter() -> Result<()> {
     if GUARDED.set(guarded).is_err() {
         bail!("it is guarded already");
     }
+    bug::set_listener(bug::Listener {
+        panics: |report| tell(PANICS, report.as_bytes()),
+        catches: || tell(CATCHES, &[]),
+    });
     std::thread::spawn(tell_of_life);
     Ok(())
 }
@@ -561,11 +564,6 @@ pub fn done(code: u8) {
 pub fn panics(report: &str) -> bool {
     tell(PANICS, report.as_bytes());
     GUARDED.get().is_some()
-}
-
-/// Takes the report of a panic back.
-pub fn catches() {
-    tell(CATCHES, &[]);
 }
 
 /// stdout and stderr of a guarded process, which a binary does not know.
@@ -714,4 +712,57 @@ fn in_use(kind: &str) -> u64 {
 fn kilobytes(status: &str, kind: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix(kind))?;
     line.trim().strip_suffix("kB")?.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Argument of this program by which a test knows that it is the guarded process. For the test harness it is the name
+    /// of a test that is not there.
+    const CHILD: &str = "guarded_process";
+
+    /// Runs `work` in a guarded process, which runs the test `name` again, and returns the end of that process.
+    fn end_of(name: &str, work: fn()) -> Cause {
+        if std::env::args().any(|argument| argument == CHILD) {
+            bug::keep_panics();
+            enter().unwrap();
+            work();
+        }
+        let name = format!("guard::tests::{name}");
+        let call = std::time::Duration::from_secs(60);
+        let limits = Limits { call, total: Some(call), memory: 1 << 40, file: 1 << 40 };
+        let program = std::env::current_exe().unwrap();
+        let arguments = ["--exact", &name, CHILD];
+        run(&program, arguments, &limits, Output::Kept, |_| {}).unwrap().cause
+    }
+
+    #[test]
+    fn a_panic_in_a_guarded_process_is_reported_to_its_parent() {
+        let name = "a_panic_in_a_guarded_process_is_reported_to_its_parent";
+        let cause = end_of(name, || panic!("row {} is odd", 7));
+        let Cause::Panicked(report) = &cause else { panic!("{cause:?}") };
+        assert!(report.starts_with("this is a bug of hubslosh"), "{report}");
+        assert!(report.contains("row 7 is odd (harness/host/src/guard.rs:"), "{report}");
+    }
+
+    #[test]
+    fn a_panic_that_aborts_a_guarded_process_is_reported_to_its_parent() {
+        extern "C" fn called_by_an_fmu() {
+            panic!("row 7 is odd");
+        }
+        let name = "a_panic_that_aborts_a_guarded_process_is_reported_to_its_parent";
+        let cause = end_of(name, || called_by_an_fmu());
+        let Cause::Panicked(report) = &cause else { panic!("{cause:?}") };
+        assert!(report.contains("row 7 is odd (harness/host/src/guard.rs:"), "{report}");
+    }
+
+    #[test]
+    fn a_panic_that_was_caught_does_not_explain_a_later_crash() {
+        let cause = end_of("a_panic_that_was_caught_does_not_explain_a_later_crash", || {
+            bug::caught(|| -> i32 { panic!("a damaged file") }).unwrap_err();
+            std::process::abort();
+        });
+        assert!(matches!(cause, Cause::Ended(_)), "{cause:?}");
+    }
 }

@@ -1,14 +1,10 @@
 //! Loads FMUs as any host does: the packed archive, what it says of itself, its binary.
 //!
 //! The rest of the harness meets an FMU only through this crate; no code is shared with a model.
-//! Whatever check, pack and experiments need alike is here too: reading binaries of any platform, writing
-//! files so that they appear whole or not at all, temporary folders, and what a command may take of
-//! a machine.
+//! Code that check and pack need too is here: reading binaries of any platform.
 
 pub mod archive;
 pub mod binary;
-pub mod budget;
-pub mod bug;
 pub mod c_abi;
 pub mod description;
 pub mod drive;
@@ -16,8 +12,5 @@ pub mod fmi2;
 pub mod fmi3;
 pub mod fmu;
 pub mod guard;
-pub mod input;
-pub mod output;
-pub mod temporary;
 pub mod wasm;
 pub mod xml;

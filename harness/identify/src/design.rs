@@ -7,7 +7,7 @@ use analysis::linear::Linear;
 use analysis::random::Random;
 use analysis::statistics::peak;
 use anyhow::{Result, ensure};
-use host::budget;
+use files::budget;
 use host::fmu::Fmu;
 use nalgebra::Matrix5;
 

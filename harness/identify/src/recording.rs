@@ -10,8 +10,8 @@ use std::path::Path;
 use analysis::innovations;
 use analysis::statistics::{about_mean, correlation, deviation, mean, noise_level, peak};
 use anyhow::{Context, Result, bail, ensure};
-use host::budget;
-use signals::recording::{self as files, Between, Columns, Signal, Wanted};
+use files::budget;
+use signals::recording::{self, Between, Columns, Signal, Wanted};
 
 use crate::spikes;
 
@@ -229,7 +229,8 @@ pub fn read(
     let mut signals =
         vec![signal("omega", true, Between::Line), signal("tau_cmd", true, source.slow)];
     signals.extend(OPTIONAL.map(|name| signal(name, false, Between::Line)));
-    let table = files::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
+    let table =
+        recording::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
     let maybe = |name: &str| table.column(name).map(<[f64]>::to_vec);
     let column = |name: &str| maybe(name).context("a column that was read");
     let name = path.display().to_string();
@@ -257,7 +258,7 @@ pub fn read_decay(
     let name = path.display().to_string();
     let given = DECAYING.iter().filter(|name| source.columns.names(name)).collect::<Vec<_>>();
     ensure!(given.len() < 2, "--columns names {} signals; a free decay is one", given.len());
-    let there = files::names(path)?;
+    let there = recording::names(path)?;
     let found = given
         .first()
         .copied()
@@ -271,7 +272,8 @@ pub fn read_decay(
         )
     };
     let signals = [Signal { name: found, required: true, between: Between::Line, unit: None }];
-    let table = files::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
+    let table =
+        recording::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
     let column =
         |name: &str| table.column(name).map(<[f64]>::to_vec).context("a column that was read");
     let (time, signal) = (column("time")?, column(found)?);

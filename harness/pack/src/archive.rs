@@ -4,8 +4,8 @@ use std::io::{Seek, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use files::output;
 use host::fmi2::PLATFORM;
-use host::output;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 

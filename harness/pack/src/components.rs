@@ -15,8 +15,8 @@ use crate::archive::Packed;
 use crate::fmi::Fmi;
 use crate::models::Model;
 use crate::project;
+use files::output::sha256;
 use host::description::ModelDescription;
-use host::output::sha256;
 use serde_json::json;
 
 /// Licence of the project's own parts, SPDX.

@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use host::output::{self, sha256};
+use files::output::{self, sha256};
 
 use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
+use files::output;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use host::output;
 use tar::{Builder, Header};
 
 use crate::archive::{Files, read};

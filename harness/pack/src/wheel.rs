@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use base64ct::{Base64UrlUnpadded, Encoding};
+use files::output::sha256;
 use host::binary::{Binary, GLIBC, Kind, MACOS, Version};
 use host::fmi2::PLATFORM;
-use host::output::sha256;
 use sha2::{Digest, Sha256};
 
 use crate::archive::{self, Files, Packed, below, read};

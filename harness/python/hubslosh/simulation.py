@@ -22,7 +22,7 @@ DEFAULT_STEP = 0.02
 """s, where neither rows nor the FMU suggest another."""
 
 MOST_ROWS = 20_000_000
-"""Largest size of a table; the same as in ``harness/host/src/budget.rs``."""
+"""Largest size of a table; the same as in ``harness/files/src/budget.rs``."""
 
 
 class History:

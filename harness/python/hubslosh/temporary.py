@@ -1,6 +1,6 @@
 """Temporary folders that go however the program ends; after a kill, at the next start.
 
-The scheme is that of the program ``hubslosh`` (``harness/host/src/temporary.rs``): a folder
+The scheme is that of the program ``hubslosh`` (``harness/files/src/temporary.rs``): a folder
 ``hubslosh-…`` has a file ``alive``, locked as long as its process lives, and the folder ``files``.
 Either program removes the folders of both.
 """

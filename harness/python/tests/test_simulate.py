@@ -165,7 +165,7 @@ def test_wrong_arguments_are_told_in_a_sentence(fmu: Path, arguments: dict, sent
 
 def test_the_most_rows_are_those_of_the_command_line() -> None:
     """One number for both."""
-    budget = Path(__file__).parents[2] / "host" / "src" / "budget.rs"
+    budget = Path(__file__).parents[2] / "files" / "src" / "budget.rs"
     assert f"pub const ROWS: usize = {simulation.MOST_ROWS:_};" in budget.read_text()
 
 

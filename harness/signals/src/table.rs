@@ -15,8 +15,8 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
-use host::output::atomically;
-use host::{budget, input};
+use files::output::atomically;
+use files::{budget, input};
 
 use crate::parquet_file;
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use experiments::sensors::Sensor;
-use host::output::atomically;
+use files::output::atomically;
 use identify::any_fmu::foresee::{Bound, foresee};
 use identify::any_fmu::likelihood::deviances;
 use identify::any_fmu::question::{Question, Setting, Solver};
@@ -215,7 +215,7 @@ impl AnyFmuArgs {
             let rows = (0..table.rows())
                 .map(|k| columns.iter().map(|c| c[k]).collect())
                 .collect::<Vec<_>>();
-            let result = host::input::text(found)
+            let result = files::input::text(found)
                 .with_context(|| format!("{} cannot be read", found.display()))?;
             let deviances = deviances(&model, &question, &records, &result, &rows)?;
             let text = serde_json::to_string(&deviances)? + "\n";

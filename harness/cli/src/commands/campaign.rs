@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail, ensure};
 use experiments::campaign::{CURVES, Campaign, Folder};
 use experiments::plan::{self, Plan, Sweeps};
+use files::budget;
 use host::fmu::Fmu;
-use host::{budget, guard};
+use host::guard;
 
 use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting, view};
 use crate::{progress, terminal};
@@ -149,7 +150,7 @@ impl CampaignArgs {
         if name.len() <= LONGEST {
             return name.into();
         }
-        format!("{DEFAULT_CAMPAIGN}_{}", &host::output::sha256(name.as_bytes())[..12]).into()
+        format!("{DEFAULT_CAMPAIGN}_{}", &files::output::sha256(name.as_bytes())[..12]).into()
     }
 
     /// The plan that the flags without `--plan` stand for.

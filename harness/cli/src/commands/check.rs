@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use check::{Options, RULES, Severity, check, json, junit, process, rules::fmi3, sarif, table};
-use host::output;
+use files::output;
 
 use crate::{fmu, progress, terminal};
 

@@ -7,7 +7,7 @@ use analysis::gauss_markov::Noise;
 use analysis::linear::{Linear, Mode};
 use anyhow::{Result, bail, ensure};
 use experiments::profile::Written;
-use host::budget;
+use files::budget;
 use host::fmu::Fmu;
 use identify::design::{self, Multisine, Wheel};
 use identify::nominal;

@@ -8,7 +8,7 @@ use analysis::allan::Noise;
 use analysis::rest::Rest;
 use anyhow::{Result, ensure};
 use experiments::gyro::Recording;
-use host::output;
+use files::output;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::Table;
 

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
+use files::output::atomically;
 use host::fmu::Fmu;
-use host::output::atomically;
 use identify::methods::acceleration::{self, Acceleration, Weights};
 use identify::methods::black_box::BlackBox;
 use identify::methods::free_decay::FreeDecay;

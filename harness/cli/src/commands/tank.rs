@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
-use host::output::atomically;
+use files::output::atomically;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, capillarity_of, damping_of};
 use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
 

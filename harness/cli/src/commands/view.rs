@@ -5,8 +5,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use files::output::atomically;
 use host::description::ModelDescription;
-use host::output::atomically;
 use hubslosh_tank::tank::Geometry;
 use hubslosh_tank::{Fill, Tank};
 use report::view::{self, Drawing, Outline};

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use analysis::random::Random;
 use experiments::campaign::{CURVES, Folder, MANIFEST};
-use host::output::sha256;
+use files::output::sha256;
 use pack::packed_for_tests;
 
 /// `hubslosh campaign` on a plan of this text, into `directory`/c; what is temporary goes to

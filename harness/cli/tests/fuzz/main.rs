@@ -125,7 +125,7 @@ fn fuzz(
     let seed = std::env::var("HUBSLOSH_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok());
     let mut dice = Rng::with_seed(seed.unwrap_or(1));
     // those that a reader catches itself are errors, and not worth a backtrace each
-    host::bug::keep_panics();
+    files::bug::keep_panics();
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(format!("input.{ending}"));
     // the input that is being read, for the thread that looks at the clock
@@ -147,7 +147,7 @@ fn fuzz(
         std::fs::write(&path, &bytes).unwrap();
         now.1.lock().unwrap().clone_from(&bytes);
         now.0.store(began.elapsed().as_secs() + 1, Ordering::SeqCst);
-        if let Err(panic) = host::bug::caught(|| read(&path, &bytes)) {
+        if let Err(panic) = files::bug::caught(|| read(&path, &bytes)) {
             let kept = keep(name, ending, &bytes);
             eprintln!("{name}: {panic}: {}", kept.display());
             panic!("{name}: {panic}: {}", kept.display());

@@ -19,9 +19,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
-use host::input;
-use host::output::{self, sha256, sha256_of};
-use host::temporary::{self, Registered};
+use files::input;
+use files::output::{self, sha256, sha256_of};
+use files::temporary::{self, Registered};
 use signals::table::{self, Table};
 
 /// Folder of the stored runs.
@@ -358,7 +358,7 @@ fn is_published(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{Folder, MANIFEST};
-    use host::output::sha256;
+    use files::output::sha256;
     use signals::table::Table;
     use std::collections::BTreeMap;
     use std::fs;

@@ -20,10 +20,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Result, anyhow};
-use host::budget;
+use files::budget;
+use files::output::sha256;
 use host::description::{ModelDescription, Type, Value};
 use host::fmu::Fmu;
-use host::output::sha256;
 use rayon::prelude::*;
 use serde_json::json;
 use signals::table;
@@ -252,7 +252,7 @@ impl Campaign {
 
     /// Returns true if the directory contains the results of another plan.
     pub fn holds_another(&self) -> bool {
-        host::input::text(&self.plan_file()).is_ok_and(|text| text != self.plan.text)
+        files::input::text(&self.plan_file()).is_ok_and(|text| text != self.plan.text)
     }
 
     /// File name of the copy of the plan in the results folder.

@@ -1,7 +1,7 @@
 //! Reads a recording as a run: on an equally spaced grid, from the torque's beginning to its end.
 
 use anyhow::{Context, Result, ensure};
-use host::budget;
+use files::budget;
 use signals::fourier::{Forward, Inverse};
 use signals::recording::{self, Between, Signal, Wanted, even};
 use signals::table::Table;

@@ -6,8 +6,8 @@ use serde::Serialize;
 use super::outcome::{Estimate, Outcome};
 use super::{Case, Failure};
 use analysis::features::Features;
-use host::input;
-use host::output::sha256_of;
+use files::input;
+use files::output::sha256_of;
 
 /// A row of `features.csv`. Values that do not exist, or that the torque cannot show, are empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use host::budget;
+use files::budget;
 use host::description::did_you_mean;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IntoDeserializer};

@@ -15,9 +15,9 @@ use crate::profile::{Torque, Written};
 use crate::rounding::thousandths;
 use crate::run::{Run, driven};
 use crate::sensors::{Sensor, Sensors};
+use files::output::{sha256, sha256_of};
+use files::{budget, input};
 use host::description::{ModelDescription, Value, did_you_mean};
-use host::output::{sha256, sha256_of};
-use host::{budget, input};
 use signals::recording::Columns;
 
 use self::problems::{Lines, Problems};

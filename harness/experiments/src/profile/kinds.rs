@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use analysis::sweep::{Law, Sweep};
-use host::budget::FREQUENCY;
+use files::budget::FREQUENCY;
 
 use super::Values;
 use super::noise::{DwellInNoise, Noise};

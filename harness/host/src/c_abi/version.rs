@@ -10,6 +10,7 @@ use std::ptr::{null, null_mut};
 use std::slice;
 
 use anyhow::{Context, Result, bail};
+use files::temporary;
 use libloading::Library;
 
 use super::{
@@ -18,7 +19,6 @@ use super::{
 use crate::archive::Archive;
 use crate::description::{CType, ModelDescription, Type, Value, Variable};
 use crate::guard::Calls;
-use crate::temporary;
 
 pub(crate) type Component = *mut c_void;
 pub(crate) type State = *mut c_void;

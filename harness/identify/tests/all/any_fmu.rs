@@ -1,7 +1,7 @@
 //! Any FMU, here HubSlosh with a hub of which the motion is known in closed form: I ω' = τ − b ω.
 
 use analysis::random::Random;
-use host::output::atomically;
+use files::output::atomically;
 use identify::any_fmu::foresee::foresee;
 use identify::any_fmu::likelihood::deviances;
 use identify::any_fmu::question::{Question, Solver};

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use host::output;
+use files::output;
 use maud::{DOCTYPE, Markup, html};
 use serde_json::json;
 

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use files::output::sha256;
 use host::binary::Binary;
-use host::output::sha256;
 use pack::platforms::{PLATFORMS, Platform};
 use pack::{Fmi, MODELS, Model, release};
 

@@ -11,7 +11,7 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use host::{budget, bug, input};
+use files::{budget, bug, input};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{DataType, Int96};
 use parquet::file::reader::{FileReader, SerializedFileReader};

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
 use anyhow::{Context, Result, ensure};
-use host::budget;
+use files::budget;
 
 /// Largest page, bytes: 500 times what writers make.
 const LARGEST: u64 = 512 << 20;

@@ -1,7 +1,7 @@
 //! Rows on an even grid, for what needs one: spectra, Allan variances.
 
 use anyhow::{Result, ensure};
-use host::budget;
+use files::budget;
 
 use super::SHORT;
 use crate::table::Table;

@@ -7,8 +7,8 @@ use std::io::{BufReader, Read, copy, sink};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
+use files::{budget, input};
 use flate2::read::ZlibDecoder;
-use host::{budget, input};
 
 use super::{Found, Header};
 

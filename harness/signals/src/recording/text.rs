@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use chrono::{DateTime, NaiveDateTime};
-use host::{budget, input};
+use files::{budget, input};
 
 use super::{Found, Header};
 

@@ -3,16 +3,30 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
 
-use crate::{guard, input};
+use crate::input;
 
 /// Messages of panics, with the thread and the place in the source.
 static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
 
-/// Has panics kept for [`caught`] in place of printed. The parent of a guarded process hears of a panic at once, because a
-/// panic that cannot unwind ends the process.
+/// Functions that hear of the panics of this process.
+pub struct Listener {
+    /// Takes the report of a panic before it unwinds, because a panic that cannot unwind ends the process.
+    pub panics: fn(&str),
+    /// Hears that [`caught`] has caught the panic.
+    pub catches: fn(),
+}
+
+static LISTENER: OnceLock<Listener> = OnceLock::new();
+
+/// Sets the listener of this process; the first one stays.
+pub fn set_listener(listener: Listener) {
+    let _ = LISTENER.set(listener);
+}
+
+/// Has panics kept for [`caught`] in place of printed.
 pub fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));
@@ -20,7 +34,9 @@ pub fn keep_panics() {
         let mut all = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
         all.push((thread::current().id(), text.clone()));
         drop(all);
-        guard::panics(&report(&text));
+        if let Some(listener) = LISTENER.get() {
+            (listener.panics)(&report(&text));
+        }
     }));
 }
 
@@ -34,7 +50,9 @@ fn message(payload: &(dyn Any + Send)) -> String {
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
-        guard::catches();
+        if let Some(listener) = LISTENER.get() {
+            (listener.catches)();
+        }
         let mut all = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
         let text = message(&*payload);
         let own = all.iter().position(|(id, _)| *id == thread::current().id());
@@ -74,53 +92,5 @@ mod tests {
         assert!(told.starts_with("row 7 is odd"), "{told}");
         let report = report(&told);
         assert!(report.starts_with("this is a bug of hubslosh") && report.contains("row 7 is odd"));
-    }
-
-    /// Argument of this program by which a test knows that it is the guarded process. For the test harness it is the name
-    /// of a test that is not there.
-    const CHILD: &str = "guarded_process";
-
-    /// Runs `work` in a guarded process, which runs the test `name` again, and returns the end of that process.
-    fn end_of(name: &str, work: fn()) -> guard::Cause {
-        if std::env::args().any(|argument| argument == CHILD) {
-            keep_panics();
-            guard::enter().unwrap();
-            work();
-        }
-        let name = format!("bug::tests::{name}");
-        let call = std::time::Duration::from_secs(60);
-        let limits = guard::Limits { call, total: Some(call), memory: 1 << 40, file: 1 << 40 };
-        let program = std::env::current_exe().unwrap();
-        let arguments = ["--exact", &name, CHILD];
-        guard::run(&program, arguments, &limits, guard::Output::Kept, |_| {}).unwrap().cause
-    }
-
-    #[test]
-    fn a_panic_in_a_guarded_process_is_reported_to_its_parent() {
-        let name = "a_panic_in_a_guarded_process_is_reported_to_its_parent";
-        let cause = end_of(name, || panic!("row {} is odd", 7));
-        let guard::Cause::Panicked(report) = &cause else { panic!("{cause:?}") };
-        assert!(report.starts_with("this is a bug of hubslosh"), "{report}");
-        assert!(report.contains("row 7 is odd (harness/host/src/bug.rs:"), "{report}");
-    }
-
-    #[test]
-    fn a_panic_that_aborts_a_guarded_process_is_reported_to_its_parent() {
-        extern "C" fn called_by_an_fmu() {
-            panic!("row 7 is odd");
-        }
-        let name = "a_panic_that_aborts_a_guarded_process_is_reported_to_its_parent";
-        let cause = end_of(name, || called_by_an_fmu());
-        let guard::Cause::Panicked(report) = &cause else { panic!("{cause:?}") };
-        assert!(report.contains("row 7 is odd (harness/host/src/bug.rs:"), "{report}");
-    }
-
-    #[test]
-    fn a_panic_that_was_caught_does_not_explain_a_later_crash() {
-        let cause = end_of("a_panic_that_was_caught_does_not_explain_a_later_crash", || {
-            caught(|| -> i32 { panic!("a damaged file") }).unwrap_err();
-            std::process::abort();
-        });
-        assert!(matches!(cause, guard::Cause::Ended(_)), "{cause:?}");
     }
 }
