@@ -23,6 +23,8 @@ pub const JOBS: usize = 512;
 pub const LINES: usize = 20_000;
 /// Sines of a multisine, all lines in all rows: half a minute.
 pub const SINES: u64 = 2_000_000_000;
+/// Products of the frequency responses of one run, rows times frequencies: some ten seconds.
+pub const PRODUCTS: f64 = 4e9;
 /// Largest frequency of a torque, and the inverse of the least, Hz.
 pub const FREQUENCY: f64 = 1e9;
 /// Bytes of a run's name: file systems take 255 with an ending.

@@ -26,6 +26,9 @@ pub const SHORTEST: f64 = 20.0;
 /// damping and mass, and its intervals are as wide as that.
 pub const LONG: f64 = 120.0;
 
+/// Rows of a free decay: the spectrum of its residual takes 400 sines a row.
+const DECAY_ROWS: usize = 1_000_000;
+
 /// Number of spikes whose times are listed.
 const LISTED: usize = 8;
 
@@ -279,6 +282,11 @@ pub fn read_decay(
     let (time, signal) = (column("time")?, column(found)?);
     let torque = vec![0.0; time.len()];
     let all = trimmed(Recording::of(&name, time, torque, signal), source.trim, done);
+    ensure!(
+        all.time.len() <= DECAY_ROWS,
+        "{name}: {} rows are too many for a free decay (allowed: up to {DECAY_ROWS}); --trim takes a part of them",
+        all.time.len()
+    );
     all.check()?;
     let seconds = all.duration();
     ensure!(
@@ -540,8 +548,18 @@ fn is_stuck(part: &Recording) -> bool {
 fn smoothed(part: &Recording) -> Result<(Vec<f64>, Vec<f64>)> {
     let (step, torque, rate) = part.even()?;
     let width = ((0.1 / step) as usize).max(1);
-    let averaged = |x: &[f64]| x.windows(width).map(mean).collect();
-    Ok((averaged(&torque), averaged(&rate)))
+    Ok((running_mean(&torque, width), running_mean(&rate, width)))
+}
+
+/// Returns the means of all stretches of `width` values, by sums from the first value on: the work does not grow with the
+/// width.
+fn running_mean(x: &[f64], width: usize) -> Vec<f64> {
+    let sums = x.iter().scan(0.0, |sum, x| {
+        *sum += x;
+        Some(*sum)
+    });
+    let sums: Vec<f64> = std::iter::once(0.0).chain(sums).collect();
+    (width..sums.len()).map(|end| (sums[end] - sums[end - width]) / width as f64).collect()
 }
 
 #[cfg(test)]
@@ -593,6 +611,18 @@ mod tests {
         for (change, word) in faults {
             let error = refusal(change);
             assert!(error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn running_means_are_those_of_every_stretch() {
+        let x: Vec<f64> = (0..50).map(|k| f64::from(k * k % 17)).collect();
+        for width in [1, 3, 50] {
+            let expected: Vec<f64> = x.windows(width).map(mean).collect();
+            let found = running_mean(&x, width);
+            assert_eq!(found.len(), expected.len());
+            // sums of 50 whole numbers are exact
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{width}");
         }
     }
 

@@ -356,7 +356,12 @@ impl Campaign {
         };
         let columns = stored_columns(fmu.description(), run.input.as_deref());
         let recipe = store::recipe(fmu, case, &columns);
-        let mut instance = match run.initialise(fmu) {
+        // before a simulation that may take hours
+        let work = match is_bench(fmu.description()) && case.recording.is_none() {
+            true => outcome::check_work(&case.torque, run.step, run.steps() + 1),
+            false => Ok(()),
+        };
+        let mut instance = match work.and_then(|()| run.initialise(fmu)) {
             Ok(instance) => instance,
             Err(error) => return Ok(Done::Failed(error)),
         };
@@ -370,6 +375,7 @@ impl Campaign {
             }
             let read = recorded::table(case, recorded, &mut |line| watch(Progress::Note(line)));
             let analysed = read.and_then(|(step, table)| {
+                outcome::check_work(&case.torque, step, table.rows())?;
                 folder.store(&case.name, &table, &recipe)?;
                 let run = Run { step, ..run };
                 Outcome::of(case, &run, &mut instance, &table, false)

@@ -3,8 +3,9 @@
 
 use std::borrow::Cow;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use formulas::regime::Regime;
+use host::budget;
 use host::description::{ModelDescription, Value};
 use host::fmu::Instance;
 
@@ -42,6 +43,30 @@ const MOST_SHIFT: f64 = 0.25;
 
 /// Smallest valid signal-to-noise ratio at a resonance, dB.
 const LEAST_SNR: f64 = 0.0;
+
+/// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. If the band begins far
+/// below one cycle in the whole run, the windows of most frequencies hold all rows.
+pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> {
+    let Torque::Profile(profile) = torque else { return Ok(()) };
+    let Some(band) = profile.band() else { return Ok(()) };
+    let (sweep, rows) = (profile.sweep(), rows as f64);
+    let lengths = Lengths::of(band, sweep, step * rows, step);
+    let lags = lengths.lag / (step * lengths.decimation as f64);
+    let windows = sweep.map_or(0.0, |sweep| {
+        let window = |f: &f64| (demodulation::cycles(sweep, *f) / f / step).min(rows);
+        logarithmic_grid(band, GRID_POINTS).iter().map(window).sum()
+    });
+    let work = windows + GRID_POINTS as f64 * lags;
+    ensure!(
+        work <= budget::PRODUCTS,
+        "the frequency responses of {rows} rows, {step:?} s apart, from {:?} to {:?} Hz take {work:.1e} products (allowed: {:.0e}); \
+         a higher first frequency, a longer step or a shorter run takes less",
+        band.0,
+        band.1,
+        budget::PRODUCTS
+    );
+    Ok(())
+}
 
 /// Maxima and totals of a run; NaN where a recording has no value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -902,7 +927,23 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Liquid, Range};
+    use super::{Liquid, Range, check_work};
+    use crate::profile::Written;
+
+    #[test]
+    fn a_sweep_whose_windows_hold_all_of_a_long_run_is_refused() {
+        let work = |profile: &str, step: f64, rows: usize| {
+            check_work(&profile.parse::<Written>().unwrap().torque().unwrap(), step, rows)
+        };
+        // 111 h at 50 Hz in the bench's band, and the thesis's run from 1e-6 Hz
+        work("exp-sweep:f0=1.25,f1=3.5,duration=400000", 0.02, 20_000_000).unwrap();
+        work("exp-sweep:f0=1e-6,f1=3.5,duration=2700", 0.02, 135_000).unwrap();
+        for profile in ["exp-sweep:f0=1e-9", "noise:f0=1e-9"] {
+            let text = format!("{profile},f1=3.5,duration=400000");
+            let error = work(&text, 0.02, 20_000_000).unwrap_err().to_string();
+            assert!(error.contains("20000000 rows, 0.02 s apart, from 1e-9 to 3.5 Hz"), "{error}");
+        }
+    }
 
     #[test]
     fn a_liquid_without_weight_is_told_by_its_numbers() {
