@@ -5,13 +5,16 @@
 //! cargo run --release -p identify --example bounds -- [NAME:VALUE ...]
 //! ```
 
+#[path = "fmu_twin/mod.rs"]
+#[allow(dead_code, reason = "others use the rest of it")]
+mod fmu_twin;
+
 use analysis::gauss_markov::Noise;
 use anyhow::Result;
 use host::fmu::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
-use identify::twin;
 use identify::unknown::Unknown;
 
 const TRUTH: [(&str, &str, f64); 8] = [
@@ -57,7 +60,7 @@ fn main() -> Result<()> {
     };
     for torque in ["lin-sweep:amplitude=0.1", "lin-sweep:amplitude=0.25", "multisine:0.25,600"] {
         let torque_text = torque;
-        let torque = twin::torque(torque)?;
+        let torque = fmu_twin::torque(torque)?;
         let (start, stop) = torque.span();
         let rows = ((stop - start) * 50.0).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * 0.02).collect();

@@ -22,11 +22,16 @@
 //!   say=false           true: the verdict of every seed
 //! ```
 
+#[path = "fmu_twin/mod.rs"]
+#[allow(dead_code, reason = "others use the rest of it")]
+mod fmu_twin;
+
 use std::collections::BTreeMap;
 
 use analysis::innovations::Tests;
 use anyhow::{Context, Result, bail};
 use experiments::rest;
+use fmu_twin::{SensorErrors, Twin, Unmodelled};
 use host::fmu::Fmu;
 use identify::methods::identification::Identification;
 use identify::methods::output_error::identify;
@@ -36,7 +41,6 @@ use identify::recording;
 use identify::simulate::Intersample;
 use identify::start::PARAMETERS;
 use identify::tolerance::Tolerances;
-use identify::twin::{self, SensorErrors, Twin, Unmodelled};
 
 /// Command-line arguments.
 struct Arguments {
@@ -220,7 +224,7 @@ impl Tally {
 fn main() -> Result<()> {
     let asked = arguments()?;
     let fmu = Fmu::open(pack::packed_for_tests())?;
-    let torque = twin::torque(&asked.torque)?;
+    let torque = fmu_twin::torque(&asked.torque)?;
     let truths = truths(&fmu, &asked.twin)?;
     let mut tally = Tally::default();
     for seed in asked.seeds.clone() {

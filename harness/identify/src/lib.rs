@@ -28,7 +28,6 @@ pub mod start;
 pub mod stribeck;
 pub mod tank;
 pub mod tolerance;
-pub mod twin;
 pub mod uncertainty;
 pub mod unknown;
 pub mod verdict;

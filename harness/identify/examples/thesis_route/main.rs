@@ -11,12 +11,16 @@
 //! 10 % asymmetric and whose gyro has a bias of 2 mrad/s and a delay of 5 ms, which neither way is told.
 //! The compensated way knows everything else exactly: the friction, the hub's inertia, and d, h and ζ as starts.
 
+#[path = "../fmu_twin/mod.rs"]
+#[allow(dead_code, reason = "others use the rest of it")]
+mod fmu_twin;
+
 use experiments::profile::Torque;
+use fmu_twin::SensorErrors;
 use host::fmu::Fmu;
 use identify::methods::output_error::identify;
 use identify::nominal::Bench;
 use identify::options::Options;
-use identify::twin::{self, SensorErrors};
 
 mod compensation;
 
@@ -43,7 +47,7 @@ fn main() -> anyhow::Result<()> {
         "fit of the rate, %", "thesis", "compensated", "dead band", "ours", "d, mm", "ours, s"
     );
     for (name, settings, seed, sensor_errors, thesis) in cases {
-        let recording = twin::record(&fmu, settings, &torque, seed, sensor_errors)?;
+        let recording = fmu_twin::record(&fmu, settings, &torque, seed, sensor_errors)?;
         let start = (0.163, 0.1, 0.003);
         let by = |friction| compensation::identify(&recording, friction, 0.322414, start, bench);
         let (plain, banded) = (by(friction)?, by(Friction { dead_band: 2e-3, ..friction })?);

@@ -8,6 +8,9 @@ mod bench;
 #[path = "../../examples/twins/draw.rs"]
 #[allow(dead_code, reason = "the example says more of it")]
 mod draw;
+#[path = "../../examples/fmu_twin/mod.rs"]
+#[allow(dead_code, reason = "the examples use the rest of it")]
+mod fmu_twin;
 mod methods;
 mod other_bench;
 mod out_of_range;

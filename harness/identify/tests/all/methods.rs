@@ -5,15 +5,17 @@ use host::fmu::Fmu;
 use identify::methods::acceleration::{self, Weights};
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
-use identify::twin::{self, SensorErrors, Twin};
 use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
+
+use crate::fmu_twin::{self, SensorErrors, Twin};
 
 /// A sweep of a bench with a rigid liquid, and the encoder's angle.
 fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
     let torque = Torque::Profile(torque.parse().unwrap());
     let settings = [&[("slosh.model", "frozen")], settings].concat();
-    let mut one = twin::record(fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
+    let mut one =
+        fmu_twin::record(fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
     let setup = Setup {
         settings: settings.iter().map(text).collect(),
@@ -142,7 +144,8 @@ fn the_preferential_direction_shows_in_free_decay_and_in_the_harmonics() {
     }
     let torque = Torque::Rows { time, tau, held: false };
     let settings = [&[("slosh.model", "frozen")], &bench[..]].concat();
-    let mut one = twin::record(&fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
+    let mut one =
+        fmu_twin::record(&fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
     let setup = Setup {
         settings: settings.iter().map(text).collect(),

@@ -12,9 +12,9 @@ use identify::methods::{Method, Task, acceleration, black_box, multisine};
 use identify::options::Options;
 use identify::recording::Recording;
 use identify::simulate::Intersample;
-use identify::twin::{self, SensorErrors};
 use pack::packed_for_tests;
 
+use crate::fmu_twin::{self, SensorErrors};
 use crate::solver_noise::{Adaptive, question, record};
 
 /// The errors of all methods.
@@ -39,7 +39,7 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
 fn no_method_hangs_or_panics_on_values_out_of_range() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=60".parse().unwrap());
-    let sound = twin::record(&fmu, &[], &torque, Some(3), SensorErrors::default()).unwrap();
+    let sound = fmu_twin::record(&fmu, &[], &torque, Some(3), SensorErrors::default()).unwrap();
     let last = sound.time.len() - 1;
     type Change = fn(&mut Recording, usize);
     let refused: [(Change, &str); 9] = [

@@ -12,12 +12,12 @@ use identify::options::Options;
 use identify::recording::{Recording, prepare};
 use identify::simulate::{Intersample, Setup};
 use identify::tolerance::Tolerances;
-use identify::twin::{self, SensorErrors, Twin, Unmodelled};
 use identify::unknown::{Scale, Unknown};
 use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
 use crate::acceleration::{is_one_way, push};
+use crate::fmu_twin::{self, SensorErrors, Twin, Unmodelled};
 
 /// The thesis's sweep of 2700 s.
 const LONG: &str = "lin-sweep:amplitude=0.1";
@@ -28,7 +28,7 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
     let torque: Profile = torque.parse().unwrap();
     let zeta = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
     let settings = [&zeta, settings].concat();
-    twin::record(fmu, &settings, &Torque::Profile(torque), Some(4), SensorErrors::default())
+    fmu_twin::record(fmu, &settings, &Torque::Profile(torque), Some(4), SensorErrors::default())
         .unwrap()
 }
 
@@ -227,14 +227,14 @@ fn what_the_loudest_part_has_against_a_stribeck_speed_the_whole_has_too() {
 #[test]
 fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let torque = twin::torque("multisine:0.25,200").unwrap();
+    let torque = fmu_twin::torque("multisine:0.25,200").unwrap();
     let settings = [
         ("slosh.model", "spherical"),
         ("slosh.zeta_from_correlation", "false"),
         ("slosh.zeta", "0.003"),
     ];
     let errors = SensorErrors { gyro_scale: 1.02, ..SensorErrors::default() };
-    let recording = twin::record(&fmu, &settings, &torque, Some(4), errors).unwrap();
+    let recording = fmu_twin::record(&fmu, &settings, &torque, Some(4), errors).unwrap();
     let options = Options { models: vec!["spherical".into()], gyro_scale: 0.02, ..options() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     let fit = &found.details.fit;
@@ -325,7 +325,7 @@ fn no_model_error_makes_the_rate_come_before_the_torque() {
     let zeta = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.0029757")];
     let settings = [&zeta[..], &settings].concat();
     let recording =
-        twin::record(&fmu, &settings, &torque, Some(1), SensorErrors::default()).unwrap();
+        fmu_twin::record(&fmu, &settings, &torque, Some(1), SensorErrors::default()).unwrap();
     let options = Options { sensor_errors: true, gyro_scale: 0.01, ..of_any_torque() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     let delay = &found.measurement["delay"];
@@ -421,7 +421,7 @@ fn an_encoder_shows_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let sensor_errors = SensorErrors { gyro_scale: 1.01, ..SensorErrors::default() };
     let torque = Torque::Profile(SHORT.parse().unwrap());
-    let mut recording = twin::record(&fmu, &[], &torque, Some(2), sensor_errors).unwrap();
+    let mut recording = fmu_twin::record(&fmu, &[], &torque, Some(2), sensor_errors).unwrap();
     // an encoder of 17 bits on the same motion, whose angle is that of a run without noise
     let setup = Setup { settings: Vec::new(), intersample: Intersample::FirstOrderHold };
     let motion = setup.run(&fmu, &[], &recording, 0.0).unwrap();

@@ -9,9 +9,9 @@ use experiments::run::{Run, TORQUE};
 use host::drive::Inputs;
 use host::fmu::Fmu;
 
-use crate::design::Multisine;
-use crate::recording::Recording;
-use crate::simulate::{Intersample, TORQUE_BESIDES};
+use identify::design::Multisine;
+use identify::recording::Recording;
+use identify::simulate::{Intersample, TORQUE_BESIDES};
 
 /// Errors of gyro and data link in addition to the FMU's own noise.
 #[derive(Clone, Copy, Debug)]
