@@ -1,10 +1,15 @@
 //! Singular values and eigenvectors of matrices of derivatives. nalgebra's iterations never end for NaN or infinity.
 
 use anyhow::{Context, Result, bail, ensure};
-use nalgebra::{DMatrix, Dyn, SVD, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 
 /// Limit of nalgebra's iterations; n columns take about 2 n.
 const ITERATIONS: usize = 10_000;
+
+/// Eigenvalue over the largest one up to which a direction counts as flat: the recordings do not show it.
+const FLAT: f64 = 1e-12;
+/// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
+const RESOLVED: f64 = 4.0;
 
 /// Lengths of the columns.
 ///
@@ -49,12 +54,87 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Result<SymmetricEigen<f64, Dyn>> {
     found.context("the eigenvectors of the derivatives are not found")
 }
 
+/// A symmetric matrix in its own scales, D A D with a unit diagonal, by eigenvectors. It may have no rows.
+pub struct Curvature {
+    values: DVector<f64>,
+    vectors: DMatrix<f64>,
+    scale: DVector<f64>,
+}
+
+impl Curvature {
+    /// Returns the curvature JᵀJ over the columns `which` of J, whose columns have these names.
+    ///
+    /// # Errors
+    /// If a derivative is not finite.
+    pub fn of(jacobian: &DMatrix<f64>, names: &[String], which: &[usize]) -> Result<Self> {
+        let picked = jacobian.select_columns(which);
+        let picked_names: Vec<String> =
+            which.iter().filter_map(|&j| names.get(j).cloned()).collect();
+        lengths(&picked, &picked_names)?;
+        let a = picked.tr_mul(&picked);
+        let scale = a.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+        if which.is_empty() {
+            return Ok(Curvature { values: DVector::zeros(0), vectors: a, scale });
+        }
+        let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
+        let SymmetricEigen { eigenvalues, eigenvectors } = symmetric(scaled)?;
+        Ok(Curvature { values: eigenvalues, vectors: eigenvectors, scale })
+    }
+
+    /// The eigenvalue below which a direction is flat.
+    fn flat(&self) -> f64 {
+        FLAT * self.values.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// A⁻¹ b, damped by λ in the matrix's own scales; nothing along directions that are flat.
+    pub fn solve(&self, b: &DVector<f64>, damping: f64) -> DVector<f64> {
+        let flat = self.flat();
+        let mut c = self.vectors.tr_mul(&b.component_mul(&self.scale));
+        for (c, value) in c.iter_mut().zip(&self.values) {
+            *c = if *value > flat { *c / (value + damping) } else { 0.0 };
+        }
+        (&self.vectors * c).component_mul(&self.scale)
+    }
+
+    /// Directions that the matrix does not resolve. `errors` are the relative errors of the Jacobian's columns, all of them
+    /// independent: along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i². Each direction is a unit vector
+    /// in the matrix's own scales.
+    pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
+        let flat = self.flat();
+        let is_flat = |value: f64, v: &DVector<f64>| {
+            let made: f64 = v.iter().zip(errors).map(|(v, error)| (v * error).powi(2)).sum();
+            value <= flat.max(RESOLVED * made)
+        };
+        let all = self.values.iter().zip(self.vectors.column_iter());
+        let all = all.map(|(value, v)| (*value, v.into_owned()));
+        all.filter(|(value, v)| is_flat(*value, v)).map(|(_, v)| v).collect()
+    }
+
+    /// A direction in the unknowns' own units.
+    pub fn unscaled(&self, direction: &DVector<f64>) -> DVector<f64> {
+        direction.component_mul(&self.scale)
+    }
+
+    /// A⁻¹ over the directions that are not flat.
+    pub fn inverse(&self) -> DMatrix<f64> {
+        let flat = self.flat();
+        let n = self.scale.len();
+        let mut inverse = DMatrix::zeros(n, n);
+        for (value, v) in self.values.iter().zip(self.vectors.column_iter()) {
+            if *value > flat {
+                let v = v.component_mul(&self.scale);
+                inverse += &v * v.transpose() / *value;
+            }
+        }
+        inverse
+    }
+}
+
 const NOT_FINITE: &str = "products of the derivatives are not finite";
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::any_fmu::search::Curvature;
     use crate::uncertainty::Covariance;
 
     #[test]

@@ -13,6 +13,7 @@ pub mod fit;
 pub mod friction;
 pub mod goodness;
 pub mod methods;
+pub mod minimum;
 pub mod missing;
 pub mod names;
 pub mod news;

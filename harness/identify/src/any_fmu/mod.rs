@@ -29,10 +29,11 @@ use self::problem::{Channel, Motion, Problem};
 use self::profile::Interval;
 use self::question::Question;
 use self::record::Record;
-use self::search::{Curvature, DECREMENT, Minimum};
+use self::search::{DECREMENT, Minimum};
 use self::simulate::{Model, Setup};
 use self::solver_error::{ADDED, DECIDES, SolverError};
 use self::unknown::{Unknown, What};
+use crate::decomposition::Curvature;
 use crate::estimate::{Estimated, prose};
 use crate::methods::{Identified, Residual};
 use crate::news::News;
@@ -181,7 +182,7 @@ pub fn identify(
             break;
         }
         told(&News::Step(format!("noise estimated, turn {turn}")));
-        minimum = search::search(&problem, &minimum.x, minimum.steps, DECREMENT, 30, &mut told)?;
+        minimum = search::search(&problem, &minimum.x, minimum.steps, (DECREMENT, 30), &mut told)?;
     }
     // the last noise is that of the last minimum
     minimum.answer.e = problem.stacked(&minimum.answer.motion, &minimum.x);
@@ -270,7 +271,7 @@ fn remedy(problem: &Problem, solver: &SolverError) -> String {
 
 fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<Identification> {
     let n = minimum.x.len();
-    let inner = minimum.inner(&problem.unknowns);
+    let inner = minimum.inner(problem);
     let solver = solver_error::measure(
         problem,
         &minimum.x,

@@ -10,7 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::problem::{Answer, Problem};
-use super::search::{Curvature, Minimum};
+use super::search::Minimum;
+use crate::decomposition::Curvature;
 
 /// Two-sided 95 % of the normal distribution.
 pub const Z: f64 = 1.96;
@@ -49,8 +50,7 @@ fn interval(problem: &Problem, minimum: &Minimum, j: usize, std: f64) -> Result<
         let ends = [low, high].map(|end| if end.is_finite() { end } else { f64::NAN });
         return Ok(Interval { ends, ended: [false; 2], quadratic: false });
     }
-    let others: Vec<usize> =
-        minimum.inner(&problem.unknowns).into_iter().filter(|k| *k != j).collect();
+    let others: Vec<usize> = minimum.inner(problem).into_iter().filter(|k| *k != j).collect();
     let profile = Profile::new(problem, minimum, j, others)?;
     let mut sides = [-1.0, 1.0].map(|sign| {
         let room = if sign < 0.0 { x - low } else { high - x };

@@ -1,29 +1,20 @@
-//! The minimum of a [`Problem`] within bounds.
-//!
-//! Levenberg and Marquardt's method by projection (Kelley, Iterative Methods for Optimization, 5.5): a step is cut at the bounds;
-//! an unknown at a bound whose cost falls beyond it is left out of the next step. So an estimate at a bound is one at which the
-//! recordings want to go further, and no transformation flattens the cost on the way there.
+//! The search of [`crate::minimum`] for any FMU: from afar, and from several starts.
 //!
 //! From afar the search goes over windows of the recordings that grow: over a whole recording of an oscillation the cost has as many
 //! minima as there are cycles, over its beginning one.
 
 use anyhow::{Context, Result};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 use super::problem::{Answer, Problem, Step};
 use super::record::Record;
 use super::unknown::Unknown;
-use crate::decomposition;
+use crate::minimum::{self, CONVERGED, End, SumOfSquares};
 use crate::news::News;
 use analysis::random::Random;
 
 /// A search has ended where the distance to the minimum, in standard deviations, is below this.
 pub const DECREMENT: f64 = 0.02;
-/// Directions along which the scaled cost is flatter than this part of the steepest are not known.
-const FLAT: f64 = 1e-12;
-/// Directions along which the scaled cost is not steeper than this many times what the errors of the derivatives make are not
-/// resolved: they would be steep by chance.
-const RESOLVED: f64 = 4.0;
 /// Windows of a search from afar, as parts of the recordings.
 const WINDOWS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
 /// Least noise of a window, in parts of an output's spread: what the model can't follow yet.
@@ -32,19 +23,7 @@ const COARSE: f64 = 0.03;
 const BAD: f64 = 1.5;
 
 /// End of a search.
-#[derive(Clone)]
-pub struct Minimum {
-    /// The unknowns.
-    pub x: Vec<f64>,
-    /// The answer there.
-    pub answer: Answer,
-    /// Derivatives there.
-    pub jacobian: DMatrix<f64>,
-    /// Steps of the differences.
-    pub steps: Vec<Step>,
-    /// Distance to the minimum in standard deviations.
-    pub decrement: f64,
-}
+pub type Minimum = minimum::Minimum<Answer, Step>;
 
 impl Minimum {
     /// Sum of squares.
@@ -52,103 +31,43 @@ impl Minimum {
         self.answer.e.norm_squared()
     }
 
-    /// Whether it is one: within half a standard deviation, which the stated ones contain.
+    /// Returns true if the search converged.
     pub fn converged(&self) -> bool {
-        self.decrement < 0.5
+        self.decrement < CONVERGED
     }
 
     /// The unknowns that are not held at a bound.
-    pub fn inner(&self, unknowns: &[Unknown]) -> Vec<usize> {
-        inner(unknowns, &self.x, &(self.jacobian.tr_mul(&self.answer.e)))
+    pub fn inner(&self, problem: &Problem) -> Vec<usize> {
+        minimum::inner(&problem.bounds(), &self.x, &self.jacobian.tr_mul(&self.answer.e))
     }
 }
 
-/// Those that are not at a bound beyond which the cost falls.
-fn inner(unknowns: &[Unknown], x: &[f64], gradient: &DVector<f64>) -> Vec<usize> {
-    let is_inner = |j: &usize| {
-        let (low, high) = unknowns[*j].bounds;
-        !(x[*j] <= low && gradient[*j] > 0.0 || x[*j] >= high && gradient[*j] < 0.0)
-    };
-    (0..x.len()).filter(is_inner).collect()
-}
+impl SumOfSquares for Problem<'_> {
+    type Answer = Answer;
+    type Step = Step;
 
-/// A symmetric matrix in its own scales, D A D with a unit diagonal, by eigenvectors. It may have no rows.
-pub struct Curvature {
-    values: DVector<f64>,
-    vectors: DMatrix<f64>,
-    scale: DVector<f64>,
-}
-
-impl Curvature {
-    /// Of JᵀJ over the columns `which` of J; `names`: of all columns.
-    ///
-    /// # Errors
-    /// If a derivative is not finite.
-    pub fn of(jacobian: &DMatrix<f64>, names: &[String], which: &[usize]) -> Result<Self> {
-        let picked = jacobian.select_columns(which);
-        let picked_names: Vec<String> =
-            which.iter().filter_map(|&j| names.get(j).cloned()).collect();
-        decomposition::lengths(&picked, &picked_names)?;
-        let a = picked.tr_mul(&picked);
-        let scale = a.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
-        if which.is_empty() {
-            return Ok(Curvature { values: DVector::zeros(0), vectors: a, scale });
-        }
-        let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
-        let SymmetricEigen { eigenvalues, eigenvectors } = decomposition::symmetric(scaled)?;
-        Ok(Curvature { values: eigenvalues, vectors: eigenvectors, scale })
+    fn names(&self) -> Vec<String> {
+        self.names()
     }
 
-    /// The eigenvalue below which a direction is flat.
-    fn flat(&self) -> f64 {
-        FLAT * self.values.iter().copied().fold(0.0, f64::max)
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.unknowns.iter().map(|unknown| unknown.bounds).collect()
     }
 
-    /// A⁻¹ b, damped by λ in the matrix's own scales; nothing along directions that are flat.
-    pub fn solve(&self, b: &DVector<f64>, damping: f64) -> DVector<f64> {
-        let flat = self.flat();
-        let mut c = self.vectors.tr_mul(&b.component_mul(&self.scale));
-        for (c, value) in c.iter_mut().zip(&self.values) {
-            *c = if *value > flat { *c / (value + damping) } else { 0.0 };
-        }
-        (&self.vectors * c).component_mul(&self.scale)
+    fn at(&self, x: &[f64]) -> Result<Answer> {
+        self.answer(x)
     }
 
-    /// Directions that the matrix does not resolve. `errors` are the relative errors of the Jacobian's columns, all of them
-    /// independent: along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i². Each direction is a unit vector
-    /// in the matrix's own scales.
-    pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
-        let flat = self.flat();
-        let is_flat = |value: f64, v: &DVector<f64>| {
-            let made: f64 = v.iter().zip(errors).map(|(v, error)| (v * error).powi(2)).sum();
-            value <= flat.max(RESOLVED * made)
-        };
-        let all = self.values.iter().zip(self.vectors.column_iter());
-        let all = all.map(|(value, v)| (*value, v.into_owned()));
-        all.filter(|(value, v)| is_flat(*value, v)).map(|(_, v)| v).collect()
+    fn residuals(answer: &Answer) -> &DVector<f64> {
+        &answer.e
     }
 
-    /// A direction in the unknowns' own units.
-    pub fn unscaled(&self, direction: &DVector<f64>) -> DVector<f64> {
-        direction.component_mul(&self.scale)
-    }
-
-    /// A⁻¹ over the directions that are not flat.
-    pub fn inverse(&self) -> DMatrix<f64> {
-        let flat = self.flat();
-        let n = self.scale.len();
-        let mut inverse = DMatrix::zeros(n, n);
-        for (value, v) in self.values.iter().zip(self.vectors.column_iter()) {
-            if *value > flat {
-                let v = v.component_mul(&self.scale);
-                inverse += &v * v.transpose() / *value;
-            }
-        }
-        inverse
+    fn derivatives(&self, x: &[f64], at: &Answer, steps: &mut [Step]) -> Result<DMatrix<f64>> {
+        self.jacobian(x, &at.motion, steps)
     }
 }
 
-/// Searches from x until the decrement is below `tolerance`.
+/// Searches from x until the decrement is below `decrement`, with at most so many sets of derivatives.
 ///
 /// # Errors
 /// If the FMU refuses the start, or every step of an unknown.
@@ -156,78 +75,20 @@ pub fn search(
     problem: &Problem,
     x: &[f64],
     steps: Vec<Step>,
-    tolerance: f64,
-    most: usize,
+    (decrement, most): (f64, usize),
     news: &mut dyn FnMut(&News),
 ) -> Result<Minimum> {
-    let answer = problem.answer(x).context("the FMU refuses the start of the search")?;
-    let bounds: Vec<(f64, f64)> = problem.unknowns.iter().map(|u| u.bounds).collect();
-    let (mut x, mut answer, mut steps, mut damping) = (x.to_vec(), answer, steps, 1e-3);
-    for iteration in 0.. {
-        let jacobian = problem.jacobian(&x, &answer.motion, &mut steps)?;
-        let gradient = jacobian.tr_mul(&answer.e);
-        let which = inner(&problem.unknowns, &x, &gradient);
-        let curvature = Curvature::of(&jacobian, &problem.names(), &which)?;
-        let picked =
-            |g: &DVector<f64>| DVector::from_iterator(which.len(), which.iter().map(|&j| g[j]));
-        let g = picked(&gradient);
-        let decrement = g.dot(&curvature.solve(&g, 0.0)).max(0.0).sqrt();
-        let cost = answer.e.norm_squared();
-        news(&News::Detail(format!(
-            "iteration {}: sum of squares {cost:.6e}, {decrement:.3} standard deviations from the minimum",
-            iteration + 1
-        )));
-        let here = |x: Vec<f64>, answer: Answer, steps: Vec<Step>| Minimum {
-            x,
-            answer,
-            jacobian: jacobian.clone(),
-            steps,
-            decrement,
-        };
-        if decrement < tolerance || iteration + 1 >= most {
-            return Ok(here(x, answer, steps));
-        }
-        let to = |x: &[f64], g: &DVector<f64>, damping: f64| {
-            let step = curvature.solve(g, damping);
-            let mut moved = x.to_vec();
-            for (k, &j) in which.iter().enumerate() {
-                moved[j] = (x[j] - step[k]).clamp(bounds[j].0, bounds[j].1);
-            }
-            moved
-        };
-        let mut moved = false;
-        for _ in 0..12 {
-            let trial = to(&x, &g, damping);
-            if let Ok(there) = problem.answer(&trial)
-                && there.e.norm_squared() < cost
-            {
-                (x, answer, moved) = (trial, there, true);
-                damping = (damping * 0.1).max(1e-9);
-                break;
-            }
-            damping = (damping * 5.0).max(1e-6);
-        }
-        if !moved {
-            // no shorter step helps: differences end here
-            return Ok(here(x, answer, steps));
-        }
-        // with the same derivatives as long as they serve
-        for _ in 0..3 {
-            let gradient = picked(&jacobian.tr_mul(&answer.e));
-            let left = gradient.dot(&curvature.solve(&gradient, 0.0)).max(0.0).sqrt();
-            if left > 0.5 * decrement || left < 0.3 * tolerance {
-                break;
-            }
-            let trial = to(&x, &gradient, damping);
-            match problem.answer(&trial) {
-                Ok(there) if there.e.norm_squared() < answer.e.norm_squared() => {
-                    (x, answer) = (trial, there);
-                }
-                _ => break,
-            }
-        }
-    }
-    unreachable!("the loop ends by itself")
+    minimum::search(
+        problem,
+        x,
+        steps,
+        End { decrement, part: 0.0, most },
+        &mut |number, cost, left| {
+            news(&News::Detail(format!(
+                "iteration {number}: sum of squares {cost:.6e}, {left:.3} standard deviations from the minimum"
+            )));
+        },
+    )
 }
 
 /// From a start that may be far off: over windows that grow, each unknown held by a spring of its reach.
@@ -251,7 +112,7 @@ fn from_afar(problem: &Problem, x: &[f64], news: &mut dyn FnMut(&News)) -> Resul
             channel.noise.white = whole.noise.white.max(COARSE * spread);
         }
         let steps = window.first_steps();
-        let found = search(&window, &x, steps, 0.1, 25, &mut |_| {})?;
+        let found = search(&window, &x, steps, (0.1, 25), &mut |_| {})?;
         news(&News::Detail(format!(
             "window of {:.0} %: sum of squares {:.4e}",
             100.0 * part,
@@ -289,7 +150,7 @@ pub fn best(
         let x = if tried == 0 { problem.start() } else { drawn(&problem.unknowns, &mut random) };
         tried += 1;
         let found = from_afar(problem, &x, news)
-            .and_then(|x| search(problem, &x, problem.first_steps(), 0.3, 40, news));
+            .and_then(|x| search(problem, &x, problem.first_steps(), (0.3, 40), news));
         match found {
             Err(error) => first_error = first_error.or(Some(error)),
             Ok(found) => {

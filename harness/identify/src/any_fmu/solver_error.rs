@@ -17,8 +17,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::problem::{Motion, Problem, Step};
-use super::search::Curvature;
 use super::unknown::What;
+use crate::decomposition::Curvature;
 
 /// Part of its standard deviation from which on the solver's errors decide an estimate.
 pub const DECIDES: f64 = 0.3;
