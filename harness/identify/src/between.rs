@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::evidence::{ALIKE, DECIDES, probabilities};
-use crate::fit::{Channel, Polished, Problem, ROUNDS, Until, is_other};
+use crate::fit::{Channel, MINIMUM, Polished, Problem, ROUNDS, Until, is_other};
 use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
@@ -106,13 +106,10 @@ pub fn matters(recordings: &[Recording]) -> bool {
 }
 
 /// Sum of squares over the first behaviour's beyond which another one is no rival, wherever its minimum is.
-const FAR: f64 = 1.5;
+const NO_RIVAL: f64 = 1.5;
 
 /// The same beyond which another one is given up, if a step has been taken.
 const LOST: f64 = 10.0;
-
-/// A sum of squares is known to a hundredth where the Newton decrement is below this.
-const NEAR: f64 = 0.1;
 
 /// Newton decrement below which the sum of squares of the minimum is foreseen well enough to say that it does not count.
 const FORESEEN: f64 = 1.0;
@@ -126,9 +123,9 @@ pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Other
     let now = problem.setup.intersample;
     let delayed = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay);
     let late = |b: Intersample| if b == Intersample::ZeroOrderHold { 0.5 } else { 0.0 };
-    let most = FAR * minimum.cost;
+    let most = NO_RIVAL * minimum.cost;
     let until = Until {
-        decrement: NEAR,
+        decrement: MINIMUM,
         rounds: 2,
         trust: FORESEEN,
         far: LOST * minimum.cost,

@@ -9,7 +9,7 @@
 //! [`analysis::gauss_markov`]. Where an encoder was recorded, its angle less an offset is a second such sum, which
 //! knows nothing of the gyro's scale.
 //!
-//! Two searches. From afar, Levenberg and Marquardt's method as MINPACK has it. Near the minimum, Gauss
+//! Two searches. From afar, that of [`crate::minimum`]. Near the minimum, Gauss
 //! and Newton's, with sensitivities that are kept as long as they serve: the FMU answers once a step
 //! instead of once an unknown. It ends by the Newton decrement
 //!
@@ -30,7 +30,6 @@
 //! known before, L = V S⁻¹ of their J = U S Vᵀ, which move the answer by one standard deviation
 //! each and at right angles to one another; then J = D L⁻¹ is as good along the valley as across it.
 
-use std::cell::{Cell, RefCell};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -39,6 +38,7 @@ use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::minimum::{self, End, SumOfSquares};
 use crate::nominal::{self, Bench, Nominal};
 use crate::overridden::{near, refuse};
 use crate::recording::Recording;
@@ -48,7 +48,6 @@ use crate::tank;
 use crate::uncertainty::{self, Covariance};
 use crate::unknown::{Quantity, Scale, Unknown};
 use analysis::gauss_markov::{FLOOR, Noise, Whitening};
-use analysis::least_squares;
 
 /// By how much a difference moves the answer, in units of the noise's norm of one degree of freedom.
 pub const MOVE: f64 = 0.3;
@@ -57,12 +56,16 @@ pub const MOVE: f64 = 0.3;
 const TYPICAL: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
 /// Bounds of the differences' steps, in units of the variable x.
 const STEPS: (f64, f64) = (1e-6, 2e-2);
+/// Step of the first differences, in the same units.
+const FIRST_STEP: f64 = 1e-5;
+/// Most sets of derivatives of a search from afar.
+const MOST: usize = 20;
 /// Longest step of a difference along a direction, in units of x.
 const LONGEST_STEP: f64 = 0.05;
 /// Steps end where the Newton decrement is below this: a hundredth of a standard deviation.
 const DECREMENT: f64 = 0.01;
-/// A minimum has a Newton decrement below this; no sensitivities are found anew for less.
-const MINIMUM: f64 = 0.1;
+/// Newton decrement of a minimum: the sum of squares is known to a hundredth, and no sensitivities are found anew for less.
+pub const MINIMUM: f64 = 0.1;
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 pub const ROUNDS: usize = 6;
 /// A change of one variable there by more than this of one here is no valley's bend.
@@ -128,15 +131,15 @@ pub struct Answer {
     pub residual: Vec<Vec<f64>>,
 }
 
-/// Estimated unknowns.
-#[derive(Clone, Debug)]
-pub struct Estimate {
-    /// Variables x of the unknowns.
-    pub x: Vec<f64>,
-    /// Why the search ended.
-    pub reason: String,
-    /// Sensitivities near there.
-    pub jacobian: Option<DMatrix<f64>>,
+/// End of a search from afar, over all recordings or a part of them; the answer is with the stacked innovations.
+pub type Rough = minimum::Minimum<(Answer, DVector<f64>), f64>;
+
+impl Rough {
+    /// Mean square of the stacked innovations.
+    fn mean_square(&self) -> f64 {
+        let e = &self.answer.1;
+        e.norm_squared() / e.len() as f64
+    }
 }
 
 /// A minimum with its sensitivities.
@@ -586,7 +589,7 @@ impl<'a> Problem<'a> {
         known: Option<&DMatrix<f64>>,
     ) -> Result<DMatrix<f64>> {
         let Some(known) = known else {
-            let axes = vec![1e-5; x.len()];
+            let axes = vec![FIRST_STEP; x.len()];
             let rough = self.jacobian(x, free, base, &axes)?;
             let known = at_places(&rough, free, x.len());
             return self.sensitivities(x, free, base, Some(&known));
@@ -913,42 +916,13 @@ impl<'a> Problem<'a> {
         self.unknowns.iter().map(|unknown| unknown.quantity.name()).collect()
     }
 
-    /// Levenberg and Marquardt's search; ends when the sum of squares falls by less than `tolerance`, relatively.
-    pub fn search(&self, x: &[f64], tolerance: f64) -> Result<Estimate> {
-        let first = self.answer(x).context("the FMU refuses the start of the search")?;
-        let first = Cell::new(Some(first));
-        // the motion at the last x, steps of the next differences, the last sensitivities
-        let motion = RefCell::new(None);
-        let steps = RefCell::new(vec![1e-5; x.len()]);
-        let last = RefCell::new(None);
-        let residuals = |x: &[f64]| {
-            let x = &self.inside(x)[..];
-            let answer = first.take().map_or_else(|| self.answer(x), Ok);
-            let answer = answer.unwrap_or_else(|_| {
-                // a parameter the FMU refuses: worse than anything, so that the step is taken back
-                let far = |c: &Channel| vec![1e6; self.recordings[c.recording].time.len()];
-                Answer { motion: Vec::new(), residual: self.channels.iter().map(far).collect() }
-            });
-            let e = self.stacked(&answer, x);
-            *motion.borrow_mut() = Some(answer.motion).filter(|motion| !motion.is_empty());
-            e.as_slice().to_vec()
-        };
-        let all: Vec<usize> = (0..x.len()).collect();
-        let derivatives = |x: &[f64]| {
-            let (motion, inside) = (motion.borrow(), self.inside(x));
-            let mut found = self.jacobian(&inside, &all, motion.as_ref()?, &steps.borrow()).ok()?;
-            *steps.borrow_mut() = Problem::steps(&found);
-            *last.borrow_mut() = Some(found.clone());
-            // beyond the range that the FMU allows an unknown has no influence
-            for j in all.iter().copied().filter(|&j| inside[j] != x[j]) {
-                found.column_mut(j).fill(0.0);
-            }
-            Some(found)
-        };
-        let method = least_squares::tolerances(tolerance, 1e-8).with_gtol(0.0).with_patience(4);
-        let found = least_squares::minimise_by(&method, &residuals, &derivatives, x);
-        let jacobian = last.borrow_mut().take();
-        Ok(Estimate { x: self.inside(&found.x), reason: found.reason, jacobian })
+    /// Searches from x until steps would lessen the sum of squares by less than this part of it.
+    ///
+    /// # Errors
+    /// If the FMU refuses the start, or a difference.
+    pub fn search(&self, x: &[f64], part: f64) -> Result<Rough> {
+        let end = End { decrement: DECREMENT, part, most: MOST };
+        minimum::search(self, &self.inside(x), vec![FIRST_STEP; x.len()], end, &mut |_, _, _| {})
     }
 
     /// The same over windows of the recordings that grow, each from the estimate of the one before.
@@ -962,15 +936,18 @@ impl<'a> Problem<'a> {
         x: &[f64],
         windows: &[f64],
         progress: &mut dyn FnMut(String),
-    ) -> Result<Estimate> {
+    ) -> Result<Rough> {
         let mut to_come: Vec<f64> = windows.iter().rev().copied().collect();
-        let (mut from, mut jacobian) = (x.to_vec(), None);
+        let (mut from, mut last) = (x.to_vec(), None);
         // the last window, its residual, its estimate; none once a leap was taken all the same
         let mut before: Option<(f64, f64, Vec<f64>)> = None;
         let mut careful = true;
         while let Some(window) = to_come.pop() {
-            let (estimate, residual) = self.search_window(x, &from, window)?;
-            progress(format!("window of {:.0} %: {}", 100.0 * window, estimate.reason));
+            let part: Vec<Recording> =
+                self.recordings.iter().map(|r| r.beginning(window)).collect();
+            let found = self.search_part(x, &from, &part)?;
+            let residual = found.mean_square();
+            progress(format!("window of {:.0} %: mean square {residual:.3e}", 100.0 * window));
             if let Some((reached, less, estimate)) = before.take_if(|b| residual > JUMP * b.1) {
                 if window - reached > SHORTEST {
                     to_come.extend([window, 0.5 * (reached + window)]);
@@ -981,30 +958,23 @@ impl<'a> Problem<'a> {
                 careful = false;
             }
             if careful {
-                before = Some((window, residual, estimate.x.clone()));
+                before = Some((window, residual, found.x.clone()));
             }
-            from = estimate.x;
-            jacobian = estimate.jacobian.map(|jacobian| jacobian * NOISE_FACTOR);
+            from.clone_from(&found.x);
+            last = Some(found);
         }
-        Ok(Estimate { x: from, jacobian, reason: String::new() })
-    }
-
-    /// The search over a window of the recordings from x, and the residual's mean square. Each parameter is
-    /// also held near its first start ([`PRIOR_WIDTH`]), for a short window does not say everything, and what the
-    /// model cannot follow yet counts as noise of [`NOISE_FACTOR`] times the gyro's.
-    fn search_window(&self, first: &[f64], x: &[f64], fraction: f64) -> Result<(Estimate, f64)> {
-        let part: Vec<Recording> = self.recordings.iter().map(|r| r.beginning(fraction)).collect();
-        self.search_part(first, x, &part)
+        let mut rough = last.context("there is no window")?;
+        rough.jacobian *= NOISE_FACTOR;
+        Ok(rough)
     }
 
     /// The same over the loudest parts, from x; over the whole recordings where they have none.
-    pub fn search_loudest(&self, x: &[f64]) -> Result<Estimate> {
+    pub fn search_loudest(&self, x: &[f64]) -> Result<Rough> {
         let Some(part) = self.loudest() else { return self.search_growing(x, &WHOLE, &mut |_| {}) };
-        let (mut estimate, _) = self.search_part(x, x, &part)?;
+        let mut rough = self.search_part(x, x, &part)?;
         let rows = |all: &[Recording]| all.iter().map(|r| r.time.len()).sum::<usize>() as f64;
-        let more = NOISE_FACTOR * (rows(self.recordings) / rows(&part)).sqrt();
-        estimate.jacobian = estimate.jacobian.map(|jacobian| jacobian * more);
-        Ok(estimate)
+        rough.jacobian *= NOISE_FACTOR * (rows(self.recordings) / rows(&part)).sqrt();
+        Ok(rough)
     }
 
     /// The loudest parts of the recordings; `None` where one has none.
@@ -1012,8 +982,9 @@ impl<'a> Problem<'a> {
         self.recordings.iter().map(|r| r.loudest(LOUDEST, RUN_IN)).collect()
     }
 
-    /// The search over parts of the recordings.
-    fn search_part(&self, first: &[f64], x: &[f64], part: &[Recording]) -> Result<(Estimate, f64)> {
+    /// Searches over parts of the recordings from x. Each parameter is also held near its first start ([`PRIOR_WIDTH`]), for a short
+    /// window does not say everything, and what the model cannot follow yet counts as noise of [`NOISE_FACTOR`] times the gyro's.
+    fn search_part(&self, first: &[f64], x: &[f64], part: &[Recording]) -> Result<Rough> {
         let mut problem = Problem { recordings: part, ..self.clone() };
         for (unknown, &x) in problem.unknowns.iter_mut().zip(first) {
             if let Some(name) = unknown.quantity.parameter() {
@@ -1031,9 +1002,42 @@ impl<'a> Problem<'a> {
         for channel in &mut problem.channels {
             channel.noise.white *= NOISE_FACTOR;
         }
-        let estimate = problem.search(x, 1e-3)?;
-        let e = problem.stacked(&problem.answer(&estimate.x)?, &estimate.x);
-        Ok((estimate, e.norm_squared() / e.len() as f64))
+        problem.search(x, 1e-3)
+    }
+}
+
+impl SumOfSquares for Problem<'_> {
+    type Answer = (Answer, DVector<f64>);
+    type Step = f64;
+
+    fn names(&self) -> Vec<String> {
+        self.names()
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.unknowns.iter().map(|unknown| unknown.ends().into()).collect()
+    }
+
+    fn at(&self, x: &[f64]) -> Result<Self::Answer> {
+        let answer = self.answer(x)?;
+        let e = self.stacked(&answer, x);
+        Ok((answer, e))
+    }
+
+    fn residuals(answer: &Self::Answer) -> &DVector<f64> {
+        &answer.1
+    }
+
+    fn derivatives(
+        &self,
+        x: &[f64],
+        answer: &Self::Answer,
+        steps: &mut [f64],
+    ) -> Result<DMatrix<f64>> {
+        let all: Vec<usize> = (0..x.len()).collect();
+        let found = self.jacobian(x, &all, &answer.0.motion, steps)?;
+        steps.copy_from_slice(&Problem::steps(&found));
+        Ok(found)
     }
 }
 

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use nalgebra::DMatrix;
 
 use crate::between;
-use crate::fit::{Answer, Estimate, Polished, Problem, ROUNDS, WINDOWS};
+use crate::fit::{Answer, Polished, Problem, ROUNDS, Rough, WINDOWS};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::news::Since;
@@ -15,8 +15,8 @@ use crate::simulate::Intersample;
 use crate::stribeck::Indices;
 use analysis::innovations::Tests;
 
-/// Sum of squares over the rows below which a model may be near its minimum: that of noise, and half as much again.
-const NEAR: f64 = 1.5;
+/// Mean square of the innovations below which a model may be near its minimum; noise has 1.
+const NEARLY_NOISE: f64 = 1.5;
 
 /// Share of the sum of squares that remains after the steps of one set of sensitivities that lead far.
 const LEADS: f64 = 0.7;
@@ -82,7 +82,7 @@ enum From {
 enum How {
     /// Gauss and Newton's steps over the whole recordings, with so many sets of sensitivities at most.
     Steps(usize),
-    /// The same over the loudest part of long recordings first, and over the whole only where that comes near the noise ([`NEAR`]).
+    /// The same over the loudest part of long recordings first, and over the whole only where that comes near the noise ([`NEARLY_NOISE`]).
     Glance(usize),
     /// Levenberg and Marquardt's search over the whole recordings, then such steps.
     Search,
@@ -104,7 +104,7 @@ enum When {
     Moved,
     /// There is none, or a poor one.
     Poor,
-    /// The search has not ended there, and the residual is nearly the noise ([`NEAR`]).
+    /// The search has not ended there, and the residual is nearly the noise ([`NEARLY_NOISE`]).
     Near,
     /// The search has not ended there, and the fit is not poor.
     Unfinished,
@@ -228,7 +228,7 @@ impl<'a> Search<'a, '_> {
             "{}: the loudest part has a mean square of {excess:.1} of noise",
             self.model
         ));
-        if excess < NEAR {
+        if excess < NEARLY_NOISE {
             return self.polish(&there.x, Some(&there.jacobian), rounds);
         }
         let answer = self.problem.answer(&there.x)?;
@@ -239,7 +239,7 @@ impl<'a> Search<'a, '_> {
     /// Levenberg and Marquardt's search, then Gauss and Newton's steps.
     fn search(&mut self, x: &[f64], tolerance: f64) -> Result<Polished> {
         let rough = self.problem.search(x, tolerance)?;
-        self.polish(&rough.x, rough.jacobian.as_ref(), ROUNDS)
+        self.polish(&rough.x, Some(&rough.jacobian), ROUNDS)
     }
 
     /// From variables x, over windows that grow.
@@ -255,28 +255,28 @@ impl<'a> Search<'a, '_> {
     /// From variables x, over the loudest parts.
     fn loudest(&mut self, x: &[f64]) -> Result<Polished> {
         let rough = self.problem.search_loudest(x)?;
-        self.say(format!("{}: the loudest part: {}", self.model, rough.reason));
+        self.say(format!("{}: the loudest part", self.model));
         self.on(rough)
     }
 
     /// On from a rough estimate, over the whole recordings; the noise is estimated on the way.
-    fn on(&mut self, rough: Estimate) -> Result<Polished> {
+    fn on(&mut self, rough: Rough) -> Result<Polished> {
         let (mut x, mut known) = (rough.x, rough.jacobian);
         let mut answer = self.problem.answer(&x)?;
         self.problem.estimate_noise(&answer);
         let mut before = f64::INFINITY;
         while is_poor(&self.problem, &answer) {
             // a model that does not fit has no minimum worth the search, unless single steps lead far
-            let near = self.polish_from((&x, answer), known.as_ref(), 1)?;
+            let near = self.polish_from((&x, answer), Some(&known), 1)?;
             if !is_poor(&self.problem, &near.answer) {
                 self.problem.estimate_noise(&near.answer);
             } else if near.cost > LEADS * before {
                 return Ok(near);
             }
             before = near.cost;
-            (x, known, answer) = (near.x, Some(near.jacobian), near.answer);
+            (x, known, answer) = (near.x, near.jacobian, near.answer);
         }
-        let near = self.polish_from((&x, answer), known.as_ref(), ROUNDS)?;
+        let near = self.polish_from((&x, answer), Some(&known), ROUNDS)?;
         let near = self.joined(near)?;
         let mut best = self.friction(near)?;
         if !best.converged() {
@@ -522,7 +522,7 @@ impl<'a> Search<'a, '_> {
             }
             When::Moved => best.moved && !explained(),
             When::Poor => poor,
-            When::Near => !minimum.converged() && !poor && minimum.cost <= NEAR * rows,
+            When::Near => !minimum.converged() && !poor && minimum.cost <= NEARLY_NOISE * rows,
             When::Unfinished => !minimum.converged() && !poor,
         }
     }
