@@ -18,6 +18,11 @@ pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
 /// Beginning of the sentence about a search that has not converged.
 pub const NO_MINIMUM: &str = "The search did not end at a minimum";
 
+/// Beginning of the sentence about errors of the solver that leave no judgement.
+pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
+/// Beginnings of sentences that forbid to trust the numbers.
+pub const DOUBTS: [&str; 3] = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED];
+
 /// Candidates of the choice.
 pub struct Question<'a> {
     /// Slosh models, those that cannot be told from the best first.
@@ -62,7 +67,7 @@ pub fn words(
     lines.extend(findings.torque.iter().cloned());
     if !fits {
         let mut reasons: Vec<String> =
-            fit.tests.iter().map(reasons).filter(|t| !t.is_empty()).collect();
+            fit.tests.iter().flat_map(|tests| failed(tests, "the torque")).collect();
         reasons.extend(findings.missing.iter().map(Missing::words));
         reasons.extend(findings.doubts.iter().cloned());
         lines.push(format!(
@@ -183,18 +188,16 @@ fn modes(parameters: &BTreeMap<String, Estimated>, budget: &[Effect]) -> Option<
     })
 }
 
-/// Failed tests of the residual, and by how many standard deviations.
-fn reasons(tests: &Tests) -> String {
+/// Names the failed tests of a residual, each with its standard deviations of chance; `input` names what may be correlated with it.
+pub fn failed(tests: &Tests, input: &str) -> Vec<String> {
     let (time, frequency) = (tests.in_time, tests.in_frequency);
     let all = [
-        (tests.whiteness, "its residual is correlated".to_string()),
-        (time.0, format!("it is too large around {:.0} s", time.1)),
+        (tests.whiteness, "it is not white".to_string()),
+        (time.0, format!("it is too large around {:.1} s", time.1)),
         (frequency.0, format!("it is too large around {:.2} Hz", frequency.1)),
-        (tests.torque, "it is correlated with the torque".into()),
-        (tests.torque_squared, "it is correlated with the torque's square".into()),
+        (tests.torque, format!("it is correlated with {input}")),
+        (tests.torque_squared, format!("it is correlated with the square of {input}")),
     ];
-    let failed = all.into_iter().filter(|(deviations, _)| *deviations > innovations::LIMIT);
-    let words: Vec<String> =
-        failed.map(|(deviations, what)| format!("{what} ({deviations:.0} σ)")).collect();
-    words.join(", ")
+    let failed = all.into_iter().filter(|(deviations, _)| *deviations >= innovations::LIMIT);
+    failed.map(|(deviations, what)| format!("{what} ({deviations:.0} σ)")).collect()
 }

@@ -37,7 +37,7 @@ use crate::decomposition::Curvature;
 use crate::estimate::{Estimated, prose};
 use crate::methods::{Identified, Residual};
 use crate::news::News;
-use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
+use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use analysis::innovations::{LIMIT, Tests, crossed};
 use analysis::statistics::{mean, variance};
 
@@ -47,8 +47,6 @@ const CORRELATED: f64 = 0.98;
 const PRIOR_ALONE: f64 = 0.9;
 /// Part of a unit direction from which on an unknown belongs to it.
 const PART: f64 = 1e-2;
-/// How the sentence begins that says that the solver's errors leave no judgement.
-pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
 /// Turns of noise and fit.
 const TURNS: usize = 4;
 
@@ -491,30 +489,18 @@ fn say(
 }
 
 fn fit_in_words(outputs: &[Output]) -> String {
-    let failed = |o: &&Output| !o.passed();
-    let worst = outputs.iter().filter(failed).max_by(|a, b| {
+    let is_bad = |o: &&Output| !o.passed();
+    let worst = outputs.iter().filter(is_bad).max_by(|a, b| {
         a.tests.worst().max(a.mean.abs()).total_cmp(&b.tests.worst().max(b.mean.abs()))
     });
     let Some(o) = worst else {
         return "The model fits: the residual of every output is noise.".into();
     };
-    let t = &o.tests;
-    let mut why = Vec::new();
-    for (value, what) in [
-        (o.mean.abs(), "its mean is not 0"),
-        (t.whiteness, "it is not white"),
-        (t.in_frequency.0, "some frequencies stand out"),
-        (t.torque, "it follows an input"),
-        (t.torque_squared, "it follows an input's square"),
-    ] {
-        if value >= LIMIT {
-            why.push(format!("{what} ({value:.0} standard deviations of chance)"));
-        }
+    let mut why = failed(&o.tests, "an input");
+    if o.mean.abs() >= LIMIT {
+        why.push(format!("its mean is not 0 ({:.0} σ)", o.mean.abs()));
     }
-    if t.in_time.0 >= LIMIT {
-        why.push(format!("it is larger from t = {:.1} s ({:.0})", t.in_time.1, t.in_time.0));
-    }
-    let count = outputs.iter().filter(failed).count();
+    let count = outputs.iter().filter(is_bad).count();
     format!(
         "{DOES_NOT_FIT}: the residual of {count} of {} outputs is not noise; {} of {}: {}. No interval is to be trusted.",
         outputs.len(),

@@ -1,13 +1,12 @@
 //! One self-contained page on the identification of any FMU.
 
-use maud::{DOCTYPE, PreEscaped, html};
+use maud::html;
 use report::svg::{Chart, Style};
 
-use super::{Identification, NOT_JUDGED, Output};
+use super::{Identification, Output};
 use crate::estimate::{Estimated, prose};
 use crate::methods::Residual;
-use crate::methods::page::{STYLE, axis_chart, digits, series, table};
-use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
+use crate::methods::page::{axis_chart, digits, drawn, page, series, table};
 
 /// Points of a curve.
 const POINTS: usize = 700;
@@ -33,43 +32,20 @@ pub fn of(found: &Identification) -> String {
     let pairs = pairs.iter().map(|(j, i)| {
         vec![names[*j].clone(), names[*i].clone(), format!("{:+.3}", matrix[*i][*j])]
     });
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width,initial-scale=1";
-                title { "Identification" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { "Identification" }
-                @for line in &found.verdict {
-                    @let doubt = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED].iter().any(|words| line.starts_with(words));
-                    p class=[doubt.then_some("doubt")] { (line) }
-                }
-                h2 { "Parameters" }
-                (table(head, rows))
-                h2 { "Outputs" }
-                p { "Noise of a row, how much of the output the model explains, and the worst test of the residual in standard \
-                     deviations of chance; 5 is the limit." }
-                (table(["output", "rows", "noise", "fit, %", "worst test"], outputs))
-                @for (residual, output) in found.residuals.iter().zip(&found.details.outputs) {
-                    @for chart in charts(residual, output) {
-                        div class="scroll" { (PreEscaped(chart.svg())) }
-                    }
-                }
-                h2 { "Correlations above 0.5" }
-                (table(["", "", "correlation"], pairs))
-                h2 { "What was done" }
-                details {
-                    summary { (found.done.len()) " steps" }
-                    ol { @for line in &found.done { li { (line) } } }
-                }
-            }
+    let body = html! {
+        h2 { "Parameters" }
+        (table(head, rows))
+        h2 { "Outputs" }
+        p { "Noise of a row, how much of the output the model explains, and the worst test of the residual in standard \
+             deviations of chance; 5 is the limit." }
+        (table(["output", "rows", "noise", "fit, %", "worst test"], outputs))
+        @for (residual, output) in found.residuals.iter().zip(&found.details.outputs) {
+            @for chart in charts(residual, output) { (drawn(&chart)) }
         }
+        h2 { "Correlations above 0.5" }
+        (table(["", "", "correlation"], pairs))
     };
-    page.into_string()
+    page(found, &html! {}, &body)
 }
 
 fn row((name, p): (&String, &Estimated)) -> Vec<String> {

@@ -5,12 +5,12 @@ use analysis::welch::{Segments, Spectra};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use report::svg::{Axis, Chart, Series, Style};
 
-use super::Residual;
 use super::identification::Identification;
+use super::{Identified, Residual};
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
 use crate::estimate::{Estimated, prose};
-use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
+use crate::verdict::DOUBTS;
 
 /// Points of a curve: more than a screen has pixels are not seen.
 const POINTS: usize = 700;
@@ -18,7 +18,7 @@ const POINTS: usize = 700;
 const STRETCH: f64 = 8.0;
 
 /// Style sheet of every page about an identification.
-pub(crate) const STYLE: &str = "
+const STYLE: &str = "
 :root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--warn:#fde8d7}
 @media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--paper:#16171a;--soft:#a0a0a8;--rule:#3a3b40;--a:#6cb1ff;--b:#ff9a5c;--warn:#4a2a12}}
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:62rem;margin:2rem auto;padding:0 1rem}
@@ -36,6 +36,31 @@ details{margin:.6rem 0}summary{cursor:pointer}
 
 /// The page.
 pub fn of(found: &Identification) -> String {
+    let fit = &found.details.fit;
+    let first = html! {
+        @if found.fits == Some(true) && found.converged {
+            p {
+                (format!("The model {} with {} friction fits: its residual is the gyro's noise, {:.2e} rad/s a row.",
+                    fit.model, fit.friction, fit.noise_white))
+            }
+        }
+    };
+    let body = html! {
+        (parameters(found))
+        @for signals in &found.residuals {
+            h2 { (signals.name) }
+            @for chart in [envelope(signals), stretch(signals), spectrum(signals, fit.noise_white)] { (drawn(&chart)) }
+        }
+        (models(&found.details.models))
+        (correlations(found))
+        (budget(found))
+    };
+    page(found, &first, &body)
+}
+
+/// Returns a page: a first paragraph, the verdict, the body, and what was done.
+pub(crate) fn page<D>(found: &Identified<D>, first: &Markup, body: &Markup) -> String {
+    let is_doubt = |line: &str| DOUBTS.iter().any(|words| line.starts_with(words));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -47,18 +72,9 @@ pub fn of(found: &Identification) -> String {
             }
             body {
                 h1 { "Identification" }
-                (verdict(found))
-                (parameters(found))
-                @for signals in &found.residuals {
-                    h2 { (signals.name) }
-                    // on a narrow screen a chart scrolls, as a table does, instead of having letters that nobody can read
-                    @for chart in [envelope(signals), stretch(signals), spectrum(signals, found.details.fit.noise_white)] {
-                        div class="scroll" { (PreEscaped(chart.svg())) }
-                    }
-                }
-                (models(&found.details.models))
-                (correlations(found))
-                (budget(found))
+                (first)
+                @for line in &found.verdict { p class=[is_doubt(line).then_some("doubt")] { (line) } }
+                (body)
                 h2 { "What was done" }
                 details {
                     summary { (found.done.len()) " steps" }
@@ -70,20 +86,9 @@ pub fn of(found: &Identification) -> String {
     page.into_string()
 }
 
-fn verdict(found: &Identification) -> Markup {
-    let fit = &found.details.fit;
-    html! {
-        @if found.fits == Some(true) && found.converged {
-            p {
-                (format!("The model {} with {} friction fits: its residual is the gyro's noise, {:.2e} rad/s a row.",
-                    fit.model, fit.friction, fit.noise_white))
-            }
-        }
-        @for line in &found.verdict {
-            @let doubt = [DOES_NOT_FIT, NO_MINIMUM].iter().any(|words| line.starts_with(words));
-            p class=[doubt.then_some("doubt")] { (line) }
-        }
-    }
+/// A chart that scrolls on a narrow screen, as a table does: shrunk, its letters could not be read.
+pub(crate) fn drawn(chart: &Chart) -> Markup {
+    html! { div class="scroll" { (PreEscaped(chart.svg())) } }
 }
 
 /// With as many digits as the standard deviation has a meaning for; what is small, with a power of ten.
