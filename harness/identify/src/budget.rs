@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::Result;
+use anyhow::{Result, bail, ensure};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -39,7 +39,7 @@ pub struct Effect {
 const STEP: f64 = 5e-6;
 /// Relative error for which [`relative_slope`] seeks the minimum anew.
 const SIZE: f64 = 1e-3;
-/// Rounds of [`refit`] and [`modes`].
+/// Most steps of [`settled`].
 const ROUNDS: usize = 5;
 /// What a round is taken to leave of the error before it, at least.
 const LEAVES: f64 = 0.3;
@@ -128,26 +128,9 @@ fn refit(
 ) -> Result<(DVector<f64>, DVector<f64>)> {
     let covariance = problem.covariance(jacobian)?;
     let base = problem.stacked(answer, x);
-    let off = |there: &[f64]| {
-        DVector::from_iterator(x.len(), there.iter().zip(x).map(|(there, x)| there - x))
-    };
     let refitted = with_error(problem, name, size, |other| {
-        let mut there = same_motion(problem, x, name, 1.0 + size).unwrap_or_else(|| x.to_vec());
-        let mut last = f64::INFINITY;
-        for _ in 0..ROUNDS {
-            let change = other.stacked(&other.answer(&there)?, &there) - &base;
-            let step = -(&covariance.x * jacobian.tr_mul(&change));
-            let explained = change - jacobian * off(&there);
-            there.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
-            let length = (jacobian * &step).norm();
-            anyhow::ensure!(length.is_finite() && length <= 2.0 * last, "does not settle");
-            let next = if last.is_finite() { length * (length / last).max(LEAVES) } else { length };
-            last = length;
-            if next < SETTLED {
-                return Ok((explained, off(&there)));
-            }
-        }
-        anyhow::bail!("does not settle")
+        let there = same_motion(problem, x, name, 1.0 + size).unwrap_or_else(|| x.to_vec());
+        settled(other, (x, &base), (jacobian, &covariance), there)
     });
     if refitted.is_ok() {
         return refitted;
@@ -157,6 +140,37 @@ fn refit(
         let moved = -(&covariance.x * jacobian.tr_mul(&change));
         Ok((change, moved))
     })
+}
+
+/// Seeks the minimum of another problem from `there` by Gauss–Newton steps with the sensitivities of the problem at x, where the
+/// stacked innovations are `base`. Returns the change of the innovations that no step explains, and how far the minimum is from x.
+///
+/// # Errors
+/// If the steps do not settle, or the FMU refuses to run.
+fn settled(
+    other: &Problem,
+    (x, base): (&[f64], &DVector<f64>),
+    (jacobian, covariance): (&DMatrix<f64>, &Covariance),
+    mut there: Vec<f64>,
+) -> Result<(DVector<f64>, DVector<f64>)> {
+    let off = |there: &[f64]| {
+        DVector::from_iterator(x.len(), there.iter().zip(x).map(|(there, x)| there - x))
+    };
+    let mut last = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let change = other.stacked(&other.answer(&there)?, &there) - base;
+        let step = -(&covariance.x * jacobian.tr_mul(&change));
+        let explained = change - jacobian * off(&there);
+        there.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
+        let length = (jacobian * &step).norm();
+        ensure!(length.is_finite() && length <= 2.0 * last, "the steps do not settle");
+        let next = if last.is_finite() { length * (length / last).max(LEAVES) } else { length };
+        last = length;
+        if next < SETTLED {
+            return Ok((explained, off(&there)));
+        }
+    }
+    bail!("the steps do not settle")
 }
 
 /// The variables of the bench that moves the same though what is not estimated is `factor` times as large:
@@ -269,9 +283,9 @@ pub fn percent(part: f64) -> String {
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// The change of x when the model is fitted anew with four modes, by Gauss and Newton's steps with the Jacobian that there is.
-/// One step would not do: what of the innovations' change is of second order looks like a large error
-/// in weak directions, friction's. `None` if they do not settle.
+/// Returns the change of x when the model is fitted anew with four modes. `None` if the steps do not settle.
+/// One step would not do: what of the innovations' change is of second order looks like a large error in weak directions,
+/// friction's.
 fn modes(
     problem: &Problem,
     (x, answer): (&[f64], &Answer),
@@ -284,23 +298,8 @@ fn modes(
     let base = problem.stacked(answer, x);
     let mut other = problem.clone();
     other.setup.settings.push(("slosh.modes".into(), "4".into()));
-    let (mut there, mut last) = (x.to_vec(), f64::INFINITY);
-    for _ in 0..ROUNDS {
-        let answer = other.answer(&there).ok()?;
-        let change = other.stacked(&answer, &there) - &base;
-        let step = -(&covariance.x * jacobian.tr_mul(&change));
-        there.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
-        let length = (jacobian * &step).norm();
-        if !length.is_finite() || length > 2.0 * last {
-            return None;
-        }
-        let next = if last.is_finite() { length * (length / last).max(LEAVES) } else { length };
-        last = length;
-        if next < SETTLED {
-            return Some(DVector::from_iterator(x.len(), there.iter().zip(x).map(|(a, b)| a - b)));
-        }
-    }
-    None
+    let found = settled(&other, (x, &base), (jacobian, covariance), x.to_vec());
+    found.ok().map(|(_, moved)| moved)
 }
 
 /// Contribution of tolerances to the covariance of x.
