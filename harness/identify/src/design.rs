@@ -248,7 +248,7 @@ pub fn within_angle(
         let factor = 0.5 * (within + beyond);
         let found = angle(factor)?;
         *(if found <= limit { &mut within } else { &mut beyond }) = factor;
-        if (NEAR * limit..=limit).contains(&found) {
+        if (ENOUGH * limit..=limit).contains(&found) {
             break;
         }
     }
@@ -259,7 +259,7 @@ pub fn within_angle(
 /// Rounds of [`within_angle`].
 const ROUNDS: usize = 20;
 /// Part of the limit that [`within_angle`] is content with.
-const NEAR: f64 = 0.97;
+const ENOUGH: f64 = 0.97;
 
 /// Geometric mean of the relative standard deviations: what one plan tells against another. An unknown that is expected to be 0,
 /// a delay or a bias, has no relative deviation and does not count.

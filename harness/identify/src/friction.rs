@@ -42,9 +42,9 @@ const BENT: f64 = 0.05;
 /// Sum of squares above the least at the ends of the 95 % interval of one unknown: 1.96².
 const LIMIT: f64 = 3.8415;
 /// The same that still counts for the covariance: three standard deviations.
-const NEAR: f64 = 9.0;
+const COUNTED: f64 = 9.0;
 /// The same beyond which no other noise makes a minimum of it.
-const FAR: f64 = 30.0;
+const EXCLUDED: f64 = 30.0;
 /// By how much less the sum of squares must grow from one speed to the next grid speed for it to be no wall.
 const FLAT: f64 = 1.0;
 /// Longest extrapolation beyond the last point, over the way to that from the one before.
@@ -164,12 +164,12 @@ impl<'a> Loudest<'a> {
         Some(Loudest { problem, cost, jacobian })
     }
 
-    /// The ω_s of x, where the part alone has more than [`FAR`] against it.
+    /// The ω_s of x, where the part alone has more than [`EXCLUDED`] against it.
     fn refutes(&self, x: &[f64], indices: Indices) -> Option<Tried> {
         let rest = RARE * x.len() as f64;
-        let found = point(&self.problem, x, &self.jacobian, indices, self.cost + rest + FAR)?;
+        let found = point(&self.problem, x, &self.jacobian, indices, self.cost + rest + EXCLUDED)?;
         let more = found.least - self.cost - rest;
-        (more > FAR).then_some(Tried { speed: found.speed, more, x: None })
+        (more > EXCLUDED).then_some(Tried { speed: found.speed, more, x: None })
     }
 }
 
@@ -327,7 +327,8 @@ pub fn profile(
             beyond.sort_by(|a, b| (side * a).total_cmp(&(side * b)));
             for speed in beyond {
                 let furthest = found.iter().map(|p| side * p.speed.ln()).fold(f64::MIN, f64::max);
-                let is_known = |(s, more): &(f64, f64)| (s / speed).ln().abs() < 0.2 && *more > FAR;
+                let is_known =
+                    |(s, more): &(f64, f64)| (s / speed).ln().abs() < 0.2 && *more > EXCLUDED;
                 if open || side * speed.ln() <= furthest || known.iter().any(is_known) {
                     continue;
                 }
@@ -403,7 +404,7 @@ fn outwards(
         from.sort_by(|a, b| way(a).total_cmp(&way(b)));
         let fit = |near: &&Point| {
             let x = foreseen(problem, &near.x, minimum, indices, speed);
-            point(problem, &x, &near.jacobian, indices, minimum.cost + NEAR)
+            point(problem, &x, &near.jacobian, indices, minimum.cost + COUNTED)
         };
         // a sum of squares larger than beyond is that of a search gone astray, and the other neighbour may lead
         let is_astray = |p: &Point| outside.as_ref().is_some_and(|beyond| p.data > beyond.data);
@@ -551,7 +552,7 @@ fn covariance(problem: &Problem, minimum: &Polished, places: &[Place]) -> DMatri
     let n = minimum.x.len();
     let middle = problem.values(&minimum.x);
     let (mut total, mut sum) = (0.0, DMatrix::zeros(n, n));
-    for (k, place) in places.iter().enumerate().filter(|(_, p)| p.above < NEAR) {
+    for (k, place) in places.iter().enumerate().filter(|(_, p)| p.above < COUNTED) {
         // the part of ln ω_s that it stands for
         let (before, after) =
             (&places[k.saturating_sub(1)], &places[(k + 1).min(places.len() - 1)]);
