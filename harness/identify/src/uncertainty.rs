@@ -19,6 +19,8 @@ use crate::unknown::Unknown;
 /// Length of the windows of the sandwich, s; two times the slosh's decay.
 pub const WINDOW: f64 = 50.0;
 
+/// Standard deviation of the friction's asymmetry above which the recordings do not show it.
+pub const ONE_WAY: f64 = 0.3;
 /// Correlation beyond which two unknowns are told apart only if they are precise all the same.
 const CORRELATED: f64 = 0.99;
 /// Relative standard deviation beyond which a correlated unknown is not known by itself.

@@ -5,6 +5,7 @@ use host::description::ModelDescription;
 
 use super::question::{Bias, Free, Question, Triad, real};
 use super::record::Record;
+use crate::unknown::range;
 
 /// What an unknown is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,11 +190,7 @@ fn parameters(
         variable.variability,
         variable.causality
     );
-    let attributes = variable.attributes();
-    let number = |text: &Option<String>, otherwise: f64| {
-        text.as_ref().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
-    };
-    let own = (number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY));
+    let own: (f64, f64) = range(variable).into();
     let (low, high) = free.bounds.unwrap_or(own);
     ensure!(
         own.0 <= low && high <= own.1,

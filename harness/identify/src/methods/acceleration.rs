@@ -38,7 +38,7 @@ use crate::estimate::Estimated;
 use crate::news::News;
 use crate::nominal::{self, Nominal};
 use crate::recording::Recording;
-use crate::uncertainty::{self, Combination, Covariance, Sources, one_way};
+use crate::uncertainty::{self, Combination, Covariance, ONE_WAY, Sources, one_way};
 use crate::unknown::{self, Scale};
 use crate::verdict::DOES_NOT_FIT;
 use analysis::least_squares::{self, Minimum};
@@ -188,8 +188,6 @@ const VAGUE: f64 = 0.3;
 const DRIVING: f64 = 3.0;
 /// Fall of the likelihood's logarithm that ends a 95 % interval, times two.
 const LIMIT: f64 = 3.84;
-/// Standard deviation of the asymmetry beyond which it is not determined.
-const ONE_WAY: f64 = 0.3;
 /// Names of the first unknowns.
 const FIRST: [&str; 6] =
     ["hub.I", "friction.b", "friction.c", "friction.d", "friction.omega_s", "friction.asymmetry"];

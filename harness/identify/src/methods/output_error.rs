@@ -21,13 +21,14 @@ use crate::evidence::{self, ALIKE, DECIDES};
 use crate::fit::{self, Answer, Differences, Polished, Problem, ROUNDS};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
+use crate::minimum::CONVERGED;
 use crate::missing;
 use crate::news::{News, Since};
 use crate::options::Options;
 use crate::plausible;
 use crate::recording::{self, Recording};
 use crate::start::{self, Response};
-use crate::uncertainty::{self, Covariance, Sources};
+use crate::uncertainty::{self, Covariance, ONE_WAY, Sources};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict::{self, Findings};
 
@@ -61,9 +62,6 @@ impl Method for OutputError {
         Some(page::of(found))
     }
 }
-
-/// Newton decrement up to which a search has ended near enough to a minimum: the standard deviations take it in, by an eighth at most.
-const NEAR: f64 = 0.5;
 
 /// Slosh models in the order in which they are fitted.
 const ORDER: [&str; 5] = ["linear", "planar", "spherical", "paraboloid", "frozen"];
@@ -286,7 +284,7 @@ fn finish(
     fit.tests = tests(&problem, &polished.answer);
     fit.poor = is_poor(&problem, &polished.answer);
     fit.noise_white = problem.channels[0].noise.white;
-    fit.converged = polished.decrement < NEAR;
+    fit.converged = polished.decrement < CONVERGED;
     fit.newton_decrement = polished.decrement;
     x.clone_from(&polished.x);
     let e = problem.stacked(&polished.answer, &x);
@@ -441,9 +439,6 @@ fn finish(
         ..Identified::new(details)
     })
 }
-
-/// Standard deviation of the friction's asymmetry beyond which the recordings do not show it.
-const ONE_WAY: f64 = 0.3;
 
 /// A hub that turned one way alone.
 struct OneWay {

@@ -7,7 +7,7 @@
 use analysis::statistics::{deviation, mean, median};
 use nalgebra::{DMatrix, DVector};
 
-use super::{Problem, Rows};
+use super::{FREE, Problem, Rows};
 
 /// Stribeck speeds of the grid over the fastest speed: the first and the last, and how many.
 const GRID: (f64, f64, usize) = (2e-3, 3.0, 14);
@@ -17,8 +17,6 @@ const FOLLOWED: usize = 3;
 const STILL: f64 = 4.0;
 /// …if so many rows in succession are.
 const RUN: usize = 5;
-/// Torque below which nothing drives the hub, over the largest torque.
-const FREE: f64 = 1e-3;
 /// Length of a part in which the hub rests without torque, s. A dry bearing that slips changes the rate within
 /// it by more than the noise.
 const REST: f64 = 0.5;
@@ -118,8 +116,7 @@ impl Problem {
         basins.sort_by(|a, b| cost(*a).total_cmp(&cost(*b)));
         let of_grid = |k: &usize| self.start(grid[*k].0, &grid[*k].1.0, biases);
         let mut starts: Vec<Vec<f64>> = basins.iter().take(FOLLOWED).map(of_grid).collect();
-        if !given.is_empty() {
-            let mut own = starts[0].clone();
+        if let (Some(mut own), false) = (starts.first().cloned(), given.is_empty()) {
             for (place, value) in given {
                 own[*place] = self.scales[*place].variable(self.inside(*place, *value));
             }
