@@ -26,7 +26,7 @@ const NEAR_HALF: f64 = 0.1;
 /// Another behaviour than the one that was fitted.
 #[derive(Clone)]
 pub struct Alternative {
-    /// Which.
+    /// The behaviour.
     pub behaviour: Intersample,
     /// The minimum with it, all unknowns free.
     pub minimum: Polished,
@@ -75,13 +75,13 @@ impl Alternative {
         (x, jacobian)
     }
 
-    /// Whether the rate would come before the torque.
+    /// Returns true if the rate would come before the torque.
     pub fn is_acausal(&self, step: f64) -> bool {
         self.delay.is_some_and(|delay| is_acausal(delay, step))
     }
 }
 
-/// Whether a delay (s, with its standard deviation) is below zero by more than chance and time stamps explain, with rows every
+/// Returns true if a delay (s, with its standard deviation) is below zero by more than chance and time stamps explain, with rows every
 /// `step` seconds.
 pub fn is_acausal((delay, std): (f64, f64), step: f64) -> bool {
     delay < -(ACAUSAL * std).max(SYNCHRONOUS * step)
@@ -95,7 +95,7 @@ pub fn delay(problem: &Problem, x: &[f64], covariance: &Covariance) -> Option<(f
     Some((scale.value(x[index]), std))
 }
 
-/// Whether it matters: where the torque changes a lot from one row to the next.
+/// Returns true if the behaviour matters: the torque changes a lot from one row to the next.
 pub fn matters(recordings: &[Recording]) -> bool {
     let square = |x: f64| x * x;
     let varies = |recording: &Recording| {
@@ -167,7 +167,7 @@ pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Other
     Others { from: minimum.x.clone(), channels: problem.channels.clone(), all }
 }
 
-/// Which of the behaviours fits best: `None` if no other one that is allowed is clearly better.
+/// Returns the behaviour that fits best; `None` if no other allowed one is clearly better.
 pub fn better(cost: f64, step: f64, acausal: bool, others: &[Alternative]) -> Option<&Alternative> {
     others
         .iter()
@@ -269,7 +269,7 @@ pub fn evidence(
     )
 }
 
-/// Whether it is found if the torque is half a row late: no other behaviour explains the recordings as well with a delay
+/// Returns true if a torque that is half a row late would be found: no other behaviour explains the recordings as well with a delay
 /// (`delay` is the fitted one, s) that differs by more than a quarter of a row.
 pub fn is_found(
     (cost, delay): (f64, f64),

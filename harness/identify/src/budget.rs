@@ -21,10 +21,10 @@ use crate::tolerance::{NAMES, Tolerances};
 use crate::uncertainty::Covariance;
 use crate::unknown::Quantity;
 
-/// What an error of something that is not estimated does to the estimates.
+/// Effect of an error of something that is not estimated.
 #[derive(Clone, Debug, Serialize)]
 pub struct Effect {
-    /// What is wrong, and by how much.
+    /// The error and its size, in words.
     pub source: String,
     /// Change of each parameter, SI.
     pub change: BTreeMap<String, f64>,
@@ -41,12 +41,12 @@ const STEP: f64 = 5e-6;
 const SIZE: f64 = 1e-3;
 /// Most steps of [`settled`].
 const ROUNDS: usize = 5;
-/// What a round is taken to leave of the error before it, at least.
+/// Least part of an error that a step is assumed to leave.
 const LEAVES: f64 = 0.3;
 /// Step, in standard deviations, that is not taken any more.
 const SETTLED: f64 = 0.1;
 
-/// What an error of something that is known within a tolerance does.
+/// Effect of an error of something that is known within a tolerance.
 pub struct Slope {
     /// Its name.
     name: &'static str,
@@ -58,7 +58,7 @@ pub struct Slope {
     pub moved: DVector<f64>,
 }
 
-/// Of all tolerances that count, at a minimum.
+/// Returns the effects of all tolerances that count, at a minimum.
 ///
 /// # Errors
 /// If the FMU refuses to run.
@@ -250,7 +250,7 @@ fn same_motion(problem: &Problem, x: &[f64], name: &str, factor: f64) -> Option<
     Some(there)
 }
 
-/// What may be wrong in a problem, the tolerances first, and what that does at the minimum x.
+/// Returns the effects of possible errors at the minimum x, the tolerances first.
 pub fn of(
     problem: &Problem,
     (x, answer): (&[f64], &Answer),

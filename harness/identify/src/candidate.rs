@@ -48,7 +48,7 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// What it is in one line.
+    /// Description in one line.
     pub fn line(&self) -> String {
         format!(
             "{} with {} friction: fit {:.3} %, BIC {:.1}, worst residual test {:.1} standard deviations, {:.0} \
@@ -65,7 +65,7 @@ impl ModelFit {
 
 /// A fitted model with what is needed afterwards.
 pub struct Fitted<'a> {
-    /// What was solved.
+    /// The solved problem.
     pub problem: Problem<'a>,
     /// The minimum.
     pub polished: Polished,

@@ -34,7 +34,7 @@ const FEWEST: usize = 400;
 /// 95 % intervals of d, h and I with the places of these among the unknowns.
 pub struct Intervals(pub [(usize, [f64; 2]); 3]);
 
-/// What is known at the minimum.
+/// Information at the minimum.
 pub struct Minimum<'a> {
     /// Variables of the unknowns.
     pub x: &'a [f64],

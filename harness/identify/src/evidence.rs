@@ -1,4 +1,4 @@
-//! What the information criterion says between models of the same recordings.
+//! Comparison of models of the same recordings by the information criterion.
 
 /// Least difference of the information criterion that decides (Kass and Raftery: very strong).
 pub const DECIDES: f64 = 10.0;

@@ -49,7 +49,7 @@ use crate::uncertainty::{self, Covariance};
 use crate::unknown::{Quantity, Scale, Unknown};
 use analysis::gauss_markov::{FLOOR, Noise, Whitening};
 
-/// By how much a difference moves the answer, in units of the noise's norm of one degree of freedom.
+/// Change of the answer by a difference, in units of the noise's norm of one degree of freedom.
 pub const MOVE: f64 = 0.3;
 /// Drift of a MEMS gyro (the thesis's LSM6DS3), until the recording's own is known. Without it the slow
 /// decay at a recording's start, where the drift is all the noise, would draw the friction after it.
@@ -71,7 +71,7 @@ pub const ROUNDS: usize = 6;
 /// A change of one variable there by more than this of one here is no valley's bend.
 const SHARPEST: f64 = 1e3;
 
-/// What is compared with the FMU's answer.
+/// A measured signal of the hub.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signal {
     /// Rate of the hub by the gyro.
@@ -85,14 +85,13 @@ pub enum Signal {
 pub struct Channel {
     /// Number of the recording.
     pub recording: usize,
-    /// Which of its signals.
+    /// The signal.
     pub signal: Signal,
     /// Its noise.
     pub noise: Noise,
 }
 
-/// Whether the noise of channels is no longer what it was, by so much that the minimum is another one: the white noise, or a drift that
-/// counts.
+/// Returns true if the noise of channels has changed so much that the minimum moves: the white noise, or a drift that counts.
 pub fn is_other(before: &[Channel], now: &[Channel]) -> bool {
     let differs = |a: f64, b: f64, by: f64| (a / b).ln().abs() > by;
     before.iter().map(|c| c.noise).zip(now.iter().map(|c| c.noise)).any(|(a, b)| {
@@ -106,15 +105,15 @@ pub fn is_other(before: &[Channel], now: &[Channel]) -> bool {
 pub struct Problem<'a> {
     /// The FMU.
     pub fmu: &'a Fmu,
-    /// How it is set up.
+    /// Settings and drive of the FMU.
     pub setup: Setup,
     /// The recordings, fitted together.
     pub recordings: &'a [Recording],
-    /// What is estimated.
+    /// Unknowns.
     pub unknowns: Vec<Unknown>,
-    /// What is fitted.
+    /// Measured signals, with their noise.
     pub channels: Vec<Channel>,
-    /// How sensitivities are differenced.
+    /// Kind of the differences for sensitivities.
     pub differences: Differences,
     /// The bench as it is set up; `None`: the FMU refuses its settings.
     pub bench: Option<Bench>,
@@ -122,7 +121,7 @@ pub struct Problem<'a> {
     pub driven: Arc<AtomicUsize>,
 }
 
-/// What an answer looks like for given unknowns.
+/// The FMU's answer for given unknowns.
 #[derive(Clone)]
 pub struct Answer {
     /// The FMU's motion, for each recording.
@@ -160,13 +159,13 @@ pub struct Polished {
 }
 
 impl Polished {
-    /// Whether it is a minimum.
+    /// Returns true if it is a minimum.
     pub fn converged(&self) -> bool {
         self.decrement < MINIMUM
     }
 }
 
-/// What is known of sensitivities before Gauss and Newton's steps.
+/// Sensitivities known before Gauss–Newton steps.
 #[derive(Clone, Copy, Debug)]
 pub enum Known<'j> {
     /// Nothing.
@@ -177,18 +176,18 @@ pub enum Known<'j> {
     Sensitivities(&'j DMatrix<f64>),
 }
 
-/// When Gauss and Newton's steps end.
+/// Conditions that end Gauss–Newton steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Until {
     /// Newton decrement that is small enough.
     pub decrement: f64,
-    /// After so many sets of sensitivities.
+    /// Most sets of sensitivities.
     pub rounds: usize,
-    /// Where the sum of squares cannot come below this one.
+    /// Sum of squares that counts: steps end if they cannot come below it.
     pub cost: f64,
-    /// Newton decrement up to which that is believed.
+    /// Newton decrement up to which that forecast is trusted.
     pub trust: f64,
-    /// Where a step has been taken and left the sum of squares beyond this one.
+    /// Sum of squares above which steps end after the first one.
     pub far: f64,
 }
 
@@ -204,18 +203,18 @@ impl Until {
         Until { decrement, rounds, cost, trust: f64::INFINITY, far: f64::INFINITY }
     }
 
-    /// Whether the sum of squares will not come below the one that counts.
+    /// Returns true if the sum of squares will not come below the one that counts.
     pub fn is_hopeless(&self, cost: f64, decrement: f64) -> bool {
         decrement < self.trust && Until::foreseen(cost, decrement) > self.cost
     }
 
-    /// What steps leave of a sum of squares at least: to second order it falls by the decrement's square, and here by half as much again.
+    /// Returns the least sum of squares that steps can leave. To second order it falls by the decrement's square; half as much again is allowed for.
     pub fn foreseen(cost: f64, decrement: f64) -> f64 {
         cost - 1.5 * decrement * decrement
     }
 }
 
-/// How sensitivities are differenced.
+/// Kinds of differences for sensitivities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Differences {
     /// (f(x + h) − f(x))/h.
@@ -358,7 +357,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Which rows of a channel hold new values; `None`: all.
+    /// Returns the rows of a channel that hold new values; `None`: all.
     fn fresh(&self, channel: &Channel) -> Option<&'a [bool]> {
         match channel.signal {
             Signal::Rate => self.recordings[channel.recording].fresh.as_deref(),
@@ -640,7 +639,7 @@ impl<'a> Problem<'a> {
         there
     }
 
-    /// How a small change of `step` changes where it leads from x, ∂[`Problem::moved`]/∂step, in the variables `free`.
+    /// Returns ∂[`Problem::moved`]/∂step at x and this step, in the variables `free`.
     pub fn turn(&self, x: &[f64], step: &[f64], free: &[usize], fastest: f64) -> DMatrix<f64> {
         let small = 1e-5;
         let column = |k: usize| {
@@ -700,7 +699,7 @@ impl<'a> Problem<'a> {
         Ok(all)
     }
 
-    /// What is known only vaguely of unknowns beforehand adds to the sum of squares.
+    /// Returns the part of the sum of squares that vague priors make.
     pub fn vague_cost(&self, x: &[f64]) -> f64 {
         let vague = (0..x.len()).filter(|&i| self.unknowns[i].vague);
         vague.map(|i| (self.prior_slope(i) * (x[i] - self.prior_middle(i))).powi(2)).sum()
@@ -1066,17 +1065,17 @@ pub fn fastest(motion: &[Motion]) -> f64 {
 pub const WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 /// Length of the loudest part, s: a slow sweep's resonance, some times over.
 const LOUDEST: f64 = 300.0;
-/// What a model takes to forget how it began, s: some five times the slosh's time constant 1/(2π · 2.4 Hz · 0.003) = 22 s.
+/// Time in which a model forgets its initial state, s: some five times the slosh's time constant 1/(2π · 2.4 Hz · 0.003) = 22 s.
 const RUN_IN: f64 = 100.0;
 /// All of the recordings at once.
 const WHOLE: [f64; 1] = [1.0];
-/// By how much the noise of a window is taken for larger than the gyro's.
+/// Assumed noise of a window over the gyro's.
 const NOISE_FACTOR: f64 = 10.0;
 /// Mean square of a window's residual over that of the one before beyond which it is reached in smaller steps.
 const JUMP: f64 = 3.0;
 /// Shortest step from one window to the next, as a fraction of the recordings.
 const SHORTEST: f64 = 0.05;
-/// How far a parameter may be from its start in a window, relatively.
+/// Standard deviation of a parameter about its start in a window, relative.
 const PRIOR_WIDTH: f64 = 0.5;
 
 #[cfg(test)]

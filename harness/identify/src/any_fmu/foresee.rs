@@ -21,7 +21,7 @@ pub struct Bound {
     pub value: f64,
     /// The least standard deviation of an unbiased estimate; NaN: none can be made.
     pub std: f64,
-    /// Whether the errors of the solver decide it: neither bound is known then.
+    /// True if the errors of the solver decide it: neither bound is known then.
     pub decided_by_solver: bool,
     /// The unknowns that it cannot be told apart from.
     pub inseparable_from: Vec<String>,

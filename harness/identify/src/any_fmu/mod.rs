@@ -61,7 +61,7 @@ pub struct Details {
     pub cannot_tell_apart: Vec<Inseparable>,
     /// Estimates that the errors of the solver decide: they have no interval.
     pub decided_by_solver: Vec<String>,
-    /// By how much the errors of the solver move each estimate, in its unit.
+    /// Shift of each estimate by the errors of the solver, in its unit.
     pub solver_shift: BTreeMap<String, f64>,
     /// Estimates at a bound.
     pub at_bound: Vec<String>,
@@ -191,7 +191,7 @@ pub fn identify(
     Ok(found)
 }
 
-/// What is known of the unknowns at a point, and what is not.
+/// Information about the unknowns at a point.
 pub(crate) struct Knowledge {
     /// The covariance of all unknowns; rows of those at a bound are 0, and what is not resolved has an infinite variance.
     pub covariance: DMatrix<f64>,
@@ -249,7 +249,7 @@ pub(crate) fn knowledge(
     Ok(Knowledge { covariance, inseparable, decided_by_solver })
 }
 
-/// What makes the solver's errors smaller.
+/// Advice on how to make the solver's errors smaller.
 fn remedy(problem: &Problem, solver: &SolverError) -> String {
     let finer = "a smaller --solver-tolerance makes them smaller";
     match problem.model {

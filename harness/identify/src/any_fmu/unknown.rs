@@ -1,4 +1,4 @@
-//! Which unknowns a question makes, with names, units, bounds and what is known of them beforehand.
+//! Unknowns of a question, with names, units, bounds and priors.
 
 use anyhow::{Context, Result, ensure};
 use host::description::ModelDescription;
@@ -7,7 +7,7 @@ use super::question::{Bias, Free, Question, Triad, real};
 use super::record::Record;
 use crate::unknown::range;
 
-/// What an unknown is.
+/// Kinds of unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// A Real of the FMU, of one recording or of all.
@@ -38,17 +38,17 @@ pub enum What {
 pub struct Unknown {
     /// Its name in the result.
     pub name: String,
-    /// What it is.
+    /// Its kind.
     pub what: What,
     /// Its unit.
     pub unit: String,
-    /// Where the search begins.
+    /// Start of the search.
     pub start: f64,
     /// Bounds.
     pub bounds: (f64, f64),
     /// Mean and standard deviation beforehand.
     pub prior: Option<(f64, f64)>,
-    /// How far from the start it may well be.
+    /// Plausible distance from the start.
     pub reach: f64,
 }
 
@@ -119,7 +119,7 @@ impl Question {
         Ok(unknowns)
     }
 
-    /// Where an output stands in the list.
+    /// Returns the place of an output in the list.
     fn output(&self, name: &str) -> Result<usize> {
         let found = self.outputs.iter().position(|output| output == name);
         found.with_context(|| {
