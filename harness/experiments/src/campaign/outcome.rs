@@ -183,7 +183,9 @@ fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
     let degrees = |rate: f64| rate.to_degrees();
     if drift > NOTABLE_MEAN * deviation {
         return Some(format!(
-            "the mean of {name} drifts by {:.3} deg/s rms between eighths of the record, {:.0} % of its deviation. Only the mean              of the whole record, {:.3} deg/s, is removed as the gyro's bias, and the drift counts as motion in peak_rate and              in the cross-axis figures",
+            "the mean of {name} drifts by {:.3} deg/s rms between eighths of the record, {:.0} % of its deviation. Only the mean \
+             of the whole record, {:.3} deg/s, is removed as the gyro's bias, and the drift counts as motion in peak_rate and \
+             in the cross-axis figures",
             degrees(drift),
             100.0 * drift / deviation,
             degrees(mean)
