@@ -223,18 +223,24 @@ impl Layout {
         // the separator by which most lines are values, at least two in each
         let mut fields = Vec::new();
         let mut best = (0, SEPARATORS[2], 0);
-        for separator in SEPARATORS {
-            let mut widths: Vec<usize> = Vec::new();
-            for (_, line) in &sample {
-                separator.split(line, &mut fields);
-                if fields.len() > 1 && is_data(&fields, separator) {
-                    widths.push(fields.len());
+        // a table of times alone has one column
+        for (least, separators) in [(2, &SEPARATORS[..]), (1, &SEPARATORS[2..3])] {
+            for &separator in separators {
+                let mut widths: Vec<usize> = Vec::new();
+                for (_, line) in &sample {
+                    separator.split(line, &mut fields);
+                    if fields.len() >= least && is_data(&fields, separator) {
+                        widths.push(fields.len());
+                    }
+                }
+                let count = |width: usize| widths.iter().filter(|w| **w == width).count();
+                let width = widths.iter().copied().max_by_key(|width| count(*width)).unwrap_or(0);
+                if count(width) > best.0 {
+                    best = (count(width), separator, width);
                 }
             }
-            let count = |width: usize| widths.iter().filter(|w| **w == width).count();
-            let width = widths.iter().copied().max_by_key(|width| count(*width)).unwrap_or(0);
-            if count(width) > best.0 {
-                best = (count(width), separator, width);
+            if best.0 > 0 {
+                break;
             }
         }
         let (found, separator, width) = best;

@@ -57,6 +57,23 @@ const TIME: [f64; 3] = [0.0, 0.02, 0.04];
 const TORQUE: [f64; 3] = [0.1, 0.25, -0.3];
 const RATE: [f64; 3] = [0.0, std::f64::consts::PI / 180.0, -1.5 * std::f64::consts::PI / 180.0];
 
+/// A plan for an FMU without inputs has times alone.
+#[test]
+fn a_table_of_times_alone_is_read() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.csv");
+    for text in ["time\n0\n0.02\n0.04\n", "time [s]\n0\n20e-3\n0.04", "\"time\"\n0\n0.02\n0.04\n"] {
+        std::fs::write(&path, text).unwrap();
+        let wanted = Wanted { signals: &[], columns: &columns("") };
+        let mut said = Vec::new();
+        let table = read(&path, &wanted, &mut |line| said.push(line)).unwrap();
+        assert_eq!(column(&table, "time"), TIME, "{text}");
+        assert!(said.iter().all(|line| !line.contains("separated")), "{said:?}");
+    }
+    let error = read_text("csv", b"time\n0\n0.02\n", "").unwrap_err();
+    assert!(error.contains("no column omega") && error.contains("columns in it: time"), "{error}");
+}
+
 #[test]
 fn any_separator_decimal_mark_comment_and_unit_gives_the_same_numbers() {
     let renamed = "time=t,tau_cmd=T_cmd,omega=gyro z";
