@@ -254,15 +254,20 @@ fn remedy(problem: &Problem, solver: &SolverError) -> String {
     let finer = "a smaller --solver-tolerance makes them smaller";
     match problem.model {
         Model::Host { .. } => "a smaller tolerance after --exchange makes them smaller".into(),
-        Model::Own(_) if problem.model.offers_exchange() => {
-            let also = if solver.heeds_tolerance { format!("; {finer} too") } else { String::new() };
+        Model::Own(_) if problem.setup.can_exchange(problem.model) => {
+            let also =
+                if solver.heeds_tolerance { format!("; {finer} too") } else { String::new() };
             format!("with --exchange the host integrates this FMU, with errors of 1e-8{also}")
         }
         Model::Own(_) if solver.heeds_tolerance => finer.into(),
         Model::Own(_) => {
-            "the FMU ignores the tolerance that a host gives: export it with a finer solver, or for Model Exchange and use \
-             --exchange"
-                .into()
+            let exchange = match problem.model.offers_exchange() {
+                true => "--exchange is of no use, because an output follows the slope of an input",
+                false => "or for Model Exchange and use --exchange",
+            };
+            format!(
+                "the FMU ignores the tolerance that a host gives: export it with a finer solver, {exchange}"
+            )
         }
     }
 }

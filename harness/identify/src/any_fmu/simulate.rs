@@ -93,6 +93,8 @@ const FINER: f64 = 1e-2;
 /// Parts of the way from row to row over which an input that follows a line is held, where the FMU takes no slopes. Held at
 /// the middle of each part, it differs from its line by a sawtooth of an eighth of its change from row to row, without a delay.
 const HELD_STEPS: usize = 4;
+/// Steps whose effects of an input's slope are compared, s.
+const PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 /// The finest tolerance of the host's solver.
 const FINEST: f64 = 1e-13;
 
@@ -201,8 +203,7 @@ impl Setup {
             setup(Setup { tolerance: Some(tolerance), ..self.clone() }),
             setup(Setup { substeps: 2 * self.substeps, ..self.clone() }),
         ];
-        if model.offers_exchange()
-            && !self.slopes_act(fmu).is_ok_and(|act| act)
+        if self.can_exchange(model)
             && let Ok(model) = Model::open(fmu.path(), Solver::Host(FINE))
         {
             let setup = Setup { tolerance: Some(FINE), most_steps: FEW_STEPS, ..self.clone() };
@@ -211,31 +212,62 @@ impl Setup {
         all
     }
 
-    /// Whether the slope of an input changes an output at once, as the slope of the wheels' angular momentum is a torque on a
-    /// spacecraft. Model Exchange hands over no slopes: the host's solver would integrate another motion.
+    /// Returns true if the FMU steps itself, and the host's solver could integrate the same motion.
+    pub fn can_exchange(&self, model: &Model) -> bool {
+        model.offers_exchange() && !self.slopes_act(model.fmu()).is_ok_and(|act| act)
+    }
+
+    /// Returns true if the slope of an input changes an output at once, as the slope of the wheels' angular momentum is a torque
+    /// on a spacecraft. Model Exchange hands over no slopes: the host's solver would integrate another motion.
     fn slopes_act(&self, fmu: &Fmu) -> Result<bool> {
         let description = fmu.description();
-        let mut instance = rest::instantiate(fmu, "identify")?;
-        for setting in self.settings.iter().filter(|setting| setting.recording.is_none()) {
-            instance.set(&setting.name, &setting.value)?;
-        }
-        instance.enter_initialization_mode(self.tolerance, 0.0, None)?;
-        instance.exit_initialization_mode()?;
         if !interpolates(description) {
             return Ok(false);
         }
         let outputs = description.variables.iter();
         let outputs = outputs.filter(|v| v.causality == "output" && v.kind() == Type::Real);
         let outputs: Vec<u32> = outputs.map(|v| v.reference).collect();
-        let mut read = |slope: f64| -> Result<Vec<f64>> {
-            let slopes: Vec<f64> =
-                self.held.iter().map(|held| if *held { 0.0 } else { slope }).collect();
-            instance.set_slopes(&self.inputs, &slopes)?;
+        let reads = |instance: &mut Instance| -> Result<Vec<f64>> {
             let mut values = vec![0.0; outputs.len()];
             instance.get_real(&outputs, &mut values)?;
             Ok(values)
         };
-        Ok(read(0.0)? != read(1.0)?)
+        let slopes = |slope: f64| -> Vec<f64> {
+            self.held.iter().map(|held| if *held { 0.0 } else { slope }).collect()
+        };
+        let begun = || -> Result<Instance> {
+            let mut instance = rest::instantiate(fmu, "identify")?;
+            for setting in self.settings.iter().filter(|setting| setting.recording.is_none()) {
+                instance.set(&setting.name, &setting.value)?;
+            }
+            instance.enter_initialization_mode(self.tolerance, 0.0, None)?;
+            instance.exit_initialization_mode()?;
+            Ok(instance)
+        };
+        let mut instance = begun()?;
+        instance.set_slopes(&self.inputs, &slopes(0.0))?;
+        let without = reads(&mut instance)?;
+        instance.set_slopes(&self.inputs, &slopes(1.0))?;
+        if reads(&mut instance)? != without {
+            return Ok(true);
+        }
+        // an FMU 3.0 hears of slopes within steps alone: what acts at once does not shrink with the step
+        let after = |step: f64, slope: f64| -> Result<Vec<f64>> {
+            let mut instance = begun()?;
+            let mut values = vec![0.0; self.inputs.len()];
+            instance.get_real(&self.inputs, &mut values)?;
+            instance.set_real(&self.inputs, &values)?;
+            instance.do_step_along(0.0, step, &self.inputs, &values, &slopes(slope))?;
+            reads(&mut instance)
+        };
+        let change = |step: f64| -> Result<Vec<f64>> {
+            let pairs = after(step, 1.0)?.into_iter().zip(after(step, 0.0)?);
+            Ok(pairs.map(|(with, without)| (with - without).abs()).collect())
+        };
+        let [longest, middle, shortest] = PROBES.map(change);
+        let (longest, middle, shortest) = (longest?, middle?, shortest?);
+        let remains = |k: usize| longest[k] > 0.0 && middle[k].min(shortest[k]) > 0.5 * longest[k];
+        Ok((0..outputs.len()).any(remains))
     }
 
     /// The outputs at the rows of the recording of this number.

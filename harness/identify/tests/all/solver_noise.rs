@@ -256,7 +256,12 @@ fn what_is_foreseen_is_refused_where_the_solver_decides_and_is_the_stated_uncert
 /// its own solver, which decided every estimate of a flight with wheels.
 #[test]
 fn the_slope_of_the_wheels_momentum_is_no_error_of_the_solver() {
-    let fmu = pack::packed_model_for_tests(&pack::MODELS[1]);
+    for fmi in [pack::Fmi::V2, pack::Fmi::V3] {
+        wheels(pack::packed_version_for_tests(&pack::MODELS[1], fmi));
+    }
+}
+
+fn wheels(fmu: &std::path::Path) {
     let model = Model::open(fmu, Solver::Own).unwrap();
     let time: Vec<f64> = (0..200).map(|row| 0.1 * f64::from(row)).collect();
     // N.m.s: to and fro
@@ -273,6 +278,8 @@ fn the_slope_of_the_wheels_momentum_is_no_error_of_the_solver() {
         outputs: vec!["omega[3]".into()],
         ..question(Solver::Own)
     };
+    let setup = Setup::new(&question, model.description()).unwrap();
+    assert!(model.offers_exchange() && !setup.can_exchange(&model), "{}", fmu.display());
     let bounds = foresee(&model, &question, &[record], &[1e-5], &mut |_| {}).unwrap();
     assert!(!bounds[0].decided_by_solver && bounds[0].std > 0.0, "{bounds:?}");
 }
