@@ -331,8 +331,19 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
     found.details.decided_by_solver = decided.iter().map(|&j| names[j].clone()).collect();
     let shifts = names.iter().cloned().zip(solver.shift.iter().copied().map(finite));
     found.details.solver_shift = shifts.collect();
-    found.fits = (!fits || decided.is_empty()).then_some(fits);
+    let is_parameter = |unknown: &Unknown| matches!(unknown.what, What::Parameter { .. });
+    // no run with smaller errors differs: the errors are 0, or the FMU heeds none of the means
+    let is_unseen =
+        decided.is_empty() && !solver.is_seen && problem.unknowns.iter().any(is_parameter);
+    let is_unknown = is_unseen && !solver.is_smooth;
+    found.fits = (!fits || decided.is_empty() && !is_unknown).then_some(fits);
     let mut words = match found.fits {
+        None if is_unknown => vec![format!(
+            "{NOT_JUDGED}: the residual of every output is noise, but so may be the solver's errors, whose size is not known. The \
+             outputs are the same with a finer tolerance and with shorter communication steps, and they are not smooth in the \
+             parameters, as those of an adaptive solver. Intervals hold only if these errors are small against the noise. Export the \
+             FMU with a solver that heeds the host's tolerance, or for Model Exchange and use --exchange."
+        )],
         None => vec![format!(
             "{NOT_JUDGED}: the residual of every output is noise, but the errors of the solver decide estimates."
         )],
@@ -346,11 +357,10 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
             remedy(problem, &solver)
         ));
     }
-    let is_parameter = |unknown: &Unknown| matches!(unknown.what, What::Parameter { .. });
-    if decided.is_empty() && !solver.is_seen && problem.unknowns.iter().any(is_parameter) {
+    if is_unseen && solver.is_smooth {
         words.push(
-            "The size of the solver's errors is not known: the outputs are the same with a finer tolerance and with shorter \
-             communication steps. The intervals hold if these errors are small against the noise."
+            "The outputs are the same with a finer tolerance and with shorter communication steps, and smooth in the parameters: \
+             the solver shows no errors of steps that adapt. Errors of fixed steps would not be seen."
                 .into(),
         );
     }
