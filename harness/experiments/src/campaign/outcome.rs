@@ -4,8 +4,8 @@
 use std::borrow::Cow;
 
 use anyhow::{Context, Result, ensure};
+use files::budget;
 use formulas::regime::Regime;
-use host::budget;
 use host::description::{ModelDescription, Value};
 use host::fmu::Instance;
 
