@@ -365,9 +365,8 @@ impl Start {
     }
 }
 
-/// Returns the largest line of a signal between two frequencies, Hz. Rows that are not equally spaced count at the nearest
-/// point of a grid of their mean step, which is near enough below the Nyquist frequency of that step: one transform, whatever
-/// the spacing.
+/// Returns the largest line of a signal between two frequencies, Hz. Each row counts at the nearest point of a grid of the
+/// mean step, so that one transform serves rows of any spacing. Below the Nyquist frequency of that step this is near enough.
 fn largest_line(time: &[f64], weighted: &[f64], low: f64, top: f64) -> Option<f64> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;

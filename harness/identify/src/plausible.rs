@@ -51,8 +51,8 @@ pub fn check_size(found: &Response, nominal: f64, recordings: &[Recording]) -> R
     )
 }
 
-/// Returns the inertia of hub and liquid by least squares of the momentum balance, ∫τ dt = I ω + b θ + c ∫sgn ω dt + L₀,
-/// kg·m²; `None` if it is not positive. Slosh is in the residual.
+/// Returns the inertia of hub and liquid from the momentum balance, kg·m², or `None` if it is not positive. I, b, c and L₀ of
+/// ∫τ dt = I ω + b θ + c ∫sgn ω dt + L₀ are fitted by least squares. Slosh is in the residual.
 fn inertia_by_momentum(recording: &Recording) -> Option<f64> {
     let Recording { time, torque, rate, .. } = recording;
     let noise = recording.rate_noise();

@@ -59,8 +59,8 @@ pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> 
     let work = windows + GRID_POINTS as f64 * lags;
     ensure!(
         work <= budget::PRODUCTS,
-        "the frequency responses of {rows} rows, {step:?} s apart, from {:?} to {:?} Hz take {work:.1e} products (allowed: {:.0e}); \
-         a higher first frequency, a longer step or a shorter run takes less",
+        "the frequency responses of {rows} rows, {step:?} s apart, from {:?} to {:?} Hz take {work:.1e} products (allowed: {:.0e}). \
+         A higher first frequency, a longer step or a shorter run takes less",
         band.0,
         band.1,
         budget::PRODUCTS

@@ -43,7 +43,7 @@ impl Model {
         self.fmu().description()
     }
 
-    /// Whether it steps itself, but the host's solver could.
+    /// Returns true if the FMU steps itself, but also offers Model Exchange.
     pub fn offers_exchange(&self) -> bool {
         matches!(self, Model::Own(fmu) if fmu.description().model_exchange.is_some())
     }
@@ -188,9 +188,9 @@ impl Setup {
         })
     }
 
-    /// The same runs with smaller errors of the solver: with a finer tolerance, with shorter communication steps, and by the host's
-    /// solver, as far as the FMU offers Model Exchange and no output follows an input's slope at once. An FMU may refuse or ignore the
-    /// first two; where the host's solver would take long, it refuses.
+    /// Returns the same runs with smaller errors of the solver: with a finer tolerance, with shorter communication steps, and by the
+    /// host's solver if it can integrate the FMU ([`Setup::can_exchange`]). An FMU may refuse or ignore the first two. The host's
+    /// solver refuses what would take long.
     pub fn finer(&self, model: &Model) -> Vec<Finer> {
         let setup = |setup: Setup| Finer { setup, model: None };
         let Model::Own(fmu) = model else {
