@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn rows_that_are_out_are_stepped_over_however_they_went_and_came_back() {
         let mut sound = Sound { rows: 100, out: BTreeMap::new() };
-        let mut expected = vec![true; 100];
+        let mut expected = [true; 100];
         let mut random = Random::new(3, 0);
         for _ in 0..2000 {
             let k = (random.uniform() * 100.0) as usize;

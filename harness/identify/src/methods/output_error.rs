@@ -139,15 +139,15 @@ fn identify_whole(
         doubts.extend(found);
     }
     let (response, mut starts) = start::from_data(recordings, &nominal)?;
-    if let Some(found) = &response {
-        if !plausible::check_size(found, nominal.inertia, recordings)? {
-            // the last start is the FMU as it is set up
-            starts.drain(..starts.len() - 1);
-            tell(News::Step(
-                "the torque has too little power at the slosh for a frequency response: the start is the FMU as it is set up"
-                    .into(),
-            ));
-        }
+    if let Some(found) = &response
+        && !plausible::check_size(found, nominal.inertia, recordings)?
+    {
+        // the last start is the FMU as it is set up
+        starts.drain(..starts.len() - 1);
+        tell(News::Step(
+            "the torque has too little power at the slosh for a frequency response: the start is the FMU as it is set up"
+                .into(),
+        ));
     }
     let said = response.as_ref().map(Response::line);
     tell(News::Step(said.unwrap_or("frequency response: no slosh in it".into())));
