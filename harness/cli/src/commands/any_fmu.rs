@@ -18,7 +18,7 @@ use signals::recording::Columns;
 use signals::table::Table;
 use std::io::Write;
 
-use super::estimates::print_estimates;
+use super::estimates::{deviation, print_estimates};
 use crate::{progress, terminal};
 
 /// Options for fitting any FMU.
@@ -319,6 +319,7 @@ fn foreseen(bounds: &[Bound]) {
     for b in bounds {
         let percent = match b.value {
             0.0 => "–".into(),
+            _ if b.std.is_nan() => "–".into(),
             value => format!("{:.3}", (100.0 * b.std / value).abs()),
         };
         let with = match &b.with {
@@ -329,26 +330,24 @@ fn foreseen(bounds: &[Bound]) {
             with => with.as_ref().map_or(String::new(), |(name, r)| format!("{name} ({r:+.3})")),
         };
         println!(
-            "{:28} {:>12.5} {:>10.2e} {percent:>9} {:>10.1e}  {with}",
-            b.name, b.value, b.std, b.std_alone
+            "{:28} {:>12.5} {:>10} {percent:>9} {:>10}  {with}",
+            b.name,
+            b.value,
+            deviation(b.std),
+            deviation(b.std_alone)
         );
     }
     let decided: Vec<&str> =
         bounds.iter().filter(|b| b.decided_by_solver).map(|b| b.name.as_str()).collect();
     if !decided.is_empty() {
         println!(
-            "No bound is given for {}: the errors of the FMU's solver decide. --exchange (of an FMU 2.0 with Model Exchange) or a \
-             smaller --solver-tolerance make them smaller.",
+            "No bound is given for {}: the errors of the FMU's solver decide. A smaller --solver-tolerance makes them smaller. So \
+             does --exchange, unless an output follows the slope of an input.",
             decided.join(", ")
         );
     }
-    let told = |b: &&Bound| match b.prior {
-        _ if b.decided_by_solver => false,
-        Some(prior) => b.std > 0.9 * prior,
-        None => b.std.is_nan() || b.std > b.value.abs(),
-    };
-    let untold: Vec<&str> =
-        bounds.iter().filter(|b| b.is_parameter).filter(told).map(|b| b.name.as_str()).collect();
+    let untold = bounds.iter().filter(|b| b.is_parameter && b.not_determined);
+    let untold: Vec<&str> = untold.map(|b| b.name.as_str()).collect();
     if !untold.is_empty() {
         println!("Nothing will be known of {} from these inputs.", untold.join(", "));
     }

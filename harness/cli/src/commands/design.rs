@@ -17,7 +17,7 @@ use serde_json::json;
 use signals::table::{self, Table};
 
 use super::any_fmu::{AnyFmuArgs, Told};
-use super::{DEFAULT_FMU, open, setting};
+use super::{DEFAULT_FMU, estimates, open, setting};
 use crate::terminal;
 
 /// Says beforehand what a planned experiment will tell about each parameter (Cramér–Rao bound).
@@ -366,11 +366,13 @@ impl Plan {
             // nothing is a part of what is expected to be 0
             let percent = |std: f64| match *value {
                 0.0 => "-".to_string(),
+                _ if !std.is_finite() => "-".to_string(),
                 value => format!("{:.4}", 100.0 * std / value.abs()),
             };
             let other = self.sweep.as_ref().map_or(String::new(), |s| percent(s.bounds[k].2));
             println!(
-                "{name:20} {value:>12.6} {deviation:>12.2e} {:>9} {other:>9}",
+                "{name:20} {value:>12.6} {:>12} {:>9} {other:>9}",
+                estimates::deviation(*deviation),
                 percent(*deviation)
             );
         }

@@ -13,3 +13,8 @@ pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
         println!("{name:24} {:>14.7} {:>12.2e} {percent:>9}  {}", p.value, p.std, p.unit);
     }
 }
+
+/// Returns a standard deviation that is foreseen, for a table; NaN: the inputs tell nothing of it.
+pub(super) fn deviation(std: f64) -> String {
+    if std.is_finite() { format!("{std:.2e}") } else { "not told".into() }
+}

@@ -79,6 +79,10 @@ fn one_unknown_all_unknowns_at_bounds_and_no_input_are_answered() {
     assert!(said.contains("hub.I is at its upper bound, 0.12"), "{said}");
     let said = asked("design", "hub.I=0.5", &["--noise", "omega=1e-4"]);
     assert!(said.contains("Nothing will be known of hub.I from these inputs"), "{said}");
+    assert!(said.contains("not told") && !said.contains("NaN") && !said.contains("inf"), "{said}");
+    let json = asked("design", "hub.I=0.5", &["--noise", "omega=1e-4", "--json"]);
+    let bounds: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(bounds[0]["std"].is_null() && bounds[0]["not_determined"] == true, "{json}");
 }
 
 #[test]

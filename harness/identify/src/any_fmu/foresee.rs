@@ -3,13 +3,13 @@
 use anyhow::{Result, ensure};
 use serde::Serialize;
 
-use super::knowledge;
 use super::problem::Problem;
 use super::question::Question;
 use super::record::Record;
 use super::simulate::{Model, Setup};
 use super::solver_error::measure;
 use super::unknown::What;
+use super::{finite, knowledge};
 use analysis::gauss_markov::Noise;
 
 /// The bound of one unknown.
@@ -21,7 +21,9 @@ pub struct Bound {
     pub value: f64,
     /// The least standard deviation of an unbiased estimate; NaN: none can be made.
     pub std: f64,
-    /// True if the errors of the solver decide it: neither bound is known then.
+    /// True if the recordings tell less than the value itself or than was known beforehand.
+    pub not_determined: bool,
+    /// True if the errors of the solver decide the bound. Neither bound is known then.
     pub decided_by_solver: bool,
     /// The unknowns that it cannot be told apart from.
     pub inseparable_from: Vec<String>,
@@ -89,14 +91,20 @@ pub fn foresee(
         let sets = known.inseparable.iter().filter(|set| set.direction.contains_key(&unknown.name));
         let others =
             sets.flat_map(|set| set.direction.keys()).filter(|name| **name != unknown.name);
+        let prior = unknown.prior.map(|(_, std)| std);
+        let is_vague = match prior {
+            Some(prior) => std > 0.9 * prior,
+            None => !std.is_finite() || std > x[j].abs(),
+        };
         Bound {
+            not_determined: is_vague && !is_lost,
             decided_by_solver: is_lost,
             inseparable_from: others.cloned().collect(),
             name: unknown.name.clone(),
             value: x[j],
             std: if std.is_finite() && !is_lost { std } else { f64::NAN },
-            std_alone: if is_lost { f64::NAN } else { 1.0 / jacobian.column(j).norm() },
-            prior: unknown.prior.map(|(_, std)| std),
+            std_alone: if is_lost { f64::NAN } else { finite(1.0 / jacobian.column(j).norm()) },
+            prior,
             unit: unknown.unit.clone(),
             with,
             is_parameter: matches!(unknown.what, What::Parameter { .. }),
