@@ -64,8 +64,18 @@ pub struct Folder {
     files: PathBuf,
     // dropped in this order: Windows removes no file that is open
     _alive: File,
-    _directory: TempDir,
+    directory: TempDir,
     _registered: Registered,
+    process: u32,
+}
+
+/// A fork has the folder from the process that made it, and leaves it alone.
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if std::process::id() != self.process {
+            self.directory.disable_cleanup(true);
+        }
+    }
 }
 
 impl Folder {
@@ -85,7 +95,8 @@ impl Folder {
             fs::rename(&draft, directory.path().join(ALIVE))?;
             let files = directory.path().join(FILES);
             fs::create_dir(&files)?;
-            Ok(Folder { files, _alive: alive, _directory: directory, _registered: registered })
+            let process = std::process::id();
+            Ok(Folder { files, _alive: alive, directory, _registered: registered, process })
         };
         make().with_context(|| {
             format!("no temporary folder can be made in {}", std::env::temp_dir().display())

@@ -40,6 +40,8 @@ pub struct ModelDescription {
     pub default_experiment: DefaultExperiment,
     /// The variables, in the order of the file; the elements of an array one after the other, by rows.
     pub variables: Vec<Variable>,
+    /// Value references of the derivatives of the continuous states, each with that of its state.
+    pub derivatives: Vec<(u32, u32)>,
     /// Continuous states and event indicators, as an FMU 2.0 declares them.
     pub(crate) sizes: (usize, usize),
     arrays: BTreeMap<u32, Array>,
@@ -76,6 +78,8 @@ pub struct Interface {
     /// In co-simulation: whether it takes derivatives of its inputs (FMI 2.0), or new values of them within a
     /// step (FMI 3.0).
     pub can_interpolate_inputs: bool,
+    /// True if there are directional derivatives.
+    pub directional_derivatives: bool,
 }
 
 /// Element `DefaultExperiment`; times in s.
@@ -378,6 +382,8 @@ impl Reader {
             model_identifier: self.text(element, "modelIdentifier"),
             can_interpolate_inputs: element.flag("canInterpolateInputs")
                 || element.flag("providesIntermediateUpdate"),
+            directional_derivatives: element.flag("providesDirectionalDerivative")
+                || element.flag("providesDirectionalDerivatives"),
         }
     }
 
@@ -602,6 +608,34 @@ impl Reader {
     }
 }
 
+/// Value references of the derivatives in the model structure, each with that of its state: FMI 2.0 names variables by
+/// their places, FMI 3.0 by their references.
+fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
+    let all: Vec<&Element> = root.list("ModelVariables").collect();
+    let reference = |variable: &Element| variable.get("valueReference")?.trim().parse::<u32>().ok();
+    let places = all.iter().enumerate().filter_map(|(i, variable)| {
+        let key = if is_fmi3 { reference(variable)? } else { i as u32 + 1 };
+        Some((key, *variable))
+    });
+    let places: BTreeMap<u32, &Element> = places.collect();
+    let named = |element: &Element, attribute: &str| {
+        places.get(&element.get(attribute)?.trim().parse().ok()?).copied()
+    };
+    let unknowns = root.child("ModelStructure").into_iter().flat_map(|structure| match is_fmi3 {
+        true => {
+            structure.children.iter().filter(|e| e.name == "ContinuousStateDerivative").collect()
+        }
+        false => structure.list("Derivatives").collect::<Vec<_>>(),
+    });
+    let attribute = if is_fmi3 { "valueReference" } else { "index" };
+    let pair = |unknown: &Element| {
+        let derivative = named(unknown, attribute)?;
+        let typed = if is_fmi3 { derivative } else { derivative.child("Real")? };
+        Some((reference(derivative)?, reference(named(typed, "derivative")?)?))
+    };
+    unknowns.filter_map(pair).collect()
+}
+
 /// Indices from 1, with commas between, of an element counted from 0, by rows.
 fn indices(mut index: usize, dimensions: &[usize]) -> String {
     let mut all = Vec::new();
@@ -732,6 +766,7 @@ impl ModelDescription {
                 },
             },
             variables: Vec::new(),
+            derivatives: derivatives(&root, is_fmi3),
             sizes: (
                 root.child("ModelStructure").map_or(0, |s| s.list("Derivatives").count()),
                 root.number("numberOfEventIndicators").unwrap_or(0.0) as usize,

@@ -501,6 +501,9 @@ pub const MODEL_EXCHANGE: i32 = 0;
 /// fmi2Type of an instance that integrates itself.
 pub const CO_SIMULATION: i32 = 1;
 
+/// fmi2StatusKind that tells whether the FMU wants the simulation to end.
+pub const TERMINATED: i32 = 3;
+
 /// Arguments of fmi2Instantiate; `None` becomes a NULL pointer.
 #[derive(Clone, Debug)]
 pub struct Instantiation<'a> {

@@ -20,7 +20,7 @@ use crate::c_abi::{
     self, CallError, Called, Environment, Function, Message, Status, c_string, functions,
     log_message, pointer,
 };
-use crate::description::{CType, Value, Variable};
+use crate::description::{CType, Value};
 
 /// An FMU 3.0 whose binary is loaded.
 pub type Fmu = version::Fmu<Fmi3>;
@@ -227,6 +227,8 @@ pub struct Stepping {
     within: Cell<*mut Within<'static>>,
     /// Calls of intermediateUpdate.
     updates: Cell<usize>,
+    /// Room for the inputs of a step.
+    line: Cell<Line>,
     /// The pointer that the FMU hands back to intermediateUpdate.
     environment: *mut c_void,
 }
@@ -427,7 +429,8 @@ impl Version for Fmi3 {
         values: &[f64],
         slopes: &[f64],
     ) -> Called {
-        let mut line = Line::of(instance, references, values)?;
+        let mut line = instance.kept.line.take();
+        line.fill(instance, references, values)?;
         let mut refused = Status::Ok;
         let mut within = |update: &Update| {
             if update.set_requested && !line.moving.is_empty() {
@@ -439,6 +442,7 @@ impl Version for Fmi3 {
             None
         };
         let done = instance.do_step_hearing(time, step, Some(&mut within))?;
+        instance.kept.line.set(line);
         whole_step(instance, done)?;
         match refused {
             Status::Ok | Status::Warning => Ok(()),
@@ -547,6 +551,7 @@ impl Fmu {
             functions: &self.own.functions,
             within: Cell::new(null_mut::<Nobody>() as *mut Within<'static>),
             updates: Cell::new(0),
+            line: Cell::default(),
         });
         let logger = with.logger.then_some(log_message as LogMessage);
         let (logging, required) = (with.logging.into(), &with.required);
@@ -927,37 +932,38 @@ struct Line {
 }
 
 impl Line {
-    /// Those of these inputs, at `values` now, that the FMU takes within a step.
-    fn of(instance: &mut Instance, references: &[u32], values: &[f64]) -> Called<Line> {
+    /// Takes those of these inputs, at `values` now, that the FMU takes within a step, in place of the last ones.
+    fn fill(&mut self, instance: &mut Instance, references: &[u32], values: &[f64]) -> Called {
         let description = instance.fmu().description();
-        let mut line = Line::default();
+        self.references.clear();
+        self.values.clear();
+        self.moving.clear();
         let mut begins = BTreeMap::new();
         for (i, reference) in references.iter().enumerate() {
-            let is_taken = |v: &Variable| v.intermediate && v.c_type() == CType::Float64;
-            if !description.variables.iter().any(|v| v.reference == *reference && is_taken(v)) {
+            if instance.fmu().taken.binary_search(reference).is_err() {
                 continue;
             }
             let Some(element) = description.element(*reference) else {
-                line.moving.push((line.values.len(), i));
-                line.references.push(*reference);
-                line.values.push(values[i]);
+                self.moving.push((self.values.len(), i));
+                self.references.push(*reference);
+                self.values.push(values[i]);
                 continue;
             };
             let begin = match begins.get(&element.array) {
                 Some(begin) => *begin,
                 None => {
                     let length = description.array(element.array).map_or(0, |array| array.length);
-                    let begin = line.values.len();
-                    line.values.resize(begin + length, 0.0);
-                    instance.fetch(&[element.array], &mut line.values[begin..])?;
-                    line.references.push(element.array);
+                    let begin = self.values.len();
+                    self.values.resize(begin + length, 0.0);
+                    instance.fetch(&[element.array], &mut self.values[begin..])?;
+                    self.references.push(element.array);
                     begins.insert(element.array, begin);
                     begin
                 }
             };
-            line.moving.push((begin + element.index, i));
+            self.moving.push((begin + element.index, i));
         }
-        Ok(line)
+        Ok(())
     }
 }
 

@@ -16,7 +16,7 @@ use crate::description::{ModelDescription, Value, Variable};
 use crate::{fmi2, fmi3};
 
 /// An opened FMU: unpacked to a temporary directory, its binary loaded.
-#[allow(clippy::large_enum_variant)] // there is one per program
+#[allow(clippy::large_enum_variant)] // made once and hardly moved
 pub enum Fmu {
     /// FMI 2.0.
     V2(fmi2::Fmu),
@@ -131,6 +131,10 @@ passed_on! {
     get_state() -> Called<State>;
     /// Goes back to a snapshot of this instance.
     set_state(state: &State) -> Called;
+    /// Writes a snapshot as bytes.
+    serialize(state: &State) -> Called<Vec<u8>>;
+    /// Makes a snapshot of such bytes.
+    deserialize(bytes: &[u8]) -> Called<State>;
     /// Gives a snapshot of this instance back.
     free_state(state: State) -> Called;
     /// Reads Reals by reference.
@@ -139,6 +143,8 @@ passed_on! {
     set_real(references: &[u32], values: &[f64]) -> Called;
     /// The value of a variable of the FMU's description.
     value(variable: &Variable) -> Called<Value>;
+    /// Sets a variable, or an element of an array: the others keep what was set last, or their start values.
+    set_value(variable: &Variable, value: Value) -> Called;
     /// The value of a variable by name.
     get(name: &str) -> Result<Value>;
     /// The value of a real variable.
@@ -208,6 +214,26 @@ impl<'fmu> Instance<'fmu> {
         each!(Instance, self, instance => {
             Version::step_along(instance, time, step, references, values, slopes)
         })
+    }
+
+    /// Returns true if the FMU has refused a step because it wants the simulation to end.
+    pub fn wants_to_end(&mut self) -> bool {
+        match self {
+            Instance::V2(instance) => instance.boolean_status(fmi2::TERMINATED).unwrap_or(false),
+            Instance::V3(_) => false, // the refusal says it
+        }
+    }
+
+    /// Derivatives of unknowns by one known, all of them scalars of the FMU.
+    pub fn directional_derivative(&mut self, unknowns: &[u32], known: u32) -> Called<Vec<f64>> {
+        match self {
+            Instance::V2(instance) => {
+                instance.get_directional_derivative(unknowns, &[known], &[1.0])
+            }
+            Instance::V3(instance) => {
+                instance.directional_derivative(unknowns, &[known], &[1.0], unknowns.len())
+            }
+        }
     }
 
     /// Updates the discrete states, in event mode.

@@ -192,6 +192,8 @@ pub struct Fmu<V: Version> {
     is_plain: bool,
     /// References of those that are, in order.
     plain: Vec<u32>,
+    /// References of Float64 inputs that an FMU 3.0 takes within a step, elements of arrays too; in order.
+    pub(crate) taken: Vec<u32>,
     /// Structural parameters that every instance of [`Fmu::instantiate`] begins with, by reference.
     structural: BTreeMap<u32, Value>,
     // dropped in this order: first the code, then the files
@@ -300,6 +302,7 @@ impl<V: Version> Fmu<V> {
             )
         };
         let (is_plain, plain) = plain(&description);
+        let taken = taken(&description);
         Ok(Fmu {
             common,
             exchange,
@@ -316,6 +319,7 @@ impl<V: Version> Fmu<V> {
             changed,
             is_plain,
             plain,
+            taken,
             structural: BTreeMap::new(),
             library: Some(library),
             _directory: None,
@@ -360,6 +364,7 @@ impl<V: Version> Fmu<V> {
             description.set_starts(array, &values);
         }
         (self.is_plain, self.plain) = plain(&description);
+        self.taken = taken(&description);
         self.description = description;
         Ok(())
     }
@@ -473,6 +478,14 @@ fn plain(description: &ModelDescription) -> (bool, Vec<u32>) {
     let mut plain: Vec<u32> = plain.iter().map(|v| v.reference).collect();
     plain.sort_unstable();
     (others.is_empty(), plain)
+}
+
+fn taken(description: &ModelDescription) -> Vec<u32> {
+    let is_taken = |v: &&Variable| v.intermediate && v.c_type() == CType::Float64;
+    let taken = description.variables.iter().filter(is_taken);
+    let mut taken: Vec<u32> = taken.map(|v| v.reference).collect();
+    taken.sort_unstable();
+    taken
 }
 
 /// One instance of an FMU; freed when dropped. Belongs to the thread that made it.
