@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
+use std::sync::Once;
 
 use HubSlosh::table::TABLE;
 use runtime::variable::Kind;
@@ -36,11 +37,15 @@ pub fn run(command: &mut Command, sentence: &str) -> String {
     panic!("{why}\n{sentence}\n(the command: {command:?})");
 }
 
-/// The interpreter of the tests' virtual environment, which is made if need be.
+/// The interpreter of the tests' virtual environment, which is made if need be, as the package's compiled half.
 ///
 /// # Panics
-/// If it can't be made.
+/// If they can't be made.
 pub fn python() -> PathBuf {
+    static NATIVE: Once = Once::new();
+    NATIVE.call_once(|| {
+        pack::build_native(true).expect("the compiled half of the Python package");
+    });
     let target =
         pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu");
     let scripts = pack::root().join("harness").join("python");

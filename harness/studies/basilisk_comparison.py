@@ -367,7 +367,7 @@ def page(
         "Basilisk's craft is free in six degrees of freedom. Its hub has the mass M, M · 1 m²",
         "about x and y, and our inertia about z, `hub.I` + m_0 r². Gravity is a thrust (M + m) g",
         "along the body's z. The pendulum hinges at (`tank.r`, 0, 0); its damping is c times the",
-        "unit matrix, c = 2 zeta omega_1 m. RKF78 at 1 ms; ours through fmpy in steps of 20 ms,",
+        "unit matrix, c = 2 zeta omega_1 m. RKF78 at 1 ms; ours from Python in steps of 20 ms,",
         f"tolerance {TOLERANCE:.0e}. Samples every 20 ms; numbers are the largest difference over",
         "the signal's maximum.",
         "",

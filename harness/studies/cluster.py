@@ -1,4 +1,4 @@
-"""Makes the runs of a campaign's plan on a Dask cluster, with fmpy as the FMU's host.
+"""Makes the runs of a campaign's plan on a Dask cluster, with the package hubslosh as host.
 
     PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan monte_carlo --workers 4
     PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan mine.toml --scheduler tcp://head:8786
@@ -13,8 +13,8 @@ shared. This side writes runs/<name>.parquet, each whole or not at all. In the e
 campaign`` reads the runs and writes tables and report: the same as if it had made them.
 
 Start the same command again after an interruption: runs that are stored are reused. A run
-whose worker dies is given to another worker. Workers of a real cluster need ``--nthreads 1`` and
-the packages of requirements-cluster.txt.
+whose worker dies is given to another worker. Workers of a real cluster need ``--nthreads 1``, the
+system and processor of this machine, and the packages of requirements-cluster.txt.
 """
 
 import argparse
@@ -24,7 +24,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,12 +42,13 @@ try:
     import numpy as np
     import pyarrow
     import pyarrow.parquet
-    from distributed import Client, KilledWorker, LocalCluster, as_completed, get_worker
+    from distributed import Client, KilledWorker, LocalCluster, Worker, as_completed, get_worker
     from distributed.client import FutureCancelledError
-    from distributed.diagnostics.plugin import UploadFile
+    from distributed.diagnostics.plugin import UploadFile, WorkerPlugin
     from tqdm import tqdm
 
     import hubslosh
+    import hubslosh.native
     from hubslosh.store import read_manifest
 except ModuleNotFoundError as missing:
     environment.run_again_in("cluster", missing)
@@ -194,7 +194,6 @@ def drive_here(
 ) -> tuple[dict[str, np.ndarray] | None, str]:
     """Make one run: what a worker does. Returns its columns and who made it, or None and why."""
     import os
-    from importlib.metadata import version
     from pathlib import Path
 
     import hubslosh
@@ -213,21 +212,27 @@ def drive_here(
         )
     except hubslosh.FmuError as error:
         return None, str(error)
-    return table, f"fmpy {version('fmpy')}, Dask, process {os.getpid()}"
+    return table, f"hubslosh {hubslosh.__version__}, Dask, process {os.getpid()}"
 
 
-def write_package(path: Path) -> None:
-    """Write the package hubslosh as a zip that Python imports from; without FMUs.
+class Package(WorkerPlugin):
+    """The package hubslosh, without FMUs, in every worker's folder: no zip holds compiled code."""
 
-    The library for whole runs in one call is that of this platform; workers of another do without.
-    """
-    source = Path(hubslosh.__file__).parent
-    with zipfile.ZipFile(path, "w") as archive:
-        for file in source.glob("*.py"):
-            archive.write(file, f"hubslosh/{file.name}")
-        if library := hubslosh.batch.library():
-            file = Path(library._name)
-            archive.write(file, f"hubslosh/lib/{hubslosh.fmu.PLATFORM}/{file.name}")
+    def __init__(self) -> None:
+        """Read its files; the compiled half has the name that Python looks for."""
+        source, native = Path(hubslosh.__file__).parent, Path(hubslosh.native._native.__file__)
+        self.files = {file.name: file.read_bytes() for file in source.glob("*.py")}
+        ending = ".pyd" if os.name == "nt" else ".abi3.so"
+        self.files[f"_native{ending}"] = native.read_bytes()
+
+    def setup(self, worker: Worker) -> None:
+        """Write it on a worker and import it."""
+        folder = Path(worker.local_directory) / "package"
+        (folder / "hubslosh").mkdir(parents=True, exist_ok=True)
+        for name, content in self.files.items():
+            (folder / "hubslosh" / name).write_bytes(content)
+        sys.path.insert(0, str(folder))
+        import hubslosh.plant  # noqa: F401 - it may lack a package
 
 
 def prepare(client: Client, fmu: Path, sha256: str) -> str:
@@ -250,16 +255,14 @@ def prepare(client: Client, fmu: Path, sha256: str) -> str:
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory) / f"{sha256}.fmu"
         copy.write_bytes(data)
-        package = Path(directory) / "hubslosh.zip"
-        write_package(package)
-        for file, load in ((copy, False), (package, True)):
-            try:
-                client.register_plugin(UploadFile(str(file), load=load), name=file.name)
-            except ModuleNotFoundError as error:
-                raise CampaignError(
-                    f"the workers lack a package ({error}); requirements-cluster.txt says which "
-                    "they need"
-                ) from None
+        try:
+            client.register_plugin(UploadFile(str(copy), load=False), name=copy.name)
+            client.register_plugin(Package(), name="hubslosh")
+        except ImportError as error:
+            raise CampaignError(
+                f"the workers lack a package ({error}); requirements-cluster.txt says which "
+                "they need"
+            ) from None
     return copy.name
 
 
@@ -403,7 +406,7 @@ def positive(text: str) -> int:
 
 def main() -> None:
     """Make the runs, then have the harness analyse them."""
-    parser = arguments("Makes a plan's runs on a Dask cluster, with fmpy as host.")
+    parser = arguments("Makes a plan's runs on a Dask cluster.")
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",
         help="of a running Dask cluster, tcp://HOST:PORT [default: workers on this machine]",

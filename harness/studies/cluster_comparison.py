@@ -3,9 +3,10 @@
     export PYTHONPATH=harness/python
     python3 harness/studies/cluster_comparison.py --plan monte_carlo --workers 2
 
-The Dask workers host the FMU through fmpy; as soon as there is a run, one of them is killed in
-the middle of another. Compared are all columns of features.csv, features_spa.csv and runs.csv and
-all signals of all runs. Ends with an error if anything differs by more than 1e-9 of itself.
+The Dask workers host the FMU by the Python package; as soon as there is a run, one of them is
+killed in the middle of another. Compared are all columns of features.csv, features_spa.csv and
+runs.csv and all signals of all runs. Ends with an error if anything differs by more than 1e-9 of
+itself.
 
 Needs what cluster.py needs. The 200 runs of monte_carlo take some minutes on two cores.
 """

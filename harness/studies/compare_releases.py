@@ -3,8 +3,8 @@
     export PYTHONPATH=harness/python
     python3 harness/studies/compare_releases.py [--before FMU] [--now FMU] [--short]
 
-needs dist/HubSlosh.fmu and the library for runs in one call (``cargo run --release -- pack``,
-``cargo build --release -p hubslosh-batch``) and Python 3.11 or newer; the first run makes a
+needs dist/HubSlosh.fmu and the package's compiled half (``cargo run --release -- pack``,
+``cargo build --release -p hubslosh-native``) and Python 3.11 or newer; the first run makes a
 virtual environment in the target directory and needs the network. It takes some minutes, with
 ``--short`` (300 s instead of 2700 s of every sweep) some seconds.
 

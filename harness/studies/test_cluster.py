@@ -70,7 +70,7 @@ def test_with_a_worker_killed_on_the_way_every_column_is_the_harness_s(client, h
     assert len(worst) > 80
     assert max(worst.values()) == 0.0, worst
     again = maker(theirs.out / "runs" / f"{killer.interrupted}.parquet")
-    assert again.startswith("fmpy ")
+    assert again.startswith("hubslosh ")
     assert not again.endswith(f" {killer.process}"), "the run was not interrupted"
 
 

@@ -1,8 +1,7 @@
 //! The file itself: a zip archive (FMI 2.0.5, section 2.3), opened so that no archive can fill the
 //! disk or the memory, or lead out of the folder that it is unpacked to.
 //!
-//! Everything that opens an FMU does it here; `book/foreign.md` lists the budgets for users, and
-//! `harness/python/hubslosh/opening.py` has the same for Python.
+//! Everything that opens an FMU does it here; `book/foreign.md` lists the budgets for users.
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -1,7 +1,7 @@
 //! The part of the C ABI that only FMI 2.0 has, as a host sees it: its types, the functions whose types differ from those of
 //! FMI 3.0, and calls for tests. [`crate::c_abi::version`] has the rest.
 //!
-//! Unsafe code of the harness is here, in `c_abi.rs`, `fmi3.rs` and `harness/batch/src/abi.rs` (`tests/architecture.rs`).
+//! Unsafe code of the harness is here, in `c_abi.rs`, `fmi3.rs` and `harness/native/src/instance.rs` (`tests/architecture.rs`).
 #![allow(unsafe_code)]
 
 use std::ffi::{c_char, c_int, c_void};

@@ -288,7 +288,19 @@ pub fn licence_note(description: &ModelDescription, components: &[Component]) ->
     note
 }
 
-/// Licences of what is linked into the command `hubslosh` for one platform, with all texts: those of
+/// Everything that is linked into the command `hubslosh` and the compiled half of the Python package.
+fn linked_in_wheel(command: Packed) -> Result<Vec<Component>> {
+    let native = crates(project::NATIVE, &BTreeSet::from([command.folder]))?;
+    let mut all = linked("hubslosh", &[command])?;
+    for component in native {
+        if all.iter().all(|known| known.purl != component.purl) {
+            all.push(component);
+        }
+    }
+    Ok(all)
+}
+
+/// Licences of what is linked into the wheel's binaries for one platform, with all texts: those of
 /// crates from the crates themselves.
 pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     let binary = Packed { folder, ending: "", bytes: binary.to_vec() };
@@ -300,7 +312,7 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     // the same text once, with all that is under it
     let mut texts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     let mut list = String::new();
-    for component in linked("hubslosh", &[binary])? {
+    for component in linked_in_wheel(binary)? {
         let version = component.version.as_deref().unwrap_or_default();
         let this = format!("{} {version}", component.name).trim_end().to_string();
         let package = metadata.packages.iter().find(|package| {
@@ -325,7 +337,7 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
         }
     }
     let mut notices = format!(
-        "The command hubslosh in this package holds the following; none of it asks more than that \n\
+        "The command hubslosh and the library _native in this package hold the following; none of it asks more than that \n\
          its notice travels with the program, as it does here.\n\n{list}"
     );
     for (text, names) in texts {
@@ -373,7 +385,7 @@ pub fn sbom(
     product.sbom(components)
 }
 
-/// The SBOM of a wheel: what is linked into its command for one platform; `files` are the names and SHA-256 of its binaries
+/// The SBOM of a wheel: what is linked into its command and its library for one platform; `files` are the names and SHA-256 of its binaries
 /// and FMUs.
 ///
 /// # Errors
@@ -391,7 +403,7 @@ pub fn sbom_of_wheel(
         description: "Python package and command hubslosh",
         files,
     };
-    Ok(product.sbom(&linked("hubslosh", &[binary])?))
+    Ok(product.sbom(&linked_in_wheel(binary)?))
 }
 
 /// What an SBOM is of.
@@ -490,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sbom_of_a_wheel_lists_its_files_and_what_its_command_links() {
+    fn the_sbom_of_a_wheel_lists_its_files_and_what_its_binaries_link() {
         let files = vec![("hubslosh.data/scripts/hubslosh".to_string(), "ab".to_string())];
         let sbom = sbom_of_wheel(b"/rust/deps/gimli-0.32.3/src", "linux64", files).unwrap();
         let sbom: serde_json::Value = serde_json::from_str(&sbom).unwrap();
@@ -502,7 +514,7 @@ mod tests {
         assert_eq!(product["name"], crate::metadata::PACKAGE);
         assert_eq!(product["components"][0]["hashes"][0]["content"], "ab");
         let components = sbom["components"].as_array().unwrap();
-        for name in ["hubslosh", "host", "clap", "std", "gimli"] {
+        for name in ["hubslosh", "host", "clap", "pyo3", "std", "gimli"] {
             let found = components.iter().find(|component| component["name"] == name);
             assert!(found.is_some_and(|c| !c["licenses"][0]["expression"].is_null()), "{name}");
         }

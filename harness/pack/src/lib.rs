@@ -25,7 +25,7 @@ pub use crate::fmi::Fmi;
 pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, Sizes, model};
 pub use crate::platforms::Built;
 use crate::project::build_in;
-pub use crate::project::{build, has_source, needs_source, root};
+pub use crate::project::{build, build_native, has_source, needs_source, root};
 
 /// Builds the binary of an FMU for the platform this program runs on and packs it to `out`.
 pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {

@@ -228,6 +228,8 @@ pub enum Product<'a> {
     Fmu(&'a Model),
     /// The library of another package of this workspace, by its package and its file's name.
     Library(&'static str, &'static str),
+    /// The compiled half of the Python package.
+    Native,
     /// The command `hubslosh`.
     Command,
 }
@@ -398,6 +400,10 @@ impl Toolchain {
                 project::arguments(&mut command, package);
                 Some(name.to_string())
             }
+            Product::Native => {
+                project::native_arguments(&mut command);
+                Some("hubslosh_native".into())
+            }
             Product::Command => {
                 project::program_arguments(&mut command);
                 None
@@ -408,7 +414,7 @@ impl Toolchain {
             // hosts load it by its path; its name must not be that of a folder on this machine
             link.push(format!("-Wl,-install_name,@rpath/{name}{}", platform.ending));
         }
-        if let (None, "darwin64") = (&name, platform.folder) {
+        if let (Product::Native | Product::Command, "darwin64") = (product, platform.folder) {
             // zig brings macOS's C library alone; the others' names are here
             link.push(format!("-F{}", self.root.join("harness/platforms/macos").display()));
         }

@@ -106,6 +106,27 @@ pub(crate) fn program_arguments(command: &mut Command) {
     command.args(["--", "-Cstrip=symbols"]);
 }
 
+/// Cargo package of the compiled half of the Python package.
+pub(crate) const NATIVE: &str = "hubslosh-native";
+
+/// Arguments of `cargo rustc` for the compiled half of the Python package. What follows goes to the compiler.
+pub(crate) fn native_arguments(command: &mut Command) {
+    command.args(["--release", "--package", NATIVE, "--lib", "--crate-type", "cdylib"]);
+    command.args(["--message-format", "json-render-diagnostics", "--", "-Cstrip=symbols"]);
+}
+
+/// Builds the compiled half of the Python package for the platform this program runs on, and returns where Cargo put it:
+/// where the package finds it in the source tree.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_native(quiet: bool) -> Result<PathBuf> {
+    let mut command = cargo();
+    command.args(["rustc", "--locked"]);
+    native_arguments(&mut command);
+    cargo_build(command, quiet)
+}
+
 /// Runs Cargo and returns where it put the binary; Cargo's own progress goes to stderr.
 pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> {
     let root = root();

@@ -2,7 +2,8 @@
 //! `hubslosh` inside (packaging.python.org, "Binary distribution format"): same files, same bytes.
 //!
 //! Its Python runs anywhere, its binaries do not: the tag says which Linux, Windows or macOS they
-//! need, and is read from the binaries themselves.
+//! need, and is read from the binaries themselves. Its compiled half uses the stable ABI of Python alone: one wheel for
+//! every CPython from [`ABI`]'s version on.
 
 use std::path::{Path, PathBuf};
 
@@ -16,10 +17,10 @@ use sha2::{Digest, Sha256};
 use crate::archive::{self, Files, Packed, below, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::platforms::{self, Platform, Product, Target, Toolchain};
-use crate::{Fmi, MODELS, build, components, files as files_of_fmu, pack, root};
+use crate::{Fmi, MODELS, build, build_native, components, files as files_of_fmu, pack, root};
 
-/// Cargo package of the library that makes a whole run in one call, and its file's name.
-const BATCH: (&str, &str) = ("hubslosh-batch", "hubslosh_batch");
+/// Tags of the oldest Python, and of the stable ABI.
+const ABI: &str = "cp311-abi3";
 
 /// Where the software bill of materials is in `.dist-info` (PEP 770).
 const SBOM: &str = "sboms/hubslosh.cdx.json";
@@ -30,8 +31,8 @@ struct Binaries {
     folder: &'static str,
     /// Names and bytes of the packed FMUs.
     fmus: Files,
-    /// Name and bytes of the library for whole runs.
-    library: (String, Vec<u8>),
+    /// Name and bytes of the package's compiled half.
+    native: (&'static str, Vec<u8>),
     /// Name and bytes of the command.
     command: Option<(String, Vec<u8>)>,
     /// The libraries and the command, as read.
@@ -74,12 +75,12 @@ fn check_folder(folder: &Path) -> Result<()> {
 /// If it cannot be made.
 pub fn for_tests(fmus: &[&Path]) -> PathBuf {
     let make = || {
-        let library = read(&build(BATCH.0, true)?)?;
+        let library = read(&build_native(true)?)?;
         let named = |fmu: &&Path| Ok((file_name(fmu), read(fmu)?));
         let fmus_in = fmus.iter().map(named).collect::<Result<_>>()?;
         let read = vec![Binary::read(&library)?];
-        let library = (library_name(std::env::consts::DLL_SUFFIX), library);
-        let binaries = Binaries { folder: PLATFORM, fmus: fmus_in, library, command: None, read };
+        let native = (native_name(std::env::consts::DLL_SUFFIX), library);
+        let binaries = Binaries { folder: PLATFORM, fmus: fmus_in, native, command: None, read };
         write_one(fmus[0].parent().context("the FMU is in no folder")?, binaries)
     };
     make().unwrap_or_else(|error| panic!("the wheel for the tests could not be packed: {error:#}"))
@@ -98,14 +99,14 @@ fn native() -> Result<Binaries> {
         }
         all.push(Binary::read(&read(&build(model.package, true)?)?)?);
     }
-    let library = read(&build(BATCH.0, true)?)?;
+    let library = read(&build_native(true)?)?;
     let command = read(&std::env::current_exe().context("this program cannot find itself")?)?;
     all.push(Binary::read(&library)?);
     all.push(Binary::read(&command)?);
     Ok(Binaries {
         folder: PLATFORM,
         fmus,
-        library: (library_name(std::env::consts::DLL_SUFFIX), library),
+        native: (native_name(std::env::consts::DLL_SUFFIX), library),
         command: Some((format!("{PACKAGE}{}", std::env::consts::EXE_SUFFIX), command)),
         read: all,
     })
@@ -137,7 +138,11 @@ fn cross_one(
     let mut read = Vec::new();
     let mut built = |product: &Product| -> Result<Vec<u8>> {
         let bytes = toolchain.build(product, platform, target)?;
-        let binary = Binary::read(&bytes).context(target.triple)?;
+        let mut binary = Binary::read(&bytes).context(target.triple)?;
+        if matches!(product, Product::Native) {
+            // Python itself loads it
+            binary.libraries.retain(|library| library != "python3.dll");
+        }
         let found = binary.loading_faults_for(&[target.architecture]);
         faults.extend(toolchain.faults(platform, &bytes, found));
         read.push(binary);
@@ -153,25 +158,26 @@ fn cross_one(
             fmus.push((file_name(&fmu), archive::read(&fmu)?));
         }
     }
-    let library = built(&Product::Library(BATCH.0, BATCH.1))?;
+    let library = built(&Product::Native)?;
     let command = built(&Product::Command)?;
     let ending = if platform.ending == ".dll" { ".exe" } else { "" };
     Ok(Binaries {
         folder: platform.folder,
         fmus,
-        library: (library_name(platform.ending), library),
+        native: (native_name(platform.ending), library),
         command: Some((format!("{PACKAGE}{ending}"), command)),
         read,
     })
 }
 
-fn library_name(ending: &str) -> String {
-    format!("{}{}{ending}", if ending == ".dll" { "" } else { "lib" }, BATCH.1)
+/// The name by which Python finds the compiled half, by the ending of the platform's libraries.
+fn native_name(ending: &str) -> &'static str {
+    if ending == ".dll" { "_native.pyd" } else { "_native.abi3.so" }
 }
 
 fn write_one(folder: &Path, binaries: Binaries) -> Result<PathBuf> {
     let tags = tags(&binaries.read)?;
-    let out = folder.join(format!("{PACKAGE}-{VERSION}-py3-none-{}.whl", tags.join(".")));
+    let out = folder.join(format!("{PACKAGE}-{VERSION}-{ABI}-{}.whl", tags.join(".")));
     archive::write(&files(binaries, &tags)?, &out)?;
     Ok(out)
 }
@@ -210,8 +216,8 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     for (name, bytes) in binaries.fmus {
         files.push((format!("{PACKAGE}/fmus/{name}"), bytes));
     }
-    let (name, bytes) = binaries.library;
-    files.push((format!("{PACKAGE}/lib/{}/{name}", binaries.folder), bytes));
+    let native = format!("{PACKAGE}/{}", binaries.native.0);
+    files.push((native.clone(), binaries.native.1));
     files.sort();
 
     let info = format!("{PACKAGE}-{VERSION}.dist-info");
@@ -220,8 +226,7 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     }
     if let Some((name, bytes)) = binaries.command {
         let command = format!("{PACKAGE}-{VERSION}.data/scripts/{name}");
-        let is_binary =
-            |name: &str| name.starts_with(&format!("{PACKAGE}/lib/")) || name.ends_with(".fmu");
+        let is_binary = |name: &str| name == native || name.ends_with(".fmu");
         let binaries_in = files.iter().filter(|(name, _)| is_binary(name));
         let mut hashes: Vec<_> =
             binaries_in.map(|(name, bytes)| (name.clone(), sha256(bytes))).collect();
@@ -236,7 +241,7 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     let mut wheel =
         format!("Wheel-Version: 1.0\nGenerator: {PACKAGE} {VERSION}\nRoot-Is-Purelib: false\n");
     for tag in tags {
-        wheel += &format!("Tag: py3-none-{tag}\n");
+        wheel += &format!("Tag: {ABI}-{tag}\n");
     }
     files.push((format!("{info}/WHEEL"), wheel.into_bytes()));
     let record = format!("{info}/RECORD");

@@ -18,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from . import attitude, batch, plot
+    from . import attitude, plot
     from .files import to_csv, to_mat, to_parquet
     from .fitting import TransferFunction, fit
     from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     __version__: str
 
-# numpy, pandas, fmpy and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
+# numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
 # one of its names (PEP 562). The same as above, for Python itself; a test compares.
 _MODULES = {
     "files": ("to_csv", "to_mat", "to_parquet"),
@@ -89,7 +89,6 @@ __all__ = [
     "View",
     "analyse",
     "attitude",
-    "batch",
     "bottom_up",
     "campaign",
     "closed_loop",

@@ -14,7 +14,7 @@ from .tables import ending_of, read_table, setting, write_table
 
 def main() -> None:
     """Read a torque history, drive the FMU, write the answer."""
-    parser = argparse.ArgumentParser(description="Drives the HubSlosh FMU through fmpy.")
+    parser = argparse.ArgumentParser(description="Drives HubSlosh through a torque history.")
     parser.add_argument("--fmu", default="HubSlosh", metavar="FILE")
     parser.add_argument(
         "--input", type=Path, required=True, metavar="FILE",

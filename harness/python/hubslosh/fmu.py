@@ -1,26 +1,16 @@
 """A packed FMU, 2.0 or 3.0: where it is, what it says of itself, values in its variables' types."""
 
+import atexit
 import difflib
 import math
-import threading
-import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree import ElementTree
 
-from fmpy import extract, platform, platform_tuple, read_model_description
-from fmpy.model_description import ModelDescription, ScalarVariable
+from .native import Fmu as _Fmu
+from .native import FmuError, FmuWarning, Variable, source_tree
 
-from .fmi3 import KINDS
-from .opening import DESCRIPTION, faults, is_file_name
-from .temporary import until_the_end
-
-PLATFORM = platform_tuple if platform_tuple == "aarch64-linux" else platform
-"""Folder of the binaries for this platform, as the program ``hubslosh`` names it.
-
-FMI 2.0's linux64 is for x86-64, but fmpy looks there on ARM too.
-"""
+__all__ = ["Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "did_you_mean", "source_tree"]
 
 Value = float | int | bool | str
 """A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name."""
@@ -55,20 +45,6 @@ class DefinedUnit(str):
         return str(self), self.exponents, self.factor, self.offset
 
 
-class FmuError(Exception):
-    """An error, with the FMU's own message if it has one."""
-
-
-class FmuWarning(UserWarning):
-    """A warning of an FMU, such as parameters beyond the known range of its model."""
-
-
-def source_tree() -> Path | None:
-    """Return the project's root if this package lies in its source tree."""
-    root = Path(__file__).resolve().parents[3]
-    return root if (root / "harness" / "python").is_dir() else None
-
-
 def find(model: str | Path) -> Path:
     """Return the FMU of a model: a file ``….fmu``, or the name of one that is in this package."""
     if not isinstance(model, str | Path):
@@ -101,7 +77,7 @@ def did_you_mean(wrong: str, names: Iterable[str]) -> str:
 
 
 class Fmu:
-    """An FMU, unpacked when its binary is first wanted.
+    """An FMU, unpacked for its first instance until the program ends.
 
     `open` reads a file once per program, as long as it does not change.
     """
@@ -110,42 +86,13 @@ class Fmu:
 
     def __init__(self, path: Path) -> None:
         """Read modelDescription.xml."""
-        self._unpacking = threading.Lock()
-        self._directory: str | None = None
         self.path = path
-        if why := next(faults(path), None):
-            raise FmuError(f"{path} is not an FMU: {why}")
-        try:
-            self.description: ModelDescription = read_model_description(str(path))
-        except Exception as error:  # fmpy has no class of its own for what is wrong with a file
-            raise FmuError(f"{path} is not an FMU that fmpy can read: {error}") from None
-        if self.description.fmiVersion not in ("2.0", "3.0"):
-            version = self.description.fmiVersion
-            raise FmuError(f"{path} is of FMI {version}; 2.0 or 3.0 is expected")
-        self.is_fmi3 = self.description.fmiVersion == "3.0"
+        self.native = _Fmu(path)
+        self.is_fmi3 = self.native.is_fmi3
         """True for FMI 3.0."""
-        self.intermediate: frozenset[str] = frozenset()
-        """Names of the variables that take part in intermediate update."""
-        if self.is_fmi3:
-            self.intermediate, directional = _of_fmi3(path)
-            if self.description.modelExchange is not None:
-                # the name that fmpy has of FMI 2.0
-                self.description.modelExchange.providesDirectionalDerivative = directional
-        for interface in (self.description.coSimulation, self.description.modelExchange):
-            if interface is not None and not is_file_name(interface.modelIdentifier):
-                raise FmuError(
-                    f"{path}: modelIdentifier {interface.modelIdentifier!r} leads out of its "
-                    "folder (allowed: letters, digits, underscores)"
-                )
-        self.name: str = self.description.modelName
-        self.variables: dict[str, ScalarVariable] = {
-            v.name: v for v in self.description.modelVariables
-        }
-        self._units: dict[str, dict[str, Any]] = {
-            unit.name: {shown.name: shown for shown in unit.displayUnits}
-            for unit in self.description.unitDefinitions
-        }
-        self._bases = {unit.name: unit.baseUnit for unit in self.description.unitDefinitions}
+        self.name: str = self.native.name
+        self.variables: dict[str, Variable] = {v.name: v for v in self.native.variables}
+        atexit.register(self.native.close)
 
     @classmethod
     def open(cls, model: str | Path) -> "Fmu":
@@ -157,22 +104,11 @@ class Fmu:
             cls._opened[key] = cls(path)
         return cls._opened[key]
 
-    @property
-    def directory(self) -> str:
-        """Folder of the unpacked FMU, kept until the program ends."""
-        with self._unpacking:
-            if self._directory is None:
-                try:
-                    self._directory = str(extract(str(self.path), str(until_the_end())))
-                except Exception as error:  # as in reading
-                    raise FmuError(f"{self.path} cannot be unpacked: {error}") from None
-            return self._directory
-
     def names(self, *causalities: str) -> list[str]:
         """Return the names of the variables with these causalities ("output", "local", …)."""
         return [v.name for v in self.variables.values() if v.causality in causalities]
 
-    def variable(self, name: str) -> ScalarVariable:
+    def variable(self, name: str) -> Variable:
         """Return a variable by its name."""
         if name not in self.variables:
             hint = did_you_mean(name, self.variables)
@@ -180,17 +116,12 @@ class Fmu:
         return self.variables[name]
 
     def kind(self, name: str) -> str:
-        """Return a variable's type as FMI 2.0 calls it, or FMI 3.0 if 2.0 has none."""
-        variable = self.variable(name)
-        if variable.dimensions:
-            return f"array of {variable.type}"
-        return KINDS.get(variable.type, variable.type)
+        """Return a variable's type, Real, Integer, Boolean, String or Enumeration."""
+        return self.variable(name).kind
 
     def unit(self, name: str) -> str:
         """Return the unit in which a variable is exchanged; empty if it has none."""
-        variable = self.variable(name)
-        declared = variable.declaredType.unit if variable.declaredType else None
-        return variable.unit or declared or ""
+        return self.variable(name).unit
 
     def convert(self, name: str, value: Quantity) -> Value:
         """Return a value in the type and unit of a variable.
@@ -211,7 +142,7 @@ class Fmu:
             if isinstance(value, tuple) and kind != "Real":
                 raise ValueError(f"a value of type {kind} has no unit")
             if kind not in converters:
-                raise ValueError(f"it is an {kind}" if " " in kind else f"it is of type {kind}")
+                raise ValueError(f"it is of type {kind}")
             return converters[kind](value)
         except (TypeError, ValueError, OverflowError) as error:
             raise FmuError(f"{name} cannot be {value!r}: {error}") from None
@@ -228,36 +159,21 @@ class Fmu:
 
     def scale(self, name: str, unit: str) -> tuple[float, float]:
         """Return (factor, offset) of a unit: a number in it is factor · value + offset."""
-        base = self.unit(name)
-        if isinstance(unit, DefinedUnit) and (known := self._bases.get(base)) is not None:
-            exponents = {key: getattr(known, key) for key in DefinedUnit.EXPONENTS}
-            if exponents != unit.exponents:
+        variable = self.variable(name)
+        base = variable.unit
+        if isinstance(unit, DefinedUnit) and variable.base is not None:
+            exponents, factor, offset = variable.base
+            if dict(zip(DefinedUnit.EXPONENTS, exponents, strict=True)) != unit.exponents:
                 raise ValueError(f"the unit {unit} of the file is no unit of its kind, {base}")
-            return known.factor / unit.factor, (known.offset - unit.offset) / unit.factor
+            return factor / unit.factor, (offset - unit.offset) / unit.factor
         if unit == base:
             return 1.0, 0.0
-        shown = self._units.get(base, {})
+        shown = {name: scale for name, *scale in variable.shown}
         if unit not in shown:
             units = ", ".join(u for u in (base, *shown) if u)
             raise ValueError(f"it has no unit {unit} (units: {units or 'none'})")
-        return float(shown[unit].factor), float(shown[unit].offset)
-
-
-def _of_fmi3(path: Path) -> tuple[frozenset[str], bool]:
-    """Return what fmpy does not read of an FMU 3.0.
-
-    The names of the variables with ``intermediateUpdate``, and whether Model Exchange
-    ``providesDirectionalDerivatives``.
-    """
-    true = ("true", "1")
-    intermediate, directional = set(), False
-    with zipfile.ZipFile(path) as archive, archive.open(DESCRIPTION) as file:
-        for _, element in ElementTree.iterparse(file):
-            if element.get("intermediateUpdate") in true:
-                intermediate.add(element.attrib["name"])
-            if element.tag == "ModelExchange":
-                directional = element.get("providesDirectionalDerivatives") in true
-    return frozenset(intermediate), directional
+        factor, offset = shown[unit]
+        return factor, offset
 
 
 def _with_unit(text: str) -> Quantity:
@@ -272,9 +188,9 @@ def _with_unit(text: str) -> Quantity:
     return text
 
 
-def _item(variable: ScalarVariable, value: Any) -> int:
+def _item(variable: Variable, value: Any) -> int:
     """Return the number of an enumeration's item."""
-    items = {item.name: int(item.value) for item in variable.declaredType.items}
+    items = dict(variable.items)
     if value in items:
         return items[value]
     try:

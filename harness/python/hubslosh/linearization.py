@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from fmpy import fmi2
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import names_of
@@ -226,35 +225,23 @@ def linearize(
     with ``friction.model`` none or viscous, or in motion.
     """
     fmu = Fmu.open(model)
-    exchange = fmu.description.modelExchange
-    if exchange is None or not exchange.providesDirectionalDerivative:
+    if not fmu.native.differentiates:
         raise FmuError(f"{fmu.path} offers no directional derivatives in Model Exchange")
     parameters = parameters_of(parameters)
     names_in = _reals(fmu, inputs, "input")
     names_out = _reals(fmu, outputs, "output")
-    derivatives = [unknown.variable for unknown in fmu.description.derivatives]
-    states = [derivative.derivative for derivative in derivatives]
-    if arrays := [state.name for state in states if state.dimensions]:
-        raise FmuError(f"{fmu.name} has arrays of states ({', '.join(arrays)}): scalars alone")
-    references = [fmu.variable(name).valueReference for name in names_out]
-    unknown = [v.valueReference for v in derivatives] + references
-    known = [v.valueReference for v in states]
-    known += [fmu.variable(name).valueReference for name in names_in]
-
-    with Instance(fmu, fmi2.FMU2Model) as instance:
+    by_reference = {v.reference: v for v in reversed(fmu.variables.values())}
+    pairs = fmu.native.derivatives
+    states = [by_reference.get(state) for _, state in pairs]
+    if None in states:
+        raise FmuError(f"{fmu.name} has arrays of states: scalars alone")
+    unknown = [derivative for derivative, _ in pairs]
+    unknown += [fmu.variable(name).reference for name in names_out]
+    known = [state for _, state in pairs] + [fmu.variable(name).reference for name in names_in]
+    with Instance(fmu, exchange=True) as instance:
         for name, value in parameters.items():
             instance.set(name, value)
-        instance._call("setupExperiment")
-        instance._call("enterInitializationMode")
-        instance._call("exitInitializationMode")
-        while True:
-            again, terminate, *_ = instance._call("newDiscreteStates")
-            if terminate:
-                raise FmuError(f"{fmu.name} ends the simulation at its start")
-            if not again:
-                break
-        instance._call("enterContinuousTimeMode")
-        columns = [instance._call("getDirectionalDerivative", unknown, [k], [1.0]) for k in known]
+        columns = instance.native.jacobian(unknown, known)
     jacobian = np.array(columns, float).reshape(len(known), len(unknown)).T
     n = len(states)
     A, B, C, D = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]

@@ -209,10 +209,8 @@ class Loop:
         )
         feedback = Feedback(
             controller,
-            *(
-                np.array([fmu.variable(n).valueReference for n in names], np.uint32)
-                for names in (seen, command)
-            ),
+            seen,
+            command,
             cycles=cycles,
             parts=parts,
             switch=switch,
@@ -274,16 +272,17 @@ class Loop:
         if attitude and any(n not in Fmu.open(self.model).variables for n in QUATERNION):
             raise FmuError(f"{Path(self.model).name} has no quaternion q[1], …, q[4]")
         rows = {name: history.after(time)[0] for name, history in table.items()}
-        wide = [np.pad(m, ((0, 0), (0, len(seen) - len(measured)))) for m in (model.B, model.D)]
+        A, B, C, D = (np.asarray(m, float) for m in model)
+        B, D = (np.pad(m, ((0, 0), (0, len(seen) - len(measured)))) for m in (B, D))
 
         def columns(names: list[str]) -> NDArray[np.float64]:
             return np.column_stack([rows.get(name, np.zeros(cycles)) for name in names])
 
         wanted, quaternion = columns(seen), None
         if attitude:
-            quaternion = np.array([seen.index(name) for name in QUATERNION], np.uintp)
+            quaternion = [seen.index(name) for name in QUATERNION]
             wanted[:, quaternion] /= np.linalg.norm(wanted[:, quaternion], axis=1)[:, None]
-        linear = Linear(model.A, wide[0], model.C, wide[1], wanted, columns(command), quaternion)
+        linear = Linear(A, B, C, D, wanted, columns(command), quaternion)
         return linear, seen
 
 
@@ -361,14 +360,14 @@ def _points(
     return np.append(points.ravel(), grid[-1]), switch, wanted
 
 
-def _called(law: Law, command: list[str]) -> Callable[[int, float, NDArray[np.float64]], Any]:
+def _called(law: Law, command: list[str]) -> Callable[[int, float, list[float]], list[float]]:
     """Return a function as a run calls it; what it returns is checked."""
     one = f"a finite number for {command[0]}"
     several = f"{len(command)} finite numbers ({', '.join(command)})"
     expected = one if len(command) == 1 else several
 
-    def call(cycle: int, time: float, measured: NDArray[np.float64]) -> NDArray[np.float64]:
-        returned = law(time, measured)
+    def call(cycle: int, time: float, measured: list[float]) -> list[float]:
+        returned = law(time, np.array(measured))
         try:
             values = np.atleast_1d(np.asarray(returned, float))
         except (TypeError, ValueError):
@@ -377,7 +376,7 @@ def _called(law: Law, command: list[str]) -> Callable[[int, float, NDArray[np.fl
             raise FmuError(
                 f"the controller returned {returned!r} at t = {time:g} s; {expected} must come back"
             )
-        return values
+        return values.tolist()
 
     return call
 

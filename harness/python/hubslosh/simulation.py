@@ -102,18 +102,14 @@ def simulate(
     check_outputs(fmu, columns, problems)
     if wrong := not_numbers(start=start, stop=stop, step=step, tolerance=tolerance):
         raise FmuError("; ".join(problems + wrong))
-    experiment = fmu.description.defaultExperiment
-
-    def suggested(name: str, otherwise: float) -> float:
-        text = getattr(experiment, name, None) if experiment else None
-        return otherwise if text is None else float(text)
-
+    defaults = zip(fmu.native.experiment, (0.0, 1.0, DEFAULT_STEP), strict=True)
+    suggested = [default if own is None else own for own, default in defaults]
     if start is None:
-        start = suggested("startTime", 0.0) if rows is None else float(rows[0])
+        start = suggested[0] if rows is None else float(rows[0])
     if stop is None:
-        stop = start + suggested("stopTime", 1.0) if rows is None else float(rows[-1])
+        stop = start + suggested[1] if rows is None else float(rows[-1])
     if step is None and rows is None:
-        step = suggested("stepSize", DEFAULT_STEP)
+        step = suggested[2]
     if not (np.isfinite([start, stop]).all() and stop > start):
         problems.append(f"stop must be later than start, {start} s, not {stop} s")
     if step is not None and not (np.isfinite(step) and step > 0):
@@ -131,9 +127,7 @@ def simulate(
     # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
-    interface = fmu.description.coSimulation
-    by = "providesIntermediateUpdate" if fmu.is_fmi3 else "canInterpolateInputs"
-    if sloped and interface is not None and not getattr(interface, by):
+    if sloped and not fmu.native.interpolates:
         raise FmuError(f"{fmu.name} cannot interpolate its inputs; use hold=True")
     asked = [name for name in columns if name not in given]
     with Plant(
@@ -345,7 +339,7 @@ def check_outputs(fmu: Fmu, columns: Sequence[str], problems: list[str]) -> None
     """Add to ``problems`` what is wrong with outputs."""
     check: list[tuple[Callable[[str], bool], str]] = [
         (lambda name: columns.count(name) > 1, "is wanted twice"),
-        (lambda name: fmu.variable(name).type == "String", "is a text; only numbers are recorded"),
+        (lambda name: fmu.kind(name) == "String", "is a text; only numbers are recorded"),
     ]
     for name in dict.fromkeys(columns):
         try:

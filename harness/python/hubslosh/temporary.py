@@ -5,7 +5,6 @@ The scheme is that of the program ``hubslosh`` (``harness/files/src/temporary.rs
 Either program removes the folders of both.
 """
 
-import atexit
 import os
 import shutil
 import stat
@@ -84,14 +83,6 @@ def folder(parent: Path | None = None, prefix: str = PREFIX) -> Iterator[Path]:
         yield made.files
     finally:
         made.remove()
-
-
-def until_the_end() -> Path:
-    """Return a new temporary folder that goes when the program ends."""
-    sweep(Path(tempfile.gettempdir()), PREFIX)
-    made = _Folder(Path(tempfile.gettempdir()), PREFIX)
-    atexit.register(made.remove)
-    return made.files
 
 
 def sweep(parent: Path, prefix: str = PREFIX) -> None:

@@ -3,7 +3,7 @@ r"""Fixtures: the packed FMU and the harness's binary.
     cargo run --release -- pack
     cargo run --release -- pack --python
     pytest harness/python --fmu dist/HubSlosh.fmu --hubslosh target/release/hubslosh \
-        --wheel dist/hubslosh-0.6.0-py3-none-….whl
+        --wheel dist/hubslosh-0.6.0-cp311-abi3-….whl
 
 ``cargo test --release`` calls it so, with FMU and wheel that it packs itself.
 """
@@ -14,9 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from hubslosh import COLUMNS, TORQUE, read_table
+from hubslosh import COLUMNS, TORQUE, Plant, read_table
 
 ROOT = Path(__file__).resolve().parents[3]
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
@@ -62,3 +63,24 @@ def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Harn
         return read_table(out, ["time", TORQUE, *columns])
 
     return run
+
+
+def single_calls(
+    fmu: Path, parameters: dict, inputs: pd.DataFrame, columns: list[str], hold: bool
+) -> pd.DataFrame:
+    """Return what `simulate` does, by one call for each input, step and output."""
+    time, names = inputs["time"].to_numpy(), list(inputs)[1:]
+    start = {name: inputs[name][0] for name in names}
+    rows = []
+    with Plant(fmu, parameters, stop=time[-1], inputs=start) as plant:
+        for k, now in enumerate(time):
+            rows.append(plant.get(columns))
+            if k == len(time) - 1:
+                break
+            for name in names:
+                plant.set(name, inputs[name][k])
+            for name in [] if hold else names:
+                rise = inputs[name][k + 1] - inputs[name][k]
+                plant.set_slope(name, rise / (time[k + 1] - now))
+            plant.step(time[k + 1])
+    return inputs.join(pd.DataFrame(rows, columns=columns))

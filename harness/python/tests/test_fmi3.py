@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import single_calls
 
-from hubslosh import FmuError, Plant, RunError, batch, closed_loop, linearize, simulate
+from hubslosh import FmuError, Plant, RunError, closed_loop, linearize, simulate
 from hubslosh.fmu import Fmu
 
 STEP = 0.02  # s
@@ -143,48 +144,18 @@ def test_a_linear_model_has_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
     assert linearize(three(fmu, model), moving, **some).D.shape == (2, 1)
 
 
-@pytest.fixture
-def library() -> None:
-    """Fail where the library for whole runs is missing: the tests would compare two loops alike."""
-    assert batch.library() is not None, "cargo build --release -p hubslosh-batch"
-
-
-@pytest.mark.usefixtures("library")
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", INPUTS)
-def test_one_call_gives_the_bits_of_single_calls(
-    fmu: Path, model: str, hold: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Outputs of all types, inputs in lines set within steps by the library and from Python."""
+def test_one_call_gives_the_bits_of_single_calls(fmu: Path, model: str, hold: bool) -> None:
+    """Outputs of all types, inputs in lines set within steps."""
     inputs = pd.DataFrame({"time": TIME} | INPUTS[model])
     path = three(fmu, model)
     columns = Fmu.open(path).names("output", "local")
-    arguments = (path, PARAMETERS[model], inputs, None, None, columns)
-    whole = simulate(*arguments, hold=hold)
-    monkeypatch.setattr(batch, "library", lambda: None)
-    single = simulate(*arguments, hold=hold)
-    pd.testing.assert_frame_equal(whole, single, check_exact=True)
+    whole = simulate(path, PARAMETERS[model], inputs, outputs=columns, hold=hold)
+    single = single_calls(path, PARAMETERS[model], inputs, columns, hold)
+    assert np.array_equal(whole.to_numpy(float), single.to_numpy(float))
 
 
-@pytest.mark.usefixtures("library")
-def test_a_loop_in_one_call_gives_the_bits_of_single_calls(
-    fmu: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A linear controller beside an input that goes in lines."""
-    inputs = pd.DataFrame({"time": [0.0, 10.0], "tau_ext": [0.0, 0.01]})
-
-    def run() -> pd.DataFrame:
-        return closed_loop(
-            [[0.5, 0.6]], 0.1, 10, three(fmu), {"init.omega": 0.1}, inputs=inputs, delay=0.03
-        )
-
-    whole = run()
-    monkeypatch.setattr(batch, "library", lambda: None)
-    pd.testing.assert_frame_equal(whole, run(), check_exact=True)
-
-
-@pytest.mark.usefixtures("library")
-@pytest.mark.parametrize("loop", [True, False])
 @pytest.mark.parametrize(
     ("torque", "hold", "sentence"),
     [
@@ -199,12 +170,9 @@ def test_a_loop_in_one_call_gives_the_bits_of_single_calls(
     ],
 )
 def test_a_run_that_stops_says_where_and_keeps_what_it_has(
-    fmu: Path, loop: bool, torque: np.ndarray, hold: bool, sentence: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    fmu: Path, torque: np.ndarray, hold: bool, sentence: str
+) -> None:
     """The message names the function that refused, as in FMI 2.0."""
-    if not loop:
-        monkeypatch.setattr(batch, "library", lambda: None)
     slopes = None if hold else {"tau_cmd": np.append(np.diff(torque) / STEP, 0.0)}
     with Plant(three(fmu), torque=0.0) as plant, pytest.raises(RunError) as told:
         plant.run(TIME, {"tau_cmd": torque}, slopes, ["omega"])

@@ -26,7 +26,7 @@ def test_importing_the_package_imports_nothing_large() -> None:
     assert not before & LARGE
     # simulating needs tables, and pandas imports pyarrow where it is installed; transfer functions
     # and figures are other functions' business
-    assert after & LARGE <= {"numpy", "pandas", "pyarrow", "fmpy", "lxml"}
+    assert after & LARGE <= {"numpy", "pandas", "pyarrow"}
 
 
 def test_what_comes_on_first_use_is_what_type_checkers_see() -> None:

@@ -68,7 +68,8 @@ def test_units_are_those_of_the_command_line(fmu: Path, request) -> None:
     for variable in listed:
         name, units = variable["name"], variable["units"]
         own = opened.unit(name)
-        assert set(units) == {unit for unit in (own, *opened._units.get(own, {})) if unit}, name
+        shown = [unit for unit, *_ in opened.variables[name].shown]
+        assert set(units) == {unit for unit in (own, *shown) if unit}, name
         for unit, scale in units.items():
             assert opened.scale(name, unit) == (scale["factor"], scale["offset"]), (name, unit)
         several += len(units) > 1

@@ -1,25 +1,22 @@
 """A simulation in one call: what fmpy finds, however it is called, and its errors."""
 
+import _thread
+import threading
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import single_calls
 from fmpy import simulate_fmu
 
-from hubslosh import FmuError, FmuWarning, Plant, RunError, batch, drive, simulate, simulation
+from hubslosh import FmuError, FmuWarning, Plant, RunError, drive, simulate, simulation
 
 STEP = 0.02  # s
 TIME = np.arange(3001) * STEP
 TORQUE = 0.05 * np.sin(2 * np.pi * 2.4 * TIME)  # N·m, near the slosh frequency
 TABLE = pd.DataFrame({"time": TIME, "tau_cmd": TORQUE})
-
-
-@pytest.fixture
-def library() -> None:
-    """Fail where the library for whole runs is missing: the tests would compare two loops alike."""
-    assert batch.library() is not None, "cargo build --release -p hubslosh-batch"
 
 
 def test_what_the_fmu_warns_of_is_a_warning(fmu: Path) -> None:
@@ -31,7 +28,6 @@ def test_what_the_fmu_warns_of_is_a_warning(fmu: Path) -> None:
         simulate(fmu, stop=0.1)
 
 
-@pytest.mark.usefixtures("library")
 def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
     """Same times, same calls: outputs of all types, every one of 3001 rows."""
     theirs = simulate_fmu(
@@ -50,20 +46,18 @@ def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
         assert np.array_equal(theirs[name], ours[name]), name
 
 
-@pytest.mark.usefixtures("library")
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", ["linear", "spherical"])
 def test_one_call_gives_the_bits_of_single_calls(fmu: Path, model: str, hold: bool) -> None:
     """Three inputs with slopes or held; outputs of all types, in a mixed order."""
     inputs = TABLE.assign(tau_ext=0.01 * np.cos(3 * TIME), g_axial=9.81 + 0.5 * np.sin(TIME))
     columns = ["stuck", "omega", "regime", "tau_fluid", "event_count", "theta"]
-    arguments = (fmu, {"slosh.model": model}, inputs[:1001], None, None, columns)
-    whole = simulate(*arguments, hold=hold)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(batch, "run", batch.step_by_step)
-        single = simulate(*arguments, hold=hold)
+    parameters, inputs = {"slosh.model": model}, inputs[:1001]
+    whole = simulate(fmu, parameters, inputs, outputs=columns, hold=hold)
+    single = single_calls(fmu, parameters, inputs, columns, hold)
+    assert whole["stuck"].dtype == bool and whole["event_count"].dtype == np.intc
     assert whole["stuck"].any() and not whole["stuck"].all()
-    pd.testing.assert_frame_equal(whole, single, check_exact=True)
+    assert np.array_equal(whole.to_numpy(float), single.to_numpy(float))
 
 
 def test_steps_between_rows_and_rows_between_steps_change_nothing(fmu: Path) -> None:
@@ -169,12 +163,8 @@ def test_the_most_rows_are_those_of_the_command_line() -> None:
     assert f"pub const ROWS: usize = {simulation.MOST_ROWS:_};" in budget.read_text()
 
 
-@pytest.mark.parametrize("loop", ["run", "step_by_step"])
-def test_a_run_that_stops_says_where_and_keeps_what_it_has(
-    fmu: Path, loop: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_stops_says_where_and_keeps_what_it_has(fmu: Path) -> None:
     """The FMU refuses NaN in row 500; 501 rows were read."""
-    monkeypatch.setattr(batch, "run", getattr(batch, loop))
     torque = TORQUE.copy()
     torque[500] = np.nan
     with Plant(fmu, torque=0.0) as plant, pytest.raises(RunError) as told:
@@ -215,3 +205,29 @@ def test_inputs_may_be_in_their_display_units(fmu: Path) -> None:
     scaled.attrs["units"] = {"tau_cmd": "lbf.ft"}
     with pytest.raises(FmuError, match=r"unit of tau_cmd in inputs: it has no unit lbf.ft .*mN.m"):
         simulate(fmu, inputs=scaled)
+
+
+LONG = np.arange(3_000_001) * STEP
+"""Rows of some seconds of computing."""
+
+
+def test_an_interrupt_stops_a_run_on_its_way(fmu: Path) -> None:
+    """A hub without friction turns as long as the run goes on."""
+    turning = {"slosh.model": "frozen", "friction.model": "none", "init.omega": 1.0}
+    with Plant(fmu, turning) as plant:
+        timer = threading.Timer(0.1, _thread.interrupt_main)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            plant.run(LONG, {}, None, ["theta"])
+        assert 0 < plant.get(["theta"])[0] < LONG[-1] / 2
+
+
+def test_python_goes_on_during_a_run(fmu: Path) -> None:
+    """The main thread counts while another one runs."""
+    with Plant(fmu) as plant:
+        run = threading.Thread(target=plant.run, args=(LONG[:300_001], {}, None, ["theta"]))
+        run.start()
+        count = 0
+        while run.is_alive():
+            count += 1
+    assert count > 1000

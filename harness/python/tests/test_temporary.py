@@ -13,12 +13,10 @@ from hubslosh import temporary
 
 KILLED = """
 import os, signal, sys
-from pathlib import Path
 import hubslosh
 from hubslosh import temporary
-from hubslosh.fmu import Fmu
 
-assert Path(Fmu.open(sys.argv[1]).directory, "modelDescription.xml").is_file()
+hubslosh.Plant(sys.argv[1]).close()
 with temporary.folder():
     if sys.argv[2] == "kill":
         os.kill(os.getpid(), signal.SIGKILL)
@@ -73,3 +71,26 @@ def test_a_table_that_was_not_written_to_its_end_goes_with_the_next_one(tmp_path
     (dead / "alive").touch()
     to_csv(pd.DataFrame({"a": [1.0]}), tmp_path / "a.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+
+
+FORKED = """
+import os, sys
+import hubslosh
+
+with hubslosh.Plant(sys.argv[1]):
+    if (child := os.fork()) == 0:
+        sys.exit()
+    assert os.waitpid(child, 0)[1] == 0
+    assert len(os.listdir(os.environ["TMPDIR"])) == 1
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no forks")
+def test_the_end_of_a_fork_leaves_the_folder_of_its_parent(fmu: Path, tmp_path: Path) -> None:
+    """The parent removes it at its own end."""
+    environment = os.environ | {
+        "PYTHONPATH": str(Path(__file__).parents[1]),
+        "TMPDIR": str(tmp_path),
+    }
+    subprocess.run([sys.executable, "-c", FORKED, fmu], env=environment, check=True)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,170 @@
+//! A sampled controller between the outputs and the inputs of a run.
+
+use host::fmu::Instance;
+use pyo3::buffer::PyBuffer;
+use pyo3::prelude::*;
+
+use crate::fmu::Fmu;
+use crate::numbers::{Failure, Numbers};
+
+/// A linear controller with state x, which sees the error e = r − y of what is measured:
+/// u = C x + D e + f, then x = A x + B e. Matrices row after row.
+///
+/// Sums are taken from left to right without fused multiplication, so that Python has the same bits.
+struct Linear {
+    x: Vec<f64>,
+    a: Vec<f64>,
+    b: Vec<f64>,
+    c: Vec<f64>,
+    d: Vec<f64>,
+    /// r, a row per cycle.
+    reference: Vec<f64>,
+    /// f, a row per cycle.
+    feedforward: Vec<f64>,
+    /// Places of a quaternion in y, scalar first: of its vector part the error is that of q⁻¹ ⊗ r, half of what is left to
+    /// turn about each body axis, the short way round.
+    quaternion: Option<[usize; 4]>,
+    /// Room for e and the next x.
+    error: Vec<f64>,
+    next: Vec<f64>,
+}
+
+/// Row `i` of a matrix times `x`, added to `sum`.
+fn add_row(mut sum: f64, matrix: &[f64], i: usize, x: &[f64]) -> f64 {
+    for (m, x) in matrix[i * x.len()..(i + 1) * x.len()].iter().zip(x) {
+        sum += m * x;
+    }
+    sum
+}
+
+/// Vector part of q⁻¹ ⊗ r, of the sign that makes the scalar part positive.
+fn attitude_error(q: [f64; 4], r: [f64; 4]) -> [f64; 3] {
+    let scalar = q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3];
+    let sign = if scalar < 0.0 { -1.0 } else { 1.0 };
+    [
+        sign * (q[0] * r[1] - q[1] * r[0] - q[2] * r[3] + q[3] * r[2]),
+        sign * (q[0] * r[2] + q[1] * r[3] - q[2] * r[0] - q[3] * r[1]),
+        sign * (q[0] * r[3] - q[1] * r[2] + q[2] * r[1] - q[3] * r[0]),
+    ]
+}
+
+impl Linear {
+    fn command(&mut self, cycle: usize, measured: &[f64], command: &mut [f64]) {
+        let wanted = &self.reference[cycle * measured.len()..][..measured.len()];
+        for ((e, r), y) in self.error.iter_mut().zip(wanted).zip(measured) {
+            *e = r - y;
+        }
+        if let Some(at) = self.quaternion {
+            let turn = attitude_error(at.map(|i| measured[i]), at.map(|i| wanted[i]));
+            for (i, turn) in at.into_iter().skip(1).zip(turn) {
+                self.error[i] = turn;
+            }
+        }
+        let forward = &self.feedforward[cycle * command.len()..];
+        for (i, u) in command.iter_mut().enumerate() {
+            *u = add_row(add_row(0.0, &self.c, i, &self.x), &self.d, i, &self.error) + forward[i];
+        }
+        for (i, next) in self.next.iter_mut().enumerate() {
+            *next = add_row(add_row(0.0, &self.a, i, &self.x), &self.b, i, &self.error);
+        }
+        std::mem::swap(&mut self.x, &mut self.next);
+    }
+}
+
+/// What computes the commands of a cycle.
+enum Controller {
+    Linear(Box<Linear>),
+    /// A function of cycle, time (s) and measurements that returns as many numbers as there are commands.
+    Function(Py<PyAny>),
+}
+
+/// The loop around a run, from the class `Feedback` of Python: at every `parts`-th row a cycle begins. What the controller
+/// computes from the measurements there is set `latency` cycles and `switch` rows later, and held until the next command is.
+pub struct Feedback {
+    controller: Controller,
+    /// Value references of Reals, and their values.
+    measured: (Vec<u32>, Vec<f64>),
+    command: Vec<u32>,
+    parts: usize,
+    switch: usize,
+    latency: usize,
+    /// The last `latency` + 1 commands, cycle k in place k modulo their number.
+    on_the_way: Vec<f64>,
+    now: Vec<f64>,
+    /// The commands in force from each row on.
+    pub commands: Numbers,
+}
+
+impl Feedback {
+    /// # Errors
+    /// If an attribute is missing or has another type or size.
+    pub fn of(feedback: &Bound<PyAny>, fmu: &Fmu, rows: usize) -> PyResult<Self> {
+        let references = |attribute: &str| -> PyResult<Vec<u32>> {
+            let names: Vec<String> = feedback.getattr(attribute)?.extract()?;
+            names.iter().map(|name| Ok(fmu.variable(name)?.reference)).collect()
+        };
+        let size = |attribute: &str| -> PyResult<usize> { feedback.getattr(attribute)?.extract() };
+        let controller = feedback.getattr("controller")?;
+        let (measured, command) = (references("measured")?, references("command")?);
+        let values = vec![0.0; measured.len()];
+        let latency = size("latency")?;
+        let controller = match controller.is_callable() {
+            true => Controller::Function(controller.unbind()),
+            false => Controller::Linear(Box::new(linear(&controller, measured.len())?)),
+        };
+        Ok(Feedback {
+            controller,
+            measured: (measured, values),
+            parts: size("parts")?,
+            switch: size("switch")?,
+            latency,
+            on_the_way: vec![0.0; (latency + 1) * command.len()],
+            now: vec![0.0; command.len()],
+            commands: Numbers::of(&feedback.getattr("commands")?, rows, command.len(), true)?,
+            command,
+        })
+    }
+
+    /// Acts at row `row`, `time` in s, between reading outputs and setting inputs.
+    pub fn act(&mut self, fmu: &mut Instance, row: usize, time: f64) -> Result<(), Failure> {
+        let (width, cycle) = (self.now.len(), row / self.parts);
+        let place = |cycle: usize| (cycle % (self.latency + 1)) * width;
+        if row.is_multiple_of(self.parts) {
+            let (references, measured) = &mut self.measured;
+            fmu.get_real(references, measured)?;
+            let new = &mut self.on_the_way[place(cycle)..][..width];
+            match &mut self.controller {
+                Controller::Linear(linear) => linear.command(cycle, measured, new),
+                Controller::Function(law) => Python::attach(|py| {
+                    let given: Vec<f64> =
+                        law.call1(py, (cycle, time, &measured[..]))?.extract(py)?;
+                    new.copy_from_slice(&given);
+                    PyResult::Ok(())
+                })?,
+            }
+        }
+        if row % self.parts == self.switch && cycle >= self.latency {
+            self.now.copy_from_slice(&self.on_the_way[place(cycle - self.latency)..][..width]);
+            fmu.set_real(&self.command, &self.now)?;
+        }
+        self.commands.push(&self.now);
+        Ok(())
+    }
+}
+
+fn linear(of: &Bound<PyAny>, measured: usize) -> PyResult<Linear> {
+    let matrix = |name: &str| PyBuffer::<f64>::get(&of.getattr(name)?)?.to_vec(of.py());
+    let states = of.getattr("A")?.len()?;
+    Ok(Linear {
+        x: vec![0.0; states],
+        a: matrix("A")?,
+        b: matrix("B")?,
+        c: matrix("C")?,
+        d: matrix("D")?,
+        reference: matrix("reference")?,
+        feedforward: matrix("feedforward")?,
+        quaternion: of.getattr("quaternion")?.extract()?,
+        error: vec![0.0; measured],
+        next: vec![0.0; states],
+    })
+}

@@ -1,0 +1,170 @@
+//! FMUs and their variables.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use host::description::{self, ModelDescription};
+use host::fmu::Interface;
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyUserWarning};
+use pyo3::prelude::*;
+
+create_exception!(
+    hubslosh,
+    FmuError,
+    PyException,
+    "An error, with the FMU's own message if it has one."
+);
+create_exception!(
+    hubslosh,
+    FmuWarning,
+    PyUserWarning,
+    "A warning of an FMU, such as parameters beyond the known range of its model."
+);
+
+/// An error of the host as one of Python.
+pub fn error(why: impl Into<anyhow::Error>) -> PyErr {
+    FmuError::new_err(format!("{:#}", why.into()))
+}
+
+/// A variable of an FMU.
+#[pyclass(frozen, get_all, module = "hubslosh")]
+pub struct Variable {
+    name: String,
+    reference: u32,
+    /// "Real", "Integer", "Boolean", "String", "Enumeration", "Binary" or "Clock".
+    kind: String,
+    causality: String,
+    variability: String,
+    start: Option<String>,
+    /// Unit in which it is exchanged; empty if it has none.
+    unit: String,
+    /// Display units: name, factor, offset.
+    shown: Vec<(String, f64, f64)>,
+    /// Its unit by SI base units, if the FMU defines it: exponents, factor, offset.
+    base: Option<([i32; 8], f64, f64)>,
+    /// Items of an enumeration: name, number.
+    items: Vec<(String, i64)>,
+    /// An element of an array.
+    is_element: bool,
+}
+
+impl Variable {
+    fn of(description: &ModelDescription, variable: &description::Variable) -> Variable {
+        let unit = description.unit(variable);
+        let defined = description.units.iter().find(|defined| defined.name == unit);
+        let shown = description.display_units(variable).iter();
+        let items = description.items(variable).iter();
+        Variable {
+            name: variable.name.clone(),
+            reference: variable.reference,
+            kind: format!("{:?}", variable.kind()),
+            causality: variable.causality.clone(),
+            variability: variable.variability.clone(),
+            start: variable.attributes().start.clone(),
+            unit: unit.into(),
+            shown: shown.map(|unit| (unit.name.clone(), unit.factor, unit.offset)).collect(),
+            base: defined
+                .and_then(|unit| unit.base)
+                .map(|base| (base.exponents, base.factor, base.offset)),
+            items: items.map(|item| (item.name.clone(), item.value)).collect(),
+            is_element: description.element(variable.reference).is_some(),
+        }
+    }
+}
+
+/// A packed FMU. Its binary is loaded for the first instance of an interface.
+#[pyclass(frozen, module = "hubslosh")]
+pub struct Fmu {
+    path: PathBuf,
+    description: ModelDescription,
+    /// Places in the description by name.
+    places: BTreeMap<String, usize>,
+    /// For Co-Simulation and for Model Exchange.
+    loaded: [Mutex<Option<Arc<host::fmu::Fmu>>>; 2],
+}
+
+impl Fmu {
+    /// The FMU, loaded for an interface.
+    pub fn load(&self, interface: Interface) -> PyResult<Arc<host::fmu::Fmu>> {
+        let place = &self.loaded[usize::from(interface == Interface::ModelExchange)];
+        let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(loaded) = &*place {
+            return Ok(loaded.clone());
+        }
+        let loaded = host::fmu::Fmu::open_for(interface, &self.path, &[]).map_err(error)?;
+        Ok(place.insert(Arc::new(loaded)).clone())
+    }
+
+    /// A variable by its name.
+    pub fn variable(&self, name: &str) -> PyResult<&description::Variable> {
+        match self.places.get(name) {
+            Some(place) => Ok(&self.description.variables[*place]),
+            None => self.description.variable(name).map_err(error),
+        }
+    }
+}
+
+#[pymethods]
+impl Fmu {
+    /// Read the description of a packed FMU; nothing is unpacked or loaded.
+    #[new]
+    fn new(py: Python, path: PathBuf) -> PyResult<Fmu> {
+        let description = py.detach(|| ModelDescription::of_packed(&path)).map_err(error)?;
+        let names = description.variables.iter().map(|variable| variable.name.clone());
+        let places = names.zip(0..).collect();
+        Ok(Fmu { path, description, places, loaded: Default::default() })
+    }
+
+    /// Name of the model.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.description.model_name
+    }
+
+    /// True for FMI 3.0.
+    #[getter]
+    fn is_fmi3(&self) -> bool {
+        self.description.is_fmi3()
+    }
+
+    /// All variables.
+    #[getter]
+    fn variables(&self) -> Vec<Variable> {
+        let all = self.description.variables.iter();
+        all.map(|variable| Variable::of(&self.description, variable)).collect()
+    }
+
+    /// Start, stop and step that the FMU suggests, s.
+    #[getter]
+    fn experiment(&self) -> [Option<f64>; 3] {
+        let of = &self.description.default_experiment;
+        [of.start_time, of.stop_time, of.step_size]
+    }
+
+    /// True if inputs may change within a step.
+    #[getter]
+    fn interpolates(&self) -> bool {
+        self.description.co_simulation.as_ref().is_some_and(|of| of.can_interpolate_inputs)
+    }
+
+    /// True if the FMU has directional derivatives in Model Exchange.
+    #[getter]
+    fn differentiates(&self) -> bool {
+        self.description.model_exchange.as_ref().is_some_and(|of| of.directional_derivatives)
+    }
+
+    /// Value references of the states' derivatives, and of the states.
+    #[getter]
+    fn derivatives(&self) -> Vec<(u32, u32)> {
+        self.description.derivatives.clone()
+    }
+
+    /// Unload the binaries that no instance uses, and remove their folders.
+    fn close(&self) {
+        for place in &self.loaded {
+            *place.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Instances: single calls, by the names of variables.
+#![allow(unsafe_code)]
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use host::c_abi::Called;
+use host::description::{Type, Value};
+use host::fmu::{self, Interface};
+use pyo3::buffer::PyBuffer;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::fmu::{Fmu, FmuError, FmuWarning, error};
+use crate::numbers::number;
+use crate::run::{Run, Stop, Table};
+
+/// An instance, and the FMU that it borrows: dropped in this order.
+pub struct Held {
+    pub instance: fmu::Instance<'static>,
+    /// Slopes of inputs through the next step, per s: references and values.
+    slopes: (Vec<u32>, Vec<f64>),
+    _fmu: Arc<fmu::Fmu>,
+}
+
+// SAFETY: it stands in a mutex, so that one thread at a time calls the instance, which is all that FMI asks for; what the
+// host keeps for a thread it sets anew in each call.
+unsafe impl Send for Held {}
+
+impl Held {
+    fn new(fmu: Arc<fmu::Fmu>) -> Called<Held> {
+        // SAFETY: the FMU does not move within its Arc, and goes after the instance.
+        let borrowed: &'static fmu::Fmu = unsafe { &*Arc::as_ptr(&fmu) };
+        let instance = borrowed.instantiate("hubslosh")?;
+        Ok(Held { instance, slopes: Default::default(), _fmu: fmu })
+    }
+}
+
+/// One instance of an FMU. Calls from several threads follow one another.
+#[pyclass(frozen, module = "hubslosh")]
+pub struct Instance {
+    pub fmu: Py<Fmu>,
+    held: Mutex<Option<Held>>,
+    /// The thread that is in a call, by [`this_thread`].
+    caller: AtomicUsize,
+}
+
+/// A number of this thread that is not 0.
+fn this_thread() -> usize {
+    thread_local!(static PLACE: u8 = const { 0 });
+    PLACE.with(|place| std::ptr::from_ref(place).addr())
+}
+
+/// A value for a variable.
+#[derive(FromPyObject)]
+enum Given {
+    Boolean(bool),
+    Integer(i64),
+    Real(f64),
+    String(String),
+}
+
+impl Instance {
+    /// Makes calls of the instance without Python's lock, and then the FMU's warnings.
+    ///
+    /// # Errors
+    /// What `calls` fails with; if the instance is closed, or in a call of this thread, as in a controller.
+    pub fn with<T: Send>(
+        &self,
+        py: Python,
+        calls: impl FnOnce(&mut Held) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        let (result, warnings) = py.detach(|| {
+            self.alone(|held| {
+                let held = held.as_mut().ok_or(FmuError::new_err("the instance is closed"))?;
+                let result = calls(held);
+                Ok((result, held.instance.take_warnings()))
+            })
+        })?;
+        let kind = py.get_type::<FmuWarning>();
+        for text in warnings {
+            let text = std::ffi::CString::new(text).unwrap_or_default();
+            PyErr::warn(py, &kind, &text, 3)?;
+        }
+        result
+    }
+
+    fn alone<T>(&self, calls: impl FnOnce(&mut Option<Held>) -> PyResult<T>) -> PyResult<T> {
+        if self.caller.load(Ordering::Relaxed) == this_thread() {
+            return Err(FmuError::new_err("the instance is in a call: close it after its end"));
+        }
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        self.caller.store(this_thread(), Ordering::Relaxed);
+        let result = calls(&mut held);
+        self.caller.store(0, Ordering::Relaxed);
+        result
+    }
+
+    /// Calls that return what the host does.
+    fn call<T: Send>(
+        &self,
+        py: Python,
+        calls: impl FnOnce(&mut Held) -> Called<T> + Send,
+    ) -> PyResult<T> {
+        self.with(py, |held| calls(held).map_err(error))
+    }
+}
+
+#[pymethods]
+impl Instance {
+    /// Instantiate, for Co-Simulation or for Model Exchange.
+    #[new]
+    fn new(py: Python, fmu: Py<Fmu>, exchange: bool) -> PyResult<Instance> {
+        let interface = if exchange { Interface::ModelExchange } else { Interface::CoSimulation };
+        let of = fmu.get();
+        let held = py.detach(|| Held::new(of.load(interface)?).map_err(error))?;
+        Ok(Instance { fmu, held: Mutex::new(Some(held)), caller: AtomicUsize::new(0) })
+    }
+
+    /// Free the instance; a call in another thread ends first.
+    fn close(&self, py: Python) -> PyResult<()> {
+        py.detach(|| {
+            self.alone(|held| {
+                *held = None;
+                Ok(())
+            })
+        })
+    }
+
+    /// Set a variable to a value of its type.
+    fn set(&self, py: Python, name: &str, value: Given) -> PyResult<()> {
+        let variable = self.fmu.get().variable(name)?;
+        let value = match (value, variable.kind()) {
+            (Given::Real(x), Type::Real) => Value::Real(x),
+            (Given::Integer(n), Type::Integer | Type::Enumeration) => Value::Integer(n),
+            (Given::Boolean(is), Type::Boolean) => Value::Boolean(is),
+            (Given::String(text), Type::String) => Value::String(text),
+            (_, kind) => return Err(PyValueError::new_err(format!("{name} is of type {kind:?}"))),
+        };
+        self.call(py, |held| held.instance.set_value(variable, value))
+    }
+
+    /// Return the values of numeric variables; Booleans as 0 and 1.
+    fn get(&self, py: Python, names: Vec<String>) -> PyResult<Vec<f64>> {
+        let fmu = self.fmu.get();
+        let all = names.iter().map(|name| fmu.variable(name)).collect::<PyResult<Vec<_>>>()?;
+        self.call(py, |held| {
+            all.into_iter().map(|variable| Ok(number(held.instance.value(variable)?))).collect()
+        })
+    }
+
+    /// Enter initialization mode: times in s.
+    fn initialize(
+        &self,
+        py: Python,
+        tolerance: Option<f64>,
+        start: f64,
+        stop: Option<f64>,
+    ) -> PyResult<()> {
+        self.call(py, |held| held.instance.enter_initialization_mode(tolerance, start, stop))
+    }
+
+    /// Leave initialization mode.
+    fn start(&self, py: Python) -> PyResult<()> {
+        self.call(py, |held| held.instance.exit_initialization_mode())
+    }
+
+    /// Set the slope of a Real input through the next step, per s.
+    fn set_slope(&self, py: Python, name: &str, slope: f64) -> PyResult<()> {
+        let reference = self.fmu.get().variable(name)?.reference;
+        self.call(py, |held| {
+            held.slopes.0.push(reference);
+            held.slopes.1.push(slope);
+            Ok(())
+        })
+    }
+
+    /// Make a step from `time` by `step`, s.
+    fn step(&self, py: Python, time: f64, step: f64) -> PyResult<()> {
+        self.call(py, |held| {
+            let (references, slopes) = std::mem::take(&mut held.slopes);
+            if references.is_empty() {
+                return held.instance.do_step(time, step);
+            }
+            let mut values = vec![0.0; references.len()];
+            held.instance.get_real(&references, &mut values)?;
+            held.instance.do_step_along(time, step, &references, &values, &slopes)
+        })
+    }
+
+    /// Step through all rows of `time`, s, and record `outputs` at each.
+    ///
+    /// inputs, outputs: names and a table of floats with a column for each, of enumerations and Booleans too. slopes: of the
+    /// inputs, or None. Returns None at the end, or where and why the FMU stopped: the row, how many rows were read, and a
+    /// sentence.
+    fn run(
+        &self,
+        py: Python,
+        time: PyBuffer<f64>,
+        inputs: Table,
+        slopes: Option<&Bound<PyAny>>,
+        outputs: Table,
+        feedback: Option<&Bound<PyAny>>,
+    ) -> PyResult<Option<Stop>> {
+        let fmu = self.fmu.get();
+        let mut run = Run::new(fmu, time.to_vec(py)?, &inputs, slopes, &outputs, feedback)?;
+        self.with(py, |held| run.make(&mut held.instance))
+    }
+
+    /// Return the state as bytes.
+    fn save(&self, py: Python) -> PyResult<Vec<u8>> {
+        self.call(py, |held| {
+            let state = held.instance.get_state()?;
+            let bytes = held.instance.serialize(&state);
+            held.instance.free_state(state)?;
+            bytes
+        })
+    }
+
+    /// Go back to what `save` returned, here or in another instance.
+    fn restore(&self, py: Python, bytes: &[u8]) -> PyResult<()> {
+        self.call(py, |held| {
+            let state = held.instance.deserialize(bytes)?;
+            let set = held.instance.set_state(&state);
+            held.instance.free_state(state)?;
+            set
+        })
+    }
+
+    /// Initialize in Model Exchange, and return the derivatives of `unknowns` for each of `knowns`, by reference.
+    fn jacobian(
+        &self,
+        py: Python,
+        unknowns: Vec<u32>,
+        knowns: Vec<u32>,
+    ) -> PyResult<Vec<Vec<f64>>> {
+        self.with(py, |held| {
+            let instance = &mut held.instance;
+            instance.enter_initialization_mode(None, 0.0, None).map_err(error)?;
+            instance.exit_initialization_mode().map_err(error)?;
+            loop {
+                let updated = instance.update_discrete_states().map_err(error)?;
+                if updated.terminate {
+                    return Err(FmuError::new_err("the FMU ends the simulation at its start"));
+                }
+                if !updated.again {
+                    break;
+                }
+            }
+            instance.enter_continuous_time_mode().map_err(error)?;
+            let along = |known: &u32| instance.directional_derivative(&unknowns, *known);
+            knowns.iter().map(along).collect::<Called<_>>().map_err(error)
+        })
+    }
+}

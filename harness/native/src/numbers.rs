@@ -1,0 +1,101 @@
+//! Numbers between Python and the host.
+#![allow(unsafe_code)]
+
+use host::c_abi::CallError;
+use host::description::Value;
+use pyo3::buffer::PyBuffer;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// End of a run before its last row.
+pub enum Failure {
+    /// A call of the FMU failed.
+    Call(CallError),
+    /// The controller did, or somebody pressed Ctrl-C.
+    Python(PyErr),
+}
+
+impl From<CallError> for Failure {
+    fn from(why: CallError) -> Failure {
+        Failure::Call(why)
+    }
+}
+
+impl From<PyErr> for Failure {
+    fn from(why: PyErr) -> Failure {
+        Failure::Python(why)
+    }
+}
+
+/// A value as a table has it; Booleans as 0 and 1.
+pub fn number(value: Value) -> f64 {
+    match value {
+        Value::Real(x) => x,
+        Value::Integer(n) => n as f64,
+        Value::Boolean(is) => f64::from(u8::from(is)),
+        Value::String(_) => f64::NAN,
+    }
+}
+
+/// An array of numpy, rows × width, and the rows that are on their way to or from it.
+pub struct Numbers {
+    array: PyBuffer<f64>,
+    width: usize,
+    rows: Vec<f64>,
+    /// Numbers of the array before those rows.
+    at: usize,
+}
+
+impl Numbers {
+    /// `writes`: rows go to it.
+    ///
+    /// # Errors
+    /// If it is not an array of that size with its rows one after the other.
+    pub fn of(array: &Bound<PyAny>, rows: usize, width: usize, writes: bool) -> PyResult<Numbers> {
+        let array = PyBuffer::get(array)?;
+        if array.item_count() != rows * width
+            || !array.is_c_contiguous()
+            || (writes && array.readonly())
+        {
+            return Err(PyValueError::new_err(format!("an array of {rows} × {width} is expected")));
+        }
+        Ok(Numbers { array, width, rows: Vec::new(), at: 0 })
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: &[f64]) {
+        self.rows.extend_from_slice(row);
+    }
+
+    /// Hands the rows over to Python.
+    pub fn write(&mut self, _: Python) {
+        if let Some(mut numbers) = self.array.as_slice_ptr() {
+            // SAFETY: of() has looked at its type and size, and nobody else runs Python meanwhile.
+            let numbers = unsafe { numbers.as_mut() };
+            numbers[self.at..][..self.rows.len()].copy_from_slice(&self.rows);
+        }
+        self.at += self.rows.len();
+        self.rows.clear();
+    }
+
+    /// Takes the next rows from Python.
+    pub fn read(&mut self, _: Python, rows: usize) {
+        self.at += self.rows.len();
+        self.rows.clear();
+        if let Some(numbers) = self.array.as_slice_ptr() {
+            // SAFETY: as above.
+            let numbers = unsafe { &numbers.as_ref()[self.at..] };
+            self.rows.extend(numbers.iter().take(rows * self.width));
+        }
+    }
+
+    /// Puts all rows after the first `rows` of those that were taken back.
+    pub fn keep(&mut self, rows: usize) {
+        self.rows.truncate(rows * self.width);
+    }
+
+    /// One of the rows taken.
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.rows[i * self.width..(i + 1) * self.width]
+    }
+}

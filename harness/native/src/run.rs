@@ -1,0 +1,204 @@
+//! Whole runs: the loop over the communication points.
+
+use std::time::{Duration, Instant};
+
+use host::c_abi::{Called, Status};
+use host::description::{Type, Value, Variable};
+use host::fmu::Instance;
+use pyo3::prelude::*;
+
+use crate::feedback::Feedback;
+use crate::fmu::Fmu;
+use crate::numbers::{Failure, Numbers, number};
+
+/// Most rows between two visits of Python, where Ctrl-C is heard and rows are handed over.
+const ROWS: usize = 1024;
+/// Longest time between two visits of Python, if a step takes less.
+const SILENCE: Duration = Duration::from_millis(100);
+
+/// Variables of a table: the Reals in one call, then the others.
+struct Columns<'fmu> {
+    /// References of the Reals, their columns, and room for their values.
+    references: Vec<u32>,
+    places: Vec<usize>,
+    reals: Vec<f64>,
+    /// The others with their columns.
+    others: Vec<(&'fmu Variable, usize)>,
+    row: Vec<f64>,
+}
+
+impl<'fmu> Columns<'fmu> {
+    fn of(fmu: &'fmu Fmu, names: &[String]) -> PyResult<Columns<'fmu>> {
+        let all = names.iter().map(|name| fmu.variable(name)).collect::<PyResult<Vec<_>>>()?;
+        let (reals, mut others): (Vec<_>, Vec<_>) =
+            all.into_iter().zip(0..).partition(|(variable, _)| variable.kind() == Type::Real);
+        others.sort_by_key(|(variable, _)| variable.kind() == Type::Boolean);
+        Ok(Columns {
+            references: reals.iter().map(|(variable, _)| variable.reference).collect(),
+            places: reals.iter().map(|(_, place)| *place).collect(),
+            reals: vec![0.0; reals.len()],
+            others,
+            row: vec![0.0; names.len()],
+        })
+    }
+
+    fn get(&mut self, from: &mut Instance) -> Called<&[f64]> {
+        if !self.references.is_empty() {
+            from.get_real(&self.references, &mut self.reals)?;
+        }
+        if self.others.is_empty() {
+            return Ok(&self.reals);
+        }
+        for (place, real) in self.places.iter().zip(&self.reals) {
+            self.row[*place] = *real;
+        }
+        for (variable, place) in &self.others {
+            self.row[*place] = number(from.value(variable)?);
+        }
+        Ok(&self.row)
+    }
+
+    fn set(&mut self, to: &mut Instance, row: &[f64]) -> Called {
+        for (place, real) in self.places.iter().zip(&mut self.reals) {
+            *real = row[*place];
+        }
+        if !self.references.is_empty() {
+            to.set_real(&self.references, &self.reals)?;
+        }
+        for (variable, place) in &self.others {
+            let value = match variable.kind() {
+                Type::Boolean => Value::Boolean(row[*place] != 0.0),
+                _ => Value::Integer(row[*place] as i64),
+            };
+            to.set_value(variable, value)?;
+        }
+        Ok(())
+    }
+}
+
+/// Where and why the FMU stopped a run: the row, how many rows were read, and a sentence.
+pub type Stop = (usize, usize, String);
+
+/// A table of numbers in Python, and the names of its columns.
+pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
+
+/// A run: a row per communication point.
+pub struct Run<'fmu> {
+    time: Vec<f64>,
+    inputs: (Columns<'fmu>, Numbers),
+    /// And room for those of the Reals.
+    slopes: Option<(Numbers, Vec<f64>)>,
+    outputs: (Columns<'fmu>, Numbers),
+    feedback: Option<Feedback>,
+}
+
+impl<'fmu> Run<'fmu> {
+    /// `slopes` has the columns of `inputs`.
+    ///
+    /// # Errors
+    /// If a variable is unknown, or a table has another size.
+    pub fn new(
+        fmu: &'fmu Fmu,
+        time: Vec<f64>,
+        (inputs, values): &Table,
+        slopes: Option<&Bound<PyAny>>,
+        (outputs, recorded): &Table,
+        feedback: Option<&Bound<PyAny>>,
+    ) -> PyResult<Run<'fmu>> {
+        let (rows, width) = (time.len(), inputs.len());
+        let columns = Columns::of(fmu, inputs)?;
+        let slopes = slopes.map(|of| Numbers::of(of, rows, width, false)).transpose()?;
+        Ok(Run {
+            slopes: slopes.map(|slopes| (slopes, columns.reals.clone())),
+            inputs: (columns, Numbers::of(values, rows, width, false)?),
+            outputs: (
+                Columns::of(fmu, outputs)?,
+                Numbers::of(recorded, rows, outputs.len(), true)?,
+            ),
+            feedback: feedback.map(|of| Feedback::of(of, fmu, rows)).transpose()?,
+            time,
+        })
+    }
+
+    /// Makes all rows, without Python's lock but for its visits.
+    ///
+    /// # Errors
+    /// What the controller fails with, or KeyboardInterrupt.
+    pub fn make(&mut self, instance: &mut Instance) -> PyResult<Option<Stop>> {
+        let end = self.drive(instance);
+        Python::attach(|py| self.hand_over(py));
+        match end {
+            Ok(()) => Ok(None),
+            Err((_, Failure::Python(why))) => Err(why),
+            Err((row, Failure::Call(why))) => {
+                let read = row + usize::from(!why.call[4..].starts_with("Get"));
+                let ends = why.call == "fmi2DoStep" && why.status == Status::Discard;
+                let ends = ends && instance.wants_to_end();
+                let wish = if ends { "; the FMU wants the simulation to end" } else { "" };
+                Ok(Some((row, read, format!("{why}{wish}"))))
+            }
+        }
+    }
+
+    /// Makes a row: outputs are read, then inputs set and the step made, unless it is the last row. A controller acts between
+    /// the two. `i`: the row's place among those that were taken from Python.
+    fn row(&mut self, instance: &mut Instance, row: usize, i: usize) -> Result<(), Failure> {
+        let (columns, recorded) = &mut self.outputs;
+        recorded.push(columns.get(instance)?);
+        let time = self.time[row];
+        let Some(next) = self.time.get(row + 1) else { return Ok(()) };
+        if let Some(feedback) = &mut self.feedback {
+            feedback.act(instance, row, time)?;
+        }
+        let (columns, given) = &mut self.inputs;
+        columns.set(instance, given.row(i))?;
+        match &mut self.slopes {
+            Some((slopes, along)) if !columns.references.is_empty() => {
+                for (place, slope) in columns.places.iter().zip(along.iter_mut()) {
+                    *slope = slopes.row(i)[*place];
+                }
+                let (references, values) = (&columns.references, &columns.reals);
+                instance.do_step_along(time, next - time, references, values, along)?;
+            }
+            _ => instance.do_step(time, next - time)?,
+        }
+        Ok(())
+    }
+
+    fn drive(&mut self, instance: &mut Instance) -> Result<(), (usize, Failure)> {
+        let mut row = 0;
+        while row < self.time.len() {
+            Python::attach(|py| self.visit(py)).map_err(|why| (row, why.into()))?;
+            let (first, visited) = (row, Instant::now());
+            while row < self.time.len() && row - first < ROWS {
+                if row % 16 == 0 && visited.elapsed() > SILENCE && row > first {
+                    break;
+                }
+                self.row(instance, row, row - first).map_err(|why| (row, why))?;
+                row += 1;
+            }
+            self.inputs.1.keep(row - first);
+            if let Some((slopes, _)) = &mut self.slopes {
+                slopes.keep(row - first);
+            }
+        }
+        Ok(())
+    }
+
+    /// Exchanges rows with Python, and hears signals.
+    fn visit(&mut self, py: Python) -> PyResult<()> {
+        self.hand_over(py);
+        self.inputs.1.read(py, ROWS);
+        if let Some((slopes, _)) = &mut self.slopes {
+            slopes.read(py, ROWS);
+        }
+        py.check_signals()
+    }
+
+    fn hand_over(&mut self, py: Python) {
+        self.outputs.1.write(py);
+        if let Some(feedback) = &mut self.feedback {
+            feedback.commands.write(py);
+        }
+    }
+}
