@@ -319,14 +319,58 @@ fn named(module: &Module, code: &str) -> Vec<Module> {
     found
 }
 
-/// Modules of each folder of a crate (a folder counts as one), each with the modules of the same folder that it names. What stands
-/// in the folder itself (`mod.rs`, `lib.rs`) is of the folder: who names it names no module beside.
+/// Names that modules import, with the paths that they stand for: a module inside uses them as `super::Name`, and all others
+/// if they are re-exported.
+fn imported(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, Module> {
+    let mut all = BTreeMap::new();
+    for (module, code) in sources {
+        let tokens = tokens(code);
+        for at in (0..tokens.len()).filter(|at| tokens[*at] == "use") {
+            let mut found = Vec::new();
+            let relative = tokens.get(at + 1).is_some_and(|first| {
+                let inner: Module = module.iter().cloned().chain([first.to_string()]).collect();
+                sources.keys().any(|other| other.starts_with(&inner))
+            });
+            if relative {
+                paths(&tokens[at + 1..], module, &mut found);
+            } else {
+                let end = tokens[at..].iter().position(|token| *token == ";");
+                found = named(module, &tokens[at + 1..at + end.unwrap_or(1)].join(" "));
+            }
+            for path in found {
+                let name: Module = module.iter().chain(path.last()).cloned().collect();
+                // a function may have the name of its module
+                if !path.starts_with(&name) {
+                    all.insert(name, path);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The path that a path stands for, through the imports of the modules that it names.
+fn resolved(mut path: Module, imported: &BTreeMap<Module, Module>) -> Module {
+    let mut seen = BTreeSet::new();
+    while seen.insert(path.clone()) {
+        let import = (1..=path.len()).find_map(|n| Some((n, imported.get(&path[..n])?)));
+        if let Some((n, target)) = import {
+            path = target.iter().chain(&path[n..]).cloned().collect();
+        }
+    }
+    path
+}
+
+/// Modules of each folder of a crate (a folder counts as one), each with the modules of the same folder that it names, itself or
+/// through an import of another. What `mod.rs` or `lib.rs` defines is of the folder: no module of it is named then.
 fn modules(
     sources: &BTreeMap<Module, String>,
 ) -> BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> {
     let mut all: BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
+    let imported = imported(sources);
     for (module, code) in sources {
-        for path in named(module, code) {
+        let paths = named(module, code).into_iter();
+        for path in paths.flat_map(|path| [resolved(path.clone(), &imported), path]) {
             let common = module.iter().zip(&path).take_while(|(a, b)| a == b).count();
             let (folder, own, other) = (&path[..common], module.get(common), path.get(common));
             let is_module = |name: &&String| {
@@ -386,10 +430,14 @@ fn a_circle_is_seen_however_its_modules_name_each_other() {
         "use crate::{two, one::{Kept, first}};",
         "fn f() { super::super::one::first::g() }",
         "html! { p { (super::first::text()) } }",
+        "use super::A;",
+        "use crate::one::{Kept, A};",
+        "use crate::A;",
     ];
     for way in by_ways {
         let files = [
-            ("one", "mod first; mod second; use self::first::A;"),
+            ("", "pub use self::one::A;"),
+            ("one", "mod first; mod second; pub use first::{A, B};"),
             ("one/first", "use super::second::C;"),
             ("one/second", way),
             ("two", ""),
