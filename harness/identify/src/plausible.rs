@@ -2,34 +2,19 @@
 //! about the torque and other axes.
 
 use anyhow::{Result, bail};
-use nalgebra::{DMatrix, DVector};
 
 use crate::recording::Recording;
 use crate::start::Response;
 use analysis::innovations;
-use analysis::least_squares::smallest;
 use analysis::statistics::{deviation, mean, median, noise_level};
 
-/// Inertias of the FMU over those of a recording that no wrong unit makes: revolutions per minute are a factor of 9.5.
-const PLAUSIBLE: std::ops::Range<f64> = 0.125..8.0;
-
-/// Logarithm of the ratio of two inertias up to which the frequency response is believed: slosh is in both estimates.
-const ALIKE: f64 = 0.7;
-
-/// Refuses what is off by a factor that only a wrong unit makes. Returns false if the frequency response shows nothing of the
-/// bench: that of a torque without power at the slosh, such as a push. Then the momentum balance decides.
-pub fn check_size(found: &Response, nominal: f64, recordings: &[Recording]) -> Result<bool> {
-    if PLAUSIBLE.contains(&(nominal / found.inertia)) {
-        return Ok(true);
+/// Refuses what is off by a factor that only a wrong unit makes.
+pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
+    let ratio = nominal / found.inertia;
+    // revolutions per minute are a factor of 9.5
+    if (0.125..8.0).contains(&ratio) {
+        return Ok(());
     }
-    let balanced: Vec<f64> = recordings.iter().filter_map(inertia_by_momentum).collect();
-    if balanced.iter().any(|inertia| PLAUSIBLE.contains(&(nominal / inertia))) {
-        return Ok(false);
-    }
-    let shown = median(&balanced)
-        .filter(|inertia| (inertia / found.inertia).ln().abs() > ALIKE)
-        .unwrap_or(found.inertia);
-    let ratio = nominal / shown;
     let guess = match ratio {
         r if (30.0..110.0).contains(&r) => {
             "omega looks like degrees per second; it must be in rad/s"
@@ -45,34 +30,10 @@ pub fn check_size(found: &Response, nominal: f64, recordings: &[Recording]) -> R
         "the recording shows an inertia of {:.3e} kg·m², the FMU with its settings has {nominal:.3e} kg·m²: \
          {guess}. If the bench really is that different, say what is expected of it: --known hub.I={:.1e}:{:.1e} estimates \
          it all the same.",
-        shown,
-        0.8 * shown,
-        0.4 * shown
+        found.inertia,
+        0.8 * found.inertia,
+        0.4 * found.inertia
     )
-}
-
-/// Returns the inertia of hub and liquid from the momentum balance, kg·m², or `None` if it is not positive. I, b, c and L₀ of
-/// ∫τ dt = I ω + b θ + c ∫sgn ω dt + L₀ are fitted by least squares. Slosh is in the residual.
-fn inertia_by_momentum(recording: &Recording) -> Option<f64> {
-    let Recording { time, torque, rate, .. } = recording;
-    let noise = recording.rate_noise();
-    let integral = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        let mut sum = 0.0;
-        let steps = (0..time.len()).map(|k| {
-            sum += if k > 0 { 0.5 * (of(k - 1) + of(k)) * (time[k] - time[k - 1]) } else { 0.0 };
-            sum
-        });
-        steps.collect()
-    };
-    let angle = integral(&|k| rate[k]);
-    let sign = integral(&|k| (rate[k] / (3.0 * noise).max(1e-12)).tanh());
-    let momentum = integral(&|k| torque[k]);
-    let columns = [rate.clone(), angle, sign, vec![1.0; time.len()]];
-    let size = |column: &[f64]| column.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let sizes = columns.each_ref().map(|column| size(column).max(f64::MIN_POSITIVE));
-    let matrix = DMatrix::from_fn(time.len(), 4, |i, j| columns[j][i] / sizes[j]);
-    let found = smallest(matrix, &DVector::from_vec(momentum), 1e-9)?[0] / sizes[0];
-    (found > 0.0).then_some(found)
 }
 
 /// Time over which wheel speed and torque are compared, s.

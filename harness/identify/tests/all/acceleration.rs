@@ -42,12 +42,12 @@ fn recordings(seed: u64, bias: f64) -> Vec<Recording> {
 }
 
 /// A push of 0.1 N·m for 5 s forwards (1) or backwards (−1), and the free decay to rest.
-pub fn push(seed: u64, way: f64, liquid: Liquid) -> Recording {
+pub fn push(seed: u64, way: f64) -> Recording {
     let time: Vec<f64> = (0..=3000).map(|k| 0.02 * f64::from(k)).collect();
     let tau: Vec<f64> =
         time.iter().map(|t| if (1.0..6.0).contains(t) { 0.1 * way } else { 0.0 }).collect();
     let bearing = Bearing { asymmetry: ASYMMETRY, ..Bench::default().bearing };
-    let bench = Bench { liquid, bearing, ..Bench::default() };
+    let bench = Bench { liquid: Liquid::Frozen, bearing, ..Bench::default() };
     let motion = bench.motion(&Drive::Lines(&time, &tau), &time);
     let mut random = Random::new(seed, 9);
     let rate = motion.rate.iter().map(|w| w + GYRO.0 * random.normal()).collect();
@@ -162,7 +162,7 @@ fn a_start_is_taken_besides_those_of_the_data() {
 fn a_hub_that_turns_one_way_determines_the_friction_of_that_way_alone() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for way in [1.0, -1.0] {
-        let recording = push(1, way, Liquid::Frozen);
+        let recording = push(1, way);
         let found = acceleration::identify(&fmu, &[recording], &options(0)).unwrap();
         assert!(found.fits == Some(true), "{:?}", found.verdict);
         is_one_way(&found.parameters, &found.details.combinations, &found.verdict, way);

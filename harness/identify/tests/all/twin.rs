@@ -17,7 +17,6 @@ use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
 use crate::acceleration::{is_one_way, push};
-use crate::bench::{Bench, Liquid};
 use crate::fmu_twin::{self, SensorErrors, Twin, Unmodelled};
 
 /// The thesis's sweep of 2700 s.
@@ -650,32 +649,10 @@ fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for way in [1.0, -1.0] {
         let options = Options { models: vec!["frozen".into()], sensor_errors: true, ..options() };
-        let found = identify(&fmu, &[push(1, way, Liquid::Frozen)], &options, &mut |_| {}).unwrap();
+        let found = identify(&fmu, &[push(1, way)], &options, &mut |_| {}).unwrap();
         assert!(found.converged && found.fits == Some(true), "{way}: {:?}", found.verdict);
         is_one_way(&found.parameters, &found.details.combinations, &found.verdict, way);
     }
-}
-
-/// The push has no power at the slosh, so that the frequency response shows no inertia.
-#[test]
-fn a_push_on_moving_liquid_is_not_refused_for_its_units() {
-    let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let options = Options { sensor_errors: true, ..options() };
-    let recording = push(1, 1.0, Liquid::Linear);
-    let rate = recording.rate.iter().map(|rate| rate.to_degrees()).collect();
-    let degrees = Recording { rate, ..recording.clone() };
-    let error = identify(&fmu, &[degrees], &options, &mut |_| {}).unwrap_err().to_string();
-    assert!(error.contains("omega looks like degrees per second"), "{error}");
-    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
-    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
-    // the slosh turns the hub back a little: the asymmetry is known by 0.15, the truth is 0.15
-    let asymmetry = &found.parameters["friction.asymmetry"];
-    assert!((asymmetry.value - 0.15).abs() < 4.0 * asymmetry.std, "{asymmetry:?}");
-    let inertia = &found.parameters["hub.I"];
-    assert!(
-        (inertia.value - Bench::default().hub_inertia).abs() < 4.0 * inertia.std,
-        "{inertia:?}"
-    );
 }
 
 #[test]
