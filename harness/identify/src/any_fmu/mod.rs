@@ -331,19 +331,8 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
     found.details.decided_by_solver = decided.iter().map(|&j| names[j].clone()).collect();
     let shifts = names.iter().cloned().zip(solver.shift.iter().copied().map(finite));
     found.details.solver_shift = shifts.collect();
-    let is_parameter = |unknown: &Unknown| matches!(unknown.what, What::Parameter { .. });
-    // no run with smaller errors differs: the errors are 0, or the FMU heeds none of the means
-    let is_unseen =
-        decided.is_empty() && !solver.is_seen && problem.unknowns.iter().any(is_parameter);
-    let is_unknown = is_unseen && !solver.is_smooth;
-    found.fits = (!fits || decided.is_empty() && !is_unknown).then_some(fits);
+    found.fits = (!fits || decided.is_empty()).then_some(fits);
     let mut words = match found.fits {
-        None if is_unknown => vec![format!(
-            "{NOT_JUDGED}: the residual of every output is noise, but so may be the solver's errors, whose size is not known. The \
-             outputs are the same with a finer tolerance and with shorter communication steps, and they are not smooth in the \
-             parameters, as those of an adaptive solver. Intervals hold only if these errors are small against the noise. Export the \
-             FMU with a solver that heeds the host's tolerance, or for Model Exchange and use --exchange."
-        )],
         None => vec![format!(
             "{NOT_JUDGED}: the residual of every output is noise, but the errors of the solver decide estimates."
         )],
@@ -357,10 +346,11 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
             remedy(problem, &solver)
         ));
     }
-    if is_unseen && solver.is_smooth {
+    let is_parameter = |unknown: &Unknown| matches!(unknown.what, What::Parameter { .. });
+    if decided.is_empty() && !solver.is_seen && problem.unknowns.iter().any(is_parameter) {
         words.push(
-            "The outputs are the same with a finer tolerance and with shorter communication steps, and smooth in the parameters: \
-             the solver shows no errors of steps that adapt. Errors of fixed steps would not be seen."
+            "The size of the solver's errors is not known: the outputs are the same with a finer tolerance and with shorter \
+             communication steps. The intervals hold if these errors are small against the noise."
                 .into(),
         );
     }

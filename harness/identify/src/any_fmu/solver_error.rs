@@ -36,8 +36,6 @@ pub struct SolverError {
     pub heeds_tolerance: bool,
     /// True if any run with smaller errors of the solver changed the outputs.
     pub is_seen: bool,
-    /// True if the outputs are smooth in all parameters; looked at only if no error is seen.
-    pub is_smooth: bool,
 }
 
 /// Change of an output, in parts of its peak, that rounding may make.
@@ -82,24 +80,6 @@ fn roughness(
     let noise = combined(FOURTH) / SQUARES.0.sqrt();
     let third = combined(THIRD).norm_squared() - SQUARES.1 * noise.norm_squared();
     Some(Roughness { noise, third: 0.5 * third.max(0.0).sqrt(), step })
-}
-
-/// Factor by which the fourth difference of a smooth output falls at least with a quarter of the step; 256 without rounding.
-const FALLS: f64 = 20.0;
-/// Fourth difference that is rounding, in parts of the outputs.
-const ROUNDED: f64 = 1e-11;
-
-/// Returns true if the outputs are smooth in an unknown: a smaller step leaves less of their fourth difference. Noise stays.
-fn is_smooth(problem: &Problem, x: &[f64], j: usize, base: &Motion, step: f64) -> bool {
-    if !matches!(problem.unknowns[j].what, What::Parameter { .. }) {
-        return true;
-    }
-    let noise = |step: f64| roughness(problem, x, j, base, step).map(|r| r.noise.norm());
-    let still = problem.combined(x, &[(1.0, base)]).norm();
-    match (noise(step), noise(0.25 * step)) {
-        (Some(long), Some(short)) => short < (long / FALLS).max(ROUNDED * still),
-        _ => false,
-    }
 }
 
 /// Measures the solver's errors at x, where the motion is `base` and `which` unknowns are not at a bound.
@@ -159,12 +139,10 @@ pub fn measure(
         let noise = r.noise.norm() / (std::f64::consts::SQRT_2 * r.step * norm);
         (noise, noise.hypot(r.third / (6.0 * r.step * norm)))
     };
-    let is_seen = motions.iter().flatten().any(is_changed);
     Ok(SolverError {
-        is_smooth: !is_seen && (0..x.len()).all(|j| is_smooth(problem, x, j, base, steps[j].size)),
-        is_seen,
         shift: all,
         derivative: (0..x.len()).map(derivative).collect(),
         heeds_tolerance: motions[0].as_ref().is_some_and(is_changed),
+        is_seen: motions.iter().flatten().any(is_changed),
     })
 }

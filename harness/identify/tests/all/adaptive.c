@@ -3,7 +3,7 @@
  * points and outputs are interpolated, so that the error jumps where the pattern of steps changes. A change of the
  * input restarts the solver. -DTOLERANCE=… is the relative tolerance; -DDEAF ignores that of fmi2SetupExperiment;
  * -DROUGH makes each step depend on the seventh digit of r, as a solver with Newton's iterations and many orders does;
- * -DFIXED keeps the first step; -DMODEL_EXCHANGE offers Model Exchange too. The equations, with the hinge accelerated by a along x:
+ * -DMODEL_EXCHANGE offers Model Exchange too. The equations, with the hinge accelerated by a along x:
  *
  *   r'' = r phi'^2 + g cos(phi) - k/m (r - L) - d/m r' - a sin(phi)
  *   r phi'' = -2 r' phi' - g sin(phi) - c r phi' - a cos(phi)
@@ -71,10 +71,8 @@ static int advance(Model *m)
             continue;
         }
         m->h = h;
-#ifndef FIXED
         if (error < 0.08)
             m->next = 2 * h;
-#endif
 #ifdef ROUGH
         m->next *= 0.75 + 0.25 * fmod(1e7 * fabs(m->x1[R]), 1.0);
 #endif
