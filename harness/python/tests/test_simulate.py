@@ -1,6 +1,7 @@
 """A simulation in one call: what fmpy finds, however it is called, and its errors."""
 
 import _thread
+import signal
 import threading
 import warnings
 from pathlib import Path
@@ -214,12 +215,16 @@ LONG = np.arange(3_000_001) * STEP
 def test_an_interrupt_stops_a_run_on_its_way(fmu: Path) -> None:
     """A hub without friction turns as long as the run goes on."""
     turning = {"slosh.model": "frozen", "friction.model": "none", "init.omega": 1.0}
-    with Plant(fmu, turning) as plant:
-        timer = threading.Timer(0.1, _thread.interrupt_main)
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
-            plant.run(LONG, {}, None, ["theta"])
-        assert 0 < plant.get(["theta"])[0] < LONG[-1] / 2
+    # a shell starts its background jobs with SIGINT ignored, and Python keeps that
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with Plant(fmu, turning) as plant:
+            threading.Timer(0.1, _thread.interrupt_main).start()
+            with pytest.raises(KeyboardInterrupt):
+                plant.run(LONG, {}, None, ["theta"])
+            assert 0 < plant.get(["theta"])[0] < LONG[-1] / 2
+    finally:
+        signal.signal(signal.SIGINT, handler)
 
 
 def test_python_goes_on_during_a_run(fmu: Path) -> None:
