@@ -2,10 +2,10 @@
 
 mod campaign;
 mod check;
-mod check3;
 mod command_line;
 mod documents;
 mod folder;
+mod foreign;
 mod identify;
 mod outputs;
 mod plans;

@@ -13,7 +13,7 @@
 #ifdef AT_GET
 #define fmi2GetReal get_real_of_model
 #endif
-#include "../all/model.c"
+#include "../../../check/tests/all/model.c"
 #undef fmi2DoStep
 #undef fmi2GetReal
 

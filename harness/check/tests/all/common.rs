@@ -1,0 +1,151 @@
+//! FMUs to check: our own, an archive packed otherwise, a changed word in the XML, other binaries.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{Cursor, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, OnceLock};
+use std::time::Duration;
+
+use check::{Options, Report};
+use host::fmi2::PLATFORM;
+use pack::packed_for_tests;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+/// Files of an archive, in its order.
+pub type Files = Vec<(String, Vec<u8>)>;
+
+pub const XML: &str = "modelDescription.xml";
+
+pub fn ours() -> &'static Files {
+    static FILES: OnceLock<Files> = OnceLock::new();
+    FILES.get_or_init(|| {
+        let file = std::fs::File::open(packed_for_tests()).unwrap();
+        let mut archive = ZipArchive::new(file).unwrap();
+        let count = archive.len();
+        let read = |i| {
+            let mut file = archive.by_index(i).unwrap();
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).unwrap();
+            (file.name().unwrap().into_owned(), bytes)
+        };
+        (0..count).map(read).collect()
+    })
+}
+
+pub fn zipped(files: &Files, method: CompressionMethod) -> Vec<u8> {
+    let mut to = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in files {
+        let options = SimpleFileOptions::default().compression_method(method);
+        to.start_file(name.as_str(), options).unwrap();
+        to.write_all(bytes).unwrap();
+    }
+    to.finish().unwrap().into_inner()
+}
+
+/// Path and name of binaries.
+pub fn binary() -> String {
+    format!("binaries/{PLATFORM}/HubSlosh{}", std::env::consts::DLL_SUFFIX)
+}
+
+pub fn xml() -> String {
+    String::from_utf8(ours().iter().find(|(name, _)| name == XML).unwrap().1.clone()).unwrap()
+}
+
+pub fn with(name: &str, content: Vec<u8>) -> Files {
+    let mut files = ours().clone();
+    files.iter_mut().find(|(n, _)| n == name).unwrap().1 = content;
+    files
+}
+
+/// Looks at some rules of an FMU that is given as bytes.
+pub fn look(bytes: &[u8], only: &[&str]) -> Report {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("Mutant.fmu");
+    std::fs::write(&path, bytes).unwrap();
+    look_at(&path, only, 60.0)
+}
+
+pub fn look_at(path: &Path, only: &[&str], limit: f64) -> Report {
+    let options = Options {
+        program: PathBuf::from(env!("CARGO_BIN_EXE_check-calls")),
+        only: only.iter().map(|rule| rule.to_string()).collect(),
+        limit: Duration::from_secs_f64(limit),
+    };
+    check::check(path, &options, |_| {}).unwrap()
+}
+
+/// Rules that are broken.
+pub fn broken(report: &Report) -> BTreeSet<&'static str> {
+    report.all().map(|(rule, _)| rule.id).collect()
+}
+
+/// Each FMU breaks exactly the rules that are meant, among those of the groups looked at.
+pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
+    let mut wrong = Vec::new();
+    for (name, bytes, meant) in mutants {
+        let report = look(&bytes, groups);
+        let found = broken(&report);
+        if found != meant.iter().copied().collect() {
+            wrong.push(format!("{name}: meant {meant:?}, found {found:?}\n{}", report.text()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The XML with the first `from` after `after` changed to `to`.
+pub fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
+    let text = xml();
+    let at = text.find(after).unwrap_or_else(|| panic!("no {after}"));
+    let (head, tail) = text.split_at(at);
+    assert!(tail.contains(from), "no {from} after {after}");
+    let text = format!("{head}{}", tail.replacen(from, to, 1));
+    zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
+}
+
+/// Packs our FMU with another description.
+pub fn described(text: String) -> Vec<u8> {
+    zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
+}
+
+/// Cells of a table: a line a case.
+pub fn cases<const N: usize>(table: &str) -> Vec<[&str; N]> {
+    let cells = |line| str::split(line, " | ").collect::<Vec<_>>().try_into();
+    let lines = table.lines().filter(|line| !line.is_empty());
+    lines.map(|line| cells(line).unwrap_or_else(|_| panic!("not {N} cells: {line}"))).collect()
+}
+
+/// Each description breaks exactly the rules of the group `xml` that its line names: name | the word after which | what | is
+/// replaced by | rules.
+pub fn words_break(table: &str) {
+    let cases = cases::<5>(table);
+    let rules: Vec<Vec<&str>> = cases.iter().map(|case| case[4].split(' ').collect()).collect();
+    let mutants = cases
+        .iter()
+        .zip(&rules)
+        .map(|([name, after, from, to, _], rules)| (*name, changed(after, from, to), &rules[..]));
+    breaks(mutants.collect(), &["xml"]);
+}
+
+/// The library of a source in this folder, compiled once with these definitions.
+pub fn compiled(source: &str, definitions: &[&str]) -> Vec<u8> {
+    static LIBRARIES: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let mut libraries = LIBRARIES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let compile = || {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path().join("library");
+        let done = Command::new("cc")
+            .args(["-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"])
+            .args(definitions)
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/all").join(source))
+            .arg("-o")
+            .arg(&out)
+            .args(["-ldl", "-lm"])
+            .output()
+            .expect("a C compiler is there");
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read(out).unwrap()
+    };
+    libraries.entry(format!("{source} {definitions:?}")).or_insert_with(compile).clone()
+}

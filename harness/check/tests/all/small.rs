@@ -1,0 +1,161 @@
+//! Rules on small FMUs of C (model.c).
+
+use std::collections::BTreeSet;
+use std::io::{Cursor, Read};
+
+use check::{Report, Severity};
+use host::fmi2::PLATFORM;
+use zip::{CompressionMethod, ZipArchive};
+
+use crate::common::{Files, XML, broken, compiled, look, zipped};
+
+/// Capabilities and compilation of the FMU of model.c.
+struct Small<'a> {
+    /// C definitions besides the rate.
+    definitions: &'a [&'a str],
+    /// k in x' = -k (x - u), 1/s.
+    rate: f64,
+    /// Attributes of DefaultExperiment.
+    experiment: &'a str,
+}
+
+impl Small<'_> {
+    fn offers(&self, interface: &str) -> bool {
+        self.definitions.contains(&interface)
+    }
+
+    fn xml(&self) -> String {
+        let flags = "canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" \
+                     canSerializeFMUstate=\"true\"";
+        let exchange = match self.offers("-DMODEL_EXCHANGE") {
+            true => format!("<ModelExchange modelIdentifier=\"model\" {flags}/>"),
+            false => String::new(),
+        };
+        let stepping = match self.offers("-DCO_SIMULATION") {
+            true => format!(
+                "<CoSimulation modelIdentifier=\"model\" \
+                 canHandleVariableCommunicationStepSize=\"true\" {flags}/>"
+            ),
+            false => String::new(),
+        };
+        let Small { rate, experiment, .. } = self;
+        format!(
+            r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="model" guid="{{model}}" numberOfEventIndicators="0">
+  {exchange}
+  {stepping}
+  <LogCategories><Category name="logStatusError"/></LogCategories>
+  <DefaultExperiment {experiment}/>
+  <ModelVariables>
+    <ScalarVariable name="x" valueReference="0" causality="output" variability="continuous" initial="exact"><Real start="1"/></ScalarVariable>
+    <ScalarVariable name="der(x)" valueReference="1" variability="continuous" initial="calculated"><Real derivative="1"/></ScalarVariable>
+    <ScalarVariable name="k" valueReference="2" causality="parameter" variability="fixed" initial="exact"><Real min="0" start="{rate:?}"/></ScalarVariable>
+    <ScalarVariable name="u" valueReference="3" causality="input" variability="continuous"><Real start="0"/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="1" dependencies="1" dependenciesKind="constant"/></Outputs>
+    <Derivatives><Unknown index="2" dependencies="1 4" dependenciesKind="fixed fixed"/></Derivatives>
+    <InitialUnknowns><Unknown index="2" dependencies="1 3 4"/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>
+"#
+        )
+    }
+
+    fn packed(&self) -> Vec<u8> {
+        let rate = format!("-DRATE={:e}", self.rate);
+        let library = compiled("model.c", &[&[rate.as_str()], self.definitions].concat());
+        let files: Files = vec![
+            (XML.into(), self.xml().into_bytes()),
+            (format!("binaries/{PLATFORM}/model.so"), library),
+            ("documentation/index.html".into(), b"<html></html>".to_vec()),
+            ("documentation/licenses/license.txt".into(), b"MIT".to_vec()),
+        ];
+        zipped(&files, CompressionMethod::Deflated)
+    }
+}
+
+const BOTH: &[&str] = &["-DCO_SIMULATION", "-DMODEL_EXCHANGE"];
+const USUAL: &str = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"";
+
+#[cfg(target_os = "linux")]
+#[test]
+fn good_fmus_get_no_finding_however_stiff_and_whatever_they_offer() {
+    let long = "startTime=\"0\" stopTime=\"1e6\" stepSize=\"1000\"";
+    let mut wrong = Vec::new();
+    for (name, definitions, rate, experiment) in [
+        ("both interfaces", BOTH, 1.0, USUAL),
+        ("stiff", BOTH, 1e5, USUAL),
+        ("stiff, Model Exchange only", &BOTH[1..], 1e5, USUAL),
+        ("very stiff", BOTH, 1e9, USUAL),
+        ("steps of 1000 s", BOTH, 1.0, long),
+        ("stiff in steps of 1000 s", BOTH, 1e5, long),
+        ("steps longer than the experiment", BOTH, 1.0, "stopTime=\"1\" stepSize=\"1000\""),
+        ("steps of 1000 s without an end", BOTH, 1.0, "stepSize=\"1000\""),
+        ("short steps", BOTH, 1.0, "stopTime=\"1e-3\" stepSize=\"1e-6\""),
+        ("Co-Simulation only", &BOTH[..1], 1.0, USUAL),
+        ("Model Exchange only", &BOTH[1..], 1.0, USUAL),
+    ] {
+        let small = Small { definitions, rate, experiment };
+        let report = look(&small.packed(), &[]);
+        // A plain build is for this machine; the one step that is too long is meant.
+        let fine = ["bin.system", "xml.default_experiment"];
+        let others: Vec<_> = report.all().filter(|(rule, _)| !fine.contains(&rule.id)).collect();
+        if !others.is_empty() || report.count(Severity::Error) > 0 {
+            wrong.push(format!("{name}: {}", report.text()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_model_without_a_solution_is_told_as_that_and_by_one_rule() {
+    let definitions = &["-DMODEL_EXCHANGE", "-DBLOWS_UP"];
+    let small = Small { definitions, rate: 10.0, experiment: USUAL };
+    let report = look(&small.packed(), &["life", "exchange", "values", "states"]);
+    assert_eq!(broken(&report), BTreeSet::from(["exchange.run"]), "{}", report.text());
+    let text = report.text();
+    assert!(text.contains("cannot be followed past t = 0.1"), "{text}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn each_interface_is_called_in_the_binary_that_it_names() {
+    let small = Small { definitions: BOTH, rate: 1.0, experiment: USUAL };
+    let text = small.xml().replacen(
+        "ModelExchange modelIdentifier=\"model\"",
+        "ModelExchange modelIdentifier=\"other\"",
+        1,
+    );
+    let stepping = Small { definitions: &BOTH[..1], ..small };
+    let exchange = Small { definitions: &BOTH[1..], rate: 1.0, experiment: USUAL };
+    let library = |small: &Small| {
+        let bytes = small.packed();
+        let mut archive = ZipArchive::new(Cursor::new(bytes)).unwrap();
+        let mut file = archive.by_index(1).unwrap();
+        let mut library = Vec::new();
+        file.read_to_end(&mut library).unwrap();
+        library
+    };
+    let documentation = |name: &str| (format!("documentation/{name}"), b"text".to_vec());
+    let mut files: Files = vec![
+        (XML.into(), text.into_bytes()),
+        (format!("binaries/{PLATFORM}/model.so"), library(&stepping)),
+        documentation("index.html"),
+        documentation("licenses/license.txt"),
+        (format!("binaries/{PLATFORM}/other.so"), library(&exchange)),
+    ];
+    let report = look(&zipped(&files, CompressionMethod::Stored), &[]);
+    let found: Vec<_> = report.all().filter(|(rule, _)| rule.id != "bin.system").collect();
+    assert!(found.is_empty(), "{}", report.text());
+    let called = |id: &str, report: &Report| {
+        report.outcomes.iter().any(|o| o.rule.id == id && o.findings.skipped.is_none())
+    };
+    assert!(called("exchange.run", &report) && called("steps.run", &report));
+    // without it what is there is still called
+    files.pop();
+    let report = look(&zipped(&files, CompressionMethod::Stored), &[]);
+    assert!(broken(&report).contains("bin.each_interface"), "{}", report.text());
+    assert!(called("steps.run", &report) && !called("exchange.run", &report));
+}
