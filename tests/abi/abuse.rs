@@ -597,7 +597,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
 /// What the suite divides between the versions, each of them tries here: minutes, by hand.
 #[cfg(target_os = "linux")]
 #[test]
-#[ignore = "minutes"]
+#[ignore = "minutes: .ci/run --nightly"]
 fn lives_traps_and_allowed_values_all_in_both_versions() {
     std::thread::scope(|scope| {
         for fmi in VERSIONS {

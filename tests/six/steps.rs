@@ -116,7 +116,7 @@ fn random_steps_end_in_numbers_or_a_clear_error() {
 
 /// The same, longer: `.ci/run` calls it.
 #[test]
-#[ignore = "takes a minute"]
+#[ignore = "a minute: .ci/run --nightly"]
 fn a_million_random_steps_end_in_numbers_or_a_clear_error() {
     random_steps(1_000_000, 8);
 }

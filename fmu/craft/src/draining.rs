@@ -491,7 +491,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "minutes"]
+    #[ignore = "minutes: .ci/run --nightly"]
     fn long_steps_of_draining_craft_end_where_their_pieces_do_at_every_tolerance() {
         for seed in 0..16 {
             compare_lengths_of_steps(seed, &[1e-4, 1e-6, 1e-8, 1e-10, 1e-12]);

@@ -30,7 +30,7 @@ pub struct Entry {
     method: CompressionMethod,
     encrypted: bool,
     link: bool,
-    /// Its content, if a rule asks for it.
+    /// Content of the file, if a rule asks for it.
     content: Vec<u8>,
     /// Reason why it cannot be unpacked.
     fault: Option<String>,

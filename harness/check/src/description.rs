@@ -63,7 +63,7 @@ pub struct Unknown {
 }
 
 impl Variable {
-    /// Its place in the file, for findings.
+    /// Position in the file, for findings.
     pub fn place(&self) -> String {
         format!("line {}, {}", self.line, self.name)
     }

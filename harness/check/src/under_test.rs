@@ -495,7 +495,7 @@ impl<'f> Session<'f> {
         })
     }
 
-    /// As above, with a given start time.
+    /// Makes these calls with the given times (s) and tolerance.
     pub fn initialise_at(
         &mut self,
         start: f64,

@@ -18,7 +18,7 @@ pub fn moving_starts(description: &ModelDescription) -> &'static [&'static str] 
 /// Makes an instance in which all [`moving_starts`] are 0, so that only what is set moves it.
 ///
 /// # Errors
-/// What the FMU refuses.
+/// If the FMU refuses a call.
 pub fn instantiate<'fmu>(fmu: &'fmu Fmu, name: &str) -> Result<Instance<'fmu>> {
     let mut instance = fmu.instantiate(name)?;
     for start in moving_starts(fmu.description()) {

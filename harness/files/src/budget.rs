@@ -71,7 +71,7 @@ pub fn table(rows: usize, columns: usize) -> Result<u64> {
 /// made to harm.
 ///
 /// # Errors
-/// Those of [`table`], and more bytes than [`RECORDING`] and than [`PER_BYTE`] times the file.
+/// If [`table`] fails, or the numbers take more than [`RECORDING`] and than [`PER_BYTE`] times the file.
 pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     let bytes = table(rows, columns)?;
     let most = RECORDING.max(size.saturating_mul(PER_BYTE));

@@ -59,7 +59,7 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
 /// Reads a text of at most [`budget::TEXT`] bytes in UTF-8.
 ///
 /// # Errors
-/// Those of [`bytes`], and text that is not UTF-8.
+/// If [`bytes`] fails, or the text is not UTF-8.
 pub fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?).map_err(|error| {
         let at = error.utf8_error().valid_up_to();

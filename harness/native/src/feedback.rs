@@ -2,6 +2,7 @@
 
 use host::fmu::Instance;
 use pyo3::buffer::PyBuffer;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::fmu::Fmu;
@@ -107,15 +108,19 @@ impl Feedback {
         let controller = feedback.getattr("controller")?;
         let (measured, command) = (references("measured")?, references("command")?);
         let values = vec![0.0; measured.len()];
-        let latency = size("latency")?;
+        let (cycles, parts, latency) = (size("cycles")?, size("parts")?, size("latency")?);
+        expect("rows of the run", rows, cycles * parts + 1)?;
         let controller = match controller.is_callable() {
             true => Controller::Function(controller.unbind()),
-            false => Controller::Linear(Box::new(linear(&controller, measured.len())?)),
+            false => {
+                let sizes = (cycles, measured.len(), command.len());
+                Controller::Linear(Box::new(linear(&controller, sizes)?))
+            }
         };
         Ok(Feedback {
             controller,
             measured: (measured, values),
-            parts: size("parts")?,
+            parts,
             switch: size("switch")?,
             latency,
             on_the_way: vec![0.0; (latency + 1) * command.len()],
@@ -138,6 +143,7 @@ impl Feedback {
                 Controller::Function(law) => Python::attach(|py| {
                     let given: Vec<f64> =
                         law.call1(py, (cycle, time, &measured[..]))?.extract(py)?;
+                    expect("commands of the controller", given.len(), width)?;
                     new.copy_from_slice(&given);
                     PyResult::Ok(())
                 })?,
@@ -152,18 +158,38 @@ impl Feedback {
     }
 }
 
-fn linear(of: &Bound<PyAny>, measured: usize) -> PyResult<Linear> {
-    let matrix = |name: &str| PyBuffer::<f64>::get(&of.getattr(name)?)?.to_vec(of.py());
+/// Fails if there are more or fewer of something than expected.
+fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(PyValueError::new_err(format!("{what}: {found} (expected: {expected})")))
+}
+
+/// Reads the class `Linear` of Python.
+fn linear(
+    of: &Bound<PyAny>,
+    (cycles, measured, commands): (usize, usize, usize),
+) -> PyResult<Linear> {
+    let matrix = |name: &str, rows: usize, columns: usize| -> PyResult<Vec<f64>> {
+        let numbers = PyBuffer::<f64>::get(&of.getattr(name)?)?.to_vec(of.py())?;
+        expect(&format!("numbers in {name}"), numbers.len(), rows * columns)?;
+        Ok(numbers)
+    };
     let states = of.getattr("A")?.len()?;
+    let quaternion: Option<[usize; 4]> = of.getattr("quaternion")?.extract()?;
+    if quaternion.is_some_and(|places| places.iter().any(|place| *place >= measured)) {
+        return Err(PyValueError::new_err("quaternion: a place beyond what is measured"));
+    }
     Ok(Linear {
         x: vec![0.0; states],
-        a: matrix("A")?,
-        b: matrix("B")?,
-        c: matrix("C")?,
-        d: matrix("D")?,
-        reference: matrix("reference")?,
-        feedforward: matrix("feedforward")?,
-        quaternion: of.getattr("quaternion")?.extract()?,
+        a: matrix("A", states, states)?,
+        b: matrix("B", states, measured)?,
+        c: matrix("C", commands, states)?,
+        d: matrix("D", commands, measured)?,
+        reference: matrix("reference", cycles, measured)?,
+        feedforward: matrix("feedforward", cycles, commands)?,
+        quaternion,
         error: vec![0.0; measured],
         next: vec![0.0; states],
     })

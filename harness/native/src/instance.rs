@@ -64,7 +64,7 @@ impl Instance {
     /// Makes calls of the instance without Python's lock, and then the FMU's warnings.
     ///
     /// # Errors
-    /// What `calls` fails with; if the instance is closed, or in a call of this thread, as in a controller.
+    /// If `calls` fails, the instance is closed, or this thread is in a call of it, as a controller is.
     pub fn with<T: Send>(
         &self,
         py: Python,

@@ -123,7 +123,7 @@ impl<'fmu> Run<'fmu> {
     /// Makes all rows, without Python's lock but for its visits.
     ///
     /// # Errors
-    /// What the controller fails with, or KeyboardInterrupt.
+    /// If the controller fails, or on KeyboardInterrupt.
     pub fn make(&mut self, instance: &mut Instance) -> PyResult<Option<Stop>> {
         let end = self.drive(instance);
         Python::attach(|py| self.hand_over(py));

@@ -3,13 +3,15 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hubslosh import FmuError, Plant
-from hubslosh.feedback import Feedback
+from hubslosh.feedback import Feedback, Linear
 
 STEP = 0.02  # s
 EVERYTHING = {
@@ -117,3 +119,27 @@ def test_a_controller_cannot_close_the_instance_that_it_controls(fmu: Path) -> N
         feedback = Feedback(law, ["omega"], ["tau_cmd"], cycles=2, parts=1, switch=0, latency=0)
         with pytest.raises(FmuError, match="the instance is in a call"):
             plant.run(np.arange(3) * 0.1, {}, None, ["omega"], feedback)
+
+
+def test_a_controller_of_another_size_than_its_loop_is_refused(fmu: Path) -> None:
+    """Sizes are checked before numbers are read."""
+    one, none = np.ones((1, 1)), np.zeros((0, 0))
+    law = Linear(none, np.zeros((0, 1)), np.zeros((1, 0)), one, np.zeros((2, 1)), np.zeros((2, 1)))
+    size = {"cycles": 2, "parts": 1, "switch": 0, "latency": 0}
+
+    def run(controller: Any, rows: int = 3, **other: int) -> None:
+        feedback = Feedback(controller, ["omega"], ["tau_cmd"], **(size | other))
+        with Plant(fmu) as plant:
+            plant.run(np.arange(rows) * 0.1, {}, None, ["omega"], feedback)
+
+    run(law)
+    for controller, rows, other, words in [
+        (lambda *_: [1.0, 2.0], 3, {}, r"commands of the controller: 2 \(expected: 1\)"),
+        (replace(law, D=np.ones((1, 2))), 3, {}, r"numbers in D: 2 \(expected: 1\)"),
+        (replace(law, reference=np.zeros((1, 1))), 3, {}, "numbers in reference: 1"),
+        (replace(law, quaternion=[0, 1, 2, 3]), 3, {}, "quaternion"),
+        (law, 4, {}, r"rows of the run: 4 \(expected: 3\)"),
+        (law, 3, {"parts": 0}, r"rows of the run: 3 \(expected: 1\)"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            run(controller, rows, **other)

@@ -790,7 +790,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "a campaign of some minutes"]
+    #[ignore = "some minutes: .ci/run --nightly"]
     fn stated_errors_hold_of_a_hundred_random_contours() {
         let ratios = errors_over_stated_ones(0..115);
         let worst = ratios.iter().copied().fold(0.0, f64::max);

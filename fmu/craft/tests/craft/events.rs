@@ -751,7 +751,7 @@ fn random_craft_have_the_same_impacts_in_every_host() {
 
 /// The night's run: the seed is HUBSLOSH_EVENTS_SEED, if that is set.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "minutes: .ci/run --nightly"]
 fn two_hundred_random_craft_have_the_same_impacts_in_every_host() {
     let seed = std::env::var("HUBSLOSH_EVENTS_SEED").map_or(1, |seed| seed.parse().unwrap());
     let figures = compare_hosts(1_000 * seed, 200);

@@ -8,22 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef int Status;
-typedef const char *String;
-enum { OK, WARNING, DISCARD, ERROR };
-
-typedef void (*Logger)(void *, String, Status, String, String, ...);
-struct callbacks {
-    Logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*finished)(void *, Status);
-    void *environment;
-};
-struct event_info {
-    int needed, terminate, nominals, values, defined;
-    double next;
-};
+#include "fmi2.h"
 
 enum mode { INSTANTIATED, INITIALIZATION, STEPPING, EVENT, CONTINUOUS, TERMINATED };
 enum { X, DER_X, K, U, COUNT };

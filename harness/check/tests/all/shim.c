@@ -11,24 +11,10 @@
 #include <string.h>
 #include <unistd.h>
 
-typedef void *Component;
-typedef int Status;
-typedef const char *String;
-typedef const unsigned *References;
-enum { OK, WARNING, DISCARD, ERROR };
+#include "fmi2.h"
 
-typedef void (*Logger)(void *, String, Status, String, String, ...);
-struct callbacks {
-    Logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*finished)(void *, Status);
-    void *environment;
-};
-struct event_info {
-    int needed, terminate, nominals, values, defined;
-    double next;
-};
+typedef void *Component;
+typedef const unsigned *References;
 
 static void *real;
 static char word[64], guid[64];

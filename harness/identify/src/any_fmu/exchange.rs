@@ -178,7 +178,7 @@ impl<'fmu> Run<'fmu> {
     /// Integrates to `end`, s.
     ///
     /// # Errors
-    /// What the FMU refuses; if more steps are needed than are allowed.
+    /// If the FMU refuses a call, or more steps are needed than are allowed.
     pub fn integrate(&mut self, end: f64) -> Result<()> {
         let apart = APART * (end - self.t);
         self.h = self.h.min(end - self.t);

@@ -273,7 +273,7 @@ impl Setup {
     /// The outputs at the rows of the recording of this number.
     ///
     /// # Errors
-    /// What the FMU refuses, with the time.
+    /// If the FMU refuses a call; the message has the time.
     pub fn run(
         &self,
         model: &Model,
@@ -290,7 +290,7 @@ impl Setup {
     /// The FMU's warnings of the motion that begins in the recording of this number.
     ///
     /// # Errors
-    /// What the FMU refuses.
+    /// If the FMU refuses a call.
     pub fn warnings(
         &self,
         model: &Model,
