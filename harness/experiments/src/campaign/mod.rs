@@ -470,19 +470,12 @@ impl Campaign {
     /// and all features. Without a run of the bench there is only `runs.csv`.
     pub fn tables(&self, fmu: &Fmu, results: &Results) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let plan = sha256(self.plan.text.as_bytes());
-        let written = |header: Vec<String>, rows: Vec<Vec<String>>| -> Result<Vec<u8>> {
-            let mut writer = csv::Writer::from_writer(Vec::new());
-            writer.write_record(&header)?;
-            rows.iter().try_for_each(|row| writer.write_record(row))?;
-            writer.into_inner().map_err(|error| error.into_error().into())
-        };
         let header = rows::columns::<FeatureRow>()?;
         let mut tables = Vec::new();
         type Of = dyn Fn(&Outcome) -> Option<(&Estimate, &'static str)>;
         let mut features = |name: &'static str, of: &Of| -> Result<()> {
             let row = |run| rows::record(&FeatureRow::of(run, of(run), &plan));
-            let rows = results.outcomes.iter().map(row).collect::<Result<_>>()?;
-            tables.push((name, written(header.clone(), rows)?));
+            tables.push((name, written(&header, results.outcomes.iter().map(row))?));
             Ok(())
         };
         if results.unanalysed.is_empty() {
@@ -505,10 +498,19 @@ impl Campaign {
         });
         let made_from = rows::columns::<MadeFrom>()?;
         let varied = self.plan.varied().into_iter().map(String::from).collect();
-        let header = [made_from, varied, header.clone()].concat();
-        tables.push(("runs.csv", written(header, rows.collect::<Result<_>>()?)?));
+        tables.push(("runs.csv", written(&[made_from, varied, header].concat(), rows)?));
         Ok(tables)
     }
+}
+
+/// Writes a CSV table row by row: the rows of a large campaign as strings would take more memory than its results.
+fn written(header: &[String], rows: impl Iterator<Item = Result<Vec<String>>>) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(header)?;
+    for row in rows {
+        writer.write_record(row?)?;
+    }
+    writer.into_inner().map_err(|error| error.into_error().into())
 }
 
 #[cfg(test)]

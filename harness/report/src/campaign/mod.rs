@@ -257,7 +257,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
         @if drawn < results.outcomes.len() {
             p {
                 "Responses and time histories are drawn of " (drawn) " of the "
-                (runs(results.outcomes.len())) ". Tables and figures of numbers have all of them."
+                (runs(results.outcomes.len())) ". Figures of numbers and the CSV tables have all of them."
             }
         }
         div .cards { @for group in groups.take(2 * MOST_GROUPS) { (card(page, group)) } }

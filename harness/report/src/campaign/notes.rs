@@ -102,6 +102,9 @@ fn swept_row(group: &Group) -> Option<Markup> {
     })
 }
 
+/// Most rows of the results table. A browser needs seconds to lay out a longer one.
+const MOST_ROWS: usize = 2000;
+
 pub(super) fn table(page: &Page, results: &Results) -> Markup {
     let others: Vec<usize> = page
         .plan
@@ -119,7 +122,13 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
     // columns that no run has
     let swept = results.outcomes.iter().any(|run| run.passing.is_some());
     let recorded = results.outcomes.iter().any(|run| run.record.is_some());
+    let all = results.outcomes.len();
     html! {
+        @if all > MOST_ROWS {
+            p {
+                "The first " (MOST_ROWS) " of " (all) " runs. " code { "features.csv" } " holds all of them."
+            }
+        }
         div .wide {
             table {
                 thead {
@@ -143,7 +152,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                     }
                 }
                 tbody {
-                    @for run in &results.outcomes {
+                    @for run in results.outcomes.iter().take(MOST_ROWS) {
                         tr {
                             td { (run.range.model) }
                             td { @if let Some(fill) = run.range.fill { (cm(fill)) } }
@@ -245,7 +254,7 @@ pub(super) fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> M
             }
         }
         p {
-            "Each run is in " code { "runs/" } " as Parquet, with what it was made from in its metadata. " code { "features.csv" } " holds the values of the table above, " code { "features_spa.csv" } " and " code { "features_h1.csv" } " those of the other estimators in the same columns, " code { "runs.csv" } " all of them with everything that was varied, " code { "plan.toml" } " the plan. This command reproduces everything here:"
+            "Each run is in " code { "runs/" } " as Parquet, with what it was made from in its metadata. " code { "features.csv" } " holds the columns of the table above for every run, " code { "features_spa.csv" } " and " code { "features_h1.csv" } " those of the other estimators in the same columns, " code { "runs.csv" } " all of them with everything that was varied, " code { "plan.toml" } " the plan. This command reproduces everything here:"
         }
         p { code { (campaign.command(fmu)) } }
     }
