@@ -165,9 +165,15 @@ impl Description {
         self.model_exchange.iter().chain(&self.co_simulation)
     }
 
-    /// Indices of the continuous states.
+    /// Indices of the continuous states: the variables whose derivatives Derivatives lists. The attribute derivative
+    /// alone makes no state; inputs, outputs and dummy derivatives may have it (FMI 2.0.5, section 2.2.7). An FMU for
+    /// Co-Simulation alone need not have the list, and then the attribute is all there is.
     pub fn states(&self) -> BTreeSet<usize> {
-        self.variables.iter().filter_map(Variable::derivative_of).collect()
+        if self.derivatives.is_empty() && self.model_exchange.is_none() {
+            return self.variables.iter().filter_map(Variable::derivative_of).collect();
+        }
+        let listed = self.derivatives.iter().filter_map(|unknown| self.at(unknown.index));
+        listed.filter_map(Variable::derivative_of).collect()
     }
 
     /// Each variable that breaks something, as `wrong` tells.

@@ -1,6 +1,6 @@
 //! ModelStructure of modelDescription.xml (FMI 2.0.5, section 2.2), and dependencies.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Findings;
 use super::description::{Description, Unknown, Variable};
@@ -45,12 +45,30 @@ pub fn outputs(d: &Description, findings: &mut Findings) {
 
 /// `xml.derivatives`
 pub fn derivatives(d: &Description, findings: &mut Findings) {
-    let expected = indices(d, |v| v.derivative_of().is_some());
     if d.model_exchange.is_none() && d.derivatives.is_empty() {
         return findings.skip("Co-Simulation alone need not list derivatives");
     }
-    let why = "every variable with the attribute derivative, once";
-    compare(d, findings, "Derivatives", &d.derivatives, &expected, why);
+    let mut taken = BTreeMap::new();
+    let mut seen = BTreeSet::new();
+    for unknown in &d.derivatives {
+        let Some(v) = d.at(unknown.index) else { continue };
+        let place = format!("line {}, Derivatives, {}", unknown.line, v.name);
+        let Some(state) = v.derivative_of() else {
+            findings.add(&place, "it has no attribute derivative, so its state is unknown");
+            continue;
+        };
+        if !seen.insert(unknown.index) {
+            findings.add(&place, "it is listed already");
+        } else if let Some(other) = taken.insert(state, &v.name) {
+            findings.add(&place, format!("{other} is the derivative of the same state"));
+        }
+        if let Some(state) =
+            d.at(state).filter(|state| !(v.is_continuous() && state.is_continuous()))
+        {
+            let text = format!("it and its state {} must be continuous Reals", state.name);
+            findings.add(&place, text);
+        }
+    }
 }
 
 /// `xml.initial_unknowns`
@@ -58,7 +76,8 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
     let states = d.states();
     let expected = indices(d, |v| {
         let computed = matches!(v.initial.as_deref(), Some("calculated" | "approx"));
-        let state = states.contains(&v.index) || v.derivative_of().is_some();
+        let derivative = |v: &Variable| v.derivative_of().is_some_and(|s| states.contains(&s));
+        let state = states.contains(&v.index) || derivative(v);
         computed && (v.causality == "output" || v.causality == "calculatedParameter" || state)
     });
     // What a Co-Simulation FMU says of its states is up to it.

@@ -318,30 +318,18 @@ pub fn multiple_set(d: &Description, findings: &mut Findings) {
 
 /// `xml.states`
 pub fn states(d: &Description, findings: &mut Findings) {
-    let mut taken = BTreeMap::new();
     d.each(findings, |v| {
         v.typed.get("derivative")?;
         let index = v.derivative_of().unwrap_or(0);
-        let Some(state) = d.at(index) else {
+        if d.at(index).is_none() {
             return Some(format!("derivative={index} (allowed: 1 to {})", d.variables.len()));
-        };
-        if !(v.is_continuous() && state.is_continuous()) {
-            return Some(format!("it and its state {} must be continuous Reals", state.name));
         }
         (index == v.index).then(|| "it is its own derivative".to_string())
     });
-    for v in &d.variables {
-        if let Some(index) = v.derivative_of()
-            && let Some(other) = taken.insert(index, &v.name)
-        {
-            let name = d.name_of(index);
-            findings.add(v.place(), format!("{other} is a derivative of {name} as well"));
-        }
-    }
     let states = d.states();
     d.each(findings, |v| {
         (v.typed.flag("reinit") && !states.contains(&v.index))
-            .then(|| "reinit, but it is no state: nobody is its derivative".to_string())
+            .then(|| "reinit, but Derivatives lists no derivative of it, so it is no state".into())
     });
 }
 

@@ -182,7 +182,13 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
         vec![
             ("an output missing", without(outputs), &["xml.outputs"][..]),
             ("an output twice", twice(outputs), &["xml.outputs"]),
-            ("a derivative missing", without(derivatives), &["xml.derivatives"]),
+            // which makes its state and itself no state and no derivative, so InitialUnknowns must not list them
+            (
+                "a derivative missing",
+                without(derivatives),
+                &["xml.initial_unknowns", "xml.dependencies_known"],
+            ),
+            ("a derivative twice", twice(derivatives), &["xml.derivatives"]),
             ("an initial unknown missing", without(initial), &["xml.initial_unknowns"]),
             ("an initial unknown twice", twice(initial), &["xml.initial_unknowns"]),
             ("initial unknowns unsorted", swapped, &["xml.initial_unknowns"]),
@@ -190,6 +196,24 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
         ],
         &["xml"],
     );
+}
+
+/// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is. Only Derivatives makes states of
+/// them (2.2.8). Dymola and JModelica write the attribute for outputs, inputs and dummy derivatives, too.
+#[test]
+fn the_attribute_derivative_alone_makes_no_state() {
+    let of = |variable: &str, index: &str| {
+        let derivative = format!("<Real derivative=\"{index}\"");
+        changed(&format!("name=\"{variable}\""), "<Real", &derivative)
+    };
+    for (variable, index) in [("omega_dot", "2"), ("tau_ext", "13"), ("F_radial", "8")] {
+        let report = look(&of(variable, index), &["xml"]);
+        let rules = broken(&report);
+        let others: Vec<_> = rules.iter().filter(|rule| **rule != "xml.derivative_units").collect();
+        assert!(others.is_empty(), "{variable}: {}", report.text());
+    }
+    let report = look(&of("omega_dot", "9999"), &["xml"]);
+    assert_eq!(broken(&report), BTreeSet::from(["xml.states"]), "{}", report.text());
 }
 
 #[test]
