@@ -5,6 +5,7 @@
 
 pub mod fmi3;
 pub mod icon;
+pub mod names;
 pub mod schema;
 pub mod variables;
 

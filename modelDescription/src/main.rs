@@ -1,9 +1,9 @@
-//! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml
-//! and page of variables from its variable table; with the feature `icon`, the icon's pixels from
+//! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml,
+//! page of variables and names for the harness from its variable table; with the feature `icon`, the icon's pixels from
 //! its drawing. With `--print-spacecraft`, `--print-spacecraft-fmi3` or `--print-spacecraft-fmi3-arrays` it prints the XML of Spacecraft.fmu as
 //! compiled, for `hubslosh pack --tanks`.
 
-use model_description::{fmi3, path, variables, xml};
+use model_description::{fmi3, names, path, variables, xml};
 use runtime::Model;
 use runtime::table::Layout;
 
@@ -42,6 +42,8 @@ fn write<M: Model>() -> Result<(), Box<dyn std::error::Error>> {
     }
     std::fs::write(variables::path::<M>(), variables::page::<M>())?;
     println!("wrote {}\nwrote {}", path::<M>().display(), variables::path::<M>().display());
+    std::fs::write(names::path::<M>(), names::module::<M>())?;
+    println!("wrote {}", names::path::<M>().display());
     Ok(())
 }
 

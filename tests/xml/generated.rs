@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use model_description::{fmi3, icon, variables};
+use model_description::{fmi3, icon, names, variables};
 use runtime::Model;
 use runtime::table::Layout::{Arrays, Scalars};
 use runtime::table::Scalar;
@@ -28,6 +28,7 @@ fn up_to_date<M: Model>() {
         (fmi3::path::<M>(Scalars), fmi3::xml::<M>(Scalars).unwrap()),
         (fmi3::path::<M>(Arrays), fmi3::xml::<M>(Arrays).unwrap()),
         (variables::path::<M>(), variables::page::<M>()),
+        (names::path::<M>(), names::module::<M>()),
     ] {
         let there = String::from_utf8(committed(&path)).unwrap();
         assert!(there == text, "{} is out of date: {GENERATE}", path.display());

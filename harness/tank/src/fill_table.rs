@@ -6,6 +6,9 @@
 
 use core::f64::consts::PI;
 
+use names::sloshtank::tank::MOST_MODES as MODES;
+pub use names::sloshtank::tank::fill::MOST_POINTS as POINTS;
+
 use crate::contour::Problems;
 use crate::interpolation::Monotone;
 use crate::modal::ModalData;
@@ -13,12 +16,6 @@ use crate::parameters::{Liquid, ParameterSet, Target, Value};
 use crate::sweep::{self, Sweep};
 use crate::table::short;
 use crate::tank::Tank;
-
-/// Largest number of points of an FMU's table.
-pub const POINTS: usize = 12;
-
-/// Largest number of modes of a tank in a six-axis FMU.
-const MODES: usize = 3;
 
 /// Number of fills among which points are chosen.
 const CANDIDATES: usize = 97;

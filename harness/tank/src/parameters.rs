@@ -5,6 +5,8 @@
 
 use core::fmt::Write as _;
 
+use names::{hubslosh, sloshtank, spacecraft};
+
 use crate::contour::Problems;
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
@@ -238,7 +240,11 @@ impl ParameterSet {
             ),
             format!("heights (hinge, H_0): {}", data.origin()),
         ];
-        let most = if target == Target::HubSlosh { 10 } else { 3 };
+        let most = match target {
+            Target::HubSlosh => hubslosh::slosh::MOST_MODES,
+            Target::SloshTank => sloshtank::tank::MOST_MODES,
+            Target::Spacecraft { .. } => spacecraft::tank::MOST_MODES,
+        };
         if data.modes.is_empty() {
             return Err(format!(
                 "There are no modes: the tank is full and does not slosh. Its liquid is a rigid body: {:.6} kg at \
@@ -361,10 +367,13 @@ impl ParameterSet {
             }
             Target::SloshTank | Target::Spacecraft { .. } => {
                 let prefix = match target {
-                    Target::Spacecraft { tank: number @ 1..=4 } => format!("tank[{number}]"),
+                    Target::Spacecraft { tank: number @ 1..=spacecraft::MOST_TANKS } => {
+                        format!("tank[{number}]")
+                    }
                     Target::Spacecraft { tank: number } => {
                         return Err(format!(
-                            "The tank's number is {number}; Spacecraft has 1 to 4."
+                            "The tank's number is {number}; Spacecraft has 1 to {}.",
+                            spacecraft::MOST_TANKS
                         )
                         .into());
                     }

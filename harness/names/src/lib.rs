@@ -1,0 +1,79 @@
+//! Names of our FMUs' variables, items of their enumerations, and the sizes that their counts allow.
+//!
+//! The harness links no model. model-description writes one module per FMU from its variable table, so a
+//! misspelt or renamed variable does not compile.
+
+/// Name of an array variable with `D` indices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Array<const D: usize>(&'static str);
+
+impl<const D: usize> Array<D> {
+    /// Returns the name of the element at these indices, which count from 1.
+    pub fn at(self, indices: [usize; D]) -> String {
+        let (mut name, mut left) = (self.0.to_string(), &indices[..]);
+        while let (Some(place), [index, rest @ ..]) = (name.find("[]"), left) {
+            name.insert_str(place + 1, &index.to_string());
+            left = rest;
+        }
+        if !left.is_empty() {
+            let left: Vec<String> = left.iter().map(usize::to_string).collect();
+            name += &format!("[{}]", left.join(","));
+        }
+        name
+    }
+}
+
+macro_rules! enumeration {
+    ($name:ident: $($item:ident = $value:literal $text:literal),+) => {
+        /// Enumeration of the FMU.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name {
+            $($item = $value),+
+        }
+
+        impl $name {
+            /// Returns the item's name.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $($name::$item => $text),+
+                }
+            }
+
+            /// Returns the item of this name.
+            pub fn named(name: &str) -> Option<$name> {
+                match name {
+                    $($text => Some($name::$item),)+
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+#[allow(missing_docs)]
+pub mod hubslosh;
+#[allow(missing_docs)]
+pub mod sloshtank;
+#[allow(missing_docs)]
+pub mod spacecraft;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elements_have_the_names_of_the_model_descriptions() {
+        assert_eq!(hubslosh::slosh::MASS.at([10]), "slosh.mass[10]");
+        assert_eq!(sloshtank::tank::P.at([1, 3]), "tank.p[1,3]");
+        assert_eq!(spacecraft::tank::M_0.at([4]), "tank[4].m_0");
+        assert_eq!(spacecraft::tank::P.at([2, 1, 3]), "tank[2].p[1,3]");
+    }
+
+    #[test]
+    fn items_are_found_by_their_names() {
+        use hubslosh::FrictionModel;
+        assert_eq!(FrictionModel::named("stribeck_smooth"), Some(FrictionModel::StribeckSmooth));
+        assert_eq!(FrictionModel::named("Stribeck"), None);
+        assert_eq!((FrictionModel::Lugre.name(), FrictionModel::Lugre as i32), ("lugre", 5));
+    }
+}

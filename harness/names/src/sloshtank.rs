@@ -1,0 +1,118 @@
+//! Names of SloshTank.fmu. Written by `cargo run --release -p model-description`; do not edit.
+
+pub const FORCE: crate::Array<1> = crate::Array("force");
+pub const TORQUE: crate::Array<1> = crate::Array("torque");
+pub const BIAS: crate::Array<1> = crate::Array("bias");
+pub const ADDED_MASS: crate::Array<1> = crate::Array("added_mass");
+pub const IMPULSE: crate::Array<1> = crate::Array("impulse");
+pub const A: crate::Array<1> = crate::Array("a");
+pub const OMEGA: crate::Array<1> = crate::Array("omega");
+pub const OMEGA_DOT: crate::Array<1> = crate::Array("omega_dot");
+pub const MASS_FLOW: &str = "mass_flow";
+pub const MASS: &str = "mass";
+pub const CENTER_OF_MASS: crate::Array<1> = crate::Array("center_of_mass");
+pub const INERTIA: crate::Array<2> = crate::Array("inertia");
+pub const DISSIPATED: &str = "dissipated";
+pub const COUPLING: &str = "coupling";
+pub const COUPLING_KIND: &str = "coupling_kind";
+pub const COUPLING_RATIO: &str = "coupling_ratio";
+
+pub mod tank {
+    pub const WAVE_HEIGHT: &str = "tank.wave_height";
+    pub const REGIME: &str = "tank.regime";
+    pub const IN_RANGE: &str = "tank.in_range";
+    pub const IN_RANGE_KIND: &str = "tank.in_range_kind";
+    pub const ANGLE_X: crate::Array<1> = crate::Array("tank.angle_x");
+    pub const ANGLE_Y: crate::Array<1> = crate::Array("tank.angle_y");
+    pub const P: crate::Array<2> = crate::Array("tank.p");
+    pub const P_DOT: crate::Array<2> = crate::Array("tank.p_dot");
+    pub const LIQUID: &str = "tank.liquid";
+    pub const POSITION: crate::Array<1> = crate::Array("tank.position");
+    pub const Q: crate::Array<1> = crate::Array("tank.q");
+    pub const DIAMETER: &str = "tank.diameter";
+    pub const DEPTH: &str = "tank.depth";
+    pub const DENSITY: &str = "tank.density";
+    pub const M_0: &str = "tank.m_0";
+    pub const H_0: &str = "tank.H_0";
+    pub const I_0: &str = "tank.I_0";
+    pub const I_Z: &str = "tank.I_z";
+    pub const R_0: crate::Array<1> = crate::Array("tank.r_0");
+    pub const DI_Y: &str = "tank.dI_y";
+    pub const I_XY: &str = "tank.I_xy";
+    pub const I_XZ: &str = "tank.I_xz";
+    pub const I_YZ: &str = "tank.I_yz";
+    pub const MODES: &str = "tank.modes";
+    pub const MOST_MODES: usize = 3;
+    pub const G_REF: &str = "tank.g_ref";
+    pub const MASS: crate::Array<1> = crate::Array("tank.mass");
+    pub const LENGTH: crate::Array<1> = crate::Array("tank.length");
+    pub const FREQUENCY: crate::Array<1> = crate::Array("tank.frequency");
+    pub const HINGE: crate::Array<1> = crate::Array("tank.hinge");
+    pub const DIRECTION: crate::Array<2> = crate::Array("tank.direction");
+    pub const ARM: crate::Array<1> = crate::Array("tank.arm");
+    pub const K: crate::Array<1> = crate::Array("tank.k");
+    pub const ZETA: crate::Array<1> = crate::Array("tank.zeta");
+    pub const DAMPING_LAW: &str = "tank.damping_law";
+    pub const DAMPING_LAW_KIND: &str = "tank.damping_law_kind";
+    pub const G_FLOOR: &str = "tank.g_floor";
+    pub const ZETA_AMPLITUDE: crate::Array<1> = crate::Array("tank.zeta_amplitude");
+    pub const WAVE: crate::Array<1> = crate::Array("tank.wave");
+    pub const LIQUID_0: &str = "tank.liquid_0";
+    pub const OUTLET: &str = "tank.outlet";
+    pub const P_0: crate::Array<2> = crate::Array("tank.p_0");
+    pub const P_DOT_0: crate::Array<2> = crate::Array("tank.p_dot_0");
+
+    pub mod ball {
+        pub const STATE: &str = "tank.ball.state";
+        pub const POSITION: crate::Array<1> = crate::Array("tank.ball.position");
+        pub const VELOCITY: crate::Array<1> = crate::Array("tank.ball.velocity");
+        pub const TRAVEL: &str = "tank.ball.travel";
+        pub const RADIUS: &str = "tank.ball.radius";
+        pub const RESTITUTION: &str = "tank.ball.restitution";
+        pub const CONTACT_SPEED: &str = "tank.ball.contact_speed";
+        pub const DRAG: &str = "tank.ball.drag";
+    }
+
+    pub mod fill {
+        pub const POINTS: &str = "tank.fill.points";
+        pub const MOST_POINTS: usize = 12;
+        pub const LIQUID: crate::Array<1> = crate::Array("tank.fill.liquid");
+        pub const H_0: crate::Array<1> = crate::Array("tank.fill.H_0");
+        pub const I_0: crate::Array<1> = crate::Array("tank.fill.I_0");
+        pub const I_Z: crate::Array<1> = crate::Array("tank.fill.I_z");
+        pub const MASS: crate::Array<2> = crate::Array("tank.fill.mass");
+        pub const LENGTH: crate::Array<2> = crate::Array("tank.fill.length");
+        pub const HINGE: crate::Array<2> = crate::Array("tank.fill.hinge");
+    }
+}
+
+pub mod host {
+    pub const MASS: &str = "host.mass";
+    pub const R: crate::Array<1> = crate::Array("host.r");
+    pub const JXX: &str = "host.Jxx";
+    pub const JYY: &str = "host.Jyy";
+    pub const JZZ: &str = "host.Jzz";
+    pub const JXY: &str = "host.Jxy";
+    pub const JXZ: &str = "host.Jxz";
+    pub const JYZ: &str = "host.Jyz";
+}
+
+pub mod solver {
+    pub const MAX_STEPS: &str = "solver.max_steps";
+}
+
+enumeration! {
+    Regime: Linear = 1 "linear", Transitional = 2 "transitional", Nonlinear = 3 "nonlinear"
+}
+
+enumeration! {
+    BallState: Settled = 1 "settled", Flying = 2 "flying", Sliding = 3 "sliding"
+}
+
+enumeration! {
+    Coupling: Split = 1 "split", Lumped = 2 "lumped", RigidBody = 3 "rigid_body"
+}
+
+enumeration! {
+    DampingLaw: Laminar = 1 "laminar", ConstantRatio = 2 "constant_ratio", Constant = 3 "constant"
+}

@@ -1,0 +1,150 @@
+//! Names of Spacecraft.fmu. Written by `cargo run --release -p model-description`; do not edit.
+
+pub const Q: crate::Array<1> = crate::Array("q");
+pub const OMEGA: crate::Array<1> = crate::Array("omega");
+pub const OMEGA_DOT: crate::Array<1> = crate::Array("omega_dot");
+pub const SPECIFIC_FORCE: crate::Array<1> = crate::Array("specific_force");
+pub const POSITION: crate::Array<1> = crate::Array("position");
+pub const VELOCITY: crate::Array<1> = crate::Array("velocity");
+pub const SLOSH_FORCE: crate::Array<1> = crate::Array("slosh_force");
+pub const SLOSH_TORQUE: crate::Array<1> = crate::Array("slosh_torque");
+pub const FORCE: crate::Array<1> = crate::Array("force");
+pub const TORQUE: crate::Array<1> = crate::Array("torque");
+pub const H_WHEELS: crate::Array<1> = crate::Array("h_wheels");
+pub const MASS_FLOW: crate::Array<1> = crate::Array("mass_flow");
+pub const MOMENTUM: crate::Array<1> = crate::Array("momentum");
+pub const ANGULAR_MOMENTUM: crate::Array<1> = crate::Array("angular_momentum");
+pub const ENERGY: &str = "energy";
+pub const WORK: &str = "work";
+pub const DISSIPATED: &str = "dissipated";
+pub const DRAINED: &str = "drained";
+pub const MASS: &str = "mass";
+pub const CENTER_OF_MASS: crate::Array<1> = crate::Array("center_of_mass");
+pub const INERTIA: crate::Array<2> = crate::Array("inertia");
+pub const MOUNT: &str = "mount";
+pub const MOUNT_KIND: &str = "mount_kind";
+pub const GRAVITY: crate::Array<1> = crate::Array("gravity");
+pub const TANKS: &str = "tanks";
+pub const MOST_TANKS: usize = 4;
+
+pub mod pivot {
+    pub const TORQUE: crate::Array<1> = crate::Array("pivot.torque");
+    pub const K: crate::Array<1> = crate::Array("pivot.k");
+    pub const C: crate::Array<1> = crate::Array("pivot.c");
+
+    pub mod friction {
+        pub const C: crate::Array<1> = crate::Array("pivot.friction.c");
+        pub const D: crate::Array<1> = crate::Array("pivot.friction.d");
+        pub const OMEGA_S: &str = "pivot.friction.omega_s";
+        pub const EPS: &str = "pivot.friction.eps";
+    }
+}
+
+pub mod tank {
+    pub const FORCE: crate::Array<2> = crate::Array("tank[].force");
+    pub const TORQUE: crate::Array<2> = crate::Array("tank[].torque");
+    pub const WAVE_HEIGHT: crate::Array<1> = crate::Array("tank[].wave_height");
+    pub const REGIME: crate::Array<1> = crate::Array("tank[].regime");
+    pub const IN_RANGE: crate::Array<1> = crate::Array("tank[].in_range");
+    pub const IN_RANGE_KIND: crate::Array<1> = crate::Array("tank[].in_range_kind");
+    pub const ANGLE_X: crate::Array<2> = crate::Array("tank[].angle_x");
+    pub const ANGLE_Y: crate::Array<2> = crate::Array("tank[].angle_y");
+    pub const P: crate::Array<3> = crate::Array("tank[].p");
+    pub const P_DOT: crate::Array<3> = crate::Array("tank[].p_dot");
+    pub const LIQUID: crate::Array<1> = crate::Array("tank[].liquid");
+    pub const POSITION: crate::Array<2> = crate::Array("tank[].position");
+    pub const Q: crate::Array<2> = crate::Array("tank[].q");
+    pub const DIAMETER: crate::Array<1> = crate::Array("tank[].diameter");
+    pub const DEPTH: crate::Array<1> = crate::Array("tank[].depth");
+    pub const DENSITY: crate::Array<1> = crate::Array("tank[].density");
+    pub const M_0: crate::Array<1> = crate::Array("tank[].m_0");
+    pub const H_0: crate::Array<1> = crate::Array("tank[].H_0");
+    pub const I_0: crate::Array<1> = crate::Array("tank[].I_0");
+    pub const I_Z: crate::Array<1> = crate::Array("tank[].I_z");
+    pub const R_0: crate::Array<2> = crate::Array("tank[].r_0");
+    pub const DI_Y: crate::Array<1> = crate::Array("tank[].dI_y");
+    pub const I_XY: crate::Array<1> = crate::Array("tank[].I_xy");
+    pub const I_XZ: crate::Array<1> = crate::Array("tank[].I_xz");
+    pub const I_YZ: crate::Array<1> = crate::Array("tank[].I_yz");
+    pub const MODES: crate::Array<1> = crate::Array("tank[].modes");
+    pub const MOST_MODES: usize = 3;
+    pub const G_REF: crate::Array<1> = crate::Array("tank[].g_ref");
+    pub const MASS: crate::Array<2> = crate::Array("tank[].mass");
+    pub const LENGTH: crate::Array<2> = crate::Array("tank[].length");
+    pub const FREQUENCY: crate::Array<2> = crate::Array("tank[].frequency");
+    pub const HINGE: crate::Array<2> = crate::Array("tank[].hinge");
+    pub const DIRECTION: crate::Array<3> = crate::Array("tank[].direction");
+    pub const ARM: crate::Array<2> = crate::Array("tank[].arm");
+    pub const K: crate::Array<2> = crate::Array("tank[].k");
+    pub const ZETA: crate::Array<2> = crate::Array("tank[].zeta");
+    pub const DAMPING_LAW: crate::Array<1> = crate::Array("tank[].damping_law");
+    pub const DAMPING_LAW_KIND: crate::Array<1> = crate::Array("tank[].damping_law_kind");
+    pub const G_FLOOR: crate::Array<1> = crate::Array("tank[].g_floor");
+    pub const ZETA_AMPLITUDE: crate::Array<2> = crate::Array("tank[].zeta_amplitude");
+    pub const WAVE: crate::Array<2> = crate::Array("tank[].wave");
+    pub const LIQUID_0: crate::Array<1> = crate::Array("tank[].liquid_0");
+    pub const OUTLET: crate::Array<1> = crate::Array("tank[].outlet");
+    pub const P_0: crate::Array<3> = crate::Array("tank[].p_0");
+    pub const P_DOT_0: crate::Array<3> = crate::Array("tank[].p_dot_0");
+
+    pub mod ball {
+        pub const STATE: crate::Array<1> = crate::Array("tank[].ball.state");
+        pub const POSITION: crate::Array<2> = crate::Array("tank[].ball.position");
+        pub const VELOCITY: crate::Array<2> = crate::Array("tank[].ball.velocity");
+        pub const TRAVEL: crate::Array<1> = crate::Array("tank[].ball.travel");
+        pub const RADIUS: crate::Array<1> = crate::Array("tank[].ball.radius");
+        pub const RESTITUTION: crate::Array<1> = crate::Array("tank[].ball.restitution");
+        pub const CONTACT_SPEED: crate::Array<1> = crate::Array("tank[].ball.contact_speed");
+        pub const DRAG: crate::Array<1> = crate::Array("tank[].ball.drag");
+    }
+
+    pub mod fill {
+        pub const POINTS: crate::Array<1> = crate::Array("tank[].fill.points");
+        pub const MOST_POINTS: usize = 12;
+        pub const LIQUID: crate::Array<2> = crate::Array("tank[].fill.liquid");
+        pub const H_0: crate::Array<2> = crate::Array("tank[].fill.H_0");
+        pub const I_0: crate::Array<2> = crate::Array("tank[].fill.I_0");
+        pub const I_Z: crate::Array<2> = crate::Array("tank[].fill.I_z");
+        pub const MASS: crate::Array<3> = crate::Array("tank[].fill.mass");
+        pub const LENGTH: crate::Array<3> = crate::Array("tank[].fill.length");
+        pub const HINGE: crate::Array<3> = crate::Array("tank[].fill.hinge");
+    }
+}
+
+pub mod craft {
+    pub const MASS: &str = "craft.mass";
+    pub const R: crate::Array<1> = crate::Array("craft.r");
+    pub const JXX: &str = "craft.Jxx";
+    pub const JYY: &str = "craft.Jyy";
+    pub const JZZ: &str = "craft.Jzz";
+    pub const JXY: &str = "craft.Jxy";
+    pub const JXZ: &str = "craft.Jxz";
+    pub const JYZ: &str = "craft.Jyz";
+}
+
+pub mod init {
+    pub const Q: crate::Array<1> = crate::Array("init.q");
+    pub const OMEGA: crate::Array<1> = crate::Array("init.omega");
+    pub const POSITION: crate::Array<1> = crate::Array("init.position");
+    pub const VELOCITY: crate::Array<1> = crate::Array("init.velocity");
+}
+
+pub mod solver {
+    pub const MAX_STEPS: &str = "solver.max_steps";
+}
+
+enumeration! {
+    Regime: Linear = 1 "linear", Transitional = 2 "transitional", Nonlinear = 3 "nonlinear"
+}
+
+enumeration! {
+    BallState: Settled = 1 "settled", Flying = 2 "flying", Sliding = 3 "sliding"
+}
+
+enumeration! {
+    Mount: Free = 1 "free", Pivot = 2 "pivot"
+}
+
+enumeration! {
+    DampingLaw: Laminar = 1 "laminar", ConstantRatio = 2 "constant_ratio", Constant = 3 "constant"
+}
