@@ -6,6 +6,7 @@ use anyhow::Result;
 use super::Findings;
 use super::description::Variable;
 use super::under_test::{FmuUnderTest, Interface, Reading, Session};
+use host::causality::Causality;
 use host::description::Type;
 use host::fmi2::guarded::Lists;
 
@@ -27,7 +28,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
         serializes: fmu.can(interface, "canSerializeFMUstate"),
         ..Lists::default()
     };
-    let is_input = |v: &&Variable| v.causality == "input" && v.is_continuous();
+    let is_input = |v: &&Variable| v.causality == Causality::Input && v.is_continuous();
     for v in fmu.variables().iter().filter(is_input) {
         if let Reading::Real(x) = session.get(v)? {
             lists.inputs.push((v.reference, x));
@@ -53,7 +54,8 @@ fn lists(session: &mut Session) -> Result<Lists> {
             let order = d.co_simulation.as_ref().and_then(|i| i.number("maxOutputDerivativeOrder"));
             if order.is_some_and(|order| order >= 1.0) {
                 let outputs = fmu.variables().iter();
-                let outputs = outputs.filter(|v| v.causality == "output" && v.is_continuous());
+                let outputs =
+                    outputs.filter(|v| v.causality == Causality::Output && v.is_continuous());
                 lists.outputs = outputs.map(|v| v.reference).collect();
             }
         }

@@ -12,6 +12,7 @@ use super::description::{Unknown, Variable};
 use super::life::first;
 use super::under_test::{FmuUnderTest, Interface, Reading, Session, start_value};
 use super::values::items;
+use host::causality::Causality;
 use host::description::Type;
 
 /// Starts that are looked at before a declared feedthrough counts as not there.
@@ -177,7 +178,7 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.skip("in Co-Simulation an output may wait for the next step to follow its inputs");
         return Ok(());
     }
-    let is_input = |index: usize| d.at(index).is_some_and(|v| v.causality == "input");
+    let is_input = |index: usize| d.at(index).is_some_and(|v| v.causality == Causality::Input);
     let declared: BTreeSet<(usize, usize)> = d
         .outputs
         .iter()
@@ -216,7 +217,8 @@ fn watch(
     }
     let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
     let interface = if exchange { Interface::ModelExchange } else { first(fmu)? };
-    let inputs: Vec<_> = fmu.variables().iter().filter(|v| v.causality == "input").collect();
+    let inputs: Vec<_> =
+        fmu.variables().iter().filter(|v| v.causality == Causality::Input).collect();
     let states = fmu.states();
     let mut seen = Seen::nothing();
     for attempt in 0..TRIES {
@@ -333,8 +335,11 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         .collect();
     let references: Vec<u32> = unknowns.iter().map(|v| v.reference).collect();
     let states = fmu.states();
-    let inputs: Vec<_> =
-        fmu.variables().iter().filter(|v| v.causality == "input" && v.is_continuous()).collect();
+    let inputs: Vec<_> = fmu
+        .variables()
+        .iter()
+        .filter(|v| v.causality == Causality::Input && v.is_continuous())
+        .collect();
     let mut session = fmu.running(Interface::ModelExchange)?;
     session.advance(3)?;
     let mut x = vec![0.0; states.len()];

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Findings;
+use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::xml::Element;
 
@@ -36,9 +37,9 @@ pub struct Variable {
     /// Its value reference; 0 if that cannot be read.
     pub reference: u32,
     /// As written, or the default "local".
-    pub causality: String,
+    pub causality: Causality,
     /// As written, or the default: "continuous" of a Real, else "discrete".
-    pub variability: String,
+    pub variability: Variability,
     /// As written, or the default for causality and variability, if there is one.
     pub initial: Option<String>,
     /// Its type.
@@ -70,7 +71,7 @@ impl Variable {
 
     /// True for a Real that may change at any time.
     pub fn is_continuous(&self) -> bool {
-        self.kind == Type::Real && self.variability == "continuous"
+        self.kind == Type::Real && self.variability == Variability::Continuous
     }
 
     /// Index of the state whose derivative it is.
@@ -85,8 +86,8 @@ impl Variable {
 
     /// True for a parameter or an input, which a host sets.
     pub fn is_set_by_hosts(&self) -> bool {
-        self.causality == "input"
-            || (self.causality == "parameter" && self.variability != "constant")
+        self.causality == Causality::Input
+            || (self.causality == Causality::Parameter && self.variability != Variability::Constant)
     }
 
     /// Its order of magnitude.
@@ -104,18 +105,23 @@ impl Variable {
 
 /// The default of `initial` and what is allowed (the table of section 2.2.7); `None` where the
 /// combination is not allowed at all, an empty list where `initial` must not be written.
-pub(crate) fn initials(causality: &str, variability: &str) -> Option<&'static [&'static str]> {
+pub(crate) fn initials(
+    causality: &Causality,
+    variability: &Variability,
+) -> Option<&'static [&'static str]> {
+    use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter};
+    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
     const EXACT: &[&str] = &["exact"];
     const COMPUTED: &[&str] = &["calculated", "approx"];
     const ANY: &[&str] = &["calculated", "exact", "approx"];
     match (causality, variability) {
-        ("parameter", "fixed" | "tunable") => Some(EXACT),
-        ("calculatedParameter", "fixed" | "tunable") => Some(COMPUTED),
-        ("input", "discrete" | "continuous") => Some(&[]),
-        ("output" | "local", "constant") => Some(EXACT),
-        ("output" | "local", "discrete" | "continuous") => Some(ANY),
-        ("local", "fixed" | "tunable") => Some(COMPUTED),
-        ("independent", "continuous") => Some(&[]),
+        (Parameter, Fixed | Tunable) => Some(EXACT),
+        (CalculatedParameter, Fixed | Tunable) => Some(COMPUTED),
+        (Input, Discrete | Continuous) => Some(&[]),
+        (Output | Local, Constant) => Some(EXACT),
+        (Output | Local, Discrete | Continuous) => Some(ANY),
+        (Local, Fixed | Tunable) => Some(COMPUTED),
+        (Independent, Continuous) => Some(&[]),
         _ => None,
     }
 }
@@ -214,9 +220,9 @@ fn variable(element: &Element, index: usize, types: &BTreeMap<&str, &Element>) -
         }
     }
     let text = |name: &str, default: &str| element.get(name).unwrap_or(default).trim().to_string();
-    let causality = text("causality", "local");
+    let causality = Causality::from(&*text("causality", "local"));
     let default = if kind == Type::Real { "continuous" } else { "discrete" };
-    let variability = text("variability", default);
+    let variability = Variability::from(&*text("variability", default));
     let default = initials(&causality, &variability).and_then(|all| all.first());
     Variable {
         index,
@@ -260,10 +266,10 @@ mod tests {
             </ModelVariables></fmiModelDescription>"#;
         let d = Description::read(xml).unwrap();
         let [a, b, c] = &d.variables[..] else { panic!() };
-        assert_eq!((a.causality.as_str(), a.variability.as_str()), ("local", "continuous"));
+        assert_eq!((&a.causality, &a.variability), (&Causality::Local, &Variability::Continuous));
         assert_eq!(a.initial.as_deref(), Some("calculated"));
         assert_eq!((a.bounds(), a.typed.get("unit")), ((2.0, f64::INFINITY), Some("m")));
         assert_eq!((b.initial.as_deref(), b.kind, b.index), (Some("exact"), Type::Integer, 2));
-        assert_eq!(c.variability, "discrete");
+        assert_eq!(c.variability, Variability::Discrete);
     }
 }

@@ -7,6 +7,7 @@ use super::dependencies::elsewhere;
 use super::description::Variable;
 use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, Unusable};
+use host::causality::Causality;
 use host::fmi2::{CallError, Status};
 
 /// A stepping instance, or the reason why there is none.
@@ -225,7 +226,7 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let outputs: Vec<_> = fmu
             .variables()
             .iter()
-            .filter(|v| v.causality == "output" && v.is_continuous())
+            .filter(|v| v.causality == Causality::Output && v.is_continuous())
             .collect();
         let mut scale = vec![0.0f64; outputs.len()];
         let mut last = vec![0.0; outputs.len()];
@@ -250,8 +251,10 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (whole, scale) = run(1)?;
     for parts in [2, 5] {
         let (cut, _) = run(parts)?;
-        let outputs =
-            fmu.variables().iter().filter(|v| v.causality == "output" && v.is_continuous());
+        let outputs = fmu
+            .variables()
+            .iter()
+            .filter(|v| v.causality == Causality::Output && v.is_continuous());
         for (n, v) in outputs.enumerate() {
             let allowed = SLACK * tolerance * scale[n].max(1e-3 * v.nominal());
             let off = (whole[n] - cut[n]).abs();
@@ -276,7 +279,7 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
     let inputs: Vec<_> =
-        fmu.variables().iter().filter(|v| v.causality == "input" && v.is_real()).collect();
+        fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_real()).collect();
     if inputs.is_empty() {
         findings.skip("it has no Real inputs");
         return Ok(());
@@ -316,7 +319,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         findings.skip("canInterpolateInputs is not declared");
         return Ok(());
     }
-    let inputs = fmu.variables().iter().filter(|v| v.causality == "input" && v.is_continuous());
+    let inputs =
+        fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_continuous());
     let computed = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let computed: Vec<&Variable> = fmu.variables().iter().filter(computed).collect();
     let mut any = false;
@@ -399,8 +403,11 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
         findings.skip("maxOutputDerivativeOrder is 0");
         return Ok(());
     }
-    let outputs: Vec<_> =
-        fmu.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
+    let outputs: Vec<_> = fmu
+        .variables()
+        .iter()
+        .filter(|v| v.causality == Causality::Output && v.is_continuous())
+        .collect();
     let references: Vec<u32> = outputs.iter().map(|v| v.reference).collect();
     session.advance(STEPS)?;
     let mut declared = vec![f64::NAN; outputs.len()];
@@ -545,8 +552,11 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
         findings.skip("maxOutputDerivativeOrder is 0");
         return Ok(());
     }
-    let outputs: Vec<_> =
-        fmu.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
+    let outputs: Vec<_> = fmu
+        .variables()
+        .iter()
+        .filter(|v| v.causality == Causality::Output && v.is_continuous())
+        .collect();
     for order in 1..=most.min(10.0) as i32 {
         for v in &outputs {
             // after an error an FMU may refuse everything: a new instance each time

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use host::causality::Causality;
+
 use super::Findings;
 use super::description::{Description, Unknown, Variable};
 
@@ -39,7 +41,7 @@ fn indices(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<usiz
 
 /// `xml.outputs`
 pub fn outputs(d: &Description, findings: &mut Findings) {
-    let expected = indices(d, |v| v.causality == "output");
+    let expected = indices(d, |v| v.causality == Causality::Output);
     compare(d, findings, "Outputs", &d.outputs, &expected, "every output, once");
 }
 
@@ -78,13 +80,17 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
         let computed = matches!(v.initial.as_deref(), Some("calculated" | "approx"));
         let derivative = |v: &Variable| v.derivative_of().is_some_and(|s| states.contains(&s));
         let state = states.contains(&v.index) || derivative(v);
-        computed && (v.causality == "output" || v.causality == "calculatedParameter" || state)
+        computed
+            && (v.causality == Causality::Output
+                || v.causality == Causality::CalculatedParameter
+                || state)
     });
     // What a Co-Simulation FMU says of its states is up to it.
     let expected = match d.derivatives.is_empty() && d.model_exchange.is_none() {
         true => indices(d, |v| {
             expected.contains(&v.index)
-                && (v.causality != "local" || d.initial_unknowns.iter().any(|u| u.index == v.index))
+                && (v.causality != Causality::Local
+                    || d.initial_unknowns.iter().any(|u| u.index == v.index))
         }),
         false => expected,
     };
@@ -165,7 +171,8 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
             let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
             let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
             let known = |v: &Variable| {
-                let common = v.causality == "input" || v.causality == "independent";
+                let common =
+                    v.causality == Causality::Input || v.causality == Causality::Independent;
                 match initial {
                     true => common || v.initial.as_deref() == Some("exact"),
                     // a Co-Simulation FMU may hide its derivatives and still name its states

@@ -7,11 +7,13 @@ use super::Findings;
 use super::description::Variable;
 use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, start_value};
 use super::values::other_value;
+use host::causality::{Causality, Variability};
 use host::fmi2::Called;
 
 fn tunables(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
     let all = fmu.variables().iter();
-    let all = all.filter(|v| v.causality == "parameter" && v.variability == "tunable");
+    let all = all
+        .filter(|v| v.causality == Causality::Parameter && v.variability == Variability::Tunable);
     all.filter_map(|v| Some((v, start_value(v)?)))
 }
 

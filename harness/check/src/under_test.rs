@@ -12,6 +12,7 @@ use anyhow::{Result, bail};
 use super::Findings;
 use super::description::{Description, Variable};
 use super::trace::{self, Crash};
+use host::causality::Causality;
 use host::description::Type;
 use host::fmi2::{
     CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, PLATFORM, Status,
@@ -665,7 +666,8 @@ impl<'f> Session<'f> {
     /// Sets all Real inputs to values that change from step to step.
     pub fn stimulate(&mut self) -> Called {
         let fmu = self.fmu;
-        let inputs = fmu.variables().iter().filter(|v| v.causality == "input" && v.is_continuous());
+        let inputs =
+            fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_continuous());
         for (n, v) in inputs.enumerate() {
             let x = stimulus(v, self.count, n);
             self.set(v, &Reading::Real(x))?;

@@ -8,6 +8,7 @@ use super::Findings;
 use super::description::Variable;
 use super::life::{expect_refusal, first};
 use super::under_test::{FmuUnderTest, Reading, STEPS, Session, start_value};
+use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::fmi2::{Called, Instance};
 
@@ -280,8 +281,9 @@ pub fn wrong_type(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `values.fixed`
 pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let fixed =
-        settable(fmu).filter(|(v, _)| v.causality == "parameter" && v.variability == "fixed");
+    let fixed = settable(fmu).filter(|(v, _)| {
+        v.causality == Causality::Parameter && v.variability == Variability::Fixed
+    });
     let mut any = false;
     let (mut refused, mut accepted) = (None, Vec::new());
     for (v, start) in fixed {
@@ -323,7 +325,7 @@ pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let aliases: BTreeSet<_> =
         settable(fmu).map(|(v, _)| (v.kind == Type::Real, v.reference)).collect();
     let mut any = false;
-    for causality in ["output", "local", "calculatedParameter"] {
+    for causality in [Causality::Output, Causality::Local, Causality::CalculatedParameter] {
         // Those with initial exact or approx can be set before initialisation, not later.
         let v = fmu.variables().iter().find(|v| {
             v.causality == causality
@@ -409,7 +411,8 @@ pub fn mentions(text: &str, name: &str) -> bool {
 /// `values.not_a_number`
 pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // inputs have a rule of their own
-    let reals = settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != "input");
+    let reals =
+        settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != Causality::Input);
     for (v, _) in reals {
         for x in [f64::NAN, f64::INFINITY] {
             let mut session = fmu.session(first(fmu)?)?;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Findings;
 use super::description::{Description, Variable, initials};
+use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::xml::double;
 
@@ -79,7 +80,7 @@ pub fn parameter_names(d: &Description, findings: &mut Findings) {
     const LONGEST: usize = 55;
     d.each(findings, |v| {
         let length = v.name.chars().count();
-        (v.causality == "parameter" && length > LONGEST)
+        (v.causality == Causality::Parameter && length > LONGEST)
             .then(|| format!("the name has {length} characters (allowed: {LONGEST})"))
     });
 }
@@ -91,9 +92,9 @@ pub fn parameter_names(d: &Description, findings: &mut Findings) {
 /// alone: both can be wired, if the array is whole.
 pub fn flat_ports(d: &Description, findings: &mut Findings) {
     let is_structured = d.root.get("variableNamingConvention") == Some("structured");
-    let is_port = |v: &&Variable| matches!(v.causality.as_str(), "input" | "output");
+    let is_port = |v: &&Variable| matches!(v.causality, Causality::Input | Causality::Output);
     // Elements of each array by name, in the order of the variables.
-    let mut arrays: BTreeMap<(&str, &str), Vec<Vec<u32>>> = BTreeMap::new();
+    let mut arrays: BTreeMap<(&Causality, &str), Vec<Vec<u32>>> = BTreeMap::new();
     for v in d.variables.iter().filter(is_port) {
         if let Some((array, index)) = indexed(&v.name) {
             arrays.entry((&v.causality, array)).or_default().push(index);
@@ -113,7 +114,7 @@ pub fn flat_ports(d: &Description, findings: &mut Findings) {
             return Some("the name of a port has a bracket, and names are not structured".to_string());
         }
         let whole = indexed(&v.name)
-            .and_then(|(array, _)| arrays.get(&(v.causality.as_str(), array)))
+            .and_then(|(array, _)| arrays.get(&(&v.causality, array)))
             .is_some_and(|indices| is_whole(indices));
         (!whole).then(|| {
             "the port is an element of an array some of whose elements are missing (allowed: every index \
@@ -145,17 +146,17 @@ fn is_whole(indices: &[Vec<u32>]) -> bool {
 /// `xml.causality`
 pub fn causality(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
-        let (causality, variability) = (v.causality.as_str(), v.variability.as_str());
+        let (causality, variability) = (&v.causality, &v.variability);
         if initials(causality, variability).is_none() {
             let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
             let allowed: Vec<_> =
-                all.into_iter().filter(|v| initials(causality, v).is_some()).collect();
+                all.into_iter().filter(|v| initials(causality, &(*v).into()).is_some()).collect();
             let allowed = allowed.join(", ");
             return Some(format!(
                 "causality {causality} with variability {variability} (allowed: {allowed})"
             ));
         }
-        (variability == "continuous" && v.kind != Type::Real)
+        (v.variability == Variability::Continuous && v.kind != Type::Real)
             .then(|| format!("a continuous {} (allowed: Real alone)", v.typed.name))
     });
 }
@@ -190,17 +191,17 @@ pub fn start(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         let start = v.typed.get("start").is_some();
         let initial = v.initial.as_deref();
-        if v.causality == "independent" || initial == Some("calculated") {
+        if v.causality == Causality::Independent || initial == Some("calculated") {
             return start.then(|| {
                 let why = initial.map_or("independent".into(), |i| format!("initial={i}"));
                 format!("a start value with {why} (allowed: none)")
             });
         }
-        let needed = v.causality == "input"
-            || v.variability == "constant"
+        let needed = v.causality == Causality::Input
+            || v.variability == Variability::Constant
             || matches!(initial, Some("exact" | "approx"));
         (needed && !start).then(|| {
-            let why = initial.map_or(v.causality.clone(), |i| format!("initial={i}"));
+            let why = initial.map_or(v.causality.to_string(), |i| format!("initial={i}"));
             format!("no start value with {why}")
         })
     });
@@ -275,15 +276,16 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
         if settable > 1 {
             findings.add(&place, format!("{settable} of them are set by hosts (allowed: one)"));
         }
-        let started =
-            set.iter().filter(|v| v.typed.get("start").is_some() && v.variability != "constant");
+        let started = set
+            .iter()
+            .filter(|v| v.typed.get("start").is_some() && v.variability != Variability::Constant);
         if settable <= 1 && started.count() > 1 {
             findings.add(&place, "several of them have a start value (allowed: one)");
         }
         if set.iter().any(|v| v.typed.get("unit") != first.typed.get("unit")) {
             findings.add(&place, "one value, but several units");
         }
-        let constant = |v: &Variable| v.variability == "constant";
+        let constant = |v: &Variable| v.variability == Variability::Constant;
         if set.iter().any(|v| constant(v) != constant(first)) {
             findings.add(&place, "one value, but constant and not constant");
         }
@@ -295,7 +297,8 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
 
 /// `xml.independent`
 pub fn independent(d: &Description, findings: &mut Findings) {
-    let all: Vec<_> = d.variables.iter().filter(|v| v.causality == "independent").collect();
+    let all: Vec<_> =
+        d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
     if all.len() > 1 {
         findings.add(all[1].place(), format!("{} independent variables (allowed: one)", all.len()));
     }
@@ -311,7 +314,7 @@ pub fn multiple_set(d: &Description, findings: &mut Findings) {
         if d.model_exchange.is_none() {
             return Some("canHandleMultipleSetPerTimeInstant without ModelExchange".into());
         }
-        (v.causality != "input")
+        (v.causality != Causality::Input)
             .then(|| format!("canHandleMultipleSetPerTimeInstant of causality {}", v.causality))
     });
 }

@@ -23,6 +23,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use experiments::rest;
+use host::causality::Causality;
 use host::fmu::Fmu;
 use ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 
@@ -71,7 +72,7 @@ fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<So
     let reference =
         |name: &str| Ok::<u32, anyhow::Error>(fmu.description().variable(name)?.reference);
     let (tau, omega) = (reference("tau_cmd")?, reference("omega")?);
-    let all = fmu.description().variables.iter().filter(|v| v.causality == "output");
+    let all = fmu.description().variables.iter().filter(|v| v.causality == Causality::Output);
     let others = all.map(|v| v.reference).filter(|reference| *reference != omega);
     let read: Vec<u32> = std::iter::once(omega).chain(others).take(outputs).collect();
     ensure!(read.len() == outputs, "{outputs} outputs (allowed: 1 to {})", read.len());

@@ -10,6 +10,7 @@ use anyhow::{Context, Result};
 use crate::rounding::significant;
 use crate::run::{Run, histories};
 use files::output;
+use host::causality::Causality;
 use host::description::ModelDescription;
 use host::fmu::Fmu;
 use signals::table::Table;
@@ -156,7 +157,7 @@ pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Re
 }
 
 fn outputs(description: &ModelDescription) -> Vec<&str> {
-    let outputs = description.variables.iter().filter(|v| v.causality == "output");
+    let outputs = description.variables.iter().filter(|v| v.causality == Causality::Output);
     outputs.map(|v| v.name.as_str()).collect()
 }
 

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::profile::Torque;
 use crate::rest;
 use files::budget;
+use host::causality::Causality;
 use host::description::{ModelDescription, Type, Value, Variable};
 use host::drive::Inputs;
 use host::fmu::{Fmu, Instance};
@@ -47,13 +48,13 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
     if let Some(name) = chosen {
         let variable = description.variable(name)?;
         ensure!(
-            variable.causality == "input" && variable.kind() == Type::Real,
+            variable.causality == Causality::Input && variable.kind() == Type::Real,
             "{name} cannot be driven: it is not a Real input"
         );
         return Ok(Some(name.into()));
     }
     let inputs = description.variables.iter();
-    let inputs = inputs.filter(|v| v.causality == "input" && v.kind() == Type::Real);
+    let inputs = inputs.filter(|v| v.causality == Causality::Input && v.kind() == Type::Real);
     let names: Vec<&str> = inputs.map(|v| v.name.as_str()).collect();
     match names[..] {
         _ if names.contains(&TORQUE) => Ok(Some(TORQUE.into())),
@@ -80,7 +81,7 @@ pub fn histories(
     ignore: bool,
 ) -> Result<Vec<(String, Torque)>> {
     let is_input = |name: &str| {
-        let named = |v: &&Variable| v.name == name && v.causality == "input";
+        let named = |v: &&Variable| v.name == name && v.causality == Causality::Input;
         description.variables.iter().find(named).is_some_and(|v| v.kind() == Type::Real)
     };
     let file = path.display();
@@ -133,6 +134,14 @@ pub fn histories(
         .collect()
 }
 
+/// Returns true for what a host sets before a run.
+fn is_settable(variable: &Variable) -> bool {
+    matches!(
+        variable.causality,
+        Causality::Parameter | Causality::StructuralParameter | Causality::Input
+    )
+}
+
 /// Every parameter and input with the text of its start value: as a run sets it, or the FMU's own; inputs that are `driven`
 /// are left out. Numbers are written in one way, enumerations by name.
 pub fn parameters(
@@ -140,10 +149,10 @@ pub fn parameters(
     settings: &[(String, String)],
     driven: &[String],
 ) -> BTreeMap<String, String> {
-    let settable = description.variables.iter().filter(|variable| {
-        ["parameter", "structuralParameter", "input"].contains(&variable.causality.as_str())
-            && !driven.contains(&variable.name)
-    });
+    let settable = description
+        .variables
+        .iter()
+        .filter(|variable| is_settable(variable) && !driven.contains(&variable.name));
     settable
         .filter_map(|variable| {
             let set = settings.iter().rfind(|(name, _)| *name == variable.name);
@@ -247,11 +256,11 @@ impl Run {
         let mut instance = rest::instantiate(fmu, "run")?;
         for (name, value) in &self.settings {
             let variable = fmu.description().variable(name)?;
-            match variable.causality.as_str() {
-                "input" if self.driven().iter().any(|(driven, _)| driven == name) => {
+            match &variable.causality {
+                Causality::Input if self.driven().iter().any(|(driven, _)| driven == name) => {
                     bail!("{name} comes from the profile or the file")
                 }
-                "parameter" | "structuralParameter" | "input" => instance.set(name, value)?,
+                _ if is_settable(variable) => instance.set(name, value)?,
                 other => bail!(
                     "{name} cannot be set: it is of causality {other}, not a parameter or an input"
                 ),

@@ -11,6 +11,7 @@ use std::path::Path;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 
 use crate::archive::Archive;
+use crate::causality::{Causality, Variability};
 use crate::xml::Element;
 
 /// The root element `fmiModelDescription`.
@@ -176,10 +177,10 @@ pub struct Variable {
     /// Number by which calls refer to it (within its type); of an element of an array one of this host's own, that no
     /// other variable has.
     pub reference: u32,
-    /// input, output, parameter, calculatedParameter, local or independent.
-    pub causality: String,
-    /// constant, fixed, tunable, discrete or continuous; empty if it is not given.
-    pub variability: String,
+    /// Its role.
+    pub causality: Causality,
+    /// When its value can change; `Other` with an empty text if it is not given.
+    pub variability: Variability,
     /// Description; empty if there is none.
     pub description: String,
     /// In FMI 3.0: it may be set or read within a step.
@@ -322,7 +323,7 @@ impl Variable {
 
     /// Returns true for a structural parameter of FMI 3.0, which is set in configuration mode alone.
     pub fn is_structural(&self) -> bool {
-        self.causality == "structuralParameter"
+        self.causality == Causality::StructuralParameter
     }
 
     /// Start, unit, bounds.
@@ -439,7 +440,7 @@ impl Reader {
         Variable {
             name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
             reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
-            causality: element.get("causality").unwrap_or("local").into(),
+            causality: element.get("causality").map_or(Causality::Local, Causality::from),
             variability: element.get("variability").unwrap_or_default().into(),
             description: element.get("description").unwrap_or_default().into(),
             intermediate: false,
@@ -546,18 +547,19 @@ impl Reader {
             }
             _ => of("start").iter().flat_map(|s| s.split_whitespace()).map(String::from).collect(),
         };
-        let variability = of("variability").unwrap_or_else(|| {
+        let variability = element.get("variability").map(Variability::from);
+        let variability = variability.unwrap_or_else(|| {
             let causality = element.get("causality");
             match (causality.is_some_and(|c| c.to_lowercase().ends_with("parameter")), kind) {
-                (true, _) => "fixed".into(),
-                (false, Type::Real) => "continuous".into(),
-                (false, _) => "discrete".into(),
+                (true, _) => Variability::Fixed,
+                (false, Type::Real) => Variability::Continuous,
+                (false, _) => Variability::Discrete,
             }
         });
         let variable = Variable {
             name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
             reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
-            causality: element.get("causality").unwrap_or("local").into(),
+            causality: element.get("causality").map_or(Causality::Local, Causality::from),
             variability,
             description: element.get("description").unwrap_or_default().into(),
             intermediate: element.flag("intermediateUpdate"),
@@ -599,7 +601,7 @@ impl Reader {
             let name = self.text(alias, "name");
             let description = alias.get("description").unwrap_or_default().into();
             let mut other = Variable { name, description, ..variable.clone() };
-            other.causality = "local".into();
+            other.causality = Causality::Local;
             let shown = alias.get("displayUnit").map(String::from);
             other.attributes.display_unit = shown.or(other.attributes.display_unit);
             aliases.push(other);
@@ -1035,7 +1037,7 @@ mod tests {
     #[test]
     fn arrays_of_fmi_3_are_read_as_their_elements_by_rows() {
         let d = ModelDescription::from_xml(XML3).unwrap();
-        let elements = d.variables.iter().filter(|v| v.causality == "input");
+        let elements = d.variables.iter().filter(|v| v.causality == Causality::Input);
         let elements: Vec<_> =
             elements.map(|v| (v.name.as_str(), v.attributes().start.as_deref().unwrap())).collect();
         let all = [("a[1,1]", "1"), ("a[1,2]", "2"), ("a[2,1]", "3"), ("a[2,2]", "4")];
@@ -1067,11 +1069,9 @@ mod tests {
     fn an_alias_of_fmi_3_is_the_same_value_by_another_name_and_no_second_output() {
         let d = ModelDescription::from_xml(XML3).unwrap();
         let (y, z) = (d.variable("y").unwrap(), d.variable("z").unwrap());
-        assert_eq!((y.reference, y.causality.as_str()), (z.reference, "output"));
-        assert_eq!(
-            (z.causality.as_str(), z.attributes().display_unit.as_deref()),
-            ("local", Some("deg"))
-        );
+        assert_eq!((y.reference, &y.causality), (z.reference, &Causality::Output));
+        let displayed = z.attributes().display_unit.as_deref();
+        assert_eq!((&z.causality, displayed), (&Causality::Local, Some("deg")));
     }
 
     #[test]
@@ -1083,7 +1083,7 @@ mod tests {
         assert_eq!(why, "small expects a whole number from 0 to 255, not 256");
         assert_eq!(d.value(d.variable("model").unwrap(), "frozen").unwrap(), Value::Integer(1));
         assert_eq!(d.variable("text").unwrap().attributes().start.as_deref(), Some("one word"));
-        assert_eq!(d.variable("n").unwrap().variability, "fixed");
+        assert_eq!(d.variable("n").unwrap().variability, Variability::Fixed);
     }
 
     #[test]

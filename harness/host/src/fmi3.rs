@@ -20,6 +20,7 @@ use crate::c_abi::{
     self, CallError, Called, Environment, Function, Message, Status, c_string, functions,
     log_message, pointer,
 };
+use crate::causality::Causality;
 use crate::description::{CType, Value};
 
 /// An FMU 3.0 whose binary is loaded.
@@ -520,7 +521,7 @@ impl Fmu {
             .description
             .variables
             .iter()
-            .filter(|v| updates && v.intermediate && v.causality == "input")
+            .filter(|v| updates && v.intermediate && v.causality == Causality::Input)
             .map(|v| self.description.element(v.reference).map_or(v.reference, |e| e.array))
             .collect();
         required.dedup();

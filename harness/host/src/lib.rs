@@ -6,6 +6,7 @@
 pub mod archive;
 pub mod binary;
 pub mod c_abi;
+pub mod causality;
 pub mod description;
 pub mod drive;
 pub mod fmi2;

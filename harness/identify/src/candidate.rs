@@ -1,6 +1,7 @@
 //! One model that may explain the recordings: a slosh model with a friction law, fitted.
 
 use anyhow::{Result, ensure};
+use host::causality::Causality;
 use host::fmu::Fmu;
 use serde::Serialize;
 
@@ -212,7 +213,8 @@ fn unknowns(
         }
         let variable = fmu.description().variable(name)?;
         ensure!(
-            variable.causality == "parameter" && variable.kind() == host::description::Type::Real,
+            variable.causality == Causality::Parameter
+                && variable.kind() == host::description::Type::Real,
             "{name} cannot be estimated: it is no parameter with a real value"
         );
         if !all.iter().any(|(n, _, used)| n == name && !used) {

@@ -3,6 +3,7 @@
 use anyhow::{Result, ensure};
 use experiments::rest;
 use formulas::cylinder::pendulum;
+use host::causality::Causality;
 use host::fmu::{Fmu, Instance};
 
 /// Known values of the bench without the recording.
@@ -59,7 +60,8 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
     for (name, value) in settings {
         let variable = fmu.description().variable(name)?;
         ensure!(
-            matches!(variable.causality.as_str(), "parameter" | "input") && name != "tau_cmd",
+            matches!(variable.causality, Causality::Parameter | Causality::Input)
+                && name != "tau_cmd",
             "{name} cannot be set: it is no parameter"
         );
         instance.set(name, value)?;

@@ -1,6 +1,7 @@
 //! Quantities that an event may change, before and after it.
 
 use anyhow::Result;
+use host::causality::{Causality, Variability};
 
 use super::{FmuUnderTest, Reading, Session};
 use crate::description::Variable;
@@ -18,8 +19,8 @@ pub struct Sight {
 }
 
 fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
-    let computed = |v: &&Variable| matches!(v.causality.as_str(), "output" | "local");
-    fmu.variables().iter().filter(computed).filter(|v| v.variability == "discrete")
+    let computed = |v: &&Variable| matches!(v.causality, Causality::Output | Causality::Local);
+    fmu.variables().iter().filter(computed).filter(|v| v.variability == Variability::Discrete)
 }
 
 impl Sight {

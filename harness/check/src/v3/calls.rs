@@ -6,6 +6,7 @@ use super::Subject;
 use super::subject::{STEPS, Use, difference, start_values};
 use crate::Findings;
 use host::c_abi::{CallError, Status, foreign_environments};
+use host::causality::{Causality, Variability};
 use host::description::{CType, Type, Value};
 use host::fmi3::Interface;
 
@@ -196,7 +197,8 @@ pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
 /// `values.set`
 pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using = subject.plain_uses()[0];
-    let wanted = |v: &&super::Variable| v.is_set_by_hosts() && v.causality != "structuralParameter";
+    let wanted =
+        |v: &&super::Variable| v.is_set_by_hosts() && v.causality != Causality::StructuralParameter;
     for v in subject.readable().filter(wanted) {
         let Some(mut values) = start_values(v) else { continue };
         let (min, max) = v.bounds();
@@ -336,7 +338,9 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = subject.plain_uses().first().copied() else { return Ok(()) };
     let mut any = false;
     let wanted = |v: &&super::Variable| {
-        v.causality == "parameter" && v.variability == "fixed" && v.c_type == CType::Float64
+        v.causality == Causality::Parameter
+            && v.variability == Variability::Fixed
+            && v.c_type == CType::Float64
     };
     for v in subject.readable().filter(wanted) {
         any = true;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::Findings;
+use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 use host::xml::Element;
 
@@ -26,9 +27,9 @@ pub struct Variable {
     /// Its value reference; 0 if that cannot be read.
     pub reference: u32,
     /// Value in the file, or the default "local".
-    pub causality: String,
+    pub causality: Causality,
     /// Value in the file, or the default for causality and type.
-    pub variability: String,
+    pub variability: Variability,
     /// Value in the file, or the default for causality and variability, if there is one.
     pub initial: Option<String>,
     /// In which type calls exchange it.
@@ -73,7 +74,7 @@ impl Variable {
 
     /// Returns true for a continuous variable.
     pub fn is_continuous(&self) -> bool {
-        self.is_float() && self.variability == "continuous"
+        self.is_float() && self.variability == Variability::Continuous
     }
 
     /// Value reference of what it is the derivative of.
@@ -88,7 +89,7 @@ impl Variable {
 
     /// Returns true for variables that a host sets before and during a simulation.
     pub fn is_set_by_hosts(&self) -> bool {
-        matches!(self.causality.as_str(), "input" | "parameter")
+        matches!(self.causality, Causality::Input | Causality::Parameter)
     }
 
     /// Returns true if the rules' calls exchange values of the variable.
@@ -111,15 +112,22 @@ impl Variable {
 
 /// The default of `initial` and what is allowed (2.4.7.5); `None` where causality and variability do not go
 /// together, an empty list where `initial` must not be written.
-pub(crate) fn initials(causality: &str, variability: &str) -> Option<&'static [&'static str]> {
+pub(crate) fn initials(
+    causality: &Causality,
+    variability: &Variability,
+) -> Option<&'static [&'static str]> {
+    use Causality::{
+        CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter,
+    };
+    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
     match (causality, variability) {
-        ("parameter" | "structuralParameter", "fixed" | "tunable") => Some(&["exact"]),
-        ("calculatedParameter", "fixed" | "tunable") => Some(&["calculated", "approx"]),
-        ("input", "discrete" | "continuous") => Some(&["exact"]),
-        ("output" | "local", "constant") => Some(&["exact"]),
-        ("output" | "local", "discrete" | "continuous") => Some(&["calculated", "exact", "approx"]),
-        ("local", "fixed" | "tunable") => Some(&["calculated", "approx"]),
-        ("independent", "continuous") => Some(&[]),
+        (Parameter | StructuralParameter, Fixed | Tunable) => Some(&["exact"]),
+        (CalculatedParameter, Fixed | Tunable) => Some(&["calculated", "approx"]),
+        (Input, Discrete | Continuous) => Some(&["exact"]),
+        (Output | Local, Constant) => Some(&["exact"]),
+        (Output | Local, Discrete | Continuous) => Some(&["calculated", "exact", "approx"]),
+        (Local, Fixed | Tunable) => Some(&["calculated", "approx"]),
+        (Independent, Continuous) => Some(&[]),
         _ => None,
     }
 }
@@ -208,7 +216,8 @@ fn variable(
         Type::Real => "continuous",
         _ => "discrete",
     };
-    let variability = text("variability", default);
+    let causality = Causality::from(&*causality);
+    let variability = Variability::from(&*text("variability", default));
     let default = initials(&causality, &variability).and_then(|all| all.first());
     let starts = match kind {
         Type::String | Type::Binary => {

@@ -6,6 +6,7 @@ use anyhow::Result;
 use super::subject::{STEPS, Session, Use};
 use super::{Subject, Variable};
 use crate::Findings;
+use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
 
@@ -90,7 +91,8 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !stepping(subject, findings) {
         return Ok(());
     }
-    let is_clock = |v: &&Variable| v.causality == "independent" && v.c_type == CType::Float64;
+    let is_clock =
+        |v: &&Variable| v.causality == Causality::Independent && v.c_type == CType::Float64;
     let clock = subject.readable().find(is_clock).cloned();
     for using in stepping_uses(subject) {
         let mut session = subject.running(using)?;
@@ -233,7 +235,7 @@ pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
     }
     let discrete: Vec<Variable> = subject
         .readable()
-        .filter(|v| v.variability == "discrete" && v.causality != "input")
+        .filter(|v| v.variability == Variability::Discrete && v.causality != Causality::Input)
         .cloned()
         .collect();
     for using in uses {
@@ -271,7 +273,8 @@ pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 /// The outputs that are numbers or Booleans; the continuous ones alone, if so asked.
 fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>> {
-    let wanted = |v: &&Variable| v.causality == "output" && (!continuous || v.is_continuous());
+    let wanted =
+        |v: &&Variable| v.causality == Causality::Output && (!continuous || v.is_continuous());
     let all: Vec<Variable> = session.subject.readable().filter(wanted).cloned().collect();
     let mut outputs = Vec::new();
     for v in all {
@@ -534,7 +537,7 @@ fn pairs(subject: &Subject) -> Vec<(Variable, Vec<Variable>)> {
         let unknown = d.at(u.reference?).filter(|v| float(v))?;
         let knowns = d.variables.iter().filter(|v| {
             let listed = u.dependencies.as_ref().is_none_or(|all| all.contains(&v.reference));
-            let is_known = v.causality == "input" || states.contains(&v.reference);
+            let is_known = v.causality == Causality::Input || states.contains(&v.reference);
             float(v) && is_known && listed
         });
         Some((unknown.clone(), knowns.cloned().collect()))
@@ -748,7 +751,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
         }
         for known in d.variables.iter().filter(|k| k.c_type == CType::Float64 && k.is_continuous())
         {
-            let is_known = known.causality == "input" || states.contains(&known.reference);
+            let is_known = known.causality == Causality::Input || states.contains(&known.reference);
             // an output that is a state depends on itself
             if !is_known || listed.contains(&known.reference) || known.reference == v.reference {
                 continue;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::description::{Description, Unknown, Variable};
 use crate::Findings;
+use host::causality::{Causality, Variability};
 use host::description::Type;
 
 fn place(d: &Description, u: &Unknown) -> String {
@@ -43,7 +44,7 @@ fn all(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<u32> {
 
 /// `xml.outputs`
 pub fn outputs(d: &Description, findings: &mut Findings) {
-    let is_output = |v: &Variable| v.causality == "output";
+    let is_output = |v: &Variable| v.causality == Causality::Output;
     compare(d, findings, "Output", &all(d, is_output), is_output, "every output, once");
 }
 
@@ -82,8 +83,8 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
         let state = states.contains(&v.reference) || derivatives.contains(&v.reference);
         v.written.get("clocks").is_none()
             && v.kind != Type::Clock
-            && (v.causality == "calculatedParameter"
-                || (computed && (v.causality == "output" || state)))
+            && (v.causality == Causality::CalculatedParameter
+                || (computed && (v.causality == Causality::Output || state)))
     };
     let why = "outputs, states and their derivatives with initial calculated or approx, calculated \
                parameters, once; clocked variables";
@@ -150,12 +151,15 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
         let initial = unknown.list == "InitialUnknown";
         let known = |v: &Variable| {
             matches!(
-                v.causality.as_str(),
-                "input" | "independent" | "parameter" | "structuralParameter"
+                v.causality,
+                Causality::Input
+                    | Causality::Independent
+                    | Causality::Parameter
+                    | Causality::StructuralParameter
             ) || match initial {
                 true => v.initial.as_deref() == Some("exact"),
                 // a discrete variable may be a discrete-time state
-                false => states.contains(&v.reference) || v.variability == "discrete",
+                false => states.contains(&v.reference) || v.variability == Variability::Discrete,
             } || v.kind == Type::Clock
                 || v.written.get("clocks").is_some()
         };

@@ -10,6 +10,7 @@ use super::{Description, Variable};
 use crate::trace::{self, Crash};
 use crate::under_test::Unusable;
 use host::c_abi::Called;
+use host::causality::Causality;
 use host::description::{Type, Value};
 use host::fmi3::{EventInfo, Fmu, Instance, Instantiation, Interface, Step, Update};
 use host::xml::{Element, double};
@@ -226,7 +227,9 @@ impl Subject {
     pub fn inputs(&self) -> impl Iterator<Item = &Variable> {
         let float = host::description::CType::Float64;
         let all = self.description.variables.iter();
-        all.filter(move |v| v.causality == "input" && v.is_continuous() && v.c_type == float)
+        all.filter(move |v| {
+            v.causality == Causality::Input && v.is_continuous() && v.c_type == float
+        })
     }
 }
 

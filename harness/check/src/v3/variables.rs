@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::description::{Description, Variable, initials};
 use crate::Findings;
+use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 use host::xml::double;
 
@@ -57,17 +58,17 @@ pub fn references(d: &Description, findings: &mut Findings) {
 /// `xml.causality`
 pub fn causality(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
-        let (causality, variability) = (v.causality.as_str(), v.variability.as_str());
+        let (causality, variability) = (&v.causality, &v.variability);
         if initials(causality, variability).is_none() {
             let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
             let allowed: Vec<_> =
-                all.into_iter().filter(|v| initials(causality, v).is_some()).collect();
+                all.into_iter().filter(|v| initials(causality, &(*v).into()).is_some()).collect();
             return Some(format!(
                 "causality {causality} with variability {variability} (allowed: {})",
                 allowed.join(", ")
             ));
         }
-        (variability == "continuous" && !v.is_float())
+        (v.variability == Variability::Continuous && !v.is_float())
             .then(|| format!("a continuous {} (allowed: Float32, Float64 alone)", v.written.name))
     });
 }
@@ -95,18 +96,20 @@ pub fn start(d: &Description, findings: &mut Findings) {
         }
         let start = !v.starts.is_empty();
         let initial = v.initial.as_deref();
-        if v.causality == "independent" || initial == Some("calculated") {
+        if v.causality == Causality::Independent || initial == Some("calculated") {
             return start.then(|| {
                 let why = initial.map_or("independent".into(), |i| format!("initial={i}"));
                 format!("a start value with {why} (allowed: none)")
             });
         }
-        let needed = matches!(v.causality.as_str(), "input" | "parameter" | "structuralParameter")
-            || v.variability == "constant"
+        let needed = matches!(
+            v.causality,
+            Causality::Input | Causality::Parameter | Causality::StructuralParameter
+        ) || v.variability == Variability::Constant
             || matches!(initial, Some("exact" | "approx"));
         // an array of no elements has no values
         if needed && !start && v.length() > 0 {
-            let why = initial.map_or(v.causality.clone(), |i| format!("initial={i}"));
+            let why = initial.map_or(v.causality.to_string(), |i| format!("initial={i}"));
             return Some(format!("no start value with {why}"));
         }
         let (count, length) = (v.starts.len(), v.length());
@@ -166,7 +169,8 @@ pub fn range(d: &Description, findings: &mut Findings) {
 
 /// `xml.independent`
 pub fn independent(d: &Description, findings: &mut Findings) {
-    let all: Vec<_> = d.variables.iter().filter(|v| v.causality == "independent").collect();
+    let all: Vec<_> =
+        d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
     if all.len() != 1 {
         findings
             .add("ModelVariables", format!("{} independent variables (allowed: one)", all.len()));
@@ -189,15 +193,22 @@ pub fn independent(d: &Description, findings: &mut Findings) {
 /// `xml.flags`
 pub fn flags(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
-        if v.written.get("canHandleMultipleSetPerTimeInstant").is_some() && v.causality != "input" {
+        if v.written.get("canHandleMultipleSetPerTimeInstant").is_some()
+            && v.causality != Causality::Input
+        {
             return Some(format!(
                 "canHandleMultipleSetPerTimeInstant of causality {}",
                 v.causality
             ));
         }
-        (v.written.flag("intermediateUpdate") && v.variability != "continuous").then(|| {
-            format!("intermediateUpdate with variability {} (allowed: continuous)", v.variability)
-        })
+        (v.written.flag("intermediateUpdate") && v.variability != Variability::Continuous).then(
+            || {
+                format!(
+                    "intermediateUpdate with variability {} (allowed: continuous)",
+                    v.variability
+                )
+            },
+        )
     });
 }
 
@@ -215,7 +226,7 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
                     format!("clocks=\"{clocks}\" (allowed: value references of clocks)"),
                 );
             }
-            if !matches!(v.variability.as_str(), "discrete" | "tunable") {
+            if !matches!(v.variability, Variability::Discrete | Variability::Tunable) {
                 findings.add(
                     v.place(),
                     format!(
@@ -230,8 +241,8 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
         let fits = of.is_some_and(|of| {
             of.reference != v.reference
                 && of.kind == v.kind
-                && of.variability == "discrete"
-                && of.causality != "input"
+                && of.variability == Variability::Discrete
+                && of.causality != Causality::Input
         });
         if !fits {
             findings.add(
@@ -242,7 +253,7 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
                 ),
             );
         }
-        if clocks.is_none() || v.variability != "discrete" {
+        if clocks.is_none() || v.variability != Variability::Discrete {
             findings.add(v.place(), "previous of a variable that is not clocked and discrete");
         }
         if let Some(other) = previous.insert(text.trim(), &v.name) {
@@ -271,8 +282,8 @@ pub fn dimensions(d: &Description, findings: &mut Findings) {
                     let of = reference.trim().parse().ok().and_then(|r| d.at(r));
                     let fits = of.is_some_and(|of| {
                         of.c_type == CType::UInt64
-                            && (of.causality == "structuralParameter"
-                                || of.variability == "constant")
+                            && (of.causality == Causality::StructuralParameter
+                                || of.variability == Variability::Constant)
                     });
                     if !fits {
                         findings.add(

@@ -6,6 +6,7 @@ use anyhow::{Result, bail, ensure};
 use experiments::campaign::{CURVES, Campaign, Folder};
 use experiments::plan::{self, Plan, Sweeps};
 use files::budget;
+use host::causality::Causality;
 use host::fmu::Fmu;
 use host::guard;
 
@@ -180,7 +181,8 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
     let cases = campaign.plan.cases(fmu.description())?;
     let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();
     drop(cases);
-    let columns = fmu.description().variables.iter().filter(|v| v.causality == "output").count();
+    let columns =
+        fmu.description().variables.iter().filter(|v| v.causality == Causality::Output).count();
     let jobs = budget::jobs(campaign.jobs, 0)?;
     let largest = rows.iter().max().copied().unwrap_or(0) * (columns + 20) * 8;
     // tables and the spectra made of them; what the report keeps of each run

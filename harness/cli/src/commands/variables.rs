@@ -45,7 +45,7 @@ impl VariablesArgs {
         let wanted = |v: &&Variable| {
             let named = v.name.to_lowercase().contains(&filter);
             (named || v.description.to_lowercase().contains(&filter))
-                && self.causality.as_ref().is_none_or(|causality| *causality == v.causality)
+                && self.causality.as_ref().is_none_or(|causality| causality == v.causality.as_str())
         };
         if self.json && description.variables.iter().any(|v| wanted(&v)) {
             let chosen = description.variables.iter().filter(wanted);
@@ -106,8 +106,8 @@ fn object(description: &ModelDescription, variable: &Variable) -> Value {
     json!({
         "name": variable.name,
         "type": format!("{:?}", variable.kind()),
-        "causality": variable.causality,
-        "variability": variable.variability,
+        "causality": variable.causality.as_str(),
+        "variability": variable.variability.as_str(),
         "start": value(&attributes.start),
         "min": value(&attributes.min),
         "max": value(&attributes.max),
@@ -139,7 +139,7 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
         (None, Some(max)) => format!("<= {max}"),
         (Some(min), Some(max)) => format!("{min} to {max}"),
     };
-    let causality = variable.causality.clone();
+    let causality = variable.causality.to_string();
     let (unit, meaning) = (text(&attributes.unit), variable.description.clone());
     [variable.name.clone(), causality, start, unit, range, meaning]
 }

@@ -1,5 +1,6 @@
 //! Promises of README and of the scripts for other hosts.
 
+use host::causality::Causality;
 use host::description::ModelDescription;
 
 fn read(path: &str) -> String {
@@ -27,7 +28,7 @@ fn openmodelicas_script_sets_every_input() {
     let set: Vec<(&str, &str)> =
         set.split('"').next().unwrap().split(',').filter_map(|one| one.split_once('=')).collect();
     for input in ModelDescription::from_xml(&xml).unwrap().variables {
-        if input.causality == "input" {
+        if input.causality == Causality::Input {
             let start: f64 = input.attributes().start.as_deref().unwrap().parse().unwrap();
             let value = set.iter().find(|(name, _)| *name == input.name).map(|(_, value)| *value);
             assert_eq!(value.and_then(|text| text.parse().ok()), Some(start), "{}", input.name);

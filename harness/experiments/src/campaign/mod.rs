@@ -22,6 +22,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Result, anyhow};
 use files::budget;
 use files::output::sha256;
+use host::causality::Causality;
 use host::description::{ModelDescription, Type, Value};
 use host::fmu::Fmu;
 use rayon::prelude::*;
@@ -90,8 +91,10 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
         return STORED.map(String::from).to_vec();
     }
     // and the slosh angles of a six-axis FMU, which are local variables
-    let outputs =
-        description.variables.iter().filter(|v| v.causality == "output" || is_slosh_angle(&v.name));
+    let outputs = description
+        .variables
+        .iter()
+        .filter(|v| v.causality == Causality::Output || is_slosh_angle(&v.name));
     let outputs = outputs
         .filter(|v| !matches!(v.kind(), Type::String | Type::Binary | Type::Clock))
         .map(|v| v.name.clone());

@@ -17,6 +17,7 @@ use crate::run::{Run, driven};
 use crate::sensors::{Sensor, Sensors};
 use files::output::{sha256, sha256_of};
 use files::{budget, input};
+use host::causality::Causality;
 use host::description::{ModelDescription, Value, did_you_mean};
 use signals::recording::Columns;
 
@@ -626,7 +627,7 @@ fn settable(
     let variable = description.variable(name)?;
     ensure!(input.as_deref() != Some(name), "{name} comes from the profile");
     ensure!(
-        ["parameter", "input"].contains(&variable.causality.as_str()),
+        matches!(variable.causality, Causality::Parameter | Causality::Input),
         "{name} cannot be set: it is of causality {}, not a parameter or an input",
         variable.causality
     );

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, ensure};
 use experiments::rest;
 use experiments::sensors::Sensor;
 use experiments::sensors::quantity::Quantity;
+use host::causality::Causality;
 use host::description::{ModelDescription, Type};
 use host::fmu::{Fmu, Instance, Interface};
 
@@ -225,7 +226,8 @@ impl Setup {
             return Ok(false);
         }
         let outputs = description.variables.iter();
-        let outputs = outputs.filter(|v| v.causality == "output" && v.kind() == Type::Real);
+        let outputs =
+            outputs.filter(|v| v.causality == Causality::Output && v.kind() == Type::Real);
         let outputs: Vec<u32> = outputs.map(|v| v.reference).collect();
         let reads = |instance: &mut Instance| -> Result<Vec<f64>> {
             let mut values = vec![0.0; outputs.len()];

@@ -1,6 +1,7 @@
 //! Unknowns of a question, with names, units, bounds and priors.
 
 use anyhow::{Context, Result, ensure};
+use host::causality::{Causality, Variability};
 use host::description::ModelDescription;
 
 use super::question::{Bias, Free, Question, Triad, real};
@@ -182,9 +183,9 @@ fn parameters(
     recordings: usize,
 ) -> Result<Vec<Unknown>> {
     let variable = real(description, &free.name)?;
-    let allowed = ["parameter", "output", "local", "input"];
+    let allowed = [Causality::Parameter, Causality::Output, Causality::Local, Causality::Input];
     ensure!(
-        allowed.contains(&variable.causality.as_str()) && variable.variability != "constant",
+        allowed.contains(&variable.causality) && variable.variability != Variability::Constant,
         "{} cannot be free: it is a {} {}",
         free.name,
         variable.variability,

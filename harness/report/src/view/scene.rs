@@ -1,5 +1,6 @@
 //! The scene's `geometry` (harness/web/scene/README.md): bodies, tanks and arrows.
 
+use host::causality::Causality;
 use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
@@ -26,7 +27,7 @@ impl Arrows<'_, '_, '_> {
     fn add(&mut self, name: &str, label: &str, mut arrow: Value, names: &[String]) {
         let constant = |name: &String| {
             let variable = self.parameters.description.variable(name).ok()?;
-            (variable.causality == "input").then(|| self.parameters.number(name))
+            (variable.causality == Causality::Input).then(|| self.parameters.number(name))
         };
         let there: Vec<String> = names.iter().filter(|n| self.columns.has(n)).cloned().collect();
         if there.is_empty() || names.iter().any(|n| !self.columns.has(n) && constant(n).is_none()) {

@@ -1,0 +1,54 @@
+//! Causality and variability of a variable.
+
+use std::fmt::{self, Display};
+
+macro_rules! attribute {
+    ($(#[$doc:meta])* $name:ident: $($item:ident $text:literal),+) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        #[allow(missing_docs)]
+        pub enum $name {
+            $($item,)+
+            /// Any other text; empty if the attribute is missing.
+            Other(String),
+        }
+
+        impl $name {
+            /// Returns the attribute's text.
+            pub fn as_str(&self) -> &str {
+                match self {
+                    $($name::$item => $text,)+
+                    $name::Other(text) => text,
+                }
+            }
+        }
+
+        impl From<&str> for $name {
+            fn from(text: &str) -> $name {
+                match text {
+                    $($text => $name::$item,)+
+                    other => $name::Other(other.into()),
+                }
+            }
+        }
+
+        impl Display for $name {
+            fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+                to.pad(self.as_str())
+            }
+        }
+    };
+}
+
+attribute! {
+    /// Attribute `causality` of FMI 2.0 and 3.0.
+    Causality: Parameter "parameter", CalculatedParameter "calculatedParameter",
+    StructuralParameter "structuralParameter", Input "input", Output "output", Local "local",
+    Independent "independent"
+}
+
+attribute! {
+    /// Attribute `variability` of FMI 2.0 and 3.0.
+    Variability: Constant "constant", Fixed "fixed", Tunable "tunable", Discrete "discrete",
+    Continuous "continuous"
+}
