@@ -54,7 +54,7 @@ const HARNESS: [(&str, &[&str]); 15] = [
     ("signals", &["files"]),
     ("check", &["files", "host"]),
     ("analysis", &["signals"]),
-    ("experiments", &["files", "formulas", "host", "signals", "analysis"]),
+    ("experiments", &["files", "formulas", "host", "names", "signals", "analysis"]),
     ("web", &[]),
     ("pack", &["files", "host", "web"]),
     ("report", &["formulas", "host", "signals", "analysis", "experiments", "web"]),

@@ -13,6 +13,7 @@ use files::output;
 use host::causality::Causality;
 use host::description::ModelDescription;
 use host::fmu::Fmu;
+use names::hubslosh::TAU_CMD;
 use signals::table::Table;
 
 /// The example of an FMU of this project.
@@ -45,7 +46,7 @@ fn swell(t: f64) -> f64 {
 /// The examples, one for each FMU. 2340 N give the default craft with its liquid, 1562 kg, an acceleration of 1.5 m/s²,
 /// for which its tank's damping holds.
 pub const EXAMPLES: [Example; 3] = [
-    Example { model: "HubSlosh", inputs: &[("tau_cmd", 0.1, BENCH)] },
+    Example { model: "HubSlosh", inputs: &[(TAU_CMD, 0.1, BENCH)] },
     Example {
         model: "Spacecraft",
         inputs: &[

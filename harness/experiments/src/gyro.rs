@@ -11,6 +11,7 @@ use crate::run::{Run, TORQUE};
 use analysis::allan::{self, Noise, Point};
 use files::budget;
 use host::fmu::Fmu;
+use names::hubslosh::{OMEGA, OMEGA_IMU, imu};
 use signals::table::Table;
 
 /// Smallest number of records for a standard error from their scatter; that of four is uncertain by
@@ -65,7 +66,7 @@ impl Recording {
             "a record must last a positive number of hours, not {}",
             self.hours
         );
-        for name in ["imu.enabled", "imu.seed"] {
+        for name in [imu::ENABLED, imu::SEED] {
             ensure!(
                 self.settings.iter().all(|(set, _)| set != name),
                 "{name} cannot be set: the gyro is on, the records' seeds count from 1"
@@ -74,11 +75,11 @@ impl Recording {
         let seconds = self.hours * 3600.0;
         let mut instance = self.run(1, 1.0, 1.0)?.initialise(fmu)?;
         let mut real = |name: &str| instance.real(name);
-        let (rate, lsb) = (real("imu.rate")?, real("imu.lsb")?);
+        let (rate, lsb) = (real(imu::RATE)?, real(imu::LSB)?);
         let specified = Noise {
-            arw: real("imu.arw")?.hypot(lsb / (12.0 * rate).sqrt()),
-            bias_instability: real("imu.bias_instability")?,
-            bias_time: real("imu.bias_time")?,
+            arw: real(imu::ARW)?.hypot(lsb / (12.0 * rate).sqrt()),
+            bias_instability: real(imu::BIAS_INSTABILITY)?,
+            bias_time: real(imu::BIAS_TIME)?,
         };
         drop(instance);
         ensure!(
@@ -112,7 +113,7 @@ impl Recording {
 
     /// Returns one record, sampled at the gyro's own instants.
     fn run(&self, seed: usize, step: f64, stop: f64) -> Result<Run> {
-        let ours = [("imu.enabled", "true".to_string()), ("imu.seed", seed.to_string())];
+        let ours = [(imu::ENABLED, "true".to_string()), (imu::SEED, seed.to_string())];
         let ours = ours.map(|(name, value)| (name.to_string(), value));
         let torque: Torque = format!("zero:duration={stop}").parse::<Written>()?.torque()?;
         let settings = [&self.settings[..], &ours].concat();
@@ -133,13 +134,13 @@ impl Recording {
 fn record(run: &Run, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Point>> {
     let mut instance = run.initialise(fmu)?;
     let table =
-        run.drive(&mut instance, &["omega", "omega_imu"], |steps| watch(Progress::Steps(steps)))?;
+        run.drive(&mut instance, &[OMEGA, OMEGA_IMU], |steps| watch(Progress::Steps(steps)))?;
     let column = |name| table.column(name).unwrap_or_default();
     ensure!(
-        column("omega").iter().all(|omega| *omega == 0.0),
+        column(OMEGA).iter().all(|omega| *omega == 0.0),
         "the hub does not rest: leave its start, its torques and the friction of the bearing alone"
     );
-    Ok(allan::variances(run.step, column("omega_imu")))
+    Ok(allan::variances(run.step, column(OMEGA_IMU)))
 }
 
 impl Characteristics {

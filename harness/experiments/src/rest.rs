@@ -3,12 +3,13 @@
 use anyhow::Result;
 use host::description::ModelDescription;
 use host::fmu::{Fmu, Instance};
+use names::hubslosh::init;
 
 /// Parameters and inputs by which this project's FMUs move if nobody sets anything, for the first plot of any host; 0 is at
 /// rest. FMUs of others have none.
 pub fn moving_starts(description: &ModelDescription) -> &'static [&'static str] {
     match description.model_name.as_str() {
-        "HubSlosh" => &["init.slosh_angle"],
+        "HubSlosh" => &[init::SLOSH_ANGLE],
         name if name.starts_with("Spacecraft") => &["init.omega[1]", "init.omega[3]"],
         "SloshTank" => &["a[1]", "a[3]"],
         _ => &[],

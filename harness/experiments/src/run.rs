@@ -12,6 +12,7 @@ use host::causality::Causality;
 use host::description::{ModelDescription, Type, Value, Variable};
 use host::drive::Inputs;
 use host::fmu::{Fmu, Instance};
+use names::hubslosh::TAU_CMD;
 use signals::table::{self, Table};
 
 /// A run of an FMU.
@@ -37,7 +38,7 @@ pub struct Run {
 }
 
 /// The input that the torque drives, where an FMU has one of that name.
-pub const TORQUE: &str = "tau_cmd";
+pub const TORQUE: &str = TAU_CMD;
 
 /// Returns the driven input of an FMU: `chosen` if given, otherwise [`TORQUE`], otherwise its only Real
 /// input. Returns none if the FMU has no input.

@@ -6,6 +6,7 @@ use formulas::cylinder::{self, XI};
 use formulas::similarity::{Liquid, ruling_force};
 use host::description::{ModelDescription, Value};
 use host::fmu::Instance;
+use names::{sloshtank, spacecraft};
 use signals::table::Table;
 
 /// Below this Bond number no model here stands for the liquid (thesis 2.5, 8.2.2).
@@ -124,11 +125,15 @@ impl Tanks {
     ) -> Result<Option<Tanks>> {
         let has = |name: &str| description.variable(name).is_ok();
         let (accelerometer, names) = match () {
-            () if has("specific_force[1]") && has("tank[1].wave[1]") => {
-                let used = integer(description, instance, "tanks")?;
+            () if has(&spacecraft::SPECIFIC_FORCE.at([1]))
+                && has(&spacecraft::tank::WAVE.at([1, 1])) =>
+            {
+                let used = integer(description, instance, spacecraft::TANKS)?;
                 ("specific_force", (1..=used).map(|i| format!("tank[{i}]")).collect())
             }
-            () if has("a[1]") && has("tank.wave[1]") => ("a", vec!["tank".to_string()]),
+            () if has(&sloshtank::A.at([1])) && has(&sloshtank::tank::WAVE.at([1])) => {
+                ("a", vec!["tank".to_string()])
+            }
             () => return Ok(None),
         };
         ensure!(

@@ -25,6 +25,10 @@ use files::output::sha256;
 use host::causality::Causality;
 use host::description::{ModelDescription, Type, Value};
 use host::fmu::Fmu;
+use names::hubslosh::{
+    ENERGY, F_RADIAL, F_TANGENTIAL, HEAT, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL,
+    STUCK_TIME, TAU_CMD, WAVE_HEIGHT, WORK, friction, hub, slosh, tank,
+};
 use rayon::prelude::*;
 use serde_json::json;
 use signals::table;
@@ -47,36 +51,29 @@ use crate::sensors::Sensors;
 /// tables.
 pub const STORED: [&str; 13] = [
     "time",
-    "tau_cmd",
-    "omega",
-    "omega_imu",
-    "slosh_angle",
-    "slosh_angle_radial",
-    "wave_height",
-    "energy",
-    "work",
-    "heat",
-    "stuck_time",
-    "F_tangential",
-    "F_radial",
+    TAU_CMD,
+    OMEGA,
+    OMEGA_IMU,
+    SLOSH_ANGLE,
+    SLOSH_ANGLE_RADIAL,
+    WAVE_HEIGHT,
+    ENERGY,
+    WORK,
+    HEAT,
+    STUCK_TIME,
+    F_TANGENTIAL,
+    F_RADIAL,
 ];
 
 /// Parameters of the bench that the analysis needs.
-const PARAMETERS: [&str; 8] = [
-    "slosh.model",
-    "slosh.mass[1]",
-    "tank.h",
-    "tank.d",
-    "tank.r",
-    "tank.m_0",
-    "hub.I",
-    "friction.b",
-];
+const PARAMETERS: [&str; 7] =
+    [slosh::MODEL, tank::H, tank::D, tank::R, tank::M_0, hub::I, friction::B];
 
 /// Returns true if the FMU has the variables that the bench's analysis needs.
 fn is_bench(description: &ModelDescription) -> bool {
-    let has = |name: &&str| description.variables.iter().any(|v| v.name == *name);
-    STORED[1..].iter().all(has) && PARAMETERS.iter().all(has)
+    let has = |name: &str| description.variables.iter().any(|v| v.name == name);
+    let has_all = |names: &[&str]| names.iter().all(|name| has(name));
+    has_all(&STORED[1..]) && has_all(&PARAMETERS) && has(&slosh::MASS.at([1]))
 }
 
 /// Returns true if the variable is the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.

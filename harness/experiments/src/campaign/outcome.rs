@@ -25,6 +25,11 @@ use analysis::sweep::Sweep;
 use analysis::welch::{self, Spectra};
 use analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa, statistics};
 use formulas::similarity::Liquid;
+use names::hubslosh::{
+    ENERGY, F_RADIAL, F_TANGENTIAL, FrictionModel, G_AXIAL, HEAT, OMEGA, OMEGA_IMU, SLOSH_ANGLE,
+    SLOSH_ANGLE_RADIAL, STUCK_TIME, SloshModel, SloshSource, TAU_CMD, WAVE_HEIGHT, WORK, fluid,
+    friction, hub, slosh, tank,
+};
 use signals::table::Table;
 
 /// Number of frequencies of the responses: 1.2 mHz apart at the antiresonance of the thesis's
@@ -107,21 +112,21 @@ impl Totals {
     fn of(table: &Table, rates: &Rates) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let peak = |name| column(name).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let (energy, work, heat) = (column("energy"), column("work"), column("heat"));
+        let (energy, work, heat) = (column(ENERGY), column(WORK), column(HEAT));
         let throughput: f64 = work.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>()
             + heat.last().copied().unwrap_or(0.0);
         let residual = (0..energy.len())
             .map(|i| (energy[i] - energy[0] - (work[i] - work[0]) + (heat[i] - heat[0])).abs())
             .fold(0.0, f64::max);
         Totals {
-            peak_slosh_angle: peak("slosh_angle"),
-            peak_radial_angle: peak("slosh_angle_radial"),
-            peak_wave_height: peak("wave_height"),
+            peak_slosh_angle: peak(SLOSH_ANGLE),
+            peak_radial_angle: peak(SLOSH_ANGLE_RADIAL),
+            peak_wave_height: peak(WAVE_HEIGHT),
             peak_rate: statistics::peak(&rates.about_axis),
-            peak_acceleration: peak_slope(column("time"), column("omega_imu")),
-            gyro_errors: column("omega_imu") != column("omega"),
+            peak_acceleration: peak_slope(column("time"), column(OMEGA_IMU)),
+            gyro_errors: column(OMEGA_IMU) != column(OMEGA),
             max_energy_residual: if throughput > 0.0 { residual / throughput } else { 0.0 },
-            stuck: column("stuck_time").last().copied().unwrap_or(0.0),
+            stuck: column(STUCK_TIME).last().copied().unwrap_or(0.0),
         }
     }
 }
@@ -149,7 +154,7 @@ impl Rates {
     /// recorded gyro is unknown and not removed.
     fn of(table: &Table, alternates: bool, is_recording: bool) -> Rates {
         let column = |name| table.column(name).unwrap_or_default();
-        let (rate, truth) = (column("omega_imu"), column("omega"));
+        let (rate, truth) = (column(OMEGA_IMU), column(OMEGA));
         let has_errors = is_recording || rate != truth;
         let bias = match (has_errors, alternates) {
             (false, _) => 0.0,
@@ -159,7 +164,7 @@ impl Rates {
         let mut warnings = Vec::new();
         if has_errors && alternates {
             let names =
-                [("omega_imu", "the gyro's rate"), ("omega_x", "omega_x"), ("omega_y", "omega_y")];
+                [(OMEGA_IMU, "the gyro's rate"), ("omega_x", "omega_x"), ("omega_y", "omega_y")];
             for (column, name) in names {
                 warnings.extend(table.column(column).and_then(|rate| notable_mean(name, rate)));
             }
@@ -268,7 +273,7 @@ pub struct Ending {
 
 impl Ending {
     fn of(history: &History) -> Ending {
-        let manoeuvre = manoeuvre(&history.curve("tau_cmd"));
+        let manoeuvre = manoeuvre(&history.curve(TAU_CMD));
         let largest = |signal: &str| {
             let curve = history.curve(signal);
             let (first, last) = (curve.first()?.0, curve.last()?.0);
@@ -276,7 +281,7 @@ impl Ending {
             let late = curve.iter().filter(|(t, _)| *t > from);
             Some(late.fold(0.0, |most: f64, (_, value)| most.max(value.abs())))
         };
-        Ending { manoeuvre, rate: largest("omega_imu"), slosh_angle: largest("slosh_angle") }
+        Ending { manoeuvre, rate: largest(OMEGA_IMU), slosh_angle: largest(SLOSH_ANGLE) }
     }
 }
 
@@ -305,7 +310,7 @@ impl SloshPath {
     fn of(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let (time, radial, tangential) =
-            (column("time"), column("slosh_angle_radial"), column("slosh_angle"));
+            (column("time"), column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE));
         let size = |i: usize| radial[i].hypot(tangential[i]);
         let top = (0..time.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map(|i| time[i]);
         let stretch = |centre: f64, periods: f64| {
@@ -557,14 +562,14 @@ impl Passing {
     /// `unexplained`: as for [`Record`].
     fn of(sweep: &Sweep, table: &Table, rates: &Rates, arm: f64, unexplained: &[f64]) -> Passing {
         let column = |name| table.column(name).unwrap_or_default();
-        let is_recording = table.column("F_radial").is_none();
+        let is_recording = table.column(F_RADIAL).is_none();
         let about_axis = &rates.about_axis[..];
         // where a recording has no such rate, another stands in its place, and is not looked at
         let other = |k: usize| rates.others[k].as_deref().unwrap_or(about_axis);
         let signals = match is_recording {
             false => {
                 let [radial, tangential, force] =
-                    ["slosh_angle_radial", "slosh_angle", "F_radial"].map(column);
+                    [SLOSH_ANGLE_RADIAL, SLOSH_ANGLE, F_RADIAL].map(column);
                 [about_axis, radial, tangential, force]
             }
             true => [about_axis, other(0), other(1), about_axis],
@@ -573,7 +578,7 @@ impl Passing {
         let demodulation::Demodulated { responses, noise_gain } = demodulation::frequency_responses(
             sweep,
             column("time"),
-            column("tau_cmd"),
+            column(TAU_CMD),
             signals,
             &grid,
         );
@@ -598,7 +603,7 @@ impl Passing {
             off_axis::of_rates(&rate, about_axis, &others)
         } else {
             let leakage = off_axis::leakage(&fourth, arm);
-            let off_axis = OffAxis::of(column("F_radial"), column("F_tangential"), &leakage);
+            let off_axis = OffAxis::of(column(F_RADIAL), column(F_TANGENTIAL), &leakage);
             (leakage, Some(off_axis))
         };
         // where a window would begin before the sweep or end after it
@@ -648,7 +653,7 @@ impl Outcome {
         let (record, passing) = match &run.torque {
             Torque::Rows { .. } => (None, None),
             Torque::Profile(profile) => {
-                let (tau, omega) = (column("tau_cmd"), &rates.about_axis[..]);
+                let (tau, omega) = (column(TAU_CMD), &rates.about_axis[..]);
                 // in every fourth of the frequencies: it changes little between them
                 let unexplained = profile.band().map_or(Vec::new(), |band| {
                     let grid = logarithmic_grid(band, GRID_POINTS);
@@ -664,11 +669,11 @@ impl Outcome {
             }
         };
         // of a recording, the true rate at the start is the measured one less the bias
-        let start = column("omega").first().copied().unwrap_or(0.0)
+        let start = column(OMEGA).first().copied().unwrap_or(0.0)
             - if is_recording { rates.bias } else { 0.0 };
         let modelled = match &run.torque {
             Torque::Profile(profile) if profile.sweep().is_some() && !run.hold => {
-                linear.simulate(run.step, column("tau_cmd"), start)
+                linear.simulate(run.step, column(TAU_CMD), start)
             }
             // edges of the torque stand at the steps' ends, and are no slopes
             _ => {
@@ -679,8 +684,7 @@ impl Outcome {
         };
         let residual: Vec<f64> =
             rates.about_axis.iter().zip(&modelled).map(|(y, m)| y - m).collect();
-        let signals =
-            ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial", "omega_x", "omega_y"];
+        let signals = [TAU_CMD, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, "omega_x", "omega_y"];
         let signals = signals.into_iter().filter_map(|name| Some((name, table.column(name)?)));
         let all: Vec<(&str, &[f64])> = signals.chain([("residual", &residual[..])]).collect();
         let onset = passing.as_ref().and_then(|passing| {
@@ -702,7 +706,7 @@ impl Outcome {
             },
             warnings: rates.warnings,
             case: case.clone(),
-            weightless: range.without_weight(column(WAVE), table.column("g_axial")),
+            weightless: range.without_weight(column(WAVE), table.column(G_AXIAL)),
             range,
             linear,
             record,
@@ -804,7 +808,7 @@ impl Outcome {
 }
 
 /// The variable that tells whether the liquid is in its model's range.
-pub const WAVE: &str = "wave_height";
+pub const WAVE: &str = WAVE_HEIGHT;
 
 /// The range in which a model of the liquid means something.
 #[derive(Clone, Debug)]
@@ -829,19 +833,19 @@ impl Range {
         if !super::is_bench(description) {
             return Ok(None);
         }
-        let model = item(instance, "slosh.model", "slosh.kind")?.unwrap_or_default();
-        let source = item(instance, "slosh.source", "slosh.source_kind")?;
-        let fill = instance.real("tank.h")?;
+        let model = item(instance, slosh::MODEL, slosh::KIND)?.unwrap_or_default();
+        let source = item(instance, slosh::SOURCE, slosh::SOURCE_KIND)?;
+        let fill = instance.real(tank::H)?;
         Ok(Some(Range {
             model,
-            radius: instance.real("tank.d")? / 2.0,
-            fill: (source.as_deref() != Some("table")).then_some(fill),
+            radius: instance.real(tank::D)? / 2.0,
+            fill: (source.as_deref() != Some(SloshSource::Table.name())).then_some(fill),
             liquid: Liquid {
-                density: instance.real("fluid.rho")?,
-                tension: instance.real("fluid.sigma")?,
+                density: instance.real(fluid::RHO)?,
+                tension: instance.real(fluid::SIGMA)?,
             },
-            g: instance.real("g_axial")?,
-            length: instance.real("slosh.length[1]")?,
+            g: instance.real(G_AXIAL)?,
+            length: instance.real(&slosh::LENGTH.at([1]))?,
         }))
     }
 
@@ -866,13 +870,14 @@ impl Range {
         let wave = waves.iter().fold(0.0, |most: f64, wave| most.max(wave.abs()));
         let mm = |length: f64| format!("{:.1} mm", length * 1e3);
         let linear = self.radius / 4.0;
-        if self.model == "linear" && wave > linear {
+        if self.model == SloshModel::Linear.name() && wave > linear {
             let (wave, most) = (mm(wave), mm(linear));
             return Some(format!(
                 "a wave of {wave}; linear slosh theory holds up to a quarter of the tank's radius, {most}"
             ));
         }
-        let fill = self.fill.filter(|fill| self.model != "frozen" && wave > *fill)?;
+        let fill =
+            self.fill.filter(|fill| self.model != SloshModel::Frozen.name() && wave > *fill)?;
         Some(format!("a wave of {}, more than the liquid is deep, {}", mm(wave), mm(fill)))
     }
 }
@@ -896,34 +901,34 @@ fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String
 /// FMU has none, and the line that it hangs from.
 pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut real = |name: &str| instance.real(name);
-    let arm = real("tank.r")?;
+    let arm = real(tank::R)?;
     // What of the modes' masses is carried across their directions.
     let (mut modes, mut carried) = (Vec::new(), 0.0);
-    for n in 1..=10 {
-        let mass = real(&format!("slosh.mass[{n}]"))?;
+    for n in 1..=slosh::MOST_MODES {
+        let mass = real(&slosh::MASS.at([n]))?;
         if mass <= 0.0 {
             continue;
         }
         // Versions before 0.5 have only tangential modes. A mode at an angle to the tangent has the arm r cos. To first order
         // it is a tangential mode of mass m cos^2, and its remaining mass moves with the tank.
-        let direction = real(&format!("slosh.table.direction[{n}]")).unwrap_or(0.0);
+        let direction = real(&slosh::table::DIRECTION.at([n])).unwrap_or(0.0);
         let across = mass * direction.sin().powi(2);
         carried += across;
         if mass - across > 1e-12 * mass {
             modes.push(Mode {
                 mass: mass - across,
-                frequency: real(&format!("slosh.frequency[{n}]"))?,
-                damping: real(&format!("slosh.damping[{n}]"))?,
+                frequency: real(&slosh::FREQUENCY.at([n]))?,
+                damping: real(&slosh::DAMPING.at([n]))?,
             });
         }
     }
-    let inertia = real("hub.I")? + (real("tank.m_0")? + carried) * arm * arm;
-    let viscous = real("friction.b")?;
-    let law = item(instance, "friction.model", "friction.kind")?;
-    let bearing = if law.as_deref() == Some("none") { 0.0 } else { viscous };
+    let inertia = real(hub::I)? + (real(tank::M_0)? + carried) * arm * arm;
+    let viscous = real(friction::B)?;
+    let law = item(instance, friction::MODEL, friction::KIND)?;
+    let bearing = if law.as_deref() == Some(FrictionModel::None.name()) { 0.0 } else { viscous };
     // A bench of before 0.4 hangs from no line.
     let mut line = |name: &str| instance.real(name).unwrap_or(0.0);
-    let (stiffness, friction) = (line("hub.k"), bearing + line("hub.c"));
+    let (stiffness, friction) = (line(hub::K), bearing + line(hub::C));
     Ok(Linear { inertia, friction, stiffness, arm, modes })
 }
 

@@ -19,6 +19,7 @@ use files::output::{sha256, sha256_of};
 use files::{budget, input};
 use host::causality::Causality;
 use host::description::{ModelDescription, Value, did_you_mean};
+use names::hubslosh::{SloshModel, SloshSource, slosh, tank};
 use signals::recording::Columns;
 
 use self::problems::{Lines, Problems};
@@ -26,7 +27,7 @@ use self::random::Draws;
 
 /// Slosh models of the default campaign: the model of the thesis's synthetic data, and the model
 /// closest to its bench.
-pub const MODELS: [&str; 2] = ["linear", "spherical"];
+pub const MODELS: [&str; 2] = [SloshModel::Linear.name(), SloshModel::Spherical.name()];
 /// The thesis's fills, m.
 pub const FILLS: [f64; 2] = [0.05, 0.10];
 /// The thesis's amplitudes, N·m (its Table 5.2 and chapter 7).
@@ -55,7 +56,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
 /// Communication step of a plan without one: the thesis's IMU at 50 Hz, s.
 const STEP: f64 = 0.02;
 /// Variables of the file names `<model>_<fill>mm_<amplitude>`, which the interface fixes.
-const NAMING: [&str; 3] = ["slosh.model", "tank.h", "profile.amplitude"];
+const NAMING: [&str; 3] = [slosh::MODEL, tank::H, "profile.amplitude"];
 
 /// Value for a name in a plan file: an FMU variable, `profile`, `profile.PARAMETER`.
 #[derive(Clone, Debug)]
@@ -505,9 +506,10 @@ impl Plan {
             Some(item.map_or(text, |item| item.name.clone()))
         };
         // a table of modes has no dimensions
-        let from_table = value("slosh.source").as_deref() == Some("table")
-            || value("slosh.source_kind").as_deref() == Some("2");
-        for name in ["tank.h", "slosh.zeta"] {
+        let from_table = value(slosh::SOURCE).is_some_and(|item| item == SloshSource::Table.name())
+            || value(slosh::SOURCE_KIND)
+                .is_some_and(|item| item == (SloshSource::Table as i32).to_string());
+        for name in [tank::H, slosh::ZETA] {
             if let Some(varied) = values.iter().find(|one| from_table && one.name == name) {
                 let what = "is varied, but has no effect with slosh.source = table";
                 problems.add(&varied.lines, format!("{name} {what}"));
@@ -524,9 +526,9 @@ impl Plan {
                     value.map_or(String::new(), |one| one.value.clone())
                 })
                 .collect(),
-            model: value("slosh.model"),
+            model: value(slosh::MODEL),
             input: input.clone(),
-            fill: value("tank.h").filter(|_| !from_table).and_then(|h| h.parse().ok()),
+            fill: value(tank::H).filter(|_| !from_table).and_then(|h| h.parse().ok()),
             amplitude: match &*torque {
                 Torque::Profile(profile) => profile.amplitude(),
                 Torque::Rows { .. } => None,

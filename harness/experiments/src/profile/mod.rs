@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
 use host::description::did_you_mean;
+use names::hubslosh::TAU_CMD;
 use serde_json::json;
 
 pub(crate) use self::kinds::parameter;
@@ -312,9 +313,9 @@ pub enum Torque {
 impl Torque {
     /// Reads the columns `time,tau_cmd` of a CSV or Parquet file.
     pub fn read(path: &Path, held: bool) -> Result<Self> {
-        let table = Table::read(path, &["time", "tau_cmd"])?;
+        let table = Table::read(path, &["time", TAU_CMD])?;
         let column = |name| table.column(name).unwrap_or_default();
-        Torque::rows(column("time"), column("tau_cmd"), None, held)
+        Torque::rows(column("time"), column(TAU_CMD), None, held)
             .with_context(|| format!("{} cannot be used", path.display()))
     }
 

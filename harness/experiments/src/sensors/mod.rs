@@ -14,6 +14,7 @@ use std::str::FromStr;
 use analysis::random::Random;
 use anyhow::{Context, Error, Result, ensure};
 use host::description::{ModelDescription, did_you_mean};
+use names::hubslosh::{F_TANGENTIAL, THETA};
 
 use self::quantity::{Quantity, Surface};
 use crate::profile::{Allowed, Parameter, Written, parameter};
@@ -74,7 +75,7 @@ pub const KINDS: &[Kind] = &[
         says: "a force of the FMU, by of=NAME, N",
         parameters: &[],
         unit: "N",
-        of: Some(Some("F_tangential")),
+        of: Some(Some(F_TANGENTIAL)),
     },
     Kind {
         name: "accelerometer",
@@ -91,7 +92,7 @@ pub const KINDS: &[Kind] = &[
         says: "an angle of the FMU, by of=NAME, rad",
         parameters: &[],
         unit: "rad",
-        of: Some(Some("theta")),
+        of: Some(Some(THETA)),
     },
     Kind {
         name: "variable",

@@ -20,6 +20,9 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, ensure};
 use formulas::cylinder::{MODES, XI};
 use host::description::{ModelDescription, Type};
+use names::hubslosh::{
+    self, G_AXIAL, OMEGA, OMEGA_DOT, SloshModel, SloshSource, THETA, bench, fluid, tank,
+};
 
 /// Measured quantity of one sensor.
 #[derive(Clone, Debug)]
@@ -54,11 +57,12 @@ pub enum Coordinate {
 impl Coordinate {
     /// Coordinate of a `slosh.model`; `None` for a model whose liquid does not move.
     pub fn of(model: &str) -> Option<Coordinate> {
-        match model {
-            "linear" | "planar" => Some(Coordinate::Angle),
-            "spherical" => Some(Coordinate::Stereographic),
-            "paraboloid" | "liquid" => Some(Coordinate::Displacement),
-            _ => None,
+        use SloshModel::{Frozen, Linear, Liquid, Paraboloid, Planar, Spherical};
+        match SloshModel::named(model)? {
+            Frozen => None,
+            Linear | Planar => Some(Coordinate::Angle),
+            Spherical => Some(Coordinate::Stereographic),
+            Paraboloid | Liquid => Some(Coordinate::Displacement),
         }
     }
 
@@ -84,7 +88,7 @@ struct Modes {
 
 /// Variables that describe the motion of the tank.
 const MOTION: [&str; 7] =
-    ["theta", "omega", "omega_dot", "tank.r", "g_axial", "bench.tilt", "bench.tilt_azimuth"];
+    [THETA, OMEGA, OMEGA_DOT, tank::R, G_AXIAL, bench::TILT, bench::TILT_AZIMUTH];
 
 impl Quantity {
     /// A Real of the FMU; `unit`: the one that it must have.
@@ -123,9 +127,9 @@ impl Quantity {
     /// As [`Quantity::wave`]; if the height is that of no liquid at rest.
     pub fn pressure(surface: &Surface, angle: f64, height: f64) -> Result<Self> {
         let (mut needs, modes) = surface.modes()?;
-        let h = surface.number("tank.h")?;
+        let h = surface.number(tank::H)?;
         ensure!(height <= h, "height {height} m is above the liquid at rest, tank.h = {h} m");
-        needs.extend(["tank.h", "fluid.rho"].into_iter().chain(MOTION).map(String::from));
+        needs.extend([tank::H, fluid::RHO].into_iter().chain(MOTION).map(String::from));
         Ok(Quantity { needs, channels: one("Pa"), rule: Rule::Pressure { modes, angle, height } })
     }
 
@@ -262,21 +266,21 @@ impl Surface<'_> {
     }
 
     fn modes(&self) -> Result<(Vec<String>, Modes)> {
-        let source = self.choice("slosh.source", "slosh.source_kind")?;
+        let source = self.choice(hubslosh::slosh::SOURCE, hubslosh::slosh::SOURCE_KIND)?;
         ensure!(
-            source == "geometry",
+            source == SloshSource::Geometry.name(),
             "it is known of an upright cylinder alone (slosh.source = geometry), not of a {source}"
         );
-        let model = self.choice("slosh.model", "slosh.kind")?;
+        let model = self.choice(hubslosh::slosh::MODEL, hubslosh::slosh::KIND)?;
         let coordinate = Coordinate::of(&model)
             .with_context(|| format!("slosh.model = {model} has no surface that moves"))?;
-        let count = (self.number("slosh.modes")? as usize).clamp(1, MODES);
+        let count = (self.number(hubslosh::slosh::MODES)? as usize).clamp(1, MODES);
         let mut needs = Vec::new();
         for n in 1..=count {
-            let names = ["slosh.q_radial", "slosh.q_tangential", "slosh.length"];
-            needs.extend(names.map(|name| format!("{name}[{n}]")));
+            use names::hubslosh::slosh::{LENGTH, Q_RADIAL, Q_TANGENTIAL};
+            needs.extend([Q_RADIAL, Q_TANGENTIAL, LENGTH].map(|array| array.at([n])));
         }
-        needs.push("tank.d".into());
+        needs.push(tank::D.into());
         present(self.description, &needs)?;
         Ok((needs, Modes { count, coordinate }))
     }

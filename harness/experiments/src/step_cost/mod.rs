@@ -14,12 +14,13 @@ use anyhow::{Context, Result, bail, ensure};
 use host::c_abi::{CallError, Called};
 use host::description::{Type, Value};
 use host::fmu::{Fmu, Instance};
+use names::hubslosh::{TAU_CMD, solver};
 
 use crate::profile::Written;
 use crate::run::{Run, driven};
 
 /// The parameter that bounds the internal steps of a communication step.
-pub const MAX_STEPS: &str = "solver.max_steps";
+pub const MAX_STEPS: &str = solver::MAX_STEPS;
 /// Number of repetitions of a step from the same state.
 const TAKEN: usize = 5;
 /// The longest step that is asked for, s: what it needs no FMU needs more.
@@ -41,7 +42,7 @@ struct Usual {
 fn usual(model: &str) -> Option<Usual> {
     let of = |settings, input, profile| Some(Usual { settings, input, profile });
     match model.split('_').next() {
-        Some("HubSlosh") => of(&[], "tau_cmd", "exp-sweep:amplitude=0.1,f0=1.25,f1=3.5"),
+        Some("HubSlosh") => of(&[], TAU_CMD, "exp-sweep:amplitude=0.1,f0=1.25,f1=3.5"),
         Some("SloshTank") => {
             of(&[("a[3]", "1.5")], "a[1]", "exp-sweep:amplitude=0.15,f0=0.2,f1=0.8")
         }
