@@ -57,7 +57,7 @@ const HARNESS: [(&str, &[&str]); 15] = [
     ("experiments", &["files", "formulas", "host", "names", "signals", "analysis"]),
     ("web", &[]),
     ("pack", &["files", "host", "web"]),
-    ("report", &["formulas", "host", "signals", "analysis", "experiments", "web"]),
+    ("report", &["formulas", "host", "names", "signals", "analysis", "experiments", "web"]),
     ("identify", &["files", "formulas", "host", "signals", "analysis", "experiments", "report"]),
     ("hubslosh-tank", &["formulas", "names"]),
     ("tank-page", &["hubslosh-tank"]),

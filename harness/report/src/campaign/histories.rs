@@ -7,6 +7,7 @@ use maud::html;
 use super::colors;
 use super::figure::{Figure, Panel, line};
 use super::page::{Group, Page, manoeuvre};
+use names::hubslosh::{OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, TAU_CMD};
 
 /// Runs of a group that are drawn over time: all if they are few, else the first, the middle and the
 /// last.
@@ -28,7 +29,7 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
         "radial / deg",
         "residual / (rad/s)",
     ];
-    let signals = ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial", "residual"];
+    let signals = [TAU_CMD, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, "residual"];
     // a liquid that stays in its plane has nothing to show across it
     let planar = runs.iter().all(|run| run.totals.peak_radial_angle == 0.0);
     // the largest first, or it would hide the others
@@ -75,7 +76,7 @@ pub(super) fn after(page: &Page) -> Figure {
         from = from.min(manoeuvre(run).unwrap_or(f64::INFINITY));
         let name = format!("{}, {}", group.title(), page.name(run));
         for (p, (signal, scale)) in
-            [("omega_imu", 1e3), ("slosh_angle", 1f64.to_degrees())].iter().enumerate()
+            [(OMEGA_IMU, 1e3), (SLOSH_ANGLE, 1f64.to_degrees())].iter().enumerate()
         {
             let late = run.history.curve(signal).into_iter().filter(|(t, _)| *t >= from);
             let curve: Vec<(f64, f64)> = late.map(|(t, value)| (t, scale * value)).collect();
@@ -101,9 +102,9 @@ pub(super) fn compared(page: &Page) -> Figure {
     let runs =
         || page.groups.iter().flat_map(|group| group.drawn.iter().map(move |run| (group, run)));
     let signals = [
-        ("omega_imu", "rate / (rad/s)", 1.0),
-        ("slosh_angle", "tangential / deg", 1f64.to_degrees()),
-        ("slosh_angle_radial", "radial / deg", 1f64.to_degrees()),
+        (OMEGA_IMU, "rate / (rad/s)", 1.0),
+        (SLOSH_ANGLE, "tangential / deg", 1f64.to_degrees()),
+        (SLOSH_ANGLE_RADIAL, "radial / deg", 1f64.to_degrees()),
     ];
     let mut traces = Vec::new();
     for (i, (group, run)) in runs().enumerate() {
@@ -120,7 +121,7 @@ pub(super) fn compared(page: &Page) -> Figure {
     }
     // smallest and largest rate of each stretch of a run's history
     let envelope = |run: &Outcome| -> Vec<[f64; 2]> {
-        let rate = run.history.curve("omega_imu");
+        let rate = run.history.curve(OMEGA_IMU);
         rate.chunks_exact(2).map(|p| [p[0].1.min(p[1].1), p[0].1.max(p[1].1)]).collect()
     };
     let rates: Vec<_> = runs().map(|(_, run)| envelope(run)).collect();

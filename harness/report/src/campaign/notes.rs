@@ -9,6 +9,7 @@ use experiments::campaign::{Campaign, Estimate, Results};
 use experiments::rounding::thousandths;
 use host::fmu::Fmu;
 use maud::{Markup, html};
+use names::hubslosh::{slosh, tank};
 
 use super::page::{Group, Page, Varied, cm, hertz, sweep};
 use super::torques;
@@ -111,7 +112,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
         .varied()
         .into_iter()
         .enumerate()
-        .filter(|(_, name)| !["slosh.model", "tank.h", "profile.amplitude"].contains(name))
+        .filter(|(_, name)| ![slosh::MODEL, tank::H, "profile.amplitude"].contains(name))
         .map(|(place, _)| place)
         .collect();
     let head = |place: &usize| {

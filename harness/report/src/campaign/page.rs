@@ -8,6 +8,7 @@ use experiments::campaign::{Curve, Estimate, Outcome, Results};
 use experiments::plan::Plan;
 use experiments::profile::Torque;
 use host::fmu::Fmu;
+use names::hubslosh::{slosh, tank};
 
 /// Runs that differ in nothing but the number along which they are drawn (and what is drawn at
 /// random).
@@ -216,12 +217,12 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
         .into_iter()
         .enumerate()
         .filter(|(_, name)| grouping.contains(name) && *name != axis)
-        .filter(|(_, name)| !["slosh.model", "tank.h"].contains(name))
+        .filter(|(_, name)| ![slosh::MODEL, tank::H].contains(name))
         // one recording has its values alone; they tell it from nothing
         .filter(|(i, _)| !recorded || differs(*i))
         .filter_map(|(i, name)| Some((i, Varied::of(name, fmu, &results.outcomes)?)))
         .collect();
-    let one_fill = axis != "tank.h" && (!plan.is_random() || grouping.contains(&"tank.h"));
+    let one_fill = axis != tank::H && (!plan.is_random() || grouping.contains(&tank::H));
     let mut groups: Vec<Group> = Vec::new();
     for run in &results.outcomes {
         let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());

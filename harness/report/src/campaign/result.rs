@@ -1,6 +1,7 @@
 //! The sentence with which a page begins: what the runs show, from their own numbers.
 
 use experiments::campaign::{Outcome, Results};
+use names::hubslosh::SloshModel;
 
 use super::draws::moments;
 use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre};
@@ -53,7 +54,7 @@ impl Series {
     }
 
     fn is_linear(&self) -> bool {
-        ["linear", "frozen"].contains(&&*self.model)
+        [SloshModel::Linear.name(), SloshModel::Frozen.name()].contains(&&*self.model)
     }
 
     /// First and last position with rotary slosh, and true if it continues to the end of the axis.
@@ -103,7 +104,9 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
         plants.len() > 1
     };
     // the linear runs of the same plant, else the exact linear plant
-    let measured = |of: &Series| series.iter().find(|s| s.model == "linear" && s.plant == of.plant);
+    let measured = |of: &Series| {
+        series.iter().find(|s| s.model == SloshModel::Linear.name() && s.plant == of.plant)
+    };
     let reference = |of: &Series, point: &Point| -> [Option<f64>; 2] {
         let run = measured(of).and_then(|s| s.points.iter().find(|p| p.x == point.x));
         run.map_or(point.exact, Point::both)
@@ -141,7 +144,7 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
         within.as_ref().map(|within| format!("{where_}{within} for antiresonance and resonance"))
     };
     if swirling.is_empty() {
-        let stays = nonlinear.iter().any(|s| s.model != "planar");
+        let stays = nonlinear.iter().any(|s| s.model != SloshModel::Planar.name());
         let range =
             nonlinear.iter().filter_map(|s| ends(s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         if let (Some(holds), Some((from, to))) = (holds(""), range) {
@@ -204,9 +207,11 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
 /// Describes how antiresonance and resonance move along an axis: linear models first, else all; at most
 /// three series.
 fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String> {
-    let linear = series.iter().any(|s| s.model == "linear");
-    let these: Vec<&Series> =
-        series.iter().filter(|s| s.points.len() > 1 && (!linear || s.model == "linear")).collect();
+    let linear = series.iter().any(|s| s.model == SloshModel::Linear.name());
+    let these: Vec<&Series> = series
+        .iter()
+        .filter(|s| s.points.len() > 1 && (!linear || s.model == SloshModel::Linear.name()))
+        .collect();
     let sentence = |s: &&Series| {
         let [antiresonance, resonance] = [|p: &Point| p.antiresonance, |p: &Point| p.resonance]
             .map(|of| {

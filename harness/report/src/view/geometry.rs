@@ -16,6 +16,8 @@ use std::collections::BTreeMap;
 use formulas::cylinder::{MODES, XI, pendulum};
 use formulas::interpolation::{derivatives, quintic};
 use host::description::{ModelDescription, Value};
+use names::Array;
+use names::hubslosh::{self, SloshModel, SloshSource, fluid, tank};
 
 /// Parameters of a run: what was set, else the FMU's start values.
 pub(super) struct Parameters<'a> {
@@ -241,16 +243,17 @@ const DRAWN: &str = "an upright cylinder with the radius that its wave at the wa
 /// The tank of the bench, its origin in the middle of the bottom.
 pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank {
     let number = |name: &str| parameters.number(name);
-    let radius = 0.5 * number("tank.d");
-    let is_table = parameters.choice("slosh.source", "slosh.source_kind") == "table";
-    let count = match parameters.choice("slosh.model", "slosh.kind").as_str() {
-        "frozen" => 0,
-        _ => (number("slosh.modes") as usize).clamp(1, MODES),
+    let radius = 0.5 * number(tank::D);
+    let is_table = parameters.choice(hubslosh::slosh::SOURCE, hubslosh::slosh::SOURCE_KIND)
+        == SloshSource::Table.name();
+    let count = match parameters.choice(hubslosh::slosh::MODEL, hubslosh::slosh::KIND).as_str() {
+        model if model == SloshModel::Frozen.name() => 0,
+        _ => (number(hubslosh::slosh::MODES) as usize).clamp(1, MODES),
     };
     let (modes, level, mut bottom, m_liq, mut note) = match is_table {
         false => {
-            let h = number("tank.h");
-            let m_liq = number("fluid.rho") * std::f64::consts::PI * radius * radius * h;
+            let h = number(tank::H);
+            let m_liq = number(fluid::RHO) * std::f64::consts::PI * radius * radius * h;
             let modes: Vec<_> = (0..count).map(|n| pendulum(n, 2.0 * radius, h, m_liq)).collect();
             let note =
                 "The tank is drawn by tank.d and tank.h; how high its wall is, is no parameter."
@@ -258,21 +261,23 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             (modes, h, 0.0, m_liq, note)
         }
         true => {
-            let m_liq = number("slosh.table.m_liq");
-            let g = number("slosh.table.g_ref");
-            let of = |key: &str, n: usize| number(&format!("slosh.table.{key}[{}]", n + 1));
-            let mass = |n: usize| of("mass", n);
+            use names::hubslosh::slosh::table::{
+                FREQUENCY, G_REF, HINGE, K, LENGTH, M_LIQ, MASS, WAVE,
+            };
+            let m_liq = number(M_LIQ);
+            let g = number(G_REF);
+            let of = |array: Array<1>, n: usize| number(&array.at([n + 1]));
+            let mass = |n: usize| of(MASS, n);
             let depth = radius * depth_over_radius(mass(0) / m_liq);
             let mut modes = Vec::new();
             let mut bottom = 0.0;
             // the first mode with its place, and the others that are used
             for n in (0..count.max(1)).take_while(|n| *n == 0 || mass(*n) > 0.0) {
-                let l = length(of("length", n), of("frequency", n), g, of("k", n) / mass(n));
+                let l = length(of(LENGTH, n), of(FREQUENCY, n), g, of(K, n) / mass(n));
                 let like = pendulum(n, 2.0 * radius, depth, m_liq);
-                let wave = if of("wave", n) > 0.0 { of("wave", n) } else { like.wave };
+                let wave = if of(WAVE, n) > 0.0 { of(WAVE, n) } else { like.wave };
                 // where the table has no heights, those of the cylinder
-                let hinge =
-                    if of("hinge", n) == 0.0 { bottom + like.hinge } else { of("hinge", n) };
+                let hinge = if of(HINGE, n) == 0.0 { bottom + like.hinge } else { of(HINGE, n) };
                 if n == 0 {
                     bottom = (hinge - l) - (like.hinge - like.length);
                 }
@@ -302,7 +307,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
     Tank {
         prefix: String::new(),
         // it stands on the platform
-        position: [number("tank.r"), 0.0, -bottom],
+        position: [number(tank::R), 0.0, -bottom],
         q: [1.0, 0.0, 0.0, 0.0],
         outline,
         level,
@@ -311,7 +316,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             .iter()
             .enumerate()
             .map(|(n, mode)| {
-                let direction = |n: usize| number(&format!("slosh.table.direction[{}]", n + 1));
+                let direction = |n: usize| number(&hubslosh::slosh::table::DIRECTION.at([n + 1]));
                 Pendulum::of((if is_table { order(n, direction) } else { n }, mode))
             })
             .collect(),

@@ -12,6 +12,11 @@ use anyhow::{Context, Result, ensure};
 use experiments::sensors::quantity::Coordinate;
 use host::description::ModelDescription;
 use maud::{DOCTYPE, PreEscaped, html};
+use names::hubslosh::{
+    ENERGY, F_RADIAL, F_TANGENTIAL, HEAT, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL,
+    SloshModel, TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FLUID, TAU_FRICTION, THETA, WAVE_HEIGHT,
+    WHEEL_SPEED, WORK, slosh,
+};
 use serde_json::{Map, Value, json};
 use signals::table::Table;
 
@@ -58,7 +63,7 @@ enum Kind {
 fn kind(description: &ModelDescription) -> Option<Kind> {
     let has = |name: &str| description.variable(name).is_ok();
     [
-        ("slosh_angle_radial", Kind::Bench),
+        (SLOSH_ANGLE_RADIAL, Kind::Bench),
         ("tank[1].p[1,1]", Kind::Craft),
         ("tank.p[1,1]", Kind::Tank),
     ]
@@ -68,13 +73,13 @@ fn kind(description: &ModelDescription) -> Option<Kind> {
 
 /// Families of columns that share a panel, the most looked at first; a name with `*` is a beginning.
 const BENCH_PANELS: [(&str, &[&str]); 7] = [
-    ("Torque on the hub", &["tau_actuator", "tau_cmd", "tau_ext", "tau_friction", "tau_fluid"]),
-    ("Rate of the hub", &["omega", "omega_imu"]),
-    ("Slosh angle", &["slosh_angle", "slosh_angle_radial"]),
-    ("Wave at the wall", &["wave_height"]),
-    ("Force of the liquid on the tank", &["F_radial", "F_tangential"]),
-    ("Angle of the hub", &["theta"]),
-    ("Energy", &["energy", "work", "heat"]),
+    ("Torque on the hub", &[TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FRICTION, TAU_FLUID]),
+    ("Rate of the hub", &[OMEGA, OMEGA_IMU]),
+    ("Slosh angle", &[SLOSH_ANGLE, SLOSH_ANGLE_RADIAL]),
+    ("Wave at the wall", &[WAVE_HEIGHT]),
+    ("Force of the liquid on the tank", &[F_RADIAL, F_TANGENTIAL]),
+    ("Angle of the hub", &[THETA]),
+    ("Energy", &[ENERGY, WORK, HEAT]),
 ];
 
 /// Most panels of plots.
@@ -90,19 +95,19 @@ pub fn columns(
     let mut all = match kind(description) {
         Some(Kind::Bench) => {
             let all = of(&[
-                "theta",
-                "omega",
-                "slosh_angle",
-                "slosh_angle_radial",
-                "wave_height",
-                "tau_actuator",
-                "tau_friction",
-                "tau_fluid",
-                "F_radial",
-                "F_tangential",
-                "wheel_speed",
+                THETA,
+                OMEGA,
+                SLOSH_ANGLE,
+                SLOSH_ANGLE_RADIAL,
+                WAVE_HEIGHT,
+                TAU_ACTUATOR,
+                TAU_FRICTION,
+                TAU_FLUID,
+                F_RADIAL,
+                F_TANGENTIAL,
+                WHEEL_SPEED,
             ]);
-            let modes = parameters.number("slosh.modes") as usize;
+            let modes = parameters.number(slosh::MODES) as usize;
             all.into_iter().chain((2..=modes).flat_map(coordinates)).collect()
         }
         Some(Kind::Craft) => {
@@ -178,7 +183,7 @@ impl Columns<'_> {
 
 /// The coordinates of mode `n` of HubSlosh, from 1.
 fn coordinates(n: usize) -> [String; 2] {
-    ["radial", "tangential"].map(|along| format!("slosh.q_{along}[{n}]"))
+    [slosh::Q_RADIAL, slosh::Q_TANGENTIAL].map(|array| array.at([n]))
 }
 
 /// Slosh angles, radial and tangential, of HubSlosh's modes after the first, of which the FMU shows states alone: as far as
@@ -301,13 +306,13 @@ impl Draft<'_> {
         let mut motion = json!({});
         match self.kind {
             Kind::Bench => {
-                motion["theta"] = json!("theta");
-                if self.columns.need(&[one("theta"), one("omega")]) == Some(1) {
-                    let omega = table.column("omega").unwrap_or_default();
-                    self.derive("theta".into(), integral(self.time(), omega));
+                motion["theta"] = json!(THETA);
+                if self.columns.need(&[one(THETA), one(OMEGA)]) == Some(1) {
+                    let omega = table.column(OMEGA).unwrap_or_default();
+                    self.derive(THETA.into(), integral(self.time(), omega));
                     self.notes.push("The hub's angle is the integral of omega by the trapezoidal rule from 0: theta is not in the table.".into());
                 }
-                if let Some(speed) = table.column("wheel_speed") {
+                if let Some(speed) = table.column(WHEEL_SPEED) {
                     let angle = integral(self.time(), speed);
                     motion["wheel"] = self.derive("wheel_angle".into(), angle);
                 }
@@ -368,17 +373,15 @@ impl Draft<'_> {
         if tank.modes.is_empty() {
             return Vec::new();
         }
-        let model = self.parameters.choice("slosh.model", "slosh.kind");
-        let planar = ["linear", "planar"].contains(&model.as_str());
-        let both = vec!["slosh_angle_radial".to_string(), "slosh_angle".to_string()];
-        let lists = if planar && run.parameters_known {
-            vec![both, one("slosh_angle")]
-        } else {
-            vec![both]
-        };
+        let model = self.parameters.choice(slosh::MODEL, slosh::KIND);
+        let planar =
+            [SloshModel::Linear.name(), SloshModel::Planar.name()].contains(&model.as_str());
+        let both = vec![SLOSH_ANGLE_RADIAL.to_string(), SLOSH_ANGLE.to_string()];
+        let lists =
+            if planar && run.parameters_known { vec![both, one(SLOSH_ANGLE)] } else { vec![both] };
         let found = self.columns.need(&lists);
-        let radial = (found == Some(0)).then_some("slosh_angle_radial");
-        let mut modes = vec![json!({ "angles": [radial, "slosh_angle"] })];
+        let radial = (found == Some(0)).then_some(SLOSH_ANGLE_RADIAL);
+        let mut modes = vec![json!({ "angles": [radial, SLOSH_ANGLE] })];
         let higher = higher_modes(run.table, &model, &tank.modes);
         for (n, angles) in (2..).zip(higher) {
             let names = ["radial", "tangential"].map(|along| format!("{along} angle {n}"));

@@ -1,8 +1,11 @@
 //! The scene's `geometry` (harness/web/scene/README.md): bodies, tanks and arrows.
 
-use host::causality::Causality;
 use std::collections::BTreeMap;
 
+use host::causality::Causality;
+use names::hubslosh::{
+    F_RADIAL, F_TANGENTIAL, TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FLUID, TAU_FRICTION,
+};
 use serde_json::{Map, Value, json};
 use signals::table::Table;
 
@@ -113,15 +116,15 @@ fn bench(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let reach = r + 1.25 * radius;
     let wheel = 0.0625_f64.min(0.4 * reach);
     let below = r < radius + 1.1 * wheel;
-    let actuator = match arrows.columns.has("tau_actuator") {
-        true => ("tau_actuator", "actuator torque"),
-        false => ("tau_cmd", "torque command"),
+    let actuator = match arrows.columns.has(TAU_ACTUATOR) {
+        true => (TAU_ACTUATOR, "actuator torque"),
+        false => (TAU_CMD, "torque command"),
     };
     let torques = [
         actuator,
-        ("tau_ext", "external torque"),
-        ("tau_friction", "friction torque"),
-        ("tau_fluid", "liquid torque"),
+        (TAU_EXT, "external torque"),
+        (TAU_FRICTION, "friction torque"),
+        (TAU_FLUID, "liquid torque"),
     ];
     let [inner, outer] =
         if below { [1.1 * radius, 1.4 * radius] } else { [1.25 * wheel, 0.42 * reach] };
@@ -137,7 +140,7 @@ fn bench(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
         "kind": "force", "unit": "N", "length": 0.7 * reach,
         "at": [r, 0.0, tank.position[2] + tank.level],
     });
-    let names = ["F_radial", "F_tangential"].map(String::from);
+    let names = [F_RADIAL, F_TANGENTIAL].map(String::from);
     arrows.add("force", "liquid force on the tank", force, &names);
     let geometry = json!({
         "bench": {
