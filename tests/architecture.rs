@@ -58,7 +58,10 @@ const HARNESS: [(&str, &[&str]); 15] = [
     ("web", &[]),
     ("pack", &["files", "host", "web"]),
     ("report", &["formulas", "host", "names", "signals", "analysis", "experiments", "web"]),
-    ("identify", &["files", "formulas", "host", "signals", "analysis", "experiments", "report"]),
+    (
+        "identify",
+        &["files", "formulas", "host", "names", "signals", "analysis", "experiments", "report"],
+    ),
     ("hubslosh-tank", &["formulas", "names"]),
     ("tank-page", &["hubslosh-tank"]),
     ("hubslosh-native", &["host"]),

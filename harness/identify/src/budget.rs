@@ -20,6 +20,7 @@ use crate::tank;
 use crate::tolerance::{NAMES, Tolerances};
 use crate::uncertainty::Covariance;
 use crate::unknown::Quantity;
+use names::hubslosh::{self, G_AXIAL, fluid, friction, hub, slosh};
 
 /// Effect of an error of something that is not estimated.
 #[derive(Clone, Debug, Serialize)]
@@ -63,12 +64,12 @@ pub struct Slope {
 /// # Errors
 /// If the FMU refuses to run.
 pub fn slopes(problem: &Problem, found: &Polished, tolerances: &Tolerances) -> Result<Vec<Slope>> {
-    let sloshes = problem.index("slosh.zeta").is_some();
+    let sloshes = problem.index(slosh::ZETA).is_some();
     let mut slopes = Vec::new();
     for (name, tolerance) in NAMES.into_iter().zip(tolerances.all()) {
         let estimated = problem.index(name).is_some();
-        let recorded = name == "g_axial" && problem.recordings.iter().any(|r| r.gravity.is_some());
-        let unseen = !sloshes && matches!(name, "g_axial");
+        let recorded = name == G_AXIAL && problem.recordings.iter().any(|r| r.gravity.is_some());
+        let unseen = !sloshes && matches!(name, G_AXIAL);
         if tolerance == 0.0 || estimated || recorded || unseen {
             continue;
         }
@@ -186,18 +187,18 @@ fn settled(
 /// I₀ is the inertia that turns with the hub. The law is exact for one linear mode (`tank.rs` has l, m and I₀ of d, h and I), and
 /// for the torque of any liquid with one mode. `None` where the inertia is not estimated.
 fn same_motion(problem: &Problem, x: &[f64], name: &str, factor: f64) -> Option<Vec<f64>> {
-    let (bench, hub) = (problem.bench?, problem.index("hub.I")?);
+    let (bench, hub) = (problem.bench?, problem.index(hub::I)?);
     let (force, mass, length) = match name {
         "torque" => (factor, factor, 1.0),
         "clock" => (factor, factor, factor * factor),
-        "g_axial" => (1.0, 1.0, factor),
-        "tank.r" => (1.0, factor.powi(-2), 1.0),
-        "fluid.rho" => (1.0, 1.0, 1.0),
+        G_AXIAL => (1.0, 1.0, factor),
+        hubslosh::tank::R => (1.0, factor.powi(-2), 1.0),
+        fluid::RHO => (1.0, 1.0, 1.0),
         _ => return None,
     };
     let then = Bench {
-        arm: bench.arm * if name == "tank.r" { factor } else { 1.0 },
-        density: bench.density * if name == "fluid.rho" { factor } else { 1.0 },
+        arm: bench.arm * if name == hubslosh::tank::R { factor } else { 1.0 },
+        density: bench.density * if name == fluid::RHO { factor } else { 1.0 },
         ..bench
     };
     let values = problem.values(x);
@@ -227,7 +228,7 @@ fn same_motion(problem: &Problem, x: &[f64], name: &str, factor: f64) -> Option<
         }
         None => {
             let mut liquid = nominal::initialised(problem.fmu, &problem.setup.settings).ok()?;
-            let liquid = liquid.real("tank.m_liq").ok()?;
+            let liquid = liquid.real(hubslosh::tank::M_LIQ).ok()?;
             let then_liquid = liquid * then.density / bench.density;
             (values[hub] + bench.inertia(liquid)) * force - then.inertia(then_liquid)
         }
@@ -237,7 +238,7 @@ fn same_motion(problem: &Problem, x: &[f64], name: &str, factor: f64) -> Option<
     }
     set(hub, inertia, &mut there);
     if name == "torque" {
-        for friction in ["friction.b", "friction.c", "friction.d"] {
+        for friction in [friction::B, friction::C, friction::D] {
             if let Some(place) = problem.index(friction) {
                 set(place, values[place] * factor, &mut there);
             }
@@ -270,7 +271,7 @@ pub fn of(
         effect(source, slope.moved.clone(), true)
     };
     let mut effects: Vec<Effect> = slopes.iter().map(of_slope).collect();
-    let sloshes = problem.index("slosh.zeta").is_some();
+    let sloshes = problem.index(slosh::ZETA).is_some();
     if let Some(change) = modes(problem, (x, answer), jacobian, covariance).filter(|_| sloshes) {
         effects.push(effect("slosh modes 2 to 4, left out".into(), change, false));
     }
@@ -292,12 +293,12 @@ fn modes(
     jacobian: &DMatrix<f64>,
     covariance: &Covariance,
 ) -> Option<DVector<f64>> {
-    if problem.setup.settings.iter().any(|(name, _)| name == "slosh.modes") {
+    if problem.setup.settings.iter().any(|(name, _)| name == slosh::MODES) {
         return None;
     }
     let base = problem.stacked(answer, x);
     let mut other = problem.clone();
-    other.setup.settings.push(("slosh.modes".into(), "4".into()));
+    other.setup.settings.push((slosh::MODES.into(), "4".into()));
     let found = settled(&other, (x, &base), (jacobian, covariance), x.to_vec());
     found.ok().map(|(_, moved)| moved)
 }

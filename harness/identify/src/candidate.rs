@@ -3,6 +3,7 @@
 use anyhow::{Result, ensure};
 use host::causality::Causality;
 use host::fmu::Fmu;
+use names::hubslosh::{FrictionModel, SloshModel, friction, hub, init, slosh, tank};
 use serde::Serialize;
 
 use crate::between::Others;
@@ -106,7 +107,7 @@ pub fn fit<'a>(
         far,
         intersample: options.intersample,
         acausal: options.acausal,
-        alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
+        alone: options.models.iter().filter(|m| *m != SloshModel::Frozen.name()).count() == 1,
         model,
         speeds: Vec::new(),
         others: None,
@@ -114,9 +115,12 @@ pub fn fit<'a>(
         progress: &mut |line| progress(News::Detail(line)),
     };
     let sibling = from.map(|other| {
-        let pair = (&*other.fit.model, model);
-        let is_poorer =
-            matches!(pair, ("planar", "spherical" | "paraboloid") | ("spherical", "paraboloid"));
+        use SloshModel::{Paraboloid, Planar, Spherical};
+        let is_poorer = match SloshModel::named(&other.fit.model) {
+            Some(Planar) => [Spherical.name(), Paraboloid.name()].contains(&model),
+            Some(Spherical) => model == Paraboloid.name(),
+            _ => false,
+        };
         Sibling {
             problem: &other.problem,
             minimum: &other.polished,
@@ -140,15 +144,15 @@ fn problem<'a>(
 ) -> Result<Problem<'a>> {
     let unknowns = unknowns(fmu, recordings, options, (model, law), start)?;
     let mut settings = vec![
-        ("slosh.model".to_string(), model.to_string()),
-        ("slosh.zeta_from_correlation".to_string(), "false".to_string()),
-        ("friction.model".to_string(), law.to_string()),
+        (slosh::MODEL.to_string(), model.to_string()),
+        (slosh::ZETA_FROM_CORRELATION.to_string(), "false".to_string()),
+        (friction::MODEL.to_string(), law.to_string()),
     ];
-    if law == "lugre" {
+    if law == FrictionModel::Lugre.name() {
         // the bristles' damping is no more than a bearing with little viscous friction allows
-        settings.push(("friction.sigma1".into(), "0".into()));
+        settings.push((friction::SIGMA1.into(), "0".into()));
     }
-    let chosen = |name: &str| matches!(name, "slosh.model" | "friction.model");
+    let chosen = |name: &str| matches!(name, slosh::MODEL | friction::MODEL);
     settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
     let setup =
         Setup { settings, intersample: options.intersample.unwrap_or(Intersample::FirstOrderHold) };
@@ -165,18 +169,21 @@ fn unknowns(
     start: &Start,
 ) -> Result<Vec<Unknown>> {
     let setting = |name: &str| options.settings.iter().any(|(n, _)| n == name);
-    let frozen = model == "frozen";
-    let (viscous, dry) = (law != "none", !matches!(law, "none" | "viscous"));
+    let frozen = model == SloshModel::Frozen.name();
+    let (viscous, dry) = (
+        law != FrictionModel::None.name(),
+        ![FrictionModel::None.name(), FrictionModel::Viscous.name()].contains(&law),
+    );
     let inertia = if start.hub_inertia > 0.0 { start.hub_inertia } else { 0.3 };
     let all = [
-        ("tank.d", start.d, !frozen),
-        ("tank.h", start.h, !frozen),
-        ("slosh.zeta", start.zeta, !frozen),
-        ("hub.I", inertia, true),
-        ("friction.b", start.b, viscous),
-        ("friction.c", start.c, dry),
-        ("friction.d", start.stribeck, dry),
-        ("friction.omega_s", start.omega_s, dry),
+        (tank::D, start.d, !frozen),
+        (tank::H, start.h, !frozen),
+        (slosh::ZETA, start.zeta, !frozen),
+        (hub::I, inertia, true),
+        (friction::B, start.b, viscous),
+        (friction::C, start.c, dry),
+        (friction::D, start.stribeck, dry),
+        (friction::OMEGA_S, start.omega_s, dry),
     ];
     let given = |name: &str| options.starts.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
     let unit = |name: &str| -> Result<String> {
@@ -189,15 +196,15 @@ fn unknowns(
             continue;
         }
         let mut unknown = Unknown::positive(name, &unit(name)?, given(name).unwrap_or(value));
-        if matches!(name, "friction.b" | "friction.c" | "friction.d") {
+        if matches!(name, friction::B | friction::C | friction::D) {
             unknown.scale = Scale::Softplus(0.1 * value);
         }
         // Of the right size, give or take a factor of some ten: without that, a model that does not fit may drive
         // what it does not need to nothing, and its influence with it.
         let vague = match name {
-            "friction.b" => 3.0,
+            friction::B => 3.0,
             // a deep tank's fill shows next to nothing of itself
-            "friction.c" | "friction.d" | "friction.omega_s" | "tank.h" => 1.5,
+            friction::C | friction::D | friction::OMEGA_S | tank::H => 1.5,
             _ => 0.0,
         };
         if vague > 0.0 {
@@ -208,7 +215,7 @@ fn unknowns(
     // parameters that are estimated because a start or something known of them is given
     for name in options.starts.iter().map(|s| &s.0).chain(options.known.iter().map(|k| &k.0)) {
         let there = list.iter().any(|u| u.quantity.parameter() == Some(name));
-        if there || setting(name) || name == "friction.asymmetry" {
+        if there || setting(name) || name == friction::ASYMMETRY {
             continue;
         }
         let variable = fmu.description().variable(name)?;
@@ -224,9 +231,9 @@ fn unknowns(
             list.push(Unknown::positive(name, &unit(name)?, start));
         }
     }
-    if law == "lugre" && !setting("friction.sigma0") {
+    if law == FrictionModel::Lugre.name() && !setting(friction::SIGMA0) {
         // stiffer than the upper end, bristles move less than 1/100 of what a gyro of this kind sees
-        let mut stiffness = Unknown::positive("friction.sigma0", &unit("friction.sigma0")?, 100.0);
+        let mut stiffness = Unknown::positive(friction::SIGMA0, &unit(friction::SIGMA0)?, 100.0);
         stiffness.scale = Scale::Logit(0.0, 1000.0);
         list.push(stiffness);
     }
@@ -236,14 +243,14 @@ fn unknowns(
         }
     }
     if options.sensor_errors {
-        if !setting("friction.asymmetry") && dry {
+        if !setting(friction::ASYMMETRY) && dry {
             list.push(Unknown::asymmetry());
         }
         list.push(Unknown::delay());
         list.extend((0..recordings.len()).map(Unknown::gyro_bias));
     }
     // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise
-    let nonlinear = !frozen && model != "linear";
+    let nonlinear = !frozen && model != SloshModel::Linear.name();
     if options.gyro_scale > 0.0 && (nonlinear || recordings.iter().any(|r| r.angle.is_some())) {
         list.push(Unknown::gyro_scale().known(1.0, options.gyro_scale));
     }
@@ -253,10 +260,10 @@ fn unknowns(
         }
     }
     for (i, _) in recordings.iter().enumerate().filter(|(_, r)| !r.from_rest) {
-        list.push(Unknown::initial(i, "init.omega", "rad/s", 1e-2));
+        list.push(Unknown::initial(i, init::OMEGA, "rad/s", 1e-2));
         if !frozen {
-            list.push(Unknown::initial(i, "init.slosh_angle", "rad", 0.1));
-            list.push(Unknown::initial(i, "init.slosh_rate", "rad/s", 1.0));
+            list.push(Unknown::initial(i, init::SLOSH_ANGLE, "rad", 0.1));
+            list.push(Unknown::initial(i, init::SLOSH_RATE, "rad/s", 1.0));
         }
     }
     Ok(list)

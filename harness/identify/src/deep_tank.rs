@@ -18,6 +18,7 @@ use analysis::random::Random;
 use anyhow::Result;
 use formulas::cylinder::XI;
 use nalgebra::{DMatrix, DVector};
+use names::hubslosh::fluid;
 
 use crate::fit::{Answer, Problem};
 use crate::nominal::Bench;
@@ -69,7 +70,7 @@ pub fn intervals(problem: &Problem, at: &Minimum) -> Result<Option<Intervals>> {
     let logarithmic = places.map(|j| problem.unknowns[j].scale.slope(at.x[j]) / values[j]);
     let by_t = 2.0 * XI[0] * h / d * (1.0 - seen.t * seen.t) / seen.t;
     let density =
-        crate::budget::relative_slope(problem, (at.x, at.answer, at.jacobian), "fluid.rho")?;
+        crate::budget::relative_slope(problem, (at.x, at.answer, at.jacobian), fluid::RHO)?;
     let column = |k: usize| at.jacobian.column(places[k]) / logarithmic[k];
     let [e_d, e_h, e_hub] = [column(0), column(1), column(2)];
     let a = bench.inertia(bench.liquid(d, h) - bench.slosh_mass(d, h)) / inertia;

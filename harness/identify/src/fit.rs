@@ -36,6 +36,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use anyhow::{Context, Result};
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
+use names::hubslosh::{friction, init};
 use rayon::prelude::*;
 
 use crate::minimum::{self, End, SumOfSquares};
@@ -869,7 +870,7 @@ impl<'a> Problem<'a> {
                 return true;
             }
             match quantity {
-                Quantity::Initial(_, name) => name == "init.omega" && x.abs() < 2.0 * deviation,
+                Quantity::Initial(_, name) => name == init::OMEGA && x.abs() < 2.0 * deviation,
                 _ => {
                     matches!(scale, Scale::Softplus(_))
                         && scale.value(x) + scale.slope(x) * step[j] < 0.0
@@ -988,7 +989,7 @@ impl<'a> Problem<'a> {
         for (unknown, &x) in problem.unknowns.iter_mut().zip(first) {
             if let Some(name) = unknown.quantity.parameter() {
                 // the friction's shape is left to the search that knows of its valleys
-                let shape = matches!(name, "friction.d" | "friction.omega_s");
+                let shape = matches!(name, friction::D | friction::OMEGA_S);
                 let width = if shape { 0.4 * PRIOR_WIDTH } else { PRIOR_WIDTH };
                 let value = unknown.scale.value(x);
                 let size = match unknown.scale {

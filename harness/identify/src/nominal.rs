@@ -5,6 +5,7 @@ use experiments::rest;
 use formulas::cylinder::pendulum;
 use host::causality::Causality;
 use host::fmu::{Fmu, Instance};
+use names::hubslosh::{G_AXIAL, TAU_CMD, fluid, friction, hub, slosh, tank};
 
 /// Known values of the bench without the recording.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +62,7 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
         let variable = fmu.description().variable(name)?;
         ensure!(
             matches!(variable.causality, Causality::Parameter | Causality::Input)
-                && name != "tau_cmd",
+                && name != TAU_CMD,
             "{name} cannot be set: it is no parameter"
         );
         instance.set(name, value)?;
@@ -80,9 +81,9 @@ pub fn warnings(fmu: &Fmu, settings: &[(String, String)]) -> Result<Vec<String>>
 /// Settings in which a damping ratio counts: `slosh.zeta` turns `slosh.zeta_from_correlation` off, unless the settings say what
 /// that is.
 pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)> {
-    const CORRELATION: &str = "slosh.zeta_from_correlation";
+    const CORRELATION: &str = slosh::ZETA_FROM_CORRELATION;
     let has = |name: &str| settings.iter().any(|(n, _)| n == name);
-    if has("slosh.zeta") && !has(CORRELATION) {
+    if has(slosh::ZETA) && !has(CORRELATION) {
         settings.push((CORRELATION.into(), "false".into()));
     }
     settings
@@ -117,19 +118,19 @@ impl Nominal {
         let mut instance = initialised(fmu, &all)?;
         let mut real = |name: &str| instance.real(name);
         let bench =
-            Bench { arm: real("tank.r")?, density: real("fluid.rho")?, gravity: real("g_axial")? };
+            Bench { arm: real(tank::R)?, density: real(fluid::RHO)?, gravity: real(G_AXIAL)? };
         let start = Start {
-            d: real("tank.d")?,
-            h: real("tank.h")?,
-            zeta: real("slosh.damping[1]")?,
-            hub_inertia: real("hub.I")?,
-            b: real("friction.b")?,
-            c: real("friction.c")?,
-            stribeck: real("friction.d")?,
-            omega_s: real("friction.omega_s")?,
+            d: real(tank::D)?,
+            h: real(tank::H)?,
+            zeta: real(&slosh::DAMPING.at([1]))?,
+            hub_inertia: real(hub::I)?,
+            b: real(friction::B)?,
+            c: real(friction::C)?,
+            stribeck: real(friction::D)?,
+            omega_s: real(friction::OMEGA_S)?,
         };
         let inertia = start.hub_inertia + bench.inertia(bench.liquid(start.d, start.h));
-        Ok(Nominal { bench, start, inertia, period: 1.0 / real("slosh.frequency[1]")? })
+        Ok(Nominal { bench, start, inertia, period: 1.0 / real(&slosh::FREQUENCY.at([1]))? })
     }
 
     /// Longest mean time between rows with which this bench can be identified, s: a few rows a period.

@@ -2,6 +2,8 @@
 
 use anyhow::Result;
 use host::fmu::Fmu;
+use names::hubslosh::FrictionModel;
+use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
 
 use crate::nominal::Nominal;
 use crate::recording::Recording;
@@ -38,8 +40,8 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Options {
-            models: ["frozen", "linear", "planar", "spherical"].map(String::from).to_vec(),
-            friction: vec!["stribeck".into()],
+            models: [Frozen, Linear, Planar, Spherical].map(|model| model.name().into()).to_vec(),
+            friction: vec![FrictionModel::Stribeck.name().into()],
             settings: Vec::new(),
             known: Vec::new(),
             starts: Vec::new(),

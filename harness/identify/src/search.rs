@@ -14,6 +14,7 @@ use crate::news::Since;
 use crate::simulate::Intersample;
 use crate::stribeck::Indices;
 use analysis::innovations::Tests;
+use names::hubslosh::{SloshModel, hub};
 
 /// Mean square of the innovations below which a model may be near its minimum; noise has 1.
 const NEARLY_NOISE: f64 = 1.5;
@@ -365,9 +366,9 @@ impl<'a> Search<'a, '_> {
 
     /// The attempts, in their order: from the data's or the user's starts, or near the minimum of another model.
     fn attempts(&self, sibling: Option<&Sibling>) -> Vec<Attempt> {
-        let frozen = self.model == "frozen";
+        let frozen = self.model == SloshModel::Frozen.name();
         // The response that starts come from is linear: a model that is not may be far from it.
-        let nonlinear = !frozen && self.model != "linear";
+        let nonlinear = !frozen && self.model != SloshModel::Linear.name();
         let how = if self.far || nonlinear { How::Windows(&WINDOWS) } else { How::Loudest };
         let others = (1..if frozen { 1 } else { self.starts.len() }).flat_map(|i| {
             [
@@ -378,7 +379,7 @@ impl<'a> Search<'a, '_> {
         let Some(sibling) = sibling else {
             let mut all = vec![Attempt::over(From::Start(0), how, When::Always)];
             all.extend(others);
-            if self.model == "linear" && self.alone && !self.far {
+            if self.model == SloshModel::Linear.name() && self.alone && !self.far {
                 all.push(Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Poor));
             }
             return all;
@@ -497,7 +498,9 @@ impl<'a> Search<'a, '_> {
                 *x = sibling.minimum.x[index];
             }
         }
-        if let ("frozen", Some(hub)) = (self.model, self.problem.index("hub.I")) {
+        if self.model == SloshModel::Frozen.name()
+            && let Some(hub) = self.problem.index(hub::I)
+        {
             // all the liquid turns with the hub: the inertia above the resonance and more
             x[hub] += 0.1;
         }

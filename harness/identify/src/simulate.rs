@@ -4,6 +4,7 @@ use anyhow::Result;
 use experiments::rest;
 use host::drive::Inputs;
 use host::fmu::Fmu;
+use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA};
 
 use crate::recording::Recording;
 
@@ -11,7 +12,7 @@ use crate::recording::Recording;
 const SAME: f64 = 1e-9;
 
 /// The FMU's input for a torque on the hub besides the actuator's.
-pub const TORQUE_BESIDES: &str = "tau_ext";
+pub const TORQUE_BESIDES: &str = TAU_EXT;
 
 /// Motion of the hub at the rows of a recording.
 #[derive(Clone, Debug, Default)]
@@ -137,8 +138,8 @@ impl Setup {
             }
             Intersample::FirstOrderHold | Intersample::ZeroOrderHold => &recording.torque,
         };
-        let mut driven = vec![("tau_cmd", torque.as_slice())];
-        driven.extend(recording.gravity.as_ref().map(|gravity| ("g_axial", gravity.as_slice())));
+        let mut driven = vec![(TAU_CMD, torque.as_slice())];
+        driven.extend(recording.gravity.as_ref().map(|gravity| (G_AXIAL, gravity.as_slice())));
         driven.extend(besides.map(|torque| (TORQUE_BESIDES, torque)));
         let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let held = self.intersample == Intersample::ZeroOrderHold;
@@ -147,12 +148,8 @@ impl Setup {
         let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
         inputs.initialise(&mut instance, None, time[0], None, &first)?;
 
-        let outputs = [
-            reference("theta")?,
-            reference("omega")?,
-            reference("omega_dot")?,
-            reference("slosh_angle")?,
-        ];
+        let outputs =
+            [reference(THETA)?, reference(OMEGA)?, reference(OMEGA_DOT)?, reference(SLOSH_ANGLE)?];
         let outputs = match read {
             Read::All => &outputs[..],
             Read::States => &outputs[..2],

@@ -12,6 +12,7 @@ use analysis::{
 };
 use anyhow::{Context, Result, ensure};
 use formulas::cylinder::tank_of_first_mode;
+use names::hubslosh::{friction, hub, slosh, tank};
 use signals::fourier::Forward;
 
 use crate::nominal::{Bench, Nominal, Start};
@@ -36,14 +37,14 @@ pub struct Response {
 
 /// Parameters of the FMU that have a start from the data, in the order of [`Start`].
 pub const PARAMETERS: [&str; 8] = [
-    "tank.d",
-    "tank.h",
-    "slosh.zeta",
-    "hub.I",
-    "friction.b",
-    "friction.c",
-    "friction.d",
-    "friction.omega_s",
+    tank::D,
+    tank::H,
+    slosh::ZETA,
+    hub::I,
+    friction::B,
+    friction::C,
+    friction::D,
+    friction::OMEGA_S,
 ];
 
 /// Frequencies between which the torque has its power, Hz.

@@ -9,6 +9,7 @@
 //! it is bent.
 
 use formulas::cylinder::XI;
+use names::hubslosh::{hub, tank};
 
 use crate::nominal::Bench;
 use crate::unknown::Unknown;
@@ -28,7 +29,7 @@ impl Indices {
     /// `None` unless the tank is unknown.
     pub fn of(unknowns: &[Unknown]) -> Option<Self> {
         let index = |name: &str| unknowns.iter().position(|u| u.quantity.parameter() == Some(name));
-        Some(Indices { d: index("tank.d")?, h: index("tank.h")?, hub: index("hub.I") })
+        Some(Indices { d: index(tank::D)?, h: index(tank::H)?, hub: index(hub::I) })
     }
 }
 

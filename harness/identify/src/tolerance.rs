@@ -1,6 +1,7 @@
 //! Tolerances of values that are not estimated: relative standard deviations.
 
 use anyhow::{Context, Result, bail, ensure};
+use names::hubslosh::{G_AXIAL, fluid, tank};
 
 /// Relative standard deviations of numbers that the recording cannot show.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +19,7 @@ pub struct Tolerances {
 }
 
 /// The names, in their order.
-pub const NAMES: [&str; 5] = ["torque", "clock", "g_axial", "tank.r", "fluid.rho"];
+pub const NAMES: [&str; 5] = ["torque", "clock", G_AXIAL, tank::R, fluid::RHO];
 
 impl Default for Tolerances {
     /// Of a bench with a calibrated wheel, a quartz, a rule and a thermometer: 1 %, 0.01 %, 0.1 % (the latitude is known, the
@@ -54,9 +55,9 @@ impl Tolerances {
             match name.trim() {
                 "torque" => self.torque = number,
                 "clock" => self.clock = number,
-                "g_axial" => self.gravity = number,
-                "tank.r" => self.arm = number,
-                "fluid.rho" => self.density = number,
+                G_AXIAL => self.gravity = number,
+                tank::R => self.arm = number,
+                fluid::RHO => self.density = number,
                 other => bail!("{other} has no tolerance: there are {}", NAMES.join(", ")),
             }
         }

@@ -15,6 +15,7 @@ use serde::Serialize;
 use crate::decomposition;
 use crate::estimate::{Estimated, prose};
 use crate::unknown::Unknown;
+use names::hubslosh::friction;
 
 /// Length of the windows of the sandwich, s; two times the slosh's decay.
 pub const WINDOW: f64 = 50.0;
@@ -218,9 +219,9 @@ pub fn one_way(
     way: f64,
     bounds: [f64; 2],
 ) -> Vec<Combination> {
-    const ASYMMETRY: &str = "friction.asymmetry";
+    const ASYMMETRY: &str = friction::ASYMMETRY;
     let mut combinations = Vec::new();
-    for name in ["friction.c", "friction.d"] {
+    for name in [friction::C, friction::D] {
         let Some(p) = parameters.get_mut(name) else { continue };
         combinations.push(Combination {
             name: format!("{name} (1 {} {ASYMMETRY})", if way > 0.0 { "+" } else { "-" }),

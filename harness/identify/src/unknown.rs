@@ -1,6 +1,7 @@
 //! Unknowns: parameters of the FMU, and properties of sensors and data link.
 
 use host::description::{ModelDescription, Variable};
+use names::hubslosh::{friction, init};
 use serde::Serialize;
 
 /// One unknown number.
@@ -195,7 +196,7 @@ impl Unknown {
 
     /// The direction-dependent part of dry friction, between −1 and 1.
     pub fn asymmetry() -> Self {
-        let quantity = Quantity::Parameter("friction.asymmetry".into());
+        let quantity = Quantity::Parameter(friction::ASYMMETRY.into());
         Unknown::new(quantity, "1", 0.0, Scale::Logit(-1.0, 1.0))
     }
 
@@ -224,7 +225,7 @@ impl Unknown {
     pub fn initial(recording: usize, name: &str, unit: &str, typical: f64) -> Self {
         let scale = match name {
             // the FMU allows 1.5 rad
-            "init.slosh_angle" => Scale::Logit(-1.4, 1.4),
+            init::SLOSH_ANGLE => Scale::Logit(-1.4, 1.4),
             _ => Scale::Linear(typical),
         };
         Unknown::new(Quantity::Initial(recording, name.into()), unit, 0.0, scale)

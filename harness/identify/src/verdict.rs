@@ -9,6 +9,7 @@ use crate::evidence::{DECIDES, probabilities};
 use crate::missing::Missing;
 use crate::uncertainty::Combination;
 use analysis::innovations::{self, Tests};
+use names::hubslosh::{SloshModel, hub};
 
 /// Newton decrement above which the verdict reports it.
 const TOLD: f64 = 0.1;
@@ -90,7 +91,7 @@ pub fn words(
             fit.newton_decrement
         ));
     }
-    if fit.model == "frozen" && parameters.contains_key("hub.I") {
+    if fit.model == SloshModel::Frozen.name() && parameters.contains_key(hub::I) {
         lines.push(
             "hub.I is the whole inertia less that of the liquid as the tank is set (tank.d, tank.h, tank.r, fluid.rho), which no \
              recording without slosh shows: its interval holds for that liquid."

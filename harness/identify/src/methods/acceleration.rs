@@ -30,6 +30,7 @@ use analysis::statistics::{about_mean, noise_level, peak};
 use anyhow::{Result, bail, ensure};
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
+use names::hubslosh::{FrictionModel, SloshModel, friction, hub, slosh, tank};
 use serde::Serialize;
 
 use super::{Identified, Method, Needs, Task};
@@ -190,7 +191,7 @@ const DRIVING: f64 = 3.0;
 const LIMIT: f64 = 3.84;
 /// Names of the first unknowns.
 const FIRST: [&str; 6] =
-    ["hub.I", "friction.b", "friction.c", "friction.d", "friction.omega_s", "friction.asymmetry"];
+    [hub::I, friction::B, friction::C, friction::D, friction::OMEGA_S, friction::ASYMMETRY];
 
 /// Rows that are closer are taken together, s. The mean of a sine of 3.5 Hz over it is 0.2 % less than its peak.
 const BLOCK: f64 = 0.01;
@@ -750,7 +751,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     }
     let mut bench = nominal::initialised(fmu, &options.settings)?;
     // it turns with the hub, all of it
-    let liquid = bench.real("tank.m_liq")? * bench.real("tank.r")?.powi(2);
+    let liquid = bench.real(tank::M_LIQ)? * bench.real(tank::R)?.powi(2);
     let mut plain = Problem::new(fmu, recordings, options, Form::AtRow)?;
     let given = given(&plain, options, liquid)?;
     let biases = plain.rough_biases();
@@ -863,7 +864,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let mut combinations = Vec::new();
     let may_have_none = parameters["friction.d"].interval[0] <= 0.0;
     if let Some(profile) = &profile {
-        let speed = parameters.get_mut("friction.omega_s").expect("one of the first");
+        let speed = parameters.get_mut(friction::OMEGA_S).expect("one of the first");
         // without an excess of the friction at rest there is no speed at which it vanishes
         let bounds = [f64::NEG_INFINITY, f64::INFINITY].map(|end| problem.bounded(STRIBECK, end));
         speed.interval = if may_have_none { bounds } else { profile.speeds };
@@ -872,7 +873,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         if !parameters["friction.c"].determined && !parameters["friction.d"].determined {
             combinations.push(Combination {
                 name: "friction.c + friction.d".into(),
-                of: ["friction.c", "friction.d"].map(String::from),
+                of: [friction::C, friction::D].map(String::from),
                 value: p[2] + p[3],
                 std: sum_of_dry.sqrt(),
                 unit: "N.m".into(),
@@ -889,11 +890,11 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     };
     let si = decomposition::singular(jacobian.clone().qr().r())?.singular_values;
     let mut settings: BTreeMap<String, String> = options.settings.iter().cloned().collect();
-    settings.insert("slosh.model".into(), "frozen".into());
-    settings.insert("friction.model".into(), "stribeck".into());
+    settings.insert(slosh::MODEL.into(), SloshModel::Frozen.name().into());
+    settings.insert(friction::MODEL.into(), FrictionModel::Stribeck.name().into());
     let mut uncorrected: BTreeMap<String, f64> =
         problem.names.iter().cloned().zip(uncorrected).collect();
-    uncorrected.entry("hub.I".into()).and_modify(|inertia| *inertia -= liquid);
+    uncorrected.entry(hub::I.into()).and_modify(|inertia| *inertia -= liquid);
     let braking: Vec<Braking> = [1.0, -1.0]
         .into_iter()
         .filter_map(|way| braking(recordings, problem.biases(&p), way))
@@ -934,10 +935,10 @@ fn off_the_bounds(x: &[f64]) -> Vec<f64> {
 
 fn unit(name: &str) -> &'static str {
     match name {
-        "hub.I" => "kg.m2",
-        "friction.b" => "N.m.s",
-        "friction.c" | "friction.d" => "N.m",
-        "friction.omega_s" => "rad/s",
+        hub::I => "kg.m2",
+        friction::B => "N.m.s",
+        friction::C | friction::D => "N.m",
+        friction::OMEGA_S => "rad/s",
         _ if name.starts_with("gyro_bias") => "rad/s",
         _ => "1",
     }
@@ -1027,7 +1028,7 @@ fn words(found: &Found) -> Vec<String> {
             "{name} ended at a bound; its value is the bound's. --bound {name}=LOW:HIGH moves the bound."
         ));
     }
-    if found.parameters.get("friction.omega_s").is_some_and(|speed| !speed.determined) {
+    if found.parameters.get(friction::OMEGA_S).is_some_and(|speed| !speed.determined) {
         words.push(
             "friction.omega_s is not determined: other Stribeck speeds explain the recording as well, each with its own friction.c \
              and friction.d. A sweep and a ramp through zero together tell them apart."
@@ -1048,7 +1049,7 @@ fn words(found: &Found) -> Vec<String> {
             }
         }
     }
-    if let Some(asymmetry) = found.parameters.get("friction.asymmetry").filter(|a| a.determined) {
+    if let Some(asymmetry) = found.parameters.get(friction::ASYMMETRY).filter(|a| a.determined) {
         let strong = asymmetry.value.abs() > 3.0 * asymmetry.std && fits;
         if strong {
             let (harder, easier) = if asymmetry.value > 0.0 {

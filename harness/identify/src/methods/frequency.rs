@@ -34,6 +34,7 @@ use crate::start::{self, Plant};
 use crate::uncertainty::Covariance;
 use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
 use analysis::least_squares::{differences, minimise};
+use names::hubslosh::{FrictionModel, SloshModel, friction, hub, slosh, tank};
 
 /// Degree of T. Two are the plant's own; two more take what sampling folds back.
 const TRANSIENT: usize = 4;
@@ -235,10 +236,10 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     }
     let structure = response.remove("structure").map_or(0.0, |p| p.value / p.std);
     let mut parameters = BTreeMap::new();
-    for name in ["tank.d", "tank.h", "hub.I"] {
+    for name in [tank::D, tank::H, hub::I] {
         parameters.extend(response.remove(name).map(|p| (name.to_string(), p)));
     }
-    for (name, of) in [("slosh.zeta", "slosh_damping"), ("friction.b", "friction")] {
+    for (name, of) in [(slosh::ZETA, "slosh_damping"), (friction::B, "friction")] {
         parameters.insert(name.into(), response[of].clone());
     }
     let floor = noise * noise * count as f64;
@@ -256,9 +257,9 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     Ok(Found {
         parameters,
         settings: [
-            ("slosh.model", "linear"),
-            ("slosh.zeta_from_correlation", "false"),
-            ("friction.model", "viscous"),
+            (slosh::MODEL, SloshModel::Linear.name()),
+            (slosh::ZETA_FROM_CORRELATION, "false"),
+            (friction::MODEL, FrictionModel::Viscous.name()),
         ]
         .map(setting)
         .into(),
@@ -303,9 +304,9 @@ fn translated(x: &[f64], unit: f64, step: f64, bench: Bench) -> Option<[Named; 1
         ("friction", "N.m.s", plant.friction),
         ("delay", "s", x[6] * step),
         ("structure", "1/s", plant.structure),
-        ("tank.d", "m", d),
-        ("tank.h", "m", h),
-        ("hub.I", "kg.m2", hub),
+        (tank::D, "m", d),
+        (tank::H, "m", h),
+        (hub::I, "kg.m2", hub),
     ])
 }
 

@@ -9,6 +9,8 @@ use formulas::cylinder::XI;
 use formulas::regime::Regime;
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
+use names::hubslosh::SloshModel::{self, Frozen, Linear, Paraboloid, Planar, Spherical};
+use names::hubslosh::{self, FrictionModel};
 
 use super::identification::{Details, Identification};
 use super::{Identified, Method, Needs, Residual, Task, page};
@@ -64,10 +66,12 @@ impl Method for OutputError {
 }
 
 /// Slosh models in the order in which they are fitted.
-const ORDER: [&str; 5] = ["linear", "planar", "spherical", "paraboloid", "frozen"];
+const ORDER: [&str; 5] =
+    [Linear.name(), Planar.name(), Spherical.name(), Paraboloid.name(), Frozen.name()];
 
 /// From the simplest slosh model to the richest.
-const SIMPLEST: [&str; 5] = ["frozen", "linear", "planar", "spherical", "paraboloid"];
+const SIMPLEST: [&str; 5] =
+    [Frozen.name(), Linear.name(), Planar.name(), Spherical.name(), Paraboloid.name()];
 
 /// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
 const BEGINNINGS: [f64; 2] = [0.35, 0.5];
@@ -149,10 +153,10 @@ fn identify_whole(
         tell(if number == 0 { News::Step(line) } else { News::Detail(line) });
     }
     // the slosh models with the first friction law, each from the best so far
-    let law = options.friction.first().map_or("stribeck", String::as_str);
+    let law = options.friction.first().map_or(FrictionModel::Stribeck.name(), String::as_str);
     let (mut fitted, mut failed): (Vec<Fitted>, _) = (Vec::new(), None);
     for model in ORDER.into_iter().filter(|model| options.models.iter().any(|m| m == model)) {
-        if model != "frozen" && response.is_none() && options.starts.is_empty() {
+        if model != SloshModel::Frozen.name() && response.is_none() && options.starts.is_empty() {
             tell(News::Step(format!("{model}: not tried, the data show no slosh to start from")));
             continue;
         }
@@ -453,9 +457,9 @@ struct OneWay {
 /// If the hub turns one way alone, its friction is c (1 ± asymmetry) and d (1 ± asymmetry), and nothing tells the asymmetry from c
 /// and d but what is vaguely known of these. The asymmetry is then no unknown: the minimum is sought with an asymmetry of 0.
 fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>> {
-    const NAME: &str = "friction.asymmetry";
+    const NAME: &str = hubslosh::friction::ASYMMETRY;
     let Some(place) = problem.index(NAME) else { return Ok(None) };
-    let dry = ["friction.c", "friction.d"].map(|name| problem.index(name));
+    let dry = [hubslosh::friction::C, hubslosh::friction::D].map(|name| problem.index(name));
     if dry.iter().flatten().next().is_none() {
         return Ok(None);
     }
@@ -502,12 +506,12 @@ fn regime(model: &str, answer: &Answer) -> Option<String> {
     let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
     let (is, advice) = match Regime::of(wave) {
         Regime::Nonlinear => ("nonlinear", "less torque is better known"),
-        Regime::Transitional if model == "linear" => {
+        Regime::Transitional if model == SloshModel::Linear.name() => {
             ("between linear and nonlinear", "--model planar,spherical tells whether that matters")
         }
         _ => return None,
     };
-    (model != "frozen").then(|| {
+    (model != SloshModel::Frozen.name()).then(|| {
         format!(
             "The slosh is {is}: the fit has a slosh angle up to {angle:.2} rad, a wave of {wave:.2} of the radius (linear up to 0.15, \
              nonlinear from 0.25); {advice}."
