@@ -71,6 +71,7 @@ const HARNESS: [(&str, &[&str]); 15] = [
             "files",
             "formulas",
             "host",
+            "names",
             "signals",
             "check",
             "pack",

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 use experiments::campaign::{Campaign, recorded};
 use experiments::plan::{Plan, Recorded};
 use experiments::profile::{Torque, Written};
+use names::hubslosh::TAU_CMD;
 use signals::recording::Columns;
 
 use super::{DEFAULT_FMU, campaign, open, setting};
@@ -101,7 +102,7 @@ impl AnalyseArgs {
                 path.display()
             );
             step.get_or_insert(each);
-            let torque = table.column("tau_cmd").unwrap_or_default();
+            let torque = table.column(TAU_CMD).unwrap_or_default();
             let amplitude = torque.iter().fold(0.0, |most: f64, tau| most.max(tau.abs()));
             ensure!(amplitude > 0.0, "{}: tau_cmd is 0 N·m all along", path.display());
             runs.push_str("[[run]]\n");

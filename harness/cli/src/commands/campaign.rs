@@ -9,6 +9,7 @@ use files::budget;
 use host::causality::Causality;
 use host::fmu::Fmu;
 use host::guard;
+use names::hubslosh::{TAU_CMD, slosh, tank};
 
 use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting, view};
 use crate::{progress, terminal};
@@ -158,7 +159,7 @@ impl CampaignArgs {
     fn flags_as_plan(&self) -> Result<Plan> {
         for (name, _) in &self.settings {
             ensure!(
-                !["slosh.model", "tank.h", "tau_cmd"].contains(&name.as_str()),
+                ![slosh::MODEL, tank::H, TAU_CMD].contains(&name.as_str()),
                 "{name} is what the campaign varies; use --model, --fills, --amplitudes"
             );
         }

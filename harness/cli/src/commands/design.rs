@@ -13,6 +13,7 @@ use identify::design::{self, Multisine, Wheel};
 use identify::nominal;
 use identify::simulate::{Intersample, Setup};
 use identify::unknown::Unknown;
+use names::hubslosh::{TAU_CMD, friction, hub, imu, slosh, tank, wheel};
 use serde_json::json;
 use signals::table::{self, Table};
 
@@ -127,9 +128,9 @@ impl DesignArgs {
         let mut instance = nominal::initialised(&fmu, &self.settings)?;
         let mut real = |name: &str| instance.real(name);
         let wheel = Wheel {
-            torque: real("wheel.tau_max")?,
-            inertia: real("wheel.I")?,
-            speeds: [real("wheel.speed_0")?, real("wheel.speed_min")?, real("wheel.speed_max")?],
+            torque: real(wheel::TAU_MAX)?,
+            inertia: real(wheel::I)?,
+            speeds: [real(wheel::SPEED_0)?, real(wheel::SPEED_MIN)?, real(wheel::SPEED_MAX)?],
         };
         if let Some(snr) = self.snr {
             return self.torque_for(snr, wheel.torque, &mut real);
@@ -152,7 +153,7 @@ impl DesignArgs {
             plan.print(&wheel, self.slosh_angle);
         }
         if let Some(out) = &self.out {
-            let names = ["time", "tau_cmd"].map(String::from).to_vec();
+            let names = ["time", TAU_CMD].map(String::from).to_vec();
             Table::new(names, vec![time, torque]).write(out, &BTreeMap::new())?;
             done!("{}", out.display());
         }
@@ -239,22 +240,23 @@ impl<'f> Bench<'f> {
         let intersample = Intersample::FirstOrderHold;
         let setup = Setup { settings: asked.settings.clone(), intersample };
         let mut fitted = setup.clone();
-        fitted.settings.push(("slosh.zeta_from_correlation".into(), "false".into()));
+        fitted.settings.push((slosh::ZETA_FROM_CORRELATION.into(), "false".into()));
         let mut unknowns = Vec::new();
         for name in identify::start::PARAMETERS {
             let unit =
                 fmu.description().variable(name)?.attributes().unit.clone().unwrap_or_default();
-            let shown = if name == "slosh.zeta" { "slosh.damping[1]" } else { name };
+            let damping = slosh::DAMPING.at([1]);
+            let shown = if name == slosh::ZETA { &damping } else { name };
             unknowns.push(Unknown::positive(name, &unit, real(shown)?));
         }
         if asked.sensor_errors {
             unknowns.extend([Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)]);
         }
-        let (arw, rate) = (real("imu.arw")?, real("imu.rate")?);
+        let (arw, rate) = (real(imu::ARW)?, real(imu::RATE)?);
         let white = arw * rate.sqrt();
         // Gauss–Markov bias of IEEE Std 952: its standard deviation is the instability over 0.664
-        let drift = real("imu.bias_instability")? / 0.664 / white;
-        let noise = Noise { white, drift, time: real("imu.bias_time")? };
+        let drift = real(imu::BIAS_INSTABILITY)? / 0.664 / white;
+        let noise = Noise { white, drift, time: real(imu::BIAS_TIME)? };
         Ok(Bench { fmu, setup, fitted, unknowns, noise, limit: asked.slosh_angle })
     }
 
@@ -405,14 +407,14 @@ impl DesignArgs {
         ensure!(0.0 < f0 && f0 < f1 && f1.is_finite(), "--band = {f0},{f1} (allowed: 0 < f0 < f1)");
         ensure!(snr.abs() <= 200.0, "--snr = {snr} (allowed: -200 to 200 dB)");
         // Per sample: the sine's power Ω²/2 over arw² times the sampling rate.
-        let sigma = real("imu.arw")? * real("imu.rate")?.sqrt();
+        let sigma = real(imu::ARW)? * real(imu::RATE)?.sqrt();
         ensure!(sigma > 0.0, "imu.arw = 0 leaves no noise to compare with (allowed: above 0)");
         let rate = sigma * std::f64::consts::SQRT_2 * 10f64.powf(snr / 20.0);
-        let dry = real("friction.c")? + real("friction.d")?;
+        let dry = real(friction::C)? + real(friction::D)?;
         // Its describing function at that rate.
         let mut bench = expected(real, 1.0)?;
         bench.friction =
-            real("friction.b")? + real("hub.c")? + 4.0 * dry / (std::f64::consts::PI * rate);
+            real(friction::B)? + real(hub::C)? + 4.0 * dry / (std::f64::consts::PI * rate);
         let torque = |f: f64| rate / bench.response(f).norm();
         let grid = analysis::logarithmic_grid((f0, f1), 2000);
         let (mut least, mut most) = ((f64::INFINITY, f0), (0.0, f0));
@@ -457,17 +459,17 @@ impl DesignArgs {
 /// The linear bench that is expected: dry friction as the viscous friction that takes the same power at the
 /// rate of a torque with this peak (crest factor 3) far from resonance.
 fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
-    let arm = real("tank.r")?;
+    let arm = real(tank::R)?;
     let mode = Mode {
-        mass: real("slosh.mass[1]")?,
-        frequency: real("slosh.frequency[1]")?,
-        damping: real("slosh.damping[1]")?,
+        mass: real(&slosh::MASS.at([1]))?,
+        frequency: real(&slosh::FREQUENCY.at([1]))?,
+        damping: real(&slosh::DAMPING.at([1]))?,
     };
-    let inertia = real("hub.I")? + real("tank.m_0")? * arm * arm;
+    let inertia = real(hub::I)? + real(tank::M_0)? * arm * arm;
     let rate = peak / 3.0 / (inertia * std::f64::consts::TAU * mode.frequency);
     // ⟨|ω|⟩ of a normal distribution is sqrt(2/π) σ
-    let dry = real("friction.c")? + real("friction.d")?;
-    let viscous = real("friction.b")? + real("hub.c")?;
+    let dry = real(friction::C)? + real(friction::D)?;
+    let viscous = real(friction::B)? + real(hub::C)?;
     let friction = viscous + dry * (2.0 / std::f64::consts::PI).sqrt() / rate;
-    Ok(Linear { inertia, friction, stiffness: real("hub.k")?, arm, modes: vec![mode] })
+    Ok(Linear { inertia, friction, stiffness: real(hub::K)?, arm, modes: vec![mode] })
 }

@@ -18,6 +18,7 @@ use identify::options::Options;
 use identify::recording::{self, Recording, Source};
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
+use names::hubslosh::fluid;
 use signals::recording::Between;
 use std::io::Write;
 
@@ -242,7 +243,7 @@ impl IdentifyArgs {
         }
         if self.empty {
             // the least that the FMU takes: 2e-9 kg in the bench's tank
-            self.settings.push(("fluid.rho".into(), "1e-6".into()));
+            self.settings.push((fluid::RHO.into(), "1e-6".into()));
             self.model = vec!["frozen".into()];
         }
         let json = self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));

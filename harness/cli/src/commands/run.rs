@@ -12,6 +12,7 @@ use experiments::sensors::{self, Sensor, Sensors};
 use experiments::weight::{Tanks, WATER_TENSION};
 use host::description::ModelDescription;
 use host::guard;
+use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL};
 use report::view;
 
 use super::{DEFAULT_FMU, check_out, open_with, setting, write_out};
@@ -175,7 +176,7 @@ impl RunArgs {
             .iter()
             .filter_map(|range| Some((range, table.column(WAVE)?)))
             .flat_map(|(range, waves)| {
-                [range.left(waves), range.without_weight(waves, table.column("g_axial"))]
+                [range.left(waves), range.without_weight(waves, table.column(G_AXIAL))]
             })
             .flatten()
             .chain(tanks.iter().flat_map(|tanks| tanks.without_weight(&table)))
@@ -197,7 +198,7 @@ fn default_columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
 ) -> Vec<String> {
-    const BENCH: [&str; 4] = ["omega", "omega_imu", "slosh_angle", "slosh_angle_radial"];
+    const BENCH: [&str; 4] = [OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL];
     let mut names = match BENCH.iter().all(|name| description.variable(name).is_ok()) {
         true => BENCH.map(String::from).into(),
         false => stored_columns(description, None).split_off(1), // without time

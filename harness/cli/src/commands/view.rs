@@ -9,6 +9,7 @@ use files::output::atomically;
 use host::description::ModelDescription;
 use hubslosh_tank::tank::Geometry;
 use hubslosh_tank::{Fill, Tank};
+use names::hubslosh::{SLOSH_ANGLE, TAU_CMD};
 use report::view::{self, Drawing, Outline};
 use signals::table::{self, Table};
 
@@ -176,7 +177,7 @@ pub fn of_stored(description: &ModelDescription, file: &Path, title: &str) -> Re
 fn model_of(columns: &[String]) -> Option<PathBuf> {
     let any = |beginning: &str| columns.iter().any(|name| name.starts_with(beginning));
     let name = match () {
-        () if any("slosh_angle") || any("tau_cmd") => "HubSlosh",
+        () if any(SLOSH_ANGLE) || any(TAU_CMD) => "HubSlosh",
         () if any("tank[") || any("q[") => "Spacecraft",
         () if any("tank.") => "SloshTank",
         () => return None,
