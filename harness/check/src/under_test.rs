@@ -603,12 +603,12 @@ impl<'f> Session<'f> {
 
     /// fmi2CompletedIntegratorStep, and the events that follow from it.
     pub(super) fn complete_step(&mut self, crossed: bool) -> Result<()> {
-        let (enter, terminate) = self.instance.completed_integrator_step()?;
-        if terminate {
+        let completed = self.instance.completed_integrator_step()?;
+        if completed.terminate {
             self.end("fmi2CompletedIntegratorStep");
         }
         let due = self.next_event.is_some_and(|next| self.time >= next);
-        if !(enter || crossed || due) {
+        if !(completed.enter_event_mode || crossed || due) {
             return Ok(());
         }
         let is_asked = !crossed && !due && self.asked < ASKED && self.step_event.is_none();

@@ -9,7 +9,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::archive::Archive;
-pub use crate::c_abi::version::{FmuState as State, Interface, Updated};
+pub use crate::c_abi::version::{CompletedStep, FmuState as State, Interface, Updated};
 use crate::c_abi::version::{Version, described};
 use crate::c_abi::{Called, Message};
 use crate::description::{ModelDescription, Value, Variable};
@@ -159,8 +159,8 @@ passed_on! {
     enter_event_mode() -> Called;
     /// Enters continuous-time mode.
     enter_continuous_time_mode() -> Called;
-    /// Completes a step of the integrator: enterEventMode, terminateSimulation.
-    completed_integrator_step() -> Called<(bool, bool)>;
+    /// Completes a step of the integrator.
+    completed_integrator_step() -> Called<CompletedStep>;
     /// Sets the time, s.
     set_time(time: f64) -> Called;
     /// Sets the continuous states.

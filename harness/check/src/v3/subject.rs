@@ -411,9 +411,9 @@ impl Session<'_> {
             self.instance.set_continuous_states(&x)?;
             self.instance.event_indicators(&mut z)?;
             let crossed = z.iter().zip(&before).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
-            let (enter, end) = self.instance.completed_integrator_step()?;
-            self.ended |= end;
-            if (enter || crossed || due) && !self.ended {
+            let completed = self.instance.completed_integrator_step()?;
+            self.ended |= completed.terminate;
+            if (completed.enter_event_mode || crossed || due) && !self.ended {
                 self.event()?;
             }
         }

@@ -395,15 +395,15 @@ impl Campaign {
             false => folder
                 .check(&case.name)
                 .and_then(|sum| {
-                    let (table, lacks) = store::stored(&path, &run, &recipe, (&columns, &sensors))?;
-                    Ok((table, lacks, sum))
+                    let stored = store::stored(&path, &run, &recipe, (&columns, &sensors))?;
+                    Ok((stored, sum))
                 })
                 .map_err(|why| watch(Progress::Note(store::because(case, &why))))
                 .ok(),
         };
         let reused = there.is_some();
         let table = match there {
-            Some((table, lacks_sensors, sum)) => {
+            Some((store::Stored { table, lacks_sensors }, sum)) => {
                 watch(Progress::Steps(run.steps() as u64));
                 if !folder.lists(&case.name) {
                     watch(Progress::Note(store::unverified(case)));

@@ -54,14 +54,21 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
     recipe
 }
 
-/// Returns the stored run if it is complete and has this recipe, otherwise the reason. Also returns true if it has the
-/// signals for the sensors but not their readings, because another program wrote it.
+/// A stored run.
+pub struct Stored {
+    /// Its columns.
+    pub table: Table,
+    /// The table has the signals for the sensors but not their readings, because another program wrote it.
+    pub lacks_sensors: bool,
+}
+
+/// Returns the stored run if it is complete and has this recipe, otherwise the reason.
 pub fn stored(
     path: &Path,
     run: &Run,
     recipe: &BTreeMap<String, String>,
     (columns, sensors): (&[String], &Sensors),
-) -> Result<(Table, bool), String> {
+) -> Result<Stored, String> {
     const INCOMPLETE: &str = "file incomplete";
     let found = table::metadata(path).map_err(|_| INCOMPLETE.to_string())?;
     if let Some(why) = difference(&found, recipe) {
@@ -82,7 +89,7 @@ pub fn stored(
     if table.rows() != run.steps() + 1 || last != Some(run.stop) {
         return Err(format!("{INCOMPLETE}, {} rows of {}", table.rows(), run.steps() + 1));
     }
-    Ok((table, lacks_sensors))
+    Ok(Stored { table, lacks_sensors })
 }
 
 /// Number of parameters that a message names if several differ.

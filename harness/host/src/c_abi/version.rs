@@ -488,6 +488,15 @@ fn taken(description: &ModelDescription) -> Vec<u32> {
     taken
 }
 
+/// Requests of an FMU after a step of the integrator.
+#[derive(Clone, Copy, Debug)]
+pub struct CompletedStep {
+    /// The host must enter event mode.
+    pub enter_event_mode: bool,
+    /// The host must end the simulation.
+    pub terminate: bool,
+}
+
 /// One instance of an FMU; freed when dropped. Belongs to the thread that made it.
 pub struct Instance<'fmu, V: Version> {
     pub(crate) fmu: &'fmu Fmu<V>,
@@ -834,15 +843,15 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.plain(self.exchange().enter_continuous_time_mode)
     }
 
-    /// fmi2CompletedIntegratorStep or fmi3CompletedIntegratorStep: enterEventMode, terminateSimulation.
-    pub fn completed_integrator_step(&mut self) -> Called<(bool, bool)> {
+    /// fmi2CompletedIntegratorStep or fmi3CompletedIntegratorStep.
+    pub fn completed_integrator_step(&mut self) -> Called<CompletedStep> {
         let no = V::Boolean::default();
         let (mut enter, mut terminate) = (no, no);
         // SAFETY: places for the answers.
         self.call(self.exchange().completed_integrator_step, |f, c| unsafe {
             f(c, true.into(), &mut enter, &mut terminate)
         })?;
-        Ok((enter != no, terminate != no))
+        Ok(CompletedStep { enter_event_mode: enter != no, terminate: terminate != no })
     }
 
     /// Sets the time, s.

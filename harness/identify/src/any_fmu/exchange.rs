@@ -240,10 +240,10 @@ impl<'fmu> Run<'fmu> {
                 true => self.h.max(grown),
                 false => grown,
             };
-            let (asked, ends) = self.instance.completed_integrator_step()?;
-            ensure!(!ends, "the FMU ends the run at t = {to} s");
+            let completed = self.instance.completed_integrator_step()?;
+            ensure!(!completed.terminate, "the FMU ends the run at t = {to} s");
             let due = self.next_event.is_some_and(|next| to >= next);
-            if crossed || asked || due {
+            if crossed || completed.enter_event_mode || due {
                 self.instance.enter_event_mode()?;
                 self.update()?;
             } else {
