@@ -2,11 +2,12 @@
 
     python3 .ci/check_wheel.py dist/hubslosh-….whl [--find-links FOLDER]
 
-In a new virtual environment, with nothing on PATH but it and the system's own programs: how long
-until the first plot; ``import hubslosh``; the command ``hubslosh`` with its FMUs beside it (run,
-check, tank, identify, the campaign and its report); the package's ``campaign``; every example that
-needs no further package. With --find-links pip takes packages from that folder alone, so that a
-machine without a network will do. Python 3.11 or newer and its standard library are enough.
+Creates a virtual environment; PATH has only it and the system's own programs. Measures the time to
+the first plot. Runs ``import hubslosh``, the command ``hubslosh`` with the FMUs that the wheel
+brings (run, check, tank, identify, the campaign and its report), the package's ``campaign``, and
+every example that needs no further package. With --find-links pip takes packages from that folder
+alone, so that a machine without a network will do. Python 3.11 or newer and its standard library
+are enough.
 
 Exit code 0 if everything runs, within the times that are printed.
 """

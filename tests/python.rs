@@ -29,7 +29,7 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
-/// Tests of `harness/python` that need no wheel, enough of them to run beside the others, which would otherwise be one long test.
+/// Tests of `harness/python` that need no wheel. They run in parallel with the others, which would otherwise be one long test.
 const BESIDE: [&str; 2] = ["test_liquid.py", "test_model_exchange.py"];
 
 /// pytest with what the package's tests are given: FMU and command.

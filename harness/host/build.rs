@@ -1,6 +1,5 @@
-//! Compiles the pieces of C there are: the logger a host must hand to an FMU is variadic, and
-//! stable Rust cannot define a variadic function; what an FMU shares with its host (floating-point
-//! control, locale, signals) is C's to tell.
+//! Compiles the host's C code. The logger that a host passes to an FMU is variadic, which stable Rust cannot define.
+//! Floating-point control, locale and signals, which an FMU shares with its host, are read in C.
 
 fn main() {
     println!("cargo::rerun-if-changed=src/logger.c");

@@ -5,10 +5,10 @@ libcosim is the Open Simulation Platform's master; it reads FMUs with Modelon's 
     pip install libcosimpy==0.0.6 fmpy==0.3.32 numpy
     python harness/hosts/cosim.py dist/HubSlosh.fmu
 
-Packs the system of ssp/, checks its texts against the schemas of SSP 1.0, drives it with a sine
-for a minute and prints by how much the motion differs from what fmpy gets from the FMU alone. Two
-things to know: libcosim ignores enumerations (`slosh.model`, `friction.model`), so it has the
-linear model; and when an FMU returns an error it prints the FMU's message and ends the process.
+Packs the system of ssp/, checks its XML against the schemas of SSP 1.0 and drives it with a sine
+for a minute. Prints the largest difference from fmpy with the FMU alone. Limitations: libcosim
+ignores enumerations (`slosh.model`, `friction.model`), so the model is linear. If an FMU returns an
+error, libcosim prints the FMU's message and ends the process.
 """
 
 import sys

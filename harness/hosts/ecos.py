@@ -4,9 +4,8 @@
     python harness/hosts/ecos.py dist/HubSlosh.fmu
 
 Drives the FMU with a sine for a minute and prints by how much the motion differs from what fmpy
-gets for the same steps. Two things to know: ecos can't set enumerations (`slosh.model`,
-`friction.model`), so it has the linear model; and it does not say when an FMU returns an error:
-look at the values, as here.
+gets for the same steps. Limitations: ecos can't set enumerations (`slosh.model`, `friction.model`),
+so the model is linear. It does not report an FMU's errors: check the values, as here.
 """
 
 import sys

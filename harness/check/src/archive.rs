@@ -56,8 +56,8 @@ fn is_read(name: &str) -> bool {
 const INDEX: &str = "documentation/index.html";
 
 impl Archive {
-    /// Reads as much as can be read, and puts the files that hosts would find into a temporary
-    /// directory; names that lead out of it and links are left out, and found by the rules.
+    /// Reads as much as possible and unpacks the files that hosts would find into a temporary directory. It skips links and names
+    /// that lead out of it; the rules report them.
     pub fn read(path: &Path) -> Result<Archive> {
         let from = host::archive::Archive::open(path)?;
         let directory = temporary::Folder::new()?;

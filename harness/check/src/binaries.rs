@@ -17,8 +17,8 @@ pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
     ("aarch64-linux", ".so", Some(Kind::LinuxArm)),
 ];
 
-/// Architectures of the platform tuples of FMI 3.0 (section 2.5.1.4.1), which FMI 2.0.4 takes over for
-/// all platforms but those with 32 and 64.
+/// Architectures of the platform tuples of FMI 3.0 (section 2.5.1.4.1). FMI 2.0.4 uses them too, except for its own names with 32
+/// and 64.
 const ARCHITECTURES: [&str; 8] =
     ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
 

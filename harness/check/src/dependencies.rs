@@ -1,7 +1,6 @@
-//! What modelDescription.xml says of dependencies, against what the binary does (FMI 2.0.5,
-//! sections 2.2.8 and 2.1.9): everything a variable may depend on is moved, and one looks whether
-//! the variable moves as well. At the start as declared, and at many others, since what a variable
-//! depends on depends on parameters, and a state that is 0 hides a product.
+//! Rules that compare the dependencies in modelDescription.xml with the binary (FMI 2.0.5, sections 2.2.8 and 2.1.9). They change
+//! everything that a variable may depend on, and check whether the variable changes. At the start as declared, and at many
+//! others, since what a variable depends on depends on parameters, and a state that is 0 hides a product.
 
 use std::collections::BTreeSet;
 

@@ -103,8 +103,8 @@ impl Variable {
     }
 }
 
-/// The default of `initial` and what is allowed (the table of section 2.2.7); `None` where the
-/// combination is not allowed at all, an empty list where `initial` must not be written.
+/// Returns the default and the allowed values of `initial` (table in section 2.2.7). `None`: the combination is not allowed. An
+/// empty list: `initial` must not be written.
 pub(crate) fn initials(
     causality: &Causality,
     variability: &Variability,

@@ -2,9 +2,9 @@
 //!
 //! A host may enter event mode whenever it likes. Where no event indicator has changed its sign, no
 //! time event is due and fmi2CompletedIntegratorStep has not asked for it, there is no event, and
-//! nothing changes. What changes nevertheless is an event that a host would have missed. An FMU may
-//! notice that the host has passed an event, and ask for it in fmi2CompletedIntegratorStep; where its
-//! indicators never change it always does so, and its events are as late as the host's steps are long.
+//! nothing changes. What changes nevertheless is an event that a host would have missed. An FMU may notice in
+//! fmi2CompletedIntegratorStep that the host has passed an event, and ask for event mode. If its indicators never change, this is
+//! its only way, and events come up to one step of the host late.
 
 use anyhow::Result;
 
@@ -51,17 +51,17 @@ pub fn told(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.add(
             "fmi2GetEventIndicators",
             format!(
-                "none of the event indicators ever changes, but at t = {time:?} s {name} goes from \
-                 {change}, an event for which fmi2CompletedIntegratorStep asks once it is over \
-                 (allowed: an indicator that changes its sign, so that the host finds the time)"
+                "none of the event indicators ever changes, but at t = {time:?} s {name} goes from {change}: \
+                 fmi2CompletedIntegratorStep asks for this event only after it has passed (allowed: an indicator that changes \
+                 its sign, so that the host finds the time)"
             ),
         );
     }
     Ok(())
 }
 
-/// A run that enters event mode after each step, and the first thing that changes there: when, what,
-/// and both values. `vary` becomes true if an event indicator changes its value.
+/// Runs the FMU, enters event mode after each step, and returns the first change there: time, variable and both values. `vary`
+/// becomes true if an event indicator changes its value.
 fn missed_event<'f>(
     session: &mut Session<'f>,
     vary: &mut bool,

@@ -184,7 +184,7 @@ impl Session<'_> {
         })
     }
 
-    /// The Jacobian from differences; columns that cannot be had are 0, which the method forgives.
+    /// Computes the Jacobian by differences. A column whose difference fails is 0: the method then only converges more slowly.
     fn jacobian(&mut self, t: f64, x: &DVector<f64>) -> Result<DMatrix<f64>> {
         let n = x.len();
         let mut jacobian = DMatrix::zeros(n, n);

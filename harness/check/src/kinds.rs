@@ -1,9 +1,8 @@
 //! The attribute dependenciesKind (FMI 2.0.5, section 2.2.8), against what the binary does.
 //!
-//! `dependent` says nothing. The other kinds say that the unknown is linear in the known, with a
-//! factor that is the same always (`constant`), after initialisation (`fixed`), until a tunable
-//! parameter is set (`tunable`) or between two events (`discrete`). The factor is measured by
-//! differences, small and large, at points that differ in the states, and at other parameters.
+//! `dependent` says nothing. In the other kinds the unknown is linear in the known. The factor is constant always (`constant`),
+//! after initialisation (`fixed`), until a tunable parameter is set (`tunable`) or between two events (`discrete`). The factor is
+//! measured by differences, small and large, at points that differ in the states, and at other parameters.
 
 use std::collections::BTreeSet;
 

@@ -132,8 +132,8 @@ fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<
     Ok(session.instance.take_messages())
 }
 
-/// `log.quiet`. Inputs that this check makes up may lead a model out of its range, of which it may warn; with inputs
-/// at their start values there is nothing to warn of.
+/// `log.quiet`. An ordinary run logs nothing. With changing inputs, warnings are allowed: the check's inputs may lead a model out
+/// of its range.
 pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let runs = [("inputs as they start", false), ("inputs changing", true)];
     for (interface, (inputs, changing)) in

@@ -470,8 +470,8 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let experiment = fmu.experiment();
     let continuous = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let all: Vec<&Variable> = fmu.variables().iter().filter(continuous).collect();
-    // Where the values are before, and after `count` steps of `h` with the inputs held, or what was
-    // said instead; none if the FMU asks for its end.
+    // Values before and after `count` steps of `h` with the inputs held, or the FMU's message; `None` if the FMU ends the
+    // simulation.
     type Ends = Option<Result<(Vec<f64>, Vec<f64>), String>>;
     let run = |h: f64, count: usize| -> Result<Ends> {
         let mut session = fmu.running(Interface::CoSimulation)?;

@@ -1,5 +1,5 @@
-//! Units (FMI 2.0.5, section 2.2.2): whether what UnitDefinitions says of a unit is what its name
-//! says, and whether derivatives have the unit of their state per second.
+//! Rules for units (FMI 2.0.5, section 2.2.2): UnitDefinitions agrees with the unit's name, and derivatives have the unit of
+//! their state per second.
 //!
 //! Names are read as Modelica writes them (Modelica 3.6, chapter 19): SI symbols with prefixes,
 //! `.` for products, one `/`, exponents after the symbol, as in `kg.m2/s2`. A name that does not

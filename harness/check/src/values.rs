@@ -27,8 +27,8 @@ fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
     Ok(session)
 }
 
-/// True if a value agrees with the one in modelDescription.xml to the 15 digits that a double keeps of a decimal
-/// number: half a unit of the last digit, and the rounding of both.
+/// Returns true if a value equals the one in modelDescription.xml within half a unit of the 15th digit and the rounding of both:
+/// a double keeps 15 decimal digits.
 fn has_digits_of(value: &Reading, written: &Reading) -> bool {
     const HALF_A_UNIT: f64 = 5e-15;
     match (value, written) {

@@ -88,8 +88,8 @@ pub fn parameter_names(d: &Description, findings: &mut Findings) {
 /// `xml.flat_ports`
 ///
 /// A point makes a member of a structure of the name, and importers that know such names make one port of all its
-/// members. An index makes an element of an array (2.2.9), of which importers make a vector or leave the elements
-/// alone: both can be wired, if the array is whole.
+/// members. A name with an index is an element of an array (2.2.9). Importers show it as a vector or as single elements; both can
+/// be wired if no element is missing.
 pub fn flat_ports(d: &Description, findings: &mut Findings) {
     let is_structured = d.root.get("variableNamingConvention") == Some("structured");
     let is_port = |v: &&Variable| matches!(v.causality, Causality::Input | Causality::Output);

@@ -10,9 +10,9 @@ use pack::{Fmi, Model};
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
 
-/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs. That is looked for in
-/// `dist`, where `hubslosh pack` puts it, then where this command is installed, then in `dist` of the source that
-/// the command was built from, where it is packed if need be.
+/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs. The search order is `dist`, where `hubslosh
+/// pack` puts it, the folder of this command, then `dist` of the source that the command was built from. There the command packs
+/// the FMU if necessary.
 ///
 /// # Errors
 /// If there is none; the error says what to do.
@@ -40,8 +40,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     if !pack::has_source() {
         let places: Vec<_> = folders().iter().map(|place| place.display().to_string()).collect();
         bail!(
-            "{file} was not found in dist, nor where this command is installed ({}), and there is no source to \
-             build it from: put it there, or name it by --fmu FILE; releases and the Python package have it",
+            "{file} was not found in dist or in this command's folder ({}), and there is no source to build it from. Put it \
+             there or name it with --fmu FILE; releases and the Python package contain it",
             places.join(", ")
         );
     }

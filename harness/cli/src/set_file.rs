@@ -93,8 +93,8 @@ fn from_json(text: &str) -> Result<Vec<(String, String)>> {
     Ok(settings)
 }
 
-/// SSP 1.0 and 2.0, "SystemStructureParameterValues": a value with a `unit` is converted by the definition that the file
-/// has of it in `Units`; without one it must be a unit that the FMU knows.
+/// SSP 1.0 and 2.0, "SystemStructureParameterValues": a value with a `unit` is converted by the unit's definition in the file's
+/// `Units`. Without a definition it must be a unit of the FMU.
 fn from_ssv(text: &str, description: Describe) -> Result<Vec<(String, String)>> {
     let root = Element::parse(text.as_bytes()).map_err(anyhow::Error::msg)?;
     ensure!(root.name == "ParameterSet", "its root is {}, not ParameterSet", root.name);

@@ -1,5 +1,5 @@
-//! The file itself: a zip archive (FMI 2.0.5, section 2.3), opened so that no archive can fill the
-//! disk or the memory, or lead out of the folder that it is unpacked to.
+//! Reads the zip archive of an FMU (FMI 2.0.5, section 2.3). No archive can fill the disk or the memory, or write outside the
+//! folder that it is unpacked to.
 //!
 //! Everything that opens an FMU does it here; `book/foreign.md` lists the budgets for users.
 
@@ -67,8 +67,8 @@ impl Entry {
     }
 }
 
-/// The place that a file system can take for that of a name: Windows and macOS ignore capitals, Windows drops full
-/// stops and spaces at the end of a part and takes what follows a colon for a stream of the file.
+/// Returns a name's path as the most lenient file system reads it. Windows and macOS ignore capitals. Windows drops full stops
+/// and spaces at the end of a part, and takes text after a colon for a stream of the file.
 ///
 /// Two entries with the same place overwrite each other on some system. An archive with such entries is refused on
 /// every system, so that an FMU has the same files everywhere.

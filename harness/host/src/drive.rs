@@ -48,9 +48,8 @@ impl Inputs {
         instance.exit_initialization_mode()
     }
 
-    /// Steps an initialised instance from `start`, s. At every communication point `at` is given the
-    /// instance, to read from, and the time; it says what the inputs do until the next communication
-    /// point, and when that is; `None` ends the run.
+    /// Steps an initialised instance from `start`, s. At every communication point, `at` receives the time and the instance to
+    /// read from. It returns the inputs until the next communication point and the time of that point; `None` ends the run.
     ///
     /// # Errors
     /// Errors of `at`; a call that the FMU refuses, with the time.

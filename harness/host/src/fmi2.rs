@@ -27,9 +27,9 @@ pub type Fmu = version::Fmu<Fmi2>;
 /// One instance of it; freed when dropped. Belongs to the thread that made it.
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi2>;
 
-/// Folder of the binaries for the platform this program was built for (FMI 2.0.5, section 2.3): 32 and
-/// 64 stand for x86, other processors have the platform tuples of FMI 3.0. On macOS darwin64 is for
-/// both processors, for hosts look there on both and one universal binary serves them.
+/// Folder of the binaries for this program's platform (FMI 2.0.5, section 2.3). Names with 32 and 64 are for x86; other
+/// processors use the platform tuples of FMI 3.0. On macOS darwin64 is for both processors, for hosts look there on both and one
+/// universal binary serves them.
 pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "aarch64")) {
     "aarch64-windows"
 } else if cfg!(target_os = "windows") {

@@ -512,8 +512,8 @@ impl Fmu {
         all
     }
 
-    /// The arguments of a plain instance, to be bent by tests of bad calls: no event mode, no early return, every
-    /// input and output that may be exchanged within a step is required there if intermediate update is provided.
+    /// Arguments of a plain instance, which tests of bad calls modify: no event mode and no early return. With intermediate
+    /// update, it requires every input and output that may be exchanged within a step.
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         let stepping = self.description.co_simulation.as_ref();
         let updates = stepping.is_some_and(|cs| cs.can_interpolate_inputs);

@@ -1,17 +1,16 @@
 //! Runs foreign code in a process of its own, with limits. Whatever an FMU's binary does ends with that process, and
 //! the parent reports it.
 //!
-//! The parent ([`run`]) starts the process in a group of its own, with a folder for temporary files,
-//! reads what it prints up to a limit, and ends it, and whatever it started, when it takes too long.
-//! The child calls [`enter`] first and [`done`] last: without the latter it did not succeed,
-//! whatever its exit code. It limits its own memory and files when the first binary is loaded, and
-//! keeps stdout and stderr for itself then; what the binary prints goes to the parent.
+//! The parent ([`run`]) starts the process in a group of its own with a temporary folder, and reads its output up to a limit. If
+//! it takes too long, the parent ends it and all processes that it started. The child calls [`enter`] first and [`done`] last:
+//! without the latter it did not succeed, whatever its exit code. It limits its own memory and files when the first binary is
+//! loaded, and keeps stdout and stderr for itself then; what the binary prints goes to the parent.
 //!
 //! The child answers over a connection ([`channel`]). Each message begins with a nonce that the child has read before it
 //! loads a binary. A binary that writes to the connection by mistake, or to look successful, is ended.
 //!
-//! Everything works on Linux; elsewhere on Unix the memory is not limited and processes that leave
-//! the group are not found; on Windows the process itself is ended, and nothing else.
+//! Linux has everything. Other Unix systems do not limit memory and miss processes that leave the group. Windows ends only the
+//! process itself.
 //!
 //! The guard protects against faults. It is not a sandbox: a malicious binary shares the memory of the child, where it
 //! finds the nonce, and has the rights of the user.

@@ -126,8 +126,8 @@ impl Element {
     }
 }
 
-/// The first limit that a file exceeds, found before a parser spends time and stack on it: some parsers take time that
-/// grows with the square of the depth or of the number of attributes. The file need not be well-formed: the parser checks that.
+/// Returns the first limit that a file exceeds, before a parser runs: in some parsers time grows with the square of the depth or
+/// of the number of attributes. The file need not be well-formed: the parser checks that.
 fn excess(text: &str) -> Option<String> {
     let namespaces = text.matches("xmlns").count();
     if namespaces > MOST_NAMESPACES {

@@ -1,5 +1,5 @@
-//! Cramér–Rao bounds of the thesis's experiments, in % (1σ), through the FMU: with white noise alone and with the gyro's
-//! drift as well, for eight unknowns and for those that `hubslosh identify` adds.
+//! Computes Cramér–Rao bounds of the thesis's experiments with the FMU, in % (1σ). Noise: white alone, and with the gyro's drift.
+//! Unknowns: eight, and those that `hubslosh identify` adds.
 //!
 //! ```text
 //! cargo run --release -p identify --example bounds -- [NAME:VALUE ...]

@@ -1,6 +1,6 @@
-//! Do the estimates keep what they state? Many recordings of the FMU with different gyro noise, each
-//! identified without priors and starts; prints the root-mean-square error over the stated standard deviation, how
-//! often the 95 % interval holds the truth, which models were chosen, and how often none fitted a recording.
+//! Do the estimates keep what they state? Identifies many recordings of the FMU with different gyro noise, without priors and
+//! starts. Prints the root-mean-square error over the stated standard deviation, how often the 95 % interval contains the truth,
+//! which models were chosen, and how often no model fitted.
 //!
 //! ```text
 //! cargo run --release -p identify --example coverage -- [KEY=VALUE ...]

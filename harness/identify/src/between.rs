@@ -1,8 +1,8 @@
 //! What the torque does between rows: which behaviour explains the recordings best.
 //!
-//! A torque that is held from row to row comes half a row late, on average: held without a delay and linear with one of half a row
-//! differ by little. So behaviour and delay are judged together, and with all other unknowns free; and no behaviour is taken that
-//! needs an effect before its cause.
+//! A held torque comes half a row late on average, so "held without a delay" and "linear with a delay of half a row" differ
+//! little. So behaviour and delay are judged together, and with all other unknowns free; and no behaviour is taken that needs an
+//! effect before its cause.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -14,13 +14,13 @@ use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
 use crate::unknown::Quantity;
 
-/// Standard deviations by which a delay below zero is more than chance.
+/// Standard deviations below zero at which a delay counts as acausal.
 const ACAUSAL: f64 = 3.0;
 
-/// Part of a row by which time stamps of two channels may be apart without anybody's minding.
+/// Difference of two channels' time stamps that is negligible, in rows.
 const SYNCHRONOUS: f64 = 0.02;
 
-/// Part of a row by which a delay may differ from half a row and still be taken for one.
+/// Difference from half a row up to which a delay counts as half a row, in rows.
 const NEAR_HALF: f64 = 0.1;
 
 /// Another behaviour than the one that was fitted.
@@ -28,27 +28,28 @@ const NEAR_HALF: f64 = 0.1;
 pub struct Alternative {
     /// The behaviour.
     pub behaviour: Intersample,
-    /// The minimum with it, all unknowns free.
+    /// The minimum with this behaviour, all unknowns free.
     pub minimum: Polished,
     /// Sum of squares there, less what steps would still win by their second order.
     pub cost: f64,
-    /// The delay with it, s, and its standard deviation; `None` if it is not estimated.
+    /// The delay with this behaviour, s, and its standard deviation; `None` if the delay is not estimated.
     pub delay: Option<(f64, f64)>,
 }
 
-/// The other behaviours, and the minimum that they were sought from.
+/// The other intersample behaviours, and the minimum at which their searches began.
 #[derive(Clone)]
 pub struct Others {
-    /// The variables there.
+    /// Variables x at that minimum.
     from: Vec<f64>,
-    /// With what noise.
+    /// Channels, with the noise levels of that minimum.
     channels: Vec<Channel>,
-    /// Each with its own minimum.
+    /// The other behaviours, each with its own minimum.
     pub all: Vec<Alternative>,
 }
 
 impl Others {
-    /// The one with a behaviour, where the noise is the same and a minimum less than a standard deviation from the one that it was sought from.
+    /// Returns the result for a behaviour if the noise is the same and the new minimum is less than a standard deviation from the
+    /// one at which the search began.
     fn near(
         &self,
         behaviour: Intersample,
@@ -114,11 +115,12 @@ const LOST: f64 = 10.0;
 /// Newton decrement below which the sum of squares of the minimum is foreseen well enough to say that it does not count.
 const FORESEEN: f64 = 1.0;
 
-/// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row. The
-/// sensitivities are nearly the same, so each costs a few simulations; where they lead near the minimum but not to it (the wrong behaviour may have
-/// moved what a recording hardly shows far along its valley) it has its own, for a sum of squares on the way is no evidence, unless it is
-/// less than a standard deviation from a minimum that decides against it. Where they were sought
-/// `before`, of nearly the same noise and from nearly the same minimum, they are sought on from where they were found, and one that was far is still far.
+/// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row.
+/// The sensitivities are nearly the same, so each behaviour costs a few simulations. If they lead near its minimum but not to it,
+/// the behaviour gets sensitivities of its own: a wrong behaviour may have moved a poorly determined unknown far along its
+/// valley, and a sum of squares on the way is no evidence. The exception is a point less than a standard deviation from a minimum
+/// that already decides against the behaviour. If they were sought `before` with nearly the same noise and from nearly the same
+/// minimum, the search continues from the earlier results, and a behaviour that was far off stays rejected.
 pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Others>) -> Others {
     let now = problem.setup.intersample;
     let delayed = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay);
@@ -176,8 +178,8 @@ pub fn better(cost: f64, step: f64, acausal: bool, others: &[Alternative]) -> Op
         .filter(|best| best.cost < cost - ALIKE)
 }
 
-/// What the covariance of the unknowns x gains because the torque may be another one between rows: Σ p_k δ_k δ_kᵀ, with p_k the
-/// probability of behaviour k, all equally probable beforehand, and δ_k how far its minimum is from this one's. `None`: this one is sure.
+/// Returns the covariance that the unknown intersample behaviour adds to the unknowns x: Σ p_k δ_k δ_kᵀ. p_k is the probability
+/// of behaviour k (equal priors), δ_k the distance of its minimum from this one. `None`: this one is sure.
 pub fn gained(
     found: &Polished,
     step: f64,
@@ -197,7 +199,7 @@ pub fn gained(
     gained
 }
 
-/// The behaviours that cannot be told from the one that was fitted.
+/// Returns the behaviours that the recordings cannot distinguish from the fitted one.
 fn near(
     cost: f64,
     step: f64,
@@ -269,8 +271,8 @@ pub fn evidence(
     )
 }
 
-/// Returns true if a torque that is half a row late would be found: no other behaviour explains the recordings as well with a delay
-/// (`delay` is the fitted one, s) that differs by more than a quarter of a row.
+/// Returns true if the fit would notice a torque that is half a row late: no other behaviour explains the recordings equally well
+/// with a delay that differs from the fitted `delay` (s) by more than a quarter of a row.
 pub fn is_found(
     (cost, delay): (f64, f64),
     step: f64,

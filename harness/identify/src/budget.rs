@@ -1,12 +1,13 @@
-//! The error budget: what an error of something that is not estimated does to the estimates.
+//! The error budget: the effect on the estimates of errors in quantities that are not estimated.
 //!
-//! The minimum is sought anew with the error in place, with e the innovations, J their sensitivities and q what is wrong:
+//! The minimum is sought again with the error in place. e are the innovations, J their sensitivities, q the quantity with the
+//! error:
 //!
 //! ```text
 //! x̂ ← x̂ − (JᵀJ)⁻¹ Jᵀ (e(x̂; q + Δq) − e(x; q))
 //! ```
 //!
-//! What is known of q makes that part of the covariance of x̂: σ_q² (dx̂/dq)(dx̂/dq)ᵀ, as if q were one more unknown with that knowledge.
+//! The uncertainty σ_q adds σ_q² (dx̂/dq)(dx̂/dq)ᵀ to the covariance of x̂, as if q were one more unknown with a prior.
 
 use std::collections::BTreeMap;
 
@@ -80,8 +81,8 @@ pub fn slopes(problem: &Problem, found: &Polished, tolerances: &Tolerances) -> R
     Ok(slopes)
 }
 
-/// Derivative of the stacked innovations with respect to the logarithm of `torque`, `clock` or a parameter of the FMU that is not estimated,
-/// at a minimum with its answer and sensitivities.
+/// Returns the derivative of the stacked innovations by the logarithm of `torque`, `clock` or a parameter of the FMU that is not
+/// estimated, at a minimum.
 ///
 /// # Errors
 /// If the FMU refuses to run.
@@ -118,9 +119,9 @@ fn with_error(
 /// Change of the innovations at x by an error of this size, and how far the minimum moves.
 ///
 /// The minimum is sought anew with the error, by Gauss and Newton's steps with the sensitivities that there are. It begins at the bench that has the
-/// same motion under the error ([`same_motion`]). A difference of the innovations at x itself would not do: where dry
-/// friction makes the hub stick, the instants of sticking jump with the torque, and the sensitivities of b, c, d and the
-/// asymmetry do not explain such a difference though they could. Where the steps do not settle, the first order at x is taken.
+/// same motion under the error ([`same_motion`]). A difference at fixed x would be wrong: if dry friction makes the hub stick,
+/// the instants of sticking jump with the torque. The sensitivities to b, c, d and the asymmetry could compensate that jump, but
+/// not in such a difference. Where the steps do not settle, the first order at x is taken.
 fn refit(
     problem: &Problem,
     (x, answer, jacobian): (&[f64], &Answer, &DMatrix<f64>),

@@ -199,8 +199,8 @@ fn unknowns(
         if matches!(name, friction::B | friction::C | friction::D) {
             unknown.scale = Scale::Softplus(0.1 * value);
         }
-        // Of the right size, give or take a factor of some ten: without that, a model that does not fit may drive
-        // what it does not need to nothing, and its influence with it.
+        // Within about a factor of ten of the expected size. Otherwise a model that does not fit may drive a parameter that it
+        // does not need to zero, and lose its influence.
         let vague = match name {
             friction::B => 3.0,
             // a deep tank's fill shows next to nothing of itself

@@ -4,9 +4,9 @@
 //! l = d/(2ξ T),   m = ρ π d³ T/(4 ξ (ξ² − 1)) ~ ρ l³ T⁴,   I₀ = I + r² (ρ π d² h/4 − m),   T = tanh(2 ξ h/d)
 //! ```
 //!
-//! What a recording shows, l, m and I₀ (`tank.rs`), is normally distributed, and so is ln T; d, h and I are not, where T comes near 1: there h
-//! follows from the last thousandths of T, which it hardly changes itself. To first order in d, h and I it would seem that T is known, and h from below
-//! with it. The sensitivities to (ln l, ln T, ln I₀) come from those to d, h and I and to the density, which changes m as T⁴ does,
+//! A recording shows l, m and I₀ (`tank.rs`); they are normally distributed, and so is ln T. d, h and I are not if T is near 1: h
+//! then follows from the last thousandths of T. To first order in d, h and I it would seem that T is known, and h from below with
+//! it. The sensitivities to (ln l, ln T, ln I₀) come from those to d, h and I and to the density, which changes m as T⁴ does,
 //!
 //! ```text
 //! e_T = 4 (e_ρ − a e_I),   e_l = e_d + e_h − 3 a e_I,   e_I₀ = (I₀/I) e_I,   a = r² (m_liq − m)/I,   all of logarithms,
@@ -209,8 +209,8 @@ mod tests {
         }
     }
 
-    /// Where the best T is 1 or more, the fill is known from below alone, by how far T can be from 1: the quantile 2.5 % of a half normal
-    /// distribution is 2.24 deviations.
+    /// If the best T is 1 or more, only a lower bound of the fill is known, from the smallest plausible T: the 2.5 % quantile of
+    /// a half-normal distribution is at 2.24 deviations.
     #[test]
     fn the_fill_of_a_tank_without_a_bottom_is_known_from_below() {
         let (length, deviation, inertia) = (0.0343_f64, 2e-3, 4.0_f64);

@@ -132,12 +132,12 @@ impl Multisine {
     }
 }
 
-/// Part of the power that is spread over all lines whatever the design says: a plant that is a little different
-/// must still be excited where it resonates, and distortion must be seen everywhere.
+/// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
+/// distortion everywhere.
 const SPREAD: f64 = 0.25;
 
-/// Shares of the power on lines at these frequencies (Hz) that make the determinant of the information on a linear
-/// bench's five parameters largest (D-optimal), with [`SPREAD`] of it the same on all lines.
+/// Returns the D-optimal power of lines at these frequencies (Hz): it maximises the determinant of the information on a linear
+/// bench's five parameters. The share [`SPREAD`] is the same on all lines.
 ///
 /// ```text
 /// maximise ln det Σ p_k A_k,  A_k = Re(J_kᴴ J_k),  J_k = ∂H(f_k)/∂ ln(f, ζ, m, I0, b):

@@ -4,14 +4,12 @@
 //! minimise Σ e_k² + Σ ((x_i − μ_i)/s_i)²,   e = whitened( y_k − s ω(t_k − δ; p) − b )
 //! ```
 //!
-//! ω is the FMU's answer (see [`crate::simulate`]), s, b and δ the gyro's scale and bias and the delay,
-//! the second sum what is known of some parameters beforehand, the whitening filter that of
-//! [`analysis::gauss_markov`]. Where an encoder was recorded, its angle less an offset is a second such sum, which
-//! knows nothing of the gyro's scale.
+//! ω is the FMU's answer (see [`crate::simulate`]), s, b and δ are the gyro's scale, its bias and the delay. The second sum holds
+//! the priors. [`analysis::gauss_markov`] has the whitening filter. An encoder's angle, less an offset, adds a sum of the same
+//! form without the gyro's scale.
 //!
-//! Two searches. From afar, that of [`crate::minimum`]. Near the minimum, Gauss
-//! and Newton's, with sensitivities that are kept as long as they serve: the FMU answers once a step
-//! instead of once an unknown. It ends by the Newton decrement
+//! Far from the minimum the search is that of [`crate::minimum`]. Near it, Gauss–Newton steps reuse their sensitivities while
+//! they still reduce the cost: one simulation a step instead of one for each unknown. It ends by the Newton decrement
 //!
 //! ```text
 //! λ = sqrt(gᵀ (JᵀJ)⁻¹ g),   g = Jᵀe
@@ -25,10 +23,10 @@
 //! small against curvature and large against the integrator's tolerance
 //! (`sensitivities_are_those_of_smaller_and_larger_steps` in tests/twin.rs).
 //!
-//! Along a valley large sensitivities cancel: c and d of the friction are 0.9999 correlated, and differences of each
-//! that are good to 1 % say nothing of c − d. So differences are taken along directions L from sensitivities
-//! known before, L = V S⁻¹ of their J = U S Vᵀ, which move the answer by one standard deviation
-//! each and at right angles to one another; then J = D L⁻¹ is as good along the valley as across it.
+//! Along a valley large sensitivities cancel: c and d of the friction are 0.9999 correlated, and differences that are right to 1
+//! % say nothing about c − d. So differences are taken along the directions L = V S⁻¹ of earlier sensitivities J = U S Vᵀ. These
+//! directions move the answer by one standard deviation each, at right angles to one another. With D the differences along them,
+//! J = D L⁻¹ is as accurate along the valley as across it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -656,9 +654,9 @@ impl<'a> Problem<'a> {
         DMatrix::from_columns(&(0..free.len()).map(column).collect::<Vec<_>>())
     }
 
-    /// Sensitivities carried along a valley, without a simulation: they are the same in the variables in which the valley is straight, and so
-    /// J there is J here times the inverse of that `turn`. What is known of unknowns stays as it is. False: a step that a bound has
-    /// cut short (there is no such tank) leads there from many places, and says nothing of sensitivities; they stay.
+    /// Moves sensitivities along a valley without a simulation. They are constant in the variables in which the valley is
+    /// straight, so J there is J here times the inverse of `turn`. The rows of priors stay. Returns false and changes nothing if
+    /// `turn` cannot be inverted: a bound has cut the step short (there is no such tank).
     pub fn carry(&self, jacobian: &mut DMatrix<f64>, turn: &DMatrix<f64>) -> bool {
         let known = self.unknowns.iter().filter(|unknown| unknown.prior.is_some()).count();
         let Some(back) = turn.clone().try_inverse().filter(|back| back.amax() < SHARPEST) else {
@@ -720,10 +718,9 @@ impl<'a> Problem<'a> {
     }
 
     /// Gauss and Newton's steps from near a minimum, until the Newton decrement is below [`DECREMENT`], with
-    /// at most `rounds` sets of sensitivities. A step v that makes it worse has left a bent valley: there
-    /// e(x + v) − e(x) − J v is what the curvature has made, and −(JᵀJ)⁻¹Jᵀ of it leads back (second order, without another
-    /// simulation but that of the new point; Transtrum & Sethna, arXiv:1207.4999, geodesic acceleration). A step that is worse
-    /// even so is shortened.
+    /// at most `rounds` sets of sensitivities. A step v that increases the cost has left a curved valley. The curvature's part is
+    /// e(x + v) − e(x) − J v, and −(JᵀJ)⁻¹Jᵀ times it leads back: a correction of second order that costs one simulation
+    /// (geodesic acceleration; Transtrum & Sethna, arXiv:1207.4999). A step that is worse even so is shortened.
     pub fn polish(
         &self,
         x: &[f64],
@@ -853,9 +850,10 @@ impl<'a> Problem<'a> {
         unreachable!("the rounds are counted")
     }
 
-    /// Where a search has ended off the minimum: the minimum with those unknowns held that have it at a kink, which no Newton step finds. These are a
-    /// friction that the step would lead below zero, an unknown that it would lead out of the range that the FMU allows, and an initial rate of the hub that is zero within two standard deviations: dry friction
-    /// stops a slow hub within a row, whatever the sign of its rate. Sensitivities and covariance are those of all unknowns.
+    /// Where a search has ended off the minimum: the minimum with those unknowns held that have it at a kink, which no Newton
+    /// step finds. These are a friction that the step would make negative, an unknown that it would lead out of the FMU's range,
+    /// and an initial rate of the hub that is zero within two standard deviations. (Dry friction stops a slow hub within a row,
+    /// whatever the sign of its rate.) Sensitivities and covariance are those of all unknowns.
     pub fn polish_at_kink(&self, found: Polished, rounds: usize) -> Result<Polished> {
         if found.decrement < MINIMUM {
             return Ok(found);
@@ -929,8 +927,8 @@ impl<'a> Problem<'a> {
     ///
     /// A start whose slosh frequency is 20 % off is out of phase after a few cycles; over a whole
     /// recording its error has as many minima as there are cycles. Over the beginning it has one,
-    /// and as the window grows the estimate stays within its reach. Where the residual of a window has [`JUMP`] times the
-    /// mean square of the one before (a resonance or rotary slosh has come into it), it is reached in smaller steps.
+    /// and as the window grows the estimate stays within its reach. If the residual's mean square rises by the factor [`JUMP`]
+    /// from one window to the next (a resonance or rotary slosh begins), the window grows in smaller steps.
     pub fn search_growing(
         &self,
         x: &[f64],
@@ -982,8 +980,9 @@ impl<'a> Problem<'a> {
         self.recordings.iter().map(|r| r.loudest(LOUDEST, RUN_IN)).collect()
     }
 
-    /// Searches over parts of the recordings from x. Each parameter is also held near its first start ([`PRIOR_WIDTH`]), for a short
-    /// window does not say everything, and what the model cannot follow yet counts as noise of [`NOISE_FACTOR`] times the gyro's.
+    /// Searches over parts of the recordings from x. A wide prior ([`PRIOR_WIDTH`]) holds each parameter near its first start,
+    /// because a short window does not determine all. Noise of [`NOISE_FACTOR`] times the gyro's covers what the model cannot
+    /// follow yet.
     fn search_part(&self, first: &[f64], x: &[f64], part: &[Recording]) -> Result<Rough> {
         let mut problem = Problem { recordings: part, ..self.clone() };
         for (unknown, &x) in problem.unknowns.iter_mut().zip(first) {

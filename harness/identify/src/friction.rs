@@ -7,18 +7,19 @@
 //! b, c and d enter linearly, ω_s does not. Far below ω_s only c + d shows, far above only c; so the sum of squares has
 //! valleys and more than one minimum along ω_s. Here ω_s is held at one value after the other, and the other unknowns
 //! are fitted. On a grid over the speeds of the recording that shows where the lowest minimum is, which no start can lead astray
-//! ([`grid`]). From the minimum outwards it is the profile likelihood ([`Profile`]): with C(ω_s) the sum of squares, v(ω_s) the other
-//! unknown's value and V(ω_s) its variance at a fixed ω_s,
+//! ([`grid`]). Around the minimum it is the profile likelihood ([`Profile`]). C(ω_s) is the sum of squares at a fixed ω_s, v(ω_s)
+//! the other unknown's value and V(ω_s) its variance:
 //!
 //! ```text
 //! 95 % interval of ω_s:      C(ω_s) − C_min ≤ 1.96²
 //! 95 % interval of another:  the union of v ± sqrt((1.96² + C_min − C) V)
 //! ```
 //!
-//! (Pawitan, In All Likelihood, 3.4). A valley elsewhere whose sum of squares is not clearly larger ([`DECIDES`], as between models) is not
-//! refuted by being a little higher: which of several valleys is the lowest is a matter of chance, for the difference of two has not the
-//! distribution of one's own width (Davies, Biometrika 74, 1987). Its interval is that about its own least, and all are joined. What holds an unknown only vaguely beforehand does not count in C. An end that the speeds of the
-//! recording do not reach is open: the unknown is not determined there.
+//! (Pawitan, In All Likelihood, 3.4). Another valley counts too unless its sum of squares is clearly larger ([`DECIDES`], as
+//! between models). Noise decides which of several valleys is the lowest, and the difference of two minima does not follow the χ²
+//! distribution of a single one (Davies, Biometrika 74, 1987). Its interval is that about its own least, and all are joined. What
+//! holds an unknown only vaguely beforehand does not count in C. An end that the speeds of the recording do not reach is open:
+//! the unknown is not determined there.
 
 use analysis::innovations::Tests;
 use anyhow::Result;
@@ -233,7 +234,7 @@ fn point(
     let known = Known::Sensitivities(&jacobian);
     let found = problem.polish_some((x, answer), &others, known, until).ok()?;
     let least = Until::foreseen(found.cost, found.decrement);
-    // what further steps would win to second order, where that can be told
+    // expected gain of further steps, to second order, if known
     let far = found.decrement > 1.0 && least <= most;
     let left = if far { 0.0 } else { found.decrement.powi(2) };
     Some(Point {
@@ -372,8 +373,8 @@ pub fn profile(
     }))
 }
 
-/// Fits from the middle outwards until the sum of squares is near [`LIMIT`] over `least`, and between points once there are some on both
-/// sides of it; whether even at the last speed, `end`, it is not.
+/// Fits from the middle outwards until the sum of squares is about [`LIMIT`] above `least`, then between the points on both sides
+/// of that value. Returns true if no such speed was found up to the last one, `end`.
 fn outwards(
     problem: &Problem,
     minimum: &Polished,
@@ -506,9 +507,9 @@ struct Place {
 /// Places between two points.
 const BETWEEN: usize = 8;
 
-/// The profile between its points as well: x and its covariance are joined by lines, and so is the root of the sum of squares above the
-/// least, with its sign, which is what a quadratic makes a line. Without them, an unknown that goes with ω_s would have an interval too
-/// narrow by up to 1/√2, for the widest is between the middle and the end.
+/// Interpolates the profile linearly: x, its covariance, and the signed root of the sum of squares above the least, which is a
+/// straight line for a quadratic. Without them, an unknown that goes with ω_s would have an interval too narrow by up to 1/√2,
+/// for the widest is between the middle and the end.
 fn places(points: &[Point], least: f64) -> Vec<Place> {
     let lowest = points.iter().position(|p| p.data == least).unwrap_or(0);
     let root = |k: usize| {

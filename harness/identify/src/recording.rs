@@ -386,7 +386,7 @@ fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
         found.iter().take(LISTED).map(|(k, _)| format!("{:.2}", part.time[*k])).collect();
     let more = if found.len() > LISTED { ", …" } else { "" };
     done(format!(
-        "{}: {} single values of omega are off those beside them by more than noise, by up to {largest:.2e} rad/s; they are \
+        "{}: {} single values of omega differ from their neighbours by more than noise, by up to {largest:.2e} rad/s; they are \
          not fitted (at {}{more} s)",
         part.name,
         found.len(),

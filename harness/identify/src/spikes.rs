@@ -66,7 +66,7 @@ pub fn find(rate: &[f64], torque: &[f64], fresh: Option<&[bool]>) -> Vec<(usize,
         let near = sound.near(k).filter(|near| suspects.binary_search(near).is_ok());
         by_size.extend(near.map(|near| (off(&sound, near).to_bits(), near)));
     }
-    // what only stood beside one is put back
+    // put back neighbours of spikes that were taken by mistake
     for k in taken.iter().copied() {
         if (y[k] - cubic(&y, &sound, k)).abs() < limit {
             sound.put_back(k);

@@ -22,7 +22,7 @@ pub const WINDOW: f64 = 50.0;
 
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.3;
-/// Correlation beyond which two unknowns are told apart only if they are precise all the same.
+/// Correlation above which two unknowns count as determined only if each is precise by itself.
 const CORRELATED: f64 = 0.99;
 /// Relative standard deviation beyond which a correlated unknown is not known by itself.
 const VAGUE: f64 = 0.05;
@@ -199,7 +199,7 @@ impl Combination {
     /// In words.
     pub fn words(&self) -> String {
         format!(
-            "{} and {} cannot be told apart (correlation {:.4}); known is {} = {:.6} ± {:.6} {}.",
+            "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",
             self.of[0],
             self.of[1],
             self.correlation,

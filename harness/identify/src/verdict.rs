@@ -26,7 +26,7 @@ pub const DOUBTS: [&str; 3] = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED];
 
 /// Candidates of the choice.
 pub struct Question<'a> {
-    /// Slosh models, those that cannot be told from the best first.
+    /// Slosh models; those that fit about as well as the best come first.
     pub slosh: &'a [ModelFit],
     /// Number of those.
     pub near: usize,

@@ -1,9 +1,8 @@
 //! The platforms an FMU and the program for everybody are built for, and what building for each
 //! takes.
 //!
-//! Rust's compiler writes code for all of them; what has to be had besides is
-//! Rust's standard library for the target and a linker. `harness/platforms/setup`
-//! gets both on a Debian machine, into `target/tools`.
+//! Rust's compiler writes code for all of them. Each target also needs Rust's standard library and a linker.
+//! `harness/platforms/setup` gets both on a Debian machine, into `target/tools`.
 
 use std::collections::BTreeMap;
 use std::env;

@@ -27,7 +27,7 @@ class RunError(FmuError):
     """A run that stopped on its way."""
 
     def __init__(self, sentence: str, time: float, columns: dict[str, np.ndarray]) -> None:
-        """Take what is said of it."""
+        """Store the message, the time and the record."""
         super().__init__(sentence)
         self.time = time
         """Start of the last step, s."""

@@ -36,7 +36,7 @@ PARAMETERS = {
 
 
 def three(fmu: Path, model: str = "HubSlosh") -> Path:
-    """Return the FMU 3.0 beside an FMU 2.0."""
+    """Return the FMU 3.0 in the same folder as an FMU 2.0."""
     return fmu.with_name(f"{model}-fmi3.fmu")
 
 
@@ -58,7 +58,7 @@ def test_held_inputs_give_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
 
 @pytest.mark.parametrize("model", INPUTS)
 def test_inputs_in_lines_go_through_intermediate_update(fmu: Path, model: str) -> None:
-    """FMI 3.0 is told ends of lines, not slopes: a slope is right to some units of the last digit.
+    """FMI 3.0 receives ends of lines, not slopes: slopes are right to some units of the last digit.
 
     Held inputs are far from it.
     """

@@ -452,10 +452,9 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
 
 /// `intermediate.inputs`
 ///
-/// An input that goes in a straight line through a step, set in intermediate update, is followed better than one that
-/// is held: the outputs come nearer to those of the same line in steps 64 times as short. The short steps have it in
-/// intermediate update too, for an FMU may use the input's rate, which inputs that are held do not have at any step
-/// (a wheel's torque is minus the rate of its momentum).
+/// Checks that inputs set in intermediate update act within the step. With an input on a straight line, the outputs must come
+/// nearer to those of steps 64 times as short than with a held input. The short steps use intermediate update too: an FMU may use
+/// the input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have none at any step.
 pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !updating(subject, findings) {
         return Ok(());
@@ -717,8 +716,8 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Whether a value that was `before` has become another by more than rounding: terms of the moved known that cancel in
-/// exact arithmetic leave a few units in the last place, while the known moves by a hundredth of its size or more.
+/// Returns true if a value differs from `before` by more than rounding. Terms of the moved known that cancel in exact arithmetic
+/// leave a few units in the last place; the known itself moves by at least a hundredth of its size.
 fn follows(after: f64, before: f64) -> bool {
     const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let same = after.to_bits() == before.to_bits()

@@ -36,8 +36,8 @@ pub struct DesignArgs {
     /// An odd random-phase multisine with detection lines and this peak, N·m.
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
-    /// Says which torque gives a sine of the rate this signal-to-noise ratio, dB, in the gyro's samples: on the band, at
-    /// resonance and antiresonance, and what a rigid hub would need (thesis 8.6.1).
+    /// Prints the torque of a sine whose rate has this signal-to-noise ratio, dB, in the gyro's samples: on the band, at
+    /// resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
     #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
     snr: Option<f64>,
     /// Period of the multisine, s.
@@ -456,8 +456,8 @@ impl DesignArgs {
     }
 }
 
-/// The linear bench that is expected: dry friction as the viscous friction that takes the same power at the
-/// rate of a torque with this peak (crest factor 3) far from resonance.
+/// Returns the expected linear bench. Its viscous friction takes the same power as the dry friction, at the rate of a torque with
+/// this peak (crest factor 3) far from resonance.
 fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
     let arm = real(tank::R)?;
     let mode = Mode {

@@ -21,8 +21,8 @@ pub struct PackArgs {
     /// Version of FMI, 2 or 3; the binary is the same.
     #[arg(long, value_name = "2|3", default_value = "2", value_parser = fmi, conflicts_with_all = ["python", "sdist"])]
     fmi: Fmi,
-    /// Of FMI 3.0: vectors and matrices are variables, and how many tanks or modes there are is a structural parameter
-    /// that a host can set before it initialises; the binary is the same.
+    /// FMI 3.0 only: vectors and matrices are array variables, and the numbers of tanks and modes are structural parameters that
+    /// a host can set before initialization. The binary is the same.
     #[arg(long, conflicts_with_all = ["python", "sdist"])]
     arrays: bool,
     /// Pack the Python package instead, with all FMUs and the command hubslosh inside, as a wheel.
@@ -48,8 +48,8 @@ pub struct PackArgs {
     /// on a Debian machine harness/platforms/setup gets what that takes.
     #[arg(long)]
     all_platforms: bool,
-    /// Adds a module for WebAssembly to this machine's binary, as binaries/wasm32/NAME.wasm, for web pages and Node.js
-    /// (harness/web/fmu/host.js); harness/platforms/setup --wasm gets what that takes.
+    /// Adds binaries/wasm32/NAME.wasm, a WebAssembly module for web pages and Node.js (harness/web/fmu/host.js).
+    /// harness/platforms/setup --wasm installs the tools.
     #[arg(long, conflicts_with_all = ["python", "sdist", "all_platforms"])]
     wasm: bool,
 }

@@ -12,8 +12,8 @@ use crate::progress;
 /// Default folder of the release.
 const DEFAULT_RELEASE: &str = "dist/release";
 
-/// Builds and checks the release for all platforms: each FMU in both versions of FMI with its software bill of materials
-/// (SBOM) and the report of its check; the Python package's wheels with their SBOMs, of which the one for Linux is kept.
+/// Builds and checks the release for all platforms. Each FMU comes in both versions of FMI with its software bill of materials
+/// (SBOM) and the report of its check. The Python package's wheels have SBOMs too; the folder keeps the wheel for Linux.
 /// SHA256SUMS lists them all; files of older versions are removed, their hashes stay.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\

@@ -30,8 +30,8 @@ pub struct RunArgs {
         required_unless_present = "input"
     )]
     profile: Option<String>,
-    /// Histories of inputs, .csv or .parquet: time (s), and every column that is an input of the
-    /// FMU, such as tau_cmd, tau_ext, g_axial; tau_slope is tau_cmd's derivative until the next row.
+    /// Histories of inputs, .csv or .parquet, with the column time (s). Every column with the name of an input of the FMU drives
+    /// that input, such as tau_cmd, tau_ext, g_axial; tau_slope is tau_cmd's derivative until the next row.
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
     /// Pass over columns of --input that are no inputs, instead of refusing them.
@@ -60,7 +60,7 @@ pub struct RunArgs {
     /// Input that the profile drives [default: tau_cmd, or the FMU's only Real input].
     #[arg(long, value_name = "NAME")]
     drive: Option<String>,
-    /// Surface tension of the liquid in the tanks of Spacecraft and SloshTank, N/m, for the warning where weight does not rule it; its
+    /// Surface tension of the liquid in the tanks of Spacecraft and SloshTank, N/m, for the warning at low Bond numbers. The
     /// density is the tank's parameter [default: water's, 0.07213].
     #[arg(long, value_name = "N/M")]
     tension: Option<f64>,

@@ -17,9 +17,9 @@ use crate::{progress, terminal};
 /// Measures what one communication step costs, in time and instructions, and chooses solver.max_steps for a deadline.
 ///
 /// HubSlosh and SloshTank make a sweep, Spacecraft a slew, in steps with held inputs. The time of a step is the least of
-/// five from the same saved state. Instructions are counted on Linux, of the slowest steps and of some in the middle. With
-/// --deadline the largest number of internal steps is looked for that takes at most this time, with a margin: at states
-/// along the manoeuvre the FMU is asked for far too long a step, and the time counts until it refuses.
+/// five from the same saved state. Instructions are counted on Linux, of the slowest steps and of some in the middle. --deadline
+/// finds the largest number of internal steps that take at most this time, with a margin. At states along the manoeuvre the
+/// command requests a far too long step, and measures the time until the FMU refuses it.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh step-cost --deadline 1ms\n  \
     hubslosh step-cost --fmu Spacecraft-fmi3 --deadline 500us --step 10ms --set tanks=2\n  \
@@ -233,8 +233,8 @@ impl Found<'_> {
                  gave up, and nothing has changed; shorter steps go on from there."
             }
             false => {
-                "A step that would need more is refused after that time: fmi2DoStep returns fmi2Error, says when it \
-                 gave up, and has changed nothing; a host that wants to go on restores a saved state."
+                "The FMU refuses a step that would need more: fmi2DoStep returns fmi2Error with the time that it reached, and \
+                 the state does not change. To continue, a host restores a saved state."
             }
         }
     }

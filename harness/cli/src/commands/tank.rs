@@ -30,8 +30,8 @@ pub struct TankArgs {
     /// The tank: density, and contour or box.
     #[arg(value_name = "TANK.toml")]
     tank: PathBuf,
-    /// Height of the free surface above the tank's lowest point, m; or, with a % sign, per cent of the tank's volume
-    /// (of a tank that is open at the top up to the end of its wall). A full tank has no free surface and no modes.
+    /// Height of the free surface above the tank's lowest point, m; or, with a % sign, per cent of the tank's volume (up to the
+    /// end of the wall if the tank is open at the top). A full tank has no free surface and no modes.
     #[arg(long, value_name = "METRES|PERCENT%", required_unless_present_any = ["sweep", "fill_mass"])]
     fill: Option<Fill>,
     /// In place of --fill: mass of the liquid, kg, at the tank's density.
@@ -67,17 +67,17 @@ pub struct TankArgs {
     /// The tank of Spacecraft that --parameters are for, 1 to 4.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
-    /// Kinematic viscosity of the liquid, m2/s, for the damping ratios and between what they are to be expected, at
-    /// --gravity: in the table, in --out and in --parameters; with --sweep in --parameters alone, where the ratios are those
-    /// at the largest fill [default: none, the ratios are 0].
+    /// Kinematic viscosity of the liquid, m2/s, for the damping ratios at --gravity and their expected ranges, in the table, in
+    /// --out and in --parameters. With --sweep, only --parameters has them, at the largest fill [default: none, the ratios are
+    /// 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
     /// Surface tension, N/m, for the frequencies (in table, picture and --out at --gravity), for the centring stiffness of
     /// --parameters and for the damping [default: none].
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     sigma: Option<f64>,
-    /// Contact angle between surface and wall, degrees: frequency and centring stiffness of an upright cylinder's first
-    /// mode are then those of the meniscus that --gravity and --sigma make. 90 is a flat surface.
+    /// Contact angle between surface and wall, degrees. Frequency and centring stiffness of an upright cylinder's first mode then
+    /// include the meniscus at --gravity and --sigma. 90 is a flat surface.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
     /// Write --parameters although a centring stiffness is far outside of what its formula holds for.

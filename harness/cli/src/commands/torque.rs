@@ -13,8 +13,8 @@ use crate::terminal;
 /// Writes a profile's torque alone: time (s), tau_cmd (N·m), and tau_slope (N·m/s), which is the
 /// torque's derivative until the next row.
 ///
-/// Given value and slope at every row the FMU sees what `hubslosh run` shows it, jumps included;
-/// time and tau_cmd alone are a torque history for --input, for a bench or Simulink.
+/// A host that sets value and slope at every row drives the FMU exactly as `hubslosh run` does, jumps included. The columns time
+/// and tau_cmd alone are a torque history for --input, a bench or Simulink.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct TorqueArgs {

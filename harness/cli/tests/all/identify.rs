@@ -126,7 +126,7 @@ fn friction_by_the_accelerations_least_squares_is_fed_back_to_a_run() {
     assert!(said.contains("correlations:") && said.contains("that of the gyro's noise"), "{said}");
     let asked = ["run", "--parameters", "friction.json", "--input", "data.csv", "--ignore-columns"];
     hubslosh(folder, &[&asked[..], &["--out", "twin.csv"]].concat()).unwrap();
-    // what a method does not do is said
+    // the command refuses an option that the method does not use
     let asked = ["identify", "data.csv", "--method", "acceleration", "--harmonics", "1"];
     let said = hubslosh(folder, &[&asked[..], &["--out", "a.json"]].concat()).unwrap_err();
     assert!(said.contains("harmonics of the angle need the column theta"), "{said}");

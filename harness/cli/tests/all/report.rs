@@ -139,7 +139,7 @@ fn agrees(page: &str, says: &str, column: usize) -> bool {
 fn the_page_is_well_formed_and_has_every_figure() {
     let (page, ..) = &*TEN;
     well_formed(page);
-    // the result first, what is to be said about it later
+    // the result first, warnings later
     let result = "From 150 mN·m on the liquid swirls and the resonance moves up to 3.10 Hz; below, the linear model holds within ";
     let [result, warnings, figure] = [result, "class=\"warning\"", "id=\"figure-1\""]
         .map(|words| page.find(words).unwrap_or_else(|| panic!("{words} is not in the page")));

@@ -774,8 +774,8 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
                 return Ok(());
             }
             bail!(
-                "{name} cannot be set to {text}: it is a structural parameter, by which arrays have their size, and that is \
-                 {now} for all that is done with the FMU here (`hubslosh run` and `step-cost` set it)"
+                "{name} cannot be set to {text}: it is a structural parameter that sizes arrays, and its value here is {now} \
+                 (`hubslosh run` and `step-cost` can set it)"
             );
         }
         self.set_value(variable, value).with_context(|| format!("{name}={text} was refused"))

@@ -1,14 +1,13 @@
-//! The thesis's own way in the time domain (6.1.1 and 6.1.2), to be compared with ours: friction, known from
-//! elsewhere, is computed from the *measured* rate and added to the torque; a linear model without friction is
-//! fitted to the answer.
+//! The thesis's method in the time domain (6.1.1 and 6.1.2), for comparison with ours. It computes a known friction from the
+//! *measured* rate, adds it to the torque, and fits a linear model without friction.
 //!
 //! ```text
 //! τ_act = τ_cmd + τ_f(ω_measured),   ω ≈ linear bench(d, h, ζ) driven by τ_act
 //! ```
 //!
-//! It fails, and why can be seen in the equations: nothing in the model loses energy but the slosh. Every error of
-//! τ_act, by noise near ω = 0, by a gyro's bias, by friction that is a little different, is integrated by a hub that no longer
-//! has friction, and the simulated rate drifts off; in the FMU the same error dies out within seconds.
+//! It fails, and why can be seen in the equations: nothing in the model loses energy but the slosh. Noise near ω = 0, a gyro's
+//! bias and slightly different friction all make errors of τ_act. A hub without friction integrates them, and the simulated rate
+//! drifts off. In the FMU the same errors die out within seconds.
 
 use std::f64::consts::PI;
 

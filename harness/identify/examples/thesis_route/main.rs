@@ -6,10 +6,10 @@
 //! cargo run --release -p identify --example thesis_route -- [duration of the sweep, s]
 //! ```
 //!
-//! The thesis reports 71.1 % for clean synthetic data, 46.28 % with noise and −520.9 % for experiments (6.1.2), and four to
-//! five hours for a fit with the friction inside (which it then gave up). Here the experiment is a twin whose friction is
-//! 10 % asymmetric and whose gyro has a bias of 2 mrad/s and a delay of 5 ms, which neither way is told.
-//! The compensated way knows everything else exactly: the friction, the hub's inertia, and d, h and ζ as starts.
+//! The thesis reports fits of 71.1 % for clean synthetic data, 46.28 % with noise and −520.9 % for experiments (6.1.2). A fit
+//! with the friction inside took four to five hours, so the thesis gave it up. Here the experiment is a twin with 10 % asymmetric
+//! friction, a gyro bias of 2 mrad/s and a delay of 5 ms. Neither method knows these three values. The compensated way knows
+//! everything else exactly: the friction, the hub's inertia, and d, h and ζ as starts.
 
 #[path = "../fmu_twin/mod.rs"]
 #[allow(dead_code, reason = "others use the rest of it")]

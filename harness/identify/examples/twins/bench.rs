@@ -30,8 +30,8 @@ const TOUCH: f64 = 1e-12;
 /// Longest time without a look whether a hub that sticks breaks away, s.
 const LOOK: f64 = 5e-3;
 
-/// θ, ω, then s and s' of the linear liquid or u and u' of the spherical one; last the time, for ode_solvers 0.6.2 evaluates
-/// the twelfth stage of Dop853 at the beginning of the step (c₁₂ is 0 in its table, 1 in Hairer's).
+/// State: θ, ω, then s and s' of the linear liquid or u and u' of the spherical one. The time is a state because ode_solvers
+/// 0.6.2 evaluates the twelfth stage of Dop853 at the beginning of the step (c₁₂ is 0 in its table, 1 in Hairer's).
 type State = SVector<f64, 9>;
 /// Place of the time.
 const TIME: usize = 8;

@@ -132,7 +132,7 @@ impl Twin {
         twin
     }
 
-    /// What is said of the torque between rows: where a delay may stand for it (half the twins), what it is.
+    /// Returns the intersample behaviour that the fit receives; `None` for half of the twins, where the fit has to find it.
     pub fn told(&self) -> Option<Intersample> {
         (self.seed.is_multiple_of(2)).then_some(self.between)
     }

@@ -25,7 +25,7 @@ pub struct Bound {
     pub not_determined: bool,
     /// True if the errors of the solver decide the bound. Neither bound is known then.
     pub decided_by_solver: bool,
-    /// The unknowns that it cannot be told apart from.
+    /// Names of the unknowns that the recordings cannot distinguish from this one.
     pub inseparable_from: Vec<String>,
     /// The same if all others were known.
     pub std_alone: f64,

@@ -1,10 +1,9 @@
 //! Identification of any FMU by output error: which values of its parameters and starts make its outputs those of the recordings.
 //!
-//! [`question`] says what is asked and with which unknowns, [`record`] reads, [`simulate`] runs the FMU (by its own solver, or by
-//! the host's in [`exchange`]), [`problem`] has the sum of squares, [`search`] its minimum, [`profile`] how sure it is and
-//! [`solver_error`] what the solver's errors do to it;
-//! [`page`] shows it. What a planned recording will tell is in [`foresee`], the likelihood
-//! at other points in [`likelihood`].
+//! [`question`] defines the unknowns, [`record`] reads recordings, and [`simulate`] runs the FMU with its own solver or the
+//! host's ([`exchange`]). [`problem`] computes the sum of squares, [`search`] minimises it, [`profile`] finds intervals, and
+//! [`solver_error`] estimates the effect of the solver's errors. [`page`] writes the report. What a planned recording will tell
+//! is in [`foresee`], the likelihood at other points in [`likelihood`].
 
 pub mod exchange;
 pub mod foresee;
@@ -90,9 +89,9 @@ impl Inseparable {
         let changes: Vec<String> =
             self.direction.iter().map(|(name, by)| format!("{name} {by:+.3e}")).collect();
         format!(
-            "{} cannot be told apart: no output changes when they change together ({}). Give one of them a value with --set in \
-             place of --free, or state what is known of it with --prior; else an output that depends on them differently is \
-             needed, or another motion.",
+            "{} cannot be distinguished: no output changes when they change together ({}). Give one of them a value with --set \
+             in place of --free, or a prior with --prior. Otherwise record an output that depends on them differently, or \
+             another motion.",
             names.join(", "),
             changes.join(", ")
         )
@@ -171,7 +170,7 @@ pub fn identify(
         let free = problem.unknowns.iter().filter(|unknown| unknown.prior.is_none()).count();
         let jumps = problem.leave_out_jumps(&minimum.answer.motion);
         if jumps > 0 {
-            told(&News::Step(format!("{jumps} rows beside which an output jumps are left out")));
+            told(&News::Step(format!("left out {jumps} rows next to jumps of an output")));
         }
         problem.estimate_noise(&minimum.answer.motion, &minimum.x, free, question.drift);
         let changes = problem.channels.iter().zip(&before);
@@ -396,8 +395,8 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
         for j in 0..i {
             if correlations[i][j].abs() > CORRELATED {
                 words.push(format!(
-                    "{} and {} are told apart poorly (correlation {:+.3}): the recordings know a combination of them better than \
-                     each",
+                    "{} and {} are strongly correlated ({:+.3}): the recordings determine a combination of them better than each \
+                     alone",
                     names[j], names[i], correlations[i][j]
                 ));
             }

@@ -7,12 +7,12 @@
 //! y are the FMU's outputs, M and b the errors of the sensors, the whitening filter that of [`analysis::gauss_markov`], the second
 //! sum what is known beforehand.
 //!
-//! Derivatives by M and b are exact. Those by what is set in the FMU are central differences of whole runs, over a step that moves
-//! the answer by [`MOVE`] standard deviations: the secant over what the recordings can tell apart. It is large against the solver's
+//! Derivatives by M and b are exact. Derivatives by parameters and starts are central differences of whole runs. Each step moves
+//! the answer by [`MOVE`] standard deviations, the smallest change that the recordings resolve. It is large against the solver's
 //! errors, and it is a derivative in the mean where an event moves across a row and the residual jumps.
-//! `fmi2GetDirectionalDerivative` is not used: what is free is set before initialization, and after it FMI 2.0 gives derivatives by
-//! states and inputs alone (2.0.5, section 2.1.9). The variational equations would need ∂f/∂p by differences all the same,
-//! and jump at each event.
+//! `fmi2GetDirectionalDerivative` does not help: after initialization it gives derivatives by states and inputs alone (FMI 2.0.5,
+//! section 2.1.9), and unknowns are set before it. The variational equations would need ∂f/∂p by differences all the same, and
+//! jump at each event.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
@@ -394,8 +394,8 @@ impl<'a> Problem<'a> {
         Ok(Difference { slope, bend })
     }
 
-    /// Leaves out the rows beside which the model's outputs jump: an event that the estimate has on the wrong side of a row would be
-    /// a wall in the cost, and the row says nothing of how far it is off. Says how many rows these are.
+    /// Leaves out the rows next to jumps of the model's outputs and returns their number. If the estimate puts an event on the
+    /// wrong side of a row, the cost jumps, and the row does not show how far the event is off.
     pub fn leave_out_jumps(&mut self, motion: &Motion) -> usize {
         let mut count = 0;
         for channel in &mut self.channels {

@@ -1,9 +1,9 @@
 //! Intervals from the profile of the likelihood (Raue et al., Bioinformatics 25, 2009).
 //!
-//! The profile of an unknown is the least sum of squares over all others as it is moved; its 95 % interval is where that has
-//! grown by 3.84, χ² of one degree of freedom. Where the sum of squares is a parabola this is ±1.96 standard deviations. It is
-//! looked at there, on both sides; where it is another one the ends are searched for. An interval that reaches its bound, or
-//! [`FARTHEST`] standard deviations, without an end has none.
+//! The profile of an unknown is the sum of squares minimised over all others, as a function of the unknown. Its 95 % interval
+//! ends where the profile has grown by 3.84, χ² with one degree of freedom. Where the sum of squares is a parabola this is ±1.96
+//! standard deviations. It is looked at there, on both sides; where it is another one the ends are searched for. An interval that
+//! reaches its bound, or [`FARTHEST`] standard deviations, without an end has none.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector};

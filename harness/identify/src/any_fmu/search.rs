@@ -1,7 +1,7 @@
 //! The search of [`crate::minimum`] for any FMU: from afar, and from several starts.
 //!
-//! From afar the search goes over windows of the recordings that grow: over a whole recording of an oscillation the cost has as many
-//! minima as there are cycles, over its beginning one.
+//! Far from the minimum, the search fits growing windows of the recordings. Over a whole recording of an oscillation the cost has
+//! one minimum per cycle, over its beginning only one.
 
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};

@@ -356,8 +356,8 @@ impl Setup {
         self.late(record, read)
     }
 
-    /// By the FMU's own solver: inputs are set at a row, with their slopes where the FMU takes them, the outputs are read and the
-    /// step to the next row is made. Where the FMU takes no slopes, inputs that follow lines are held over [`HELD_STEPS`] parts of
+    /// Simulates with the FMU's own solver: at each row it sets the inputs (with slopes if the FMU takes them), reads the outputs
+    /// and steps to the next row. Where the FMU takes no slopes, inputs that follow lines are held over [`HELD_STEPS`] parts of
     /// the way, each at its value in the middle of the part.
     fn step(
         &self,

@@ -7,17 +7,16 @@
 //!
 //! (5.1 and 5.3 to 5.6; the difference as printed, ω_{k+1} − ω_k over two steps, is half of the acceleration).
 //! It needs no simulation and no liquid that moves: its torque is not in the equation. Starts come from linear least squares on a
-//! grid of Stribeck speeds (`starts.rs`). The friction law does not hold for a hub that sticks: such rows are left out of it, and the
-//! readings of a hub at rest are residuals of the gyro's bias. Without them the bias is known 20 times less well, and the choice of
-//! rows by bias and the bias from these rows may alternate without an end.
-//! Rows closer than 10 ms are taken together first. The noise's share of the power of y goes with the cube of the sampling rate;
-//! I (ω̄_{k+1} − ω̄_{k−1}) = T̄_{k+1} − T̄_{k−1} holds for means over blocks of rows as it does for rows, T the integral of the torque.
-//! Three things make the estimate biased, and here each is dealt with:
+//! grid of Stribeck speeds (`starts.rs`). The friction law does not hold while the hub sticks. Such rows enter only as residuals
+//! of the gyro's bias. Without them the bias is known 20 times less well, and the choice of rows by bias and the bias from these
+//! rows may alternate without an end. Rows closer than 10 ms are taken together first. The noise's share of the power of y grows
+//! with the cube of the sampling rate. I (ω̄_{k+1} − ω̄_{k−1}) = T̄_{k+1} − T̄_{k−1} also holds for means over blocks of rows,
+//! with T the integral of the torque. Three things make the estimate biased, and here each is dealt with:
 //!
 //! * y_k is the mean of the acceleration from t_{k−1} to t_{k+1}, less than its value at t_k by (Ωh)²/6:
-//!   3.2 % at 3.5 Hz and 50 Hz sampling, which goes into I. [`Form::Averaged`] takes the mean of the
-//!   torques over the same interval: of a torque joined by lines or held, and of the friction at the rates of the
-//!   parabola through three rows, whose sign may change within it.
+//!   3.2 % at 3.5 Hz and 50 Hz sampling, which goes into I. [`Form::Averaged`] takes the mean of the torques over the same
+//!   interval. The commanded torque is linear or held between rows; the friction follows the rates of the parabola through three
+//!   rows, whose sign may change within it.
 //! * The gyro's noise is in y_k, and I multiplies it: I comes out too small by the noise's share of the
 //!   power of y. The residual is r_k/I instead: y_k is then what is explained, and its noise biases nothing, however large.
 //! * Near ω = 0 the measured sign is not that of ω. Expected is the mean over the noise, erf(ω/σ√2) ≈ tanh(ω/1.25σ).
@@ -197,7 +196,7 @@ const FIRST: [&str; 6] =
 const BLOCK: f64 = 0.01;
 /// Blocks of the shortest recording.
 const FEWEST: usize = 100;
-/// Rows by which the starts are told apart; the best is followed over all.
+/// Number of rows on which the starts are compared; the best start is then refined on all rows.
 const ROUGH: usize = 20_000;
 /// Stride over the grid of Stribeck speeds for intervals.
 const EVERY: usize = 2;
@@ -607,8 +606,9 @@ impl Problem {
         })
     }
 
-    /// Covariance of the sum of scores Jᵀe that the gyro's white noise makes: the noise of one row is in the differences of the rows before
-    /// and after it, with opposite signs, and in its own reading at rest. The sandwich alone says too little of what shows in a few windows, as d does.
+    /// Covariance of the sum of scores Jᵀe due to the gyro's white noise. The noise of one row enters the differences of both
+    /// neighbouring rows, with opposite signs, and its own reading at rest. The sandwich alone says too little of what shows in a
+    /// few windows, as d does.
     fn noise_scores(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
         let n = jacobian.ncols();
         let (mut sum, mut first) = (DMatrix::zeros(n, n), 0);
@@ -927,8 +927,8 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     Ok(found)
 }
 
-/// A start from where a search ended that may be at a bound, where a variable hardly changes its value any more: a logit of 6 is a
-/// four-hundredth of the range off.
+/// Returns a start from the end of a search. At a bound a variable hardly changes its value any more, so the start lies inside: a
+/// logit of 6 is a four-hundredth of the range off.
 fn off_the_bounds(x: &[f64]) -> Vec<f64> {
     x.iter().map(|x| x.clamp(-6.0, 6.0)).collect()
 }

@@ -128,8 +128,8 @@ impl Method for FreeDecay {
                 "One decaying oscillation fits the record: the residual is its noise.".to_string()
             } else {
                 format!(
-                    "One decaying oscillation does not fit the record: the residual is {:.2} times its noise. The intervals \
-                     have what of the residual lies beside f in them, nothing else.",
+                    "One decaying oscillation does not fit the record: the residual is {:.2} times its noise. The intervals only \
+                     include the part of the residual at frequencies near f.",
                     found.residual / noise
                 )
             },

@@ -211,8 +211,8 @@ fn identify_whole(
     Ok(found)
 }
 
-/// Sorts by the information criterion, the simplest first among those that it does not tell apart at all. Returns how
-/// many cannot be told from the first with certainty, and how many there are in all.
+/// Sorts the models by the information criterion; among equal ones the simplest comes first. Returns how many models are not
+/// clearly worse than the first, and the number of models.
 fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
     fitted.sort_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
     let within = |of: f64| fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + of).count();

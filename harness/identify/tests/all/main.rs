@@ -1,4 +1,4 @@
-//! Recordings of simulated benches, identified: what is found, with what uncertainty, and what is said of it.
+//! Identification of simulated benches: estimates, uncertainties and verdicts.
 
 mod acceleration;
 mod any_fmu;

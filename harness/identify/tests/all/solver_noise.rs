@@ -308,7 +308,7 @@ fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() 
         // the direction is an eigenvector of derivatives by differences, good to some 1e-3 where the outputs show d poorly
         assert!((relative("k") / relative("m") - 1.0).abs() < 1e-3, "{direction:?}");
         assert!((relative("d") / relative("m") - 1.0).abs() < 0.05, "{direction:?}");
-        let said = result.verdict.iter().any(|l| l.starts_with("d, k, m cannot be told apart"));
+        let said = result.verdict.iter().any(|l| l.starts_with("d, k, m cannot be distinguished"));
         assert!(said, "{:?}", result.verdict);
         let model = Model::open(&fmu.path(), solver).unwrap();
         for bound in foresee(&model, &question, &[record(1, 1.0)], &NOISE, &mut |_| {}).unwrap() {

@@ -44,7 +44,7 @@ fn options() -> Options {
     }
 }
 
-/// Not told what the torque is between rows.
+/// Options with an unknown intersample behaviour of the torque.
 fn of_any_torque() -> Options {
     Options { intersample: None, ..options() }
 }
@@ -70,7 +70,7 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     let sum =
         found.details.combinations.iter().find(|c| c.name == "friction.c + friction.d").unwrap();
     assert!((sum.value - 0.005921).abs() < 4.0 * sum.std, "{sum:?}");
-    assert!(found.verdict.iter().any(|line| line.contains("cannot be told apart")));
+    assert!(found.verdict.iter().any(|line| line.contains("cannot be distinguished")));
 }
 
 /// By a start for it, as any parameter that is not estimated by itself.
@@ -171,9 +171,9 @@ fn a_delay_of_half_a_row_is_a_finding_where_it_is_known() {
     }
 }
 
-/// Held torque comes half a row late, which nothing can make up for where no delay is estimated; smooth torque is told from a linear one
-/// long before its minimum is known to a hundredth. Neither is sought further than that: of a sweep of 2700 s
-/// nine simulations in all, and one at the end.
+/// Held torque comes half a row late; without an estimated delay nothing can compensate for that. The fit distinguishes smooth
+/// from linear torque long before its minimum is known to a hundredth. It then stops: a sweep of 2700 s takes nine simulations in
+/// all, and one at the end.
 #[test]
 fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -195,8 +195,8 @@ fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
 }
 
 /// Of a long recording whose friction shows little of its Stribeck effect, other speeds are tried; where the loudest part alone speaks against
-/// one the whole is not asked. What it says is less than the whole would: a fit that is told the speed it has least against has a sum of squares
-/// that is larger by more.
+/// one the whole is not asked. The loudest part underestimates the evidence: at the speed that it rejects least, the sum of
+/// squares of the whole recording grows by more.
 #[test]
 fn what_the_loudest_part_has_against_a_stribeck_speed_the_whole_has_too() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -1,4 +1,4 @@
-//! Recordings in every form in which loggers write them give the same numbers, and a wrong one is told where it is wrong.
+//! Recordings in every form that loggers write give the same numbers, and the error for a wrong one names the place.
 
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 //!
 //! At a given Stribeck speed and gyro bias the residual is linear in inertia, b, c and d. So a grid of Stribeck speeds needs one
 //! linear least squares each, and the sum of squares along the grid shows every basin of the nonlinear problem. From one
-//! fixed start the search ends in a basin with a Stribeck speed far beyond all rates, where c and d cannot be told apart.
+//! fixed start the search ends in a basin with a Stribeck speed far beyond all rates, where c and d are indistinguishable.
 
 use analysis::statistics::{deviation, mean, median};
 use nalgebra::{DMatrix, DVector};
@@ -36,8 +36,8 @@ pub(super) enum State {
 }
 
 impl Rows {
-    /// Which rows belong to a run in which the hub sticks by this bias, or are next to one: the Stribeck law says nothing of the
-    /// torque of a bearing that sticks. In the middle half of a long run the hub rests; at its ends it may still creep.
+    /// Returns the state of each row, given this bias. Rows of a run in which the hub sticks, and their neighbours, do not follow
+    /// the Stribeck law. Only the middle half of a long run counts as rest: at its ends the hub may still creep.
     pub(super) fn states(&self, bias: f64) -> Vec<State> {
         let still = |rate: &f64| (rate - bias).abs() < STILL * self.noise;
         let count = self.rate.len();
