@@ -1,5 +1,4 @@
-//! What the fuzzer does to an instance of any model, as functions of bytes: the tests call them as
-//! well.
+//! Operations of the fuzzer on an instance of any model, as functions of bytes. The tests call them too.
 //!
 //! Everything here panics when something happens that must not, whatever the bytes are.
 
@@ -35,8 +34,8 @@ pub fn run<M: Model>(data: &[u8]) {
     target(data);
 }
 
-/// What the hostile host knows of an FMU besides GUID and token (`host.h`): the number of scalar
-/// variables, of outputs, of continuous states, of event indicators; the first input's reference in FMI 3.0.
+/// Returns the sizes that the hostile host needs besides GUID and token (`host.h`): the numbers of scalar variables, outputs,
+/// continuous states and event indicators, and the first input's reference in FMI 3.0.
 pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     let table = M::table();
     if layout == Layout::Arrays {

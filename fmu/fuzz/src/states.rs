@@ -69,8 +69,7 @@ fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
     all.filter(|(interface, events)| V::allows(*interface, *events))
 }
 
-/// What a host may do next. Calls may be refused; after a step that succeeded everything is a
-/// number.
+/// Continues as a host may. The FMU may refuse calls; after a successful step all values are finite.
 fn live<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let table = M::table();
     for input in table.inputs() {

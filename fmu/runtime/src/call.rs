@@ -1,5 +1,4 @@
-//! What a call of a host is: the function's name and the instance states in which it may be called,
-//! as data; and what it is answered when it may not.
+//! Calls of a host as data: the function's name and the instance states in which it is allowed, and the message if it is not.
 //!
 //! The calls themselves are listed by each version of FMI (see [`Version`](crate::version::Version)).
 

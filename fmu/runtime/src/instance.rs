@@ -1,4 +1,4 @@
-//! What the calls of a host do to one instance, in any version of FMI's C interface.
+//! Effects of the host's calls on one instance, the same for every version of FMI's C interface.
 //!
 //! A call that is refused changes nothing. The one exception is a step that the
 //! model could not compute: the model stands where it was, but the instance goes
@@ -765,9 +765,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.outputs = None;
     }
 
-    /// As above, by central differences with Richardson's extrapolation between
-    /// instances that start elsewhere: each known moves by a thousandth of its value, or
-    /// of its order of magnitude where it is smaller.
+    /// Computes the derivatives in initialization mode by central differences with Richardson extrapolation, between instances
+    /// with changed starts. Each known changes by a thousandth of its value, or of its order of magnitude if the value is
+    /// smaller.
     fn initial_derivative(
         &self,
         call: &Call,

@@ -270,8 +270,8 @@ impl<M: Model> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// As the GUID, for model descriptions of FMI 3.0, which say besides what can be set within a step and, of arrays,
-    /// what sizes them: by its token the binary knows which of the two a host has read.
+    /// Returns the instantiationToken of a model description of FMI 3.0, a hash like the GUID. Scalars and arrays have different
+    /// tokens, so the binary knows which description a host has read.
     pub fn token(&self, layout: Layout) -> &str {
         let bytes = self.tokens[layout as usize].get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];

@@ -99,9 +99,8 @@ pub type Place = fn(usize) -> usize;
 pub enum Dimension {
     /// Always so long.
     Fixed(usize),
-    /// As long as the integer parameter of this name says, and at most so long. Where every element is a variable of
-    /// its own, there are always the most; where the array is one, the parameter is structural (see
-    /// [`Layout`](crate::table::Layout)).
+    /// Size from the integer parameter of this name, and the largest size. If every element is a variable of its own, the largest
+    /// size always applies; if the array is one variable, the parameter is structural (see [`Layout`](crate::table::Layout)).
     Sized(&'static str, usize),
 }
 
@@ -193,8 +192,8 @@ impl<M: Model> Copy for Variable<M> {}
 /// No input goes through its range in less, s: what follows from faster ones may overflow.
 const CROSSING: f64 = 1e-9;
 
-/// Whether x is a finite number. It looks at the bits, as what is done with numbers from the host does until
-/// then: comparing with NaN ends the process of a host that traps invalid operations.
+/// Returns true if x is finite. It tests the bits: comparing with NaN would end the process of a host that traps invalid
+/// operations.
 #[inline]
 pub const fn is_finite(x: f64) -> bool {
     const EXPONENT: u64 = f64::INFINITY.to_bits();

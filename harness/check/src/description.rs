@@ -36,11 +36,11 @@ pub struct Variable {
     pub name: String,
     /// Its value reference; 0 if that cannot be read.
     pub reference: u32,
-    /// As written, or the default "local".
+    /// Causality as written, or the default "local".
     pub causality: Causality,
-    /// As written, or the default: "continuous" of a Real, else "discrete".
+    /// Variability as written, or the default: "continuous" of a Real, else "discrete".
     pub variability: Variability,
-    /// As written, or the default for causality and variability, if there is one.
+    /// Attribute `initial` as written, or the default for causality and variability, if there is one.
     pub initial: Option<String>,
     /// Its type.
     pub kind: Type,
@@ -57,7 +57,7 @@ pub struct Unknown {
     pub line: u64,
     /// Place of the variable, counted from 1; 0 if that cannot be read.
     pub index: usize,
-    /// What it depends on; none if that is not said: on everything.
+    /// Indices that this unknown depends on; `None` if the attribute is missing: it may depend on everything.
     pub dependencies: Option<Vec<usize>>,
     /// Kinds of these dependencies.
     pub kinds: Option<Vec<String>>,

@@ -1,5 +1,4 @@
-//! Whether the ranges and items in modelDescription.xml are those of the binary (FMI 2.0.5, sections
-//! 2.2.3 and 2.2.7).
+//! Rules that compare ranges and enumeration items in modelDescription.xml with the binary (FMI 2.0.5, sections 2.2.3 and 2.2.7).
 
 use std::collections::BTreeSet;
 
@@ -13,8 +12,7 @@ use super::under_test::{FmuUnderTest, Reading, STEPS, Session, start_value};
 use super::values::{items, mentions};
 use host::description::Type;
 
-/// How far values may be outside min and max, relative to the bound or the nominal value: an
-/// integrator leaves a state slightly off.
+/// Tolerance of min and max, relative to the bound or the nominal value: an integrator leaves a state slightly off.
 const OVERSHOOT: f64 = 1e-3;
 
 /// `values.in_range`

@@ -19,7 +19,7 @@ fn stepping<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option
     fmu.running(Interface::CoSimulation).map(Some)
 }
 
-/// As above, where a few ordinary steps are possible; where they are not, other rules tell.
+/// Returns a session of [`stepping`] if three ordinary steps succeed. If they do not, other rules report it.
 fn able<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
     if let Some(mut session) = stepping(fmu, findings)? {
         session.advance(3)?;

@@ -60,8 +60,8 @@ fn from_toml(text: &str) -> Result<Vec<(String, String)>> {
     Ok(settings)
 }
 
-/// What was identified: `settings`, then the estimates of `parameters`. Another initial state of each recording
-/// is not a parameter of the bench and stands elsewhere in the file.
+/// Reads the result of an identification: `settings`, then the estimates of `parameters`. The initial states of the recordings
+/// are not parameters of the bench and stand elsewhere in the file.
 fn from_json(text: &str) -> Result<Vec<(String, String)>> {
     let root: serde_json::Value = serde_json::from_str(text)?;
     let table = |key: &str| root.get(key).and_then(serde_json::Value::as_object);

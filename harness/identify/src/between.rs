@@ -1,4 +1,4 @@
-//! What the torque does between rows: which behaviour explains the recordings best.
+//! Chooses the intersample behaviour of the torque that explains the recordings best.
 //!
 //! A held torque comes half a row late on average, so "held without a delay" and "linear with a delay of half a row" differ
 //! little. So behaviour and delay are judged together, and with all other unknowns free; and no behaviour is taken that needs an
@@ -211,8 +211,7 @@ fn near(
         .filter(move |other| (acausal || !other.is_acausal(step)) && other.cost < cost + DECIDES)
 }
 
-/// What the choice rests on, in words: the behaviour that was fitted with its sum of squares, and the others. Rows come every
-/// `step` seconds.
+/// Returns the evidence in words: the sums of squares of the fitted behaviour and of the others. Rows come every `step` seconds.
 pub fn evidence(
     problem: &Problem,
     found: &Polished,

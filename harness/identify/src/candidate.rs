@@ -75,7 +75,7 @@ pub struct Fitted<'a> {
     pub fit: ModelFit,
     /// Stribeck speeds that were tried, rad/s, with what they add to the sum of squares at least.
     pub speeds: Vec<(f64, f64)>,
-    /// What the torque may be between rows instead, if that was asked.
+    /// Fits with other intersample behaviours, if requested.
     pub others: Option<Others>,
 }
 

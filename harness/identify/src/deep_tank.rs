@@ -108,7 +108,7 @@ pub fn intervals(problem: &Problem, at: &Minimum) -> Result<Option<Intervals>> {
     Ok(Some(Intervals([0, 1, 2].map(|k| (places[k], with(k))))))
 }
 
-/// What a recording shows of tank and hub.
+/// Quantities of tank and hub that a recording shows.
 struct Seen {
     length: f64,
     t: f64,
@@ -117,7 +117,7 @@ struct Seen {
 }
 
 impl Seen {
-    /// Of d, h and I.
+    /// Returns the quantities for d, h and I.
     fn of(bench: Bench, [d, h, inertia]: [f64; 3]) -> Self {
         let t = (2.0 * XI[0] * h / d).tanh();
         let rigid = bench.liquid(d, h) - bench.slosh_mass(d, h);

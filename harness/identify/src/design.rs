@@ -1,5 +1,4 @@
-//! What a planned experiment will tell: torques made for identification, and the Cramér–Rao bound of
-//! each parameter before anything is recorded.
+//! Design of experiments: torques for identification, and the Cramér–Rao bound of each parameter before anything is recorded.
 
 use std::f64::consts::TAU;
 

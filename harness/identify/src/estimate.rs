@@ -15,7 +15,7 @@ pub struct Estimated {
     pub interval: [f64; 2],
     /// The recording shows it: both ends are there, and it is known to better than half its size or is near zero by nature.
     pub determined: bool,
-    /// As in modelDescription.xml.
+    /// Unit as in modelDescription.xml.
     pub unit: String,
 }
 

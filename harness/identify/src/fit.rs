@@ -850,7 +850,7 @@ impl<'a> Problem<'a> {
         unreachable!("the rounds are counted")
     }
 
-    /// Where a search has ended off the minimum: the minimum with those unknowns held that have it at a kink, which no Newton
+    /// If a search has ended off the minimum, searches again with the unknowns held whose minimum is at a kink, which no Newton
     /// step finds. These are a friction that the step would make negative, an unknown that it would lead out of the FMU's range,
     /// and an initial rate of the hub that is zero within two standard deviations. (Dry friction stops a slow hub within a row,
     /// whatever the sign of its rate.) Sensitivities and covariance are those of all unknowns.

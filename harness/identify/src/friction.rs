@@ -46,13 +46,13 @@ const LIMIT: f64 = 3.8415;
 const COUNTED: f64 = 9.0;
 /// The same beyond which no other noise makes a minimum of it.
 const EXCLUDED: f64 = 30.0;
-/// By how much less the sum of squares must grow from one speed to the next grid speed for it to be no wall.
+/// Largest growth of the sum of squares from one grid speed to the next that does not count as a wall.
 const FLAT: f64 = 1.0;
 /// Longest extrapolation beyond the last point, over the way to that from the one before.
 const FURTHER: f64 = 0.5;
 /// Longest step along ln ω_s.
 const LONGEST: f64 = 0.7;
-/// Where the next point is aimed: root of what it adds to the sum of squares, over that at the end of the interval.
+/// Target of the next point: square root of its increase of the sum of squares, relative to that at the end of the interval.
 const AIM: f64 = 1.03;
 /// Points on either side of the minimum.
 const POINTS: usize = 7;
@@ -67,7 +67,7 @@ fn relative(problem: &Problem, found: &Polished, index: usize) -> f64 {
     deviation / scale.value(found.x[index])
 }
 
-/// Whether a minimum may be one of several: none at all, or one whose Stribeck excess the recording hardly shows.
+/// Returns true if there may be other minima: the search did not converge, or the recording hardly shows the Stribeck excess.
 pub fn is_vague(problem: &Problem, found: &Polished, indices: Indices) -> bool {
     let relative = |index| relative(problem, found, index);
     !found.converged() || relative(indices.d) > VAGUE || relative(indices.speed) > VAGUE
@@ -82,9 +82,9 @@ struct Point {
     x: Vec<f64>,
     /// Sum of squares.
     cost: f64,
-    /// What further steps would leave of it at least, as foreseen to second order.
+    /// Lower bound of the sum of squares after further steps, predicted to second order.
     least: f64,
-    /// Sum of squares without what is known vaguely beforehand.
+    /// Sum of squares without vague priors.
     data: f64,
     /// Covariance of x at this ω_s; its own row and column are 0.
     covariance: DMatrix<f64>,
@@ -93,12 +93,12 @@ struct Point {
 }
 
 impl Point {
-    /// Root of what it adds to the `least` sum of squares, which a quadratic makes a line.
+    /// Square root of the increase above the `least` sum of squares: a straight line if the sum is quadratic.
     fn root(&self, least: f64) -> f64 {
         (self.data - least).max(0.0).sqrt()
     }
 
-    /// How far from here the end of the interval is, over the way to another point, as the line through both roots has it.
+    /// Returns the distance to the end of the interval, relative to that of another point, by a straight line through both roots.
     fn to_end(&self, other: &Point, least: f64) -> f64 {
         (LIMIT.sqrt() - self.root(least)) / (other.root(least) - self.root(least))
     }
@@ -109,9 +109,9 @@ impl Point {
 pub struct Tried {
     /// ω_s, rad/s.
     pub speed: f64,
-    /// What it adds to the sum of squares; at least, where the loudest part alone says so.
+    /// Increase of the sum of squares; a lower bound if only the loudest part was fitted.
     pub more: f64,
-    /// All unknowns' variables there; `None` where the loudest part alone speaks against it.
+    /// Variables x of all unknowns at this speed; `None` if the loudest part alone rejects it.
     pub x: Option<Vec<f64>>,
 }
 
@@ -141,7 +141,7 @@ pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Vec<Tried> 
 ///
 /// where the last, if the model holds, is no more than χ² with as many degrees of freedom as there are unknowns.
 struct Loudest<'a> {
-    /// Of that part alone.
+    /// Fit problem with the loudest part alone.
     problem: Problem<'a>,
     /// C_p(x).
     cost: f64,
@@ -149,11 +149,11 @@ struct Loudest<'a> {
     jacobian: DMatrix<f64>,
 }
 
-/// Beyond which multiple of its degrees of freedom no χ² is taken to be: of 8, 32 has a chance of 1e-4.
+/// Largest plausible χ², relative to its degrees of freedom: with 8 degrees, 32 has a probability of 1e-4.
 const RARE: f64 = 4.0;
 
 impl<'a> Loudest<'a> {
-    /// What it says of the minimum `from`; `None` where the FMU refuses.
+    /// Prepares the loudest part at the minimum `from`; `None` if the FMU refuses to run.
     fn of(problem: &Problem<'a>, part: &'a [Recording], from: &Polished) -> Option<Self> {
         let problem = Problem { recordings: part, ..problem.clone() };
         let answer = problem.answer(&from.x).ok()?;
@@ -165,7 +165,7 @@ impl<'a> Loudest<'a> {
         Some(Loudest { problem, cost, jacobian })
     }
 
-    /// The ω_s of x, where the part alone has more than [`EXCLUDED`] against it.
+    /// Returns the ω_s of x if the part alone rejects it by more than [`EXCLUDED`].
     fn refutes(&self, x: &[f64], indices: Indices) -> Option<Tried> {
         let rest = RARE * x.len() as f64;
         let found = point(&self.problem, x, &self.jacobian, indices, self.cost + rest + EXCLUDED)?;

@@ -1,4 +1,4 @@
-//! How well an answer of the FMU explains the recordings.
+//! Tests of how well the FMU's answer explains the recordings.
 
 use crate::fit::{Answer, Channel, Problem, Signal};
 use analysis::innovations::Tests;
@@ -7,7 +7,7 @@ use analysis::statistics::mean;
 /// Fit of a rate below which a minimum is taken for a wrong one at first, %.
 const POOR: f64 = 90.0;
 
-/// Whether the residual of an answer is noise, for each channel.
+/// Tests for each channel whether the residual of an answer is noise.
 pub fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
     let one = |(channel, e): (&Channel, &Vec<f64>)| {
         let recording = &problem.recordings[channel.recording];

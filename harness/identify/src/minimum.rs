@@ -18,7 +18,7 @@ pub const CONVERGED: f64 = 0.5;
 pub trait SumOfSquares {
     /// The model's answer at a point, with the residuals.
     type Answer;
-    /// What the next derivatives by an unknown know of the last ones.
+    /// State that the derivatives by an unknown keep from one call to the next.
     type Step: Clone;
 
     /// Names of the unknowns.

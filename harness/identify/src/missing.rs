@@ -1,5 +1,5 @@
-//! Which torque on the hub the model lacks: a score test (Lagrange multiplier; Rao 1948, Engle 1984) of torques that follow
-//! the model's own motion.
+//! Finds a torque on the hub that the model lacks, by a score test (Lagrange multiplier; Rao 1948, Engle 1984) of torques that
+//! depend on the model's motion.
 //!
 //! Under a small torque k φ(t) the innovations move by k s; s is a difference of two answers of the FMU. Of s, the unknowns
 //! can take what lies in the span of their sensitivities J; the rest is seen:
@@ -8,11 +8,11 @@
 //! s' = s − J (JᵀJ)⁻¹ Jᵀ s,   k = −s'·e / |s'|²,   σ_k = 1/|s'|
 //! ```
 //!
-//! k/σ_k is normal with unit variance if nothing is missing. A general test of the innovations spreads over hundreds of rows
-//! or bands what this one gathers in a single number: an estimate can be off by ten standard deviations while
-//! those see nothing. The torques are tried together: the one that explains most is taken, then of the others what it does not
-//! explain. What is known within a tolerance counts as an unknown of which that is known: a clock that is wrong by its tolerance leaves a
-//! trace in the angle of an encoder that no other unknown can take, and that is no torque.
+//! k/σ_k is normal with unit variance if nothing is missing. A general test of the innovations spreads over hundreds of rows or
+//! bands what this test gathers in one number: an estimate can be off by ten standard deviations without a sign in a general
+//! test. Of all torques, the test takes the one that explains most, then the one that explains most of the remainder. Tolerances
+//! count as unknowns with priors: a clock that is wrong by its tolerance leaves a trace in an encoder's angle that no other
+//! unknown explains, and that is not a torque.
 
 use anyhow::Result;
 use nalgebra::DVector;

@@ -469,9 +469,8 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
     Ok(())
 }
 
-/// Whether rate and torque allow a start at rest: neither is more than noise, bias and a first moment
-/// explain. (Where both pass zero by chance in the middle of a motion this is wrong, and the residual
-/// tests show it.)
+/// Returns true if rate and torque allow a start at rest: neither exceeds what noise, bias and the first moment of motion
+/// explain. (If both pass zero by chance in the middle of a motion, the answer is wrong, and the residual tests show it.)
 fn starts_at_rest(part: &Recording) -> bool {
     let rate = (part.rate[0] + part.rate[1]) / 2.0;
     // a gyro's bias is no motion: up to 3 % of the signal, or 5 times the noise
@@ -484,9 +483,9 @@ const ON_CLOCK: f64 = 0.98;
 /// Slowest gyro that is looked for, in rows a value.
 const SLOWEST: usize = 100;
 
-/// Which rows hold a new value, where most only repeat the one before: a gyro that is slower than the recording. A
-/// coarse gyro may repeat values by chance as well; so the changes must come every n-th row or, if the gyro is
-/// fine (two values are seldom the same), the repeats are taken as such.
+/// Returns the rows with a new value if most rows only repeat the one before, as with a gyro that is slower than the recording. A
+/// coarse gyro may repeat values by chance, so the changes must come every n-th row. If the gyro is fine (two values are seldom
+/// equal), every repeat counts.
 fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
     let changes: Vec<usize> = (1..rate.len()).filter(|&k| rate[k] != rate[k - 1]).collect();
     if changes.len() < 10 || changes.len() > 9 * rate.len() / 10 {

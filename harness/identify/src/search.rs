@@ -54,7 +54,7 @@ pub struct Sibling<'f, 'a> {
     pub problem: &'f Problem<'a>,
     /// The minimum.
     pub minimum: &'f Polished,
-    /// What that model explains this one explains too, so a poor fit of this one is a search that went astray.
+    /// True if the other model is a special case of this one. If this model then fits worse, its search has failed.
     pub is_poorer: bool,
 }
 

@@ -372,8 +372,8 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
     best.filter(|b| b.residual < 0.3)
 }
 
-/// Where the transfer function does not fit (large amplitudes bend its peak): antiresonance,
-/// resonance and the inertia of the band's ends. For b = 0, ω_p² = ω²(1 + m r²/I0).
+/// Returns a start from antiresonance, resonance and the inertia at the band's ends, for recordings that the transfer function
+/// does not fit (large amplitudes bend its peak). For b = 0, ω_p² = ω²(1 + m r²/I0).
 fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let features = Features::of(measured);
     let (f, fp) = (features.f_dip?, features.f_res?);

@@ -22,8 +22,8 @@ pub struct Tolerances {
 pub const NAMES: [&str; 5] = ["torque", "clock", G_AXIAL, tank::R, fluid::RHO];
 
 impl Default for Tolerances {
-    /// Of a bench with a calibrated wheel, a quartz, a rule and a thermometer: 1 %, 0.01 %, 0.1 % (the latitude is known, the
-    /// axis is upright to 2.5°), 0.4 % (1 mm) and 0.3 % (some 10 K).
+    /// Tolerances of a bench with a calibrated wheel, a quartz, a rule and a thermometer: 1 %, 0.01 %, 0.1 % (the latitude is
+    /// known, the axis is upright to 2.5°), 0.4 % (1 mm) and 0.3 % (some 10 K).
     fn default() -> Self {
         Tolerances { torque: 0.01, clock: 1e-4, gravity: 1e-3, arm: 4e-3, density: 3e-3 }
     }

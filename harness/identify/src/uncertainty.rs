@@ -1,4 +1,4 @@
-//! How sure the estimates are.
+//! Covariances and intervals of the estimates.
 //!
 //! With whitened residuals of unit variance and sensitivities J, the covariance is (JᵀJ)⁻¹: the
 //! Cramér–Rao bound of that noise. If the residual is more than noise, no such formula holds: what a
@@ -211,9 +211,9 @@ impl Combination {
     }
 }
 
-/// What is known of dry friction from a hub that turned one `way` alone (1: counter-clockwise, −1: clockwise), estimated with
-/// an asymmetry of 0: the friction of that direction, c (1 ± asymmetry) and d (1 ± asymmetry). The asymmetry is anywhere
-/// within its `bounds`, and c and d are anything from half of that friction upwards.
+/// Replaces the estimates of dry friction if the hub turned one `way` alone (1: counter-clockwise, −1: clockwise). A fit with
+/// asymmetry 0 gives only the friction of that direction, c (1 ± asymmetry) and d (1 ± asymmetry). The asymmetry is then anywhere
+/// within its `bounds`, and c and d are at least half of that friction.
 pub fn one_way(
     parameters: &mut BTreeMap<String, Estimated>,
     way: f64,

@@ -164,7 +164,7 @@ impl Unknown {
         x.max(low).min(high)
     }
 
-    /// Whether x is at one of these ends: only the FMU's range keeps it from going on.
+    /// Returns true if x is at one of these ends: only the FMU's range stops it.
     pub fn is_at_end(&self, x: f64) -> bool {
         let [low, high] = self.ends();
         x <= low || x >= high
@@ -184,7 +184,8 @@ impl Unknown {
         }
     }
 
-    /// Whether the answer is linear in its value, not in x: its intervals are symmetric in the value, which must be positive.
+    /// Returns true if the answer is linear in the value instead of x. Intervals are then symmetric in the value, which must be
+    /// positive.
     pub fn is_additive(&self) -> bool {
         matches!(self.scale, Scale::Softplus(_))
     }

@@ -72,7 +72,7 @@ impl Linear {
     }
 }
 
-/// What computes the commands of a cycle.
+/// Controller that computes the commands of a cycle.
 enum Controller {
     Linear(Box<Linear>),
     /// A function of cycle, time (s) and measurements that returns as many numbers as there are commands.

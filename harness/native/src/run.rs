@@ -76,7 +76,7 @@ impl<'fmu> Columns<'fmu> {
     }
 }
 
-/// Where and why the FMU stopped a run: the row, how many rows were read, and a sentence.
+/// Stop of a run by the FMU: its row, the number of rows read, and the reason.
 pub type Stop = (usize, usize, String);
 
 /// A table of numbers in Python, and the names of its columns.

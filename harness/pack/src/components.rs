@@ -406,7 +406,7 @@ pub fn sbom_of_wheel(
     Ok(product.sbom(&linked_in_wheel(binary)?))
 }
 
-/// What an SBOM is of.
+/// Product that an SBOM describes.
 struct Product<'a> {
     /// Type of CycloneDX.
     kind: &'static str,

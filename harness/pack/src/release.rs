@@ -29,7 +29,7 @@ pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Where the release of the present version of an FMU is, in `folder`: `NAME-VERSION.fmu`, of FMI 3.0
+/// Returns the path of the present version's release of an FMU in `folder`: `NAME-VERSION.fmu`, for FMI 3.0
 /// `NAME-VERSION-fmi3.fmu`.
 pub fn path(model: &Model, fmi: Fmi, folder: &Path) -> PathBuf {
     fmi.path(folder, &format!("{}-{}", model.name, env!("CARGO_PKG_VERSION")))
@@ -61,7 +61,7 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Whether a file's name is `NAME-VERSION`, followed by `-` or `.`.
+/// Returns true if a file's name is `NAME-VERSION`, followed by `-` or `.`.
 fn is_of(file: &str, name: &str, version: &str) -> bool {
     let rest = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-'));
     rest.and_then(|rest| rest.strip_prefix(version))

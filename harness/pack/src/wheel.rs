@@ -22,7 +22,7 @@ use crate::{Fmi, MODELS, build, build_native, components, files as files_of_fmu,
 /// Tags of the oldest Python, and of the stable ABI.
 const ABI: &str = "cp311-abi3";
 
-/// Where the software bill of materials is in `.dist-info` (PEP 770).
+/// Path of the software bill of materials in `.dist-info` (PEP 770).
 const SBOM: &str = "sboms/hubslosh.cdx.json";
 
 /// The binaries of a wheel.

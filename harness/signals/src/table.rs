@@ -275,7 +275,7 @@ fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), columns))
 }
 
-/// How to state the unit of a table's time if a file has integers.
+/// Advice if a file has integers as the table's time.
 const IN_SECONDS: &str = "the table's time is in s, write it as floating-point numbers";
 
 fn read_parquet(path: &Path, wanted: &[&str]) -> Result<Table> {

@@ -13,7 +13,7 @@ pub const SCENE: &str = include_str!("../scene/scene.js");
 /// The global `Live`: controls, plots and the place of a live page of the book.
 pub const LIVE: &str = include_str!("../pages/live.js");
 
-/// How live pages look, besides the book's own style.
+/// Style sheet of the live pages, in addition to the book's.
 pub const LIVE_CSS: &str = include_str!("../pages/live.css");
 
 /// The live page "Swirl"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and HubSlosh in the global `FMUS`.

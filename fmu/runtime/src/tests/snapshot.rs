@@ -6,8 +6,7 @@ use crate::hash::Hash;
 use crate::snapshot::{from_bytes, size};
 
 const CHECKSUM: usize = 16;
-/// Where the parts are, see the table in `snapshot.rs`.
-/// What is discrete among the outputs.
+/// Number of discrete outputs. The table in `snapshot.rs` has the places of the parts.
 const SHOWN_COUNT: usize = 3;
 const FLAGS: usize = 55;
 const TIMES: usize = 58;

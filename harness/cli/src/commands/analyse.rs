@@ -25,7 +25,7 @@ pub struct AnalyseArgs {
     /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
     #[arg(value_name = "RECORDING", required_unless_present = "plan")]
     recordings: Vec<PathBuf>,
-    /// Which column of the recordings is which signal, in what unit.
+    /// Columns of the recordings for the signals, with units.
     #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
     columns: Columns,
     /// The torque that was commanded; its amplitude is taken from the recording.

@@ -29,7 +29,7 @@ pub struct AnyFmuArgs {
     /// recording has its own.
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
-    /// What is known of an unknown beforehand: mean and standard deviation.
+    /// Prior of an unknown: mean and standard deviation.
     #[arg(long, value_name = "NAME=MEAN:STD,…", requires = "free")]
     prior: Vec<String>,
     /// Inputs that the recordings drive.

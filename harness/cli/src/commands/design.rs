@@ -82,7 +82,7 @@ pub struct DesignArgs {
     /// Noise of a row of each output, with --free.
     #[arg(long, value_name = "OUTPUT=STD,…", requires = "free")]
     noise: Vec<String>,
-    /// Which column of the tables is which input, in what unit, with --free.
+    /// Columns of the tables for the inputs, with units, with --free.
     #[arg(
         long,
         value_name = "INPUT=COLUMN[:UNIT],…",

@@ -29,7 +29,7 @@ pub struct GyroArgs {
     /// A gyro's recording at rest: text in columns, .parquet or .mat.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["hours", "records", "settings", "fmu"])]
     recording: Option<PathBuf>,
-    /// Which columns of the recording are time and omega, in what unit.
+    /// Columns of the recording for time and omega, with units.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",

@@ -48,10 +48,10 @@ pub struct IdentifyArgs {
     /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
-    /// How: `output-error` fits all of the FMU's parameters in time; `acceleration` friction and inertia
-    /// without a simulation, of a bench whose liquid does not move; `frequency` three poles and two zeros;
-    /// `multisine` tells noise from nonlinear distortion; `black-box` fits ARX and ARMAX; `free-decay` takes records
-    /// without torque and finds frequency and damping, and how both depend on the amplitude.
+    /// Identification method. `output-error` fits all of the FMU's parameters in the time domain. `acceleration` fits friction
+    /// and inertia without a simulation, for a bench whose liquid does not move. `frequency` fits three poles and two zeros.
+    /// `multisine` separates noise from nonlinear distortion. `black-box` fits ARX and ARMAX. `free-decay` finds frequency and
+    /// damping over the amplitude, from records without torque.
     #[arg(conflicts_with = "free", long, value_name = "NAME", default_value = "output-error")]
     method: MethodName,
     /// Weights of the rows, of --method acceleration.
@@ -84,7 +84,7 @@ pub struct IdentifyArgs {
         value_parser = ["none", "viscous", "stribeck_smooth", "stribeck", "lugre"]
     )]
     friction: Vec<String>,
-    /// What is known of a parameter that is estimated: value and standard deviation.
+    /// Prior of a parameter: value and standard deviation.
     #[arg(conflicts_with = "free", long, value_name = "NAME=VALUE:STD", value_parser = known)]
     known: Vec<(String, f64, f64)>,
     /// Sets what is known of the bench by its FMU name; it is then not estimated.
@@ -100,8 +100,8 @@ pub struct IdentifyArgs {
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
     #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
-    /// How well is known what no recording shows, relative standard deviations: torque (1%), clock (0.01%), g_axial (0.1%),
-    /// tank.r (0.4%), fluid.rho (0.3%). They are part of the intervals; 0 is exact.
+    /// Relative standard deviations of quantities that no recording shows: torque (1%), clock (0.01%), g_axial (0.1%), tank.r
+    /// (0.4%), fluid.rho (0.3%). The intervals include them; 0 is exact.
     #[arg(
         conflicts_with = "free",
         long = "tolerance",
@@ -116,9 +116,8 @@ pub struct IdentifyArgs {
     /// The rate's time stamps may be early: takes a delay below zero as it comes. Else it is a sign that something is wrong.
     #[arg(conflicts_with = "free", long)]
     acausal: bool,
-    /// Which column of the recordings is which signal, in what unit: time, tau_cmd, omega, theta, g_axial,
-    /// wheel_speed, omega_x, omega_y; of a free decay wave_height, force, theta or omega.
-    /// With --free: an input or output of the FMU.
+    /// Columns of the recordings for the signals, with units: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x,
+    /// omega_y; of a free decay wave_height, force, theta or omega. With --free the signals are inputs and outputs of the FMU.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",

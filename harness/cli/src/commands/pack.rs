@@ -37,11 +37,11 @@ pub struct PackArgs {
     /// File for the FMU, or folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist/NAME-fmi3-arrays.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// Of Spacecraft: a variant for this many tanks, 1 to 4, which has no variables of more. It is called Spacecraft_1x1
-    /// for one tank of one mode.
+    /// Spacecraft only: packs a variant with this many tanks, 1 to 4, and no variables for further ones. With one tank of one
+    /// mode its name is Spacecraft_1x1.
     #[arg(long, value_name = "NUMBER", conflicts_with = "python")]
     tanks: Option<usize>,
-    /// Of Spacecraft: a variant for this many slosh modes of each tank, 1 to 3.
+    /// Spacecraft only: packs a variant with this many slosh modes of each tank, 1 to 3.
     #[arg(long, value_name = "NUMBER", conflicts_with = "python")]
     modes: Option<usize>,
     /// For Linux, Windows and macOS instead of this machine's platform: one FMU for all, one wheel for each;

@@ -191,9 +191,9 @@ impl RunArgs {
     }
 }
 
-/// What people look at first: of the bench four signals, of another FMU what a campaign stores: all
-/// outputs that are numbers, and the slosh angles. And what a page cannot draw the liquid without: the states of the bench's
-/// modes after the first, and how much is left in tanks that drain.
+/// Returns the columns to record by default. For the bench these are four signals; for another FMU all numeric outputs and the
+/// slosh angles, as in a campaign. `hubslosh view` also needs the states of the bench's modes after the first, and the liquid
+/// left in draining tanks.
 fn default_columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,

@@ -305,7 +305,7 @@ impl System<f64, State> for &Equations<'_> {
     }
 }
 
-/// Where f, which is not of the sign of its end before, crosses zero between a and b (Illinois's rule).
+/// Returns the zero of f between a and b, where f has opposite signs (Illinois algorithm).
 fn crossing(a: f64, b: f64, f: &dyn Fn(f64) -> f64) -> f64 {
     let (mut a, mut b, mut fa, mut fb) = (a, b, f(a), f(b));
     for _ in 0..60 {

@@ -452,7 +452,7 @@ impl Channel {
     }
 }
 
-/// What a unit of a sensor's unknown adds to a channel's reading, row by row; `None`: nothing.
+/// Returns the change of a channel's reading per unit of a sensor's unknown, row by row; `None`: no change.
 fn sensor<'m>(
     unknown: &Unknown,
     channel: &Channel,

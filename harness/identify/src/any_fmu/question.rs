@@ -199,10 +199,10 @@ pub struct Question {
 }
 
 impl Question {
-    /// What the column of a sensor shows: the sensor, what it measures, and the number of the channel; `None`: no sensor has it.
+    /// Returns the sensor of a column, its quantity and the number of the channel; `None` if no sensor has this column.
     ///
     /// # Errors
-    /// If the FMU has not what the sensor measures.
+    /// If the FMU lacks the quantity that the sensor measures.
     pub fn sensor(
         &self,
         column: &str,

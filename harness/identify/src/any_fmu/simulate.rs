@@ -39,7 +39,7 @@ impl Model {
         fmu
     }
 
-    /// What it says of itself.
+    /// Returns the model description.
     pub fn description(&self) -> &ModelDescription {
         self.fmu().description()
     }
@@ -49,7 +49,7 @@ impl Model {
         matches!(self, Model::Own(fmu) if fmu.description().model_exchange.is_some())
     }
 
-    /// What loading its binary has changed for this whole process.
+    /// Returns the process-wide settings that loading the FMU's binary has changed.
     pub fn changed(&self) -> &[&'static str] {
         self.fmu().changed()
     }
@@ -59,7 +59,7 @@ fn interpolates(description: &ModelDescription) -> bool {
     description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs)
 }
 
-/// How an FMU is set up and driven.
+/// Settings, inputs and outputs of the FMU's runs.
 #[derive(Clone, Debug)]
 pub struct Setup {
     settings: Vec<Setting>,
@@ -67,7 +67,7 @@ pub struct Setup {
     inputs: Vec<u32>,
     held: Vec<bool>,
     outputs: Vec<Output>,
-    /// What is read of the FMU for all outputs.
+    /// Value references of the variables that all outputs need.
     reads: Vec<u32>,
     /// Relative tolerance of the solver, the host's or the FMU's; `None`: the FMU's own.
     tolerance: Option<f64>,
@@ -79,7 +79,7 @@ pub struct Setup {
 
 /// Runs with smaller errors of the solver.
 pub struct Finer {
-    /// How the FMU is driven.
+    /// Settings, inputs and outputs of the runs.
     pub setup: Setup,
     /// The FMU for another solver than before; `None`: the same.
     pub model: Option<Model>,
@@ -99,14 +99,14 @@ const PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 /// The finest tolerance of the host's solver.
 const FINEST: f64 = 1e-13;
 
-/// How an output follows from what is read.
+/// An output, computed from variables of the FMU.
 #[derive(Clone, Debug)]
 struct Output {
-    /// Where what it needs begins among all that is read.
+    /// Index of its first variable in [`Setup::reads`].
     from: usize,
-    /// What it is.
+    /// Quantity of the output.
     quantity: Quantity,
-    /// Which channel of that.
+    /// Channel of the quantity.
     channel: usize,
     /// The sensor that reads it.
     sensor: Option<Sensor>,
@@ -132,10 +132,10 @@ enum Initialised<'m> {
 pub type Value = (u32, f64);
 
 impl Setup {
-    /// As asked.
+    /// Returns the setup for a question.
     ///
     /// # Errors
-    /// All names that the FMU has not.
+    /// Lists all names that the FMU does not have.
     pub fn new(question: &Question, description: &ModelDescription) -> Result<Self> {
         let mut problems = Vec::new();
         let references = |names: &[String], problems: &mut Vec<String>| -> Vec<u32> {
@@ -339,7 +339,7 @@ impl Setup {
         Ok(Initialised::Host(run))
     }
 
-    /// By the host's solver, from row to row.
+    /// Simulates with the host's solver, from row to row.
     fn integrate(&self, mut run: exchange::Run, record: &Record) -> Result<Vec<Vec<f64>>> {
         let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
         for row in 0..record.time.len() {
@@ -457,7 +457,7 @@ impl Setup {
         record.inputs.iter().zip(&self.held).map(one).unzip()
     }
 
-    /// Whether an input that is held changes at a row.
+    /// Returns true if a held input changes at a row.
     fn jumps(&self, record: &Record, row: usize) -> bool {
         let held = record.inputs.iter().zip(&self.held).filter(|(_, held)| **held);
         held.into_iter().any(|(signal, _)| signal[row] != signal[row - 1])

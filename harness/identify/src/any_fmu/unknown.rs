@@ -25,7 +25,7 @@ pub enum What {
         /// The recording.
         recording: usize,
     },
-    /// What of one output is in another's reading, besides the output itself.
+    /// Cross-coupling: share of one output in the reading of another.
     Gain {
         /// The output that is read.
         output: usize,

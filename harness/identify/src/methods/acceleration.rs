@@ -577,7 +577,7 @@ impl Problem {
         best.expect("there is a start")
     }
 
-    /// What is known at a minimum of the variables that are not `held`; `None` if some combination has no influence.
+    /// Returns estimates and covariance of the variables that are not `held`; `None` if some combination has no influence.
     ///
     /// # Errors
     /// If a derivative is not finite.

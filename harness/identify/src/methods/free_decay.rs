@@ -19,7 +19,7 @@ const NAMED: f64 = 0.02;
 /// The result; `measurement` has f, ζ, ζ_A and κ.
 pub type Found = Identified<Details>;
 
-/// What this method alone has to say.
+/// Results that only this method has.
 #[derive(Clone, Debug, Serialize)]
 pub struct Details {
     /// The signal.
@@ -40,7 +40,7 @@ pub struct Details {
 
 /// Fits free decays.
 pub struct FreeDecay {
-    /// Which signal the recordings' rate is.
+    /// Name of the signal that the recordings hold in place of the rate.
     pub signal: &'static str,
 }
 

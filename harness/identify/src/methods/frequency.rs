@@ -51,7 +51,7 @@ const MISFIT: f64 = 1.3;
 /// shape.
 pub type Found = Identified<Details>;
 
-/// What this method alone has to say.
+/// Results that only this method has.
 #[derive(Clone, Debug, Serialize)]
 pub struct Details {
     /// Sizes.
@@ -60,7 +60,7 @@ pub struct Details {
 
 /// Three poles and two zeros.
 pub struct Frequency {
-    /// What is known of the bench, by FMU name.
+    /// Known parameters of the bench, by FMU name.
     pub settings: Vec<(String, String)>,
     /// Intersample behaviour of the torque.
     pub intersample: Intersample,
@@ -274,7 +274,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
 /// A quantity's name, unit and value.
 type Named = (&'static str, &'static str, f64);
 
-/// What coefficients (s in units of `unit`) say of the bench.
+/// Returns the bench's parameters for these coefficients (s in units of `unit`).
 fn translated(x: &[f64], unit: f64, step: f64, bench: Bench) -> Option<[Named; 14]> {
     let scaled = |c: &[f64]| [c[0] * unit, c[1] * unit.powi(2), c[2] * unit.powi(3)];
     let (numerator, denominator) = (scaled(&x[..3]), scaled(&x[3..6]));

@@ -1,4 +1,4 @@
-//! What the output-error method finds.
+//! Results of the output-error method.
 
 use serde::Serialize;
 
@@ -10,12 +10,12 @@ use crate::nominal::Start;
 use crate::start::Response;
 use crate::uncertainty::Combination;
 
-/// What the output-error method alone has to say.
+/// Results that only the output-error method has.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
     /// The chosen model's fit.
     pub fit: ModelFit,
-    /// Sums that are known where their terms are not.
+    /// Sums that are determined although their terms are not.
     pub combinations: Vec<Combination>,
     /// Condition number of the sensitivities.
     pub condition: f64,
@@ -25,7 +25,7 @@ pub struct Details {
     pub missing: Vec<Missing>,
     /// All models that were tried, the chosen one first.
     pub models: Vec<ModelFit>,
-    /// What the frequency response says.
+    /// Estimates from the frequency response.
     pub frequency_response: Option<Response>,
     /// Starts from the data.
     pub start: Option<Start>,

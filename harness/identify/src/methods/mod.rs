@@ -21,14 +21,14 @@ use crate::nominal::Nominal;
 use crate::recording::Recording;
 use crate::{plausible, start};
 
-/// What a method is given.
+/// Input of a method.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
     /// The FMU, for methods that need it.
     pub fmu: Option<&'a Fmu>,
-    /// What is fitted.
+    /// Recordings to fit.
     pub recordings: &'a [Recording],
-    /// What is simulated with the result, not fitted.
+    /// Recordings to simulate with the result, which are not fitted.
     pub validation: &'a [Recording],
 }
 
@@ -56,7 +56,7 @@ impl<'a> Task<'a> {
     }
 }
 
-/// What a method needs, and what it can use.
+/// Inputs that a method needs or can use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Needs {
     /// The FMU.
@@ -65,12 +65,12 @@ pub struct Needs {
     pub validation: bool,
 }
 
-/// What every method returns; `D`: what it alone has to say.
+/// Result of every method; `D` has the results that only this method has.
 #[derive(Clone, Debug, Serialize)]
 pub struct Identified<D> {
     /// The FMU's parameters, by name.
     pub parameters: BTreeMap<String, Estimated>,
-    /// What else was estimated: delay, gyro scale and bias, poles and zeros.
+    /// Other estimates: delay, gyro scale and bias, poles and zeros.
     pub measurement: BTreeMap<String, Estimated>,
     /// Settings of the FMU that belong to the parameters.
     pub settings: BTreeMap<String, String>,
@@ -78,18 +78,18 @@ pub struct Identified<D> {
     pub correlations: (Vec<String>, Vec<Vec<f64>>),
     /// The search ended at a minimum.
     pub converged: bool,
-    /// Whether the model is not invalidated: the residual is the gyro's noise. If it is invalidated, no interval is to be
-    /// trusted. `None`: the method cannot tell.
+    /// True if the model fits: the residual is the gyro's noise. If false, no interval can be trusted. `None`: the method does
+    /// not test it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fits: Option<bool>,
     /// The answer in words.
     pub verdict: Vec<String>,
-    /// What was done, step by step.
+    /// Log of the steps.
     pub done: Vec<String>,
     /// Measured rates and residuals, of methods that have them in time.
     #[serde(skip)]
     pub residuals: Vec<Residual>,
-    /// What the method alone has to say.
+    /// Results that only this method has.
     #[serde(flatten)]
     pub details: D,
 }
@@ -124,7 +124,7 @@ impl<D: Serialize> Identified<D> {
         }
     }
 
-    /// As `result.json`.
+    /// Returns the content of `result.json`.
     pub fn json(&self) -> Result<String> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
@@ -132,10 +132,10 @@ impl<D: Serialize> Identified<D> {
 
 /// A method of identification.
 pub trait Method {
-    /// What it alone has to say.
+    /// Results that only this method has.
     type Details: Serialize;
 
-    /// What it needs of a [`Task`].
+    /// Parts of a [`Task`] that the method needs.
     const NEEDS: Needs;
 
     /// Identifies; `progress` receives each message.
@@ -148,7 +148,7 @@ pub trait Method {
     /// Lines for a terminal, below the table of estimates.
     fn lines(found: &Identified<Self::Details>) -> Vec<String>;
 
-    /// Whether it makes a page.
+    /// True if the method writes an HTML page.
     const HAS_PAGE: bool = false;
 
     /// The page, in HTML.

@@ -46,7 +46,7 @@ pub struct Line {
 pub struct Levels {
     /// Excited lines.
     pub linear: f64,
-    /// What differs from period to period, in the mean over the periods.
+    /// Noise: variation from period to period, in the mean over the periods.
     pub noise: f64,
     /// Odd lines without power, beyond the noise.
     pub odd: f64,
@@ -66,11 +66,11 @@ pub struct Details {
     pub lines: Vec<Line>,
     /// Over the whole band.
     pub levels: Levels,
-    /// How sure the two kinds of distortion are, in standard deviations of what noise alone would make.
+    /// Significance of odd and even distortion, in standard deviations of noise alone.
     pub significance: (f64, f64),
 }
 
-/// Noise told from nonlinear distortion.
+/// Separates noise from nonlinear distortion.
 pub struct Multisine {
     /// Period of the torque, s.
     pub period: f64,

@@ -36,7 +36,7 @@ use crate::verdict::{self, Findings};
 
 /// The FMU fitted in the time domain.
 pub struct OutputError {
-    /// What is asked for.
+    /// Options of the fit.
     pub options: Options,
 }
 
@@ -221,8 +221,8 @@ fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
     (near, fitted.len())
 }
 
-/// What the covariance of the first model's unknowns x gains because it may be one of the others: Σ p_k δ_k δ_kᵀ, with p_k
-/// the probability of model k and δ_k how far its estimate is from the first's.
+/// Returns the covariance that the choice of a model adds to the first model's unknowns x: Σ p_k δ_k δ_kᵀ. p_k is the probability
+/// of model k, δ_k the distance of its estimate from the first one.
 fn of_models(near: &[Fitted]) -> DMatrix<f64> {
     let probabilities = evidence::probabilities(near.iter().map(|f| f.fit.bic));
     let (first, unknowns) = (&near[0].polished.x, &near[0].problem.unknowns);
@@ -448,9 +448,9 @@ fn finish(
 struct OneWay {
     /// 1 forwards, −1 backwards.
     way: f64,
-    /// What the asymmetry may be.
+    /// Allowed range of the asymmetry.
     range: [f64; 2],
-    /// Where it stood among the unknowns.
+    /// Former index among the unknowns.
     place: usize,
 }
 
@@ -499,7 +499,8 @@ fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>
     Ok(Some(OneWay { way, range, place }))
 }
 
-/// That the fit leaves linear slosh, in words: the wave at the wall, 2 α R/(ξ² − 1), over the radius R of an upright cylinder.
+/// Returns a warning if the fit leaves the range of linear slosh: the wave at the wall, 2 α R/(ξ² − 1), relative to the radius R
+/// of an upright cylinder.
 fn regime(model: &str, answer: &Answer) -> Option<String> {
     let angles = answer.motion.iter().flat_map(|motion| &motion.slosh_angle);
     let angle = angles.fold(0.0_f64, |most, angle| most.max(angle.abs()));
@@ -519,7 +520,7 @@ fn regime(model: &str, answer: &Answer) -> Option<String> {
     })
 }
 
-/// Which estimates are less sure by tolerances than by the recording, in words.
+/// Returns sentences on the estimates whose uncertainty is due to tolerances more than to the recording.
 fn shares(
     problem: &Problem,
     tolerances: &DMatrix<f64>,
@@ -560,12 +561,12 @@ fn shares(
 /// Share of the variance above which the report names it.
 const TOLD_SHARE: f64 = 0.2;
 
-/// What the torque between rows is, if that was free.
+/// Intersample behaviour of the torque, if it was free.
 #[derive(Default)]
 struct BetweenRows {
-    /// What the choice rests on.
+    /// Evidence in words.
     words: Vec<String>,
-    /// What the covariance gains because it may be another.
+    /// Covariance added because another behaviour is possible.
     gained: Option<DMatrix<f64>>,
 }
 

@@ -185,7 +185,7 @@ fn a_prior_holds_what_it_knows_better_than_the_recordings() {
     assert_eq!(found.fits, Some(false), "the truth is 0.05");
 }
 
-/// Of a linear model with known noise the bound is what a fit states.
+/// For a linear model with known noise, the predicted bound equals the standard deviation of a fit.
 #[test]
 fn what_is_foreseen_is_what_a_fit_states() {
     let at_truth = ["hub.I=0.35:0.1:1", "friction.b=0.05:0:1", "init.omega@each=0"];

@@ -73,7 +73,7 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     assert!(found.verdict.iter().any(|line| line.contains("cannot be distinguished")));
 }
 
-/// By a start for it, as any parameter that is not estimated by itself.
+/// A given start makes the parameter an unknown, as for any parameter that is not estimated by default.
 #[test]
 fn damping_that_grows_with_the_amplitude_comes_back() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -113,8 +113,8 @@ fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals
     assert!(is_told, "{:?}", found.verdict);
 }
 
-/// So slow that the friction's curve hardly bends: the minimum stands at 0.02 rad/s, where a quadratic would exclude the truth by fourteen
-/// standard deviations.
+/// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
+/// exclude the truth by fourteen standard deviations.
 #[test]
 fn along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -194,9 +194,9 @@ fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
     }
 }
 
-/// Of a long recording whose friction shows little of its Stribeck effect, other speeds are tried; where the loudest part alone speaks against
-/// one the whole is not asked. The loudest part underestimates the evidence: at the speed that it rejects least, the sum of
-/// squares of the whole recording grows by more.
+/// If a long recording shows little of the Stribeck effect, the fit tries other speeds. If the loudest part alone rejects a
+/// speed, the fit does not try it on the whole recording. The loudest part underestimates the evidence: at the speed that it
+/// rejects least, the sum of squares of the whole recording grows by more.
 #[test]
 fn what_the_loudest_part_has_against_a_stribeck_speed_the_whole_has_too() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -245,7 +245,8 @@ fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     assert!((scale.value - 1.02).abs() < 4.0 * scale.std && scale.std < 0.01, "{scale:?}");
 }
 
-/// Which the general tests of the residual do not see: they stay below 4, and the friction is off by tens of its standard deviations.
+/// The general tests of the residual miss this drag: they stay below 4, although the friction is off by tens of its standard
+/// deviations.
 #[test]
 fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -495,7 +496,7 @@ fn sensitivities_are_those_of_smaller_and_larger_steps() {
     }
 }
 
-/// What other intersample behaviours make of a sum of squares is compared with it: both must be of the same noise.
+/// The sums of squares of other intersample behaviours are compared with this one, so both must use the same noise.
 #[test]
 fn after_its_noise_is_renewed_a_minimum_is_of_that_noise() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

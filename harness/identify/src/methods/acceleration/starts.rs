@@ -24,7 +24,7 @@ const REST: f64 = 0.5;
 /// Inertia, b, c, d and a constant torque, and the sum of squares.
 type Linear = ([f64; 5], f64);
 
-/// What the hub does at a row.
+/// State of the hub at a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
     /// It turns.
