@@ -70,7 +70,7 @@ def angles(q: "ArrayLike | pd.DataFrame") -> Any:
 def quaternion(roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0, yaw: ArrayLike = 0.0) -> Real:
     """Return the quaternion (scalar first) of roll, pitch and yaw, rad; see `angles`.
 
-    Of arrays a row each.
+    Arrays give one row per element.
     """
     from scipy.spatial.transform import Rotation
 
@@ -103,9 +103,9 @@ def about(axis: ArrayLike, angle: ArrayLike) -> Real:
 
 
 def error(q: "ArrayLike | pd.DataFrame", wanted: "ArrayLike | pd.DataFrame") -> Any:
-    """Return what is left to turn from ``q`` to ``wanted``: a rotation vector in body axes, rad.
+    """Return the remaining rotation from ``q`` to ``wanted``: a rotation vector in body axes, rad.
 
-    The short way round.
+    It is the shorter of the two rotations.
     """
     from scipy.spatial.transform import Rotation
 
@@ -129,7 +129,10 @@ def slew(
     From ``start`` on the craft turns by ``angle`` (rad) about ``axis`` within ``duration`` (s), its
     acceleration one period of a sine. Columns: ``time``, ``q[1]`` … ``q[4]``, ``omega[1]`` …
     ``omega[3]`` and, given the ``inertia`` (kg·m², about the axis or 3 × 3), the torque that it
-    takes, ``torque[1]`` … ``torque[3]``. step: between the rows, s; stop: of the last one, s.
+    takes, ``torque[1]`` … ``torque[3]``.
+
+    * ``step``: Time between rows, s.
+    * ``stop``: Time of the last row, s.
     """
     import pandas as pd
 

@@ -23,8 +23,8 @@ class Linear:
     feedforward: Matrix
     """f, a row per cycle."""
     quaternion: list[int] | None = None
-    """Places of a quaternion in y, scalar first: the error of its vector part is that of q⁻¹ ⊗ r,
-    half of what is left to turn about each body axis, the short way round."""
+    """Indices of a quaternion in y, scalar first. The error of its vector part is that of
+    q⁻¹ ⊗ r, half the remaining rotation about each body axis, the short way."""
 
 
 @dataclass

@@ -39,7 +39,7 @@ class TransferFunction:
         return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
     def to_control(self) -> Any:
-        """Return it as ``control.TransferFunction``; needs the package control."""
+        """Return a ``control.TransferFunction``; needs the package control."""
         try:
             import control
         except ModuleNotFoundError:
@@ -50,13 +50,14 @@ class TransferFunction:
 def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunction:
     """Fit a transfer function to a frequency response.
 
-    response: a table with the columns ``frequency`` (Hz), ``real`` and ``imag``, as
-    `frequency_response` returns it. poles, zeros: how many. From torque to rate a hub with one
-    slosh mode has three and two; its zeros are the antiresonance, its pair of poles the resonance.
+    * ``response``: A table with the columns ``frequency`` (Hz), ``real`` and ``imag``, as
+      `frequency_response` returns it.
+    * ``poles``, ``zeros``: Numbers of poles and zeros. From torque to rate a hub with one slosh
+      mode has three and two; its zeros are the antiresonance, its pair of poles the resonance.
 
-    Least squares over all frequencies (Levenberg and Marquardt) from the start that Sanathanan and
-    Koerner's iteration gives. Nothing keeps the poles stable. Give a band in which the coherence is
-    near 1; a real pole far below the band is found poorly.
+    Least squares over all frequencies (Levenberg–Marquardt), starting from the Sanathanan–Koerner
+    iteration. The poles may become unstable. Use a band in which the coherence is near 1; a real
+    pole far below the band is poorly determined.
     """
     from scipy.optimize import least_squares
 

@@ -40,14 +40,15 @@ def _own(shape: str, mass: float, size: Any) -> float:
 def bottom_up(parts: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """Add up the inertia of HubSlosh's hub and dry tank about the bearing axis.
 
-    parts: by name, each a mapping with ``mass`` (kg), ``position`` (x, y) of its centre (m; from
-    the bearing axis, x radial towards the tank, y towards +theta; (0, 0) if not said) and one of
-    `SHAPES`: ``{"plate": {"mass": 2.1, "box": (0.5, 0.3)}}``. With ``inertia`` alone, as from CAD
-    and about the bearing axis, ``mass`` is 0 if not said.
+    * ``parts``: Mappings by name, each with ``mass`` (kg), ``position`` and one of `SHAPES`:
+      ``{"plate": {"mass": 2.1, "box": (0.5, 0.3)}}``. ``position`` is (x, y) of the part's centre
+      from the bearing axis, m: x radial towards the tank, y towards +theta; by default (0, 0). A
+      part may have ``inertia`` about the bearing axis instead, as from CAD; its ``mass`` is then 0
+      by default.
 
-    Returns a row a part: ``mass``, ``own`` inertia, ``offset`` (m r^2), their sum ``inertia`` and
-    its ``share``. ``.attrs["parameters"]`` are HubSlosh's ``hub.I``, ``hub.imbalance`` and
-    ``hub.imbalance_angle``, for `simulate`.
+    Returns a row for each part: ``mass``, ``own`` inertia, ``offset`` (m r^2), their sum
+    ``inertia`` and its ``share``. ``.attrs["parameters"]`` has HubSlosh's ``hub.I``,
+    ``hub.imbalance`` and ``hub.imbalance_angle``, for `simulate`.
     """
     if not isinstance(parts, Mapping):
         parts = {str(part.get("name", k)): part for k, part in enumerate(parts, 1)}

@@ -1,26 +1,26 @@
 """Slosh modes of a tank of any shape, at any tilt, by linear potential flow in three dimensions.
 
-For the tanks that ``hubslosh tank`` cannot cut from a contour: cylinders that lie, sectors, tanks
-under a lateral component of gravity, solids of a CAD system. Needs the extra ``fem`` (gmsh for the
-mesh, scikit-fem for the finite elements).
+For tanks that are not bodies of revolution or boxes, which ``hubslosh tank`` covers: lying
+cylinders, sectors, tanks under a lateral component of gravity, CAD solids. Needs the extra ``fem``
+(gmsh for the mesh, scikit-fem for the finite elements).
 
-The liquid Q has the wetted wall W and the free surface F at z = z_F, normal to the specific force;
+The liquid Q has the wetted wall W and the free surface F at z = z_F, normal to the specific force.
 n is the normal out of the liquid, λ = ω²/g:
 
     Δφ = 0 in Q,   ∂φ/∂n = 0 on W,   ∂φ/∂z = λ φ on F
     weak:          ∫_Q ∇φ·∇v = λ ∫_F φ v
 
-Of a motion j of the tank (three displacements, three rotations about O) N_j = n·e_j or
-n·(e_j × r) is the wall's velocity along n, the surface moving with it as a lid, and Ψ_j the
-potential with ∂Ψ_j/∂n = N_j. By Green's identity
+The tank has six motions j: three displacements and three rotations about O. N_j = n·e_j or n·(e_j ×
+r) is the wall's velocity along n, with the surface as a rigid lid. Ψ_j is the potential with
+∂Ψ_j/∂n = N_j. By Green's identity
 
     B_nj = ∫_F φ_n Ψ_j = (1/λ_n) ∫_(W+F) φ_n N_j,        N_n = ∫_F φ_n²
     mass matrix of mode n:   ρ λ_n B_nj B_nk/N_n          of the liquid under a lid: ρ ∫ Ψ_j N_k
 
 A mode with a displacement, A = (B_n1, B_n2), is a mass m = ρ λ |A|²/N on a pendulum of length 1/λ
-that swings along A/|A|; its height and its arm about the vertical through O follow from the
-rotations. A mode without one only twists. Sources: H. N. Abramson (ed.), NASA SP-106, ch. 6;
-Moiseyev and Rumyantsev, Dynamic Stability of Bodies Containing Fluid (1968).
+that swings along A/|A|. Its height and its arm about the vertical through O follow from the
+rotations. A mode without displacement only twists. Sources: H. N. Abramson (ed.), NASA SP-106, ch.
+6; Moiseyev and Rumyantsev, Dynamic Stability of Bodies Containing Fluid (1968).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -75,25 +75,25 @@ class LiquidModes:
     lid_inertia: "np.ndarray"
     """Inertia of the liquid under a lid about O, without its displacement, 3×3, kg·m²."""
     all: "pd.DataFrame" = field(repr=False)
-    """A row per mode; `modes` are its columns."""
+    """A row per mode, with the columns of `modes`."""
     error: "pd.DataFrame" = field(repr=False)
-    """Difference of frequency and mass of each mode between two meshes, as part of the finer's."""
+    """Relative difference of frequency and mass of each mode between two meshes."""
 
     @property
     def modes(self) -> "pd.DataFrame":
         """A row per mode, by frequency.
 
-        ``frequency`` (Hz); ``mass`` (kg); ``direction`` in which the mass moves, degrees from x
-        towards y, −90 to 90; ``length`` of the pendulum (m); ``bob`` and ``hinge``: heights (m);
-        ``arm`` of the mass's line about the vertical through O (m); ``twist``: inertia about that
-        vertical that the mode moves (kg·m²). Of modes without displacement mass is about 0, and
-        direction, bob, hinge and arm are missing.
+        Columns: ``frequency`` (Hz) and ``mass`` (kg); ``direction`` of the mass's motion, degrees
+        from x towards y, −90 to 90; ``length`` of the pendulum and heights of ``bob`` and ``hinge``
+        (m). ``arm`` is the distance of the mass's line of motion from the vertical through O (m),
+        ``twist`` the inertia about that vertical that the mode moves (kg·m²). Modes without
+        displacement have a mass of about 0, and no direction, bob, hinge and arm.
         """
         return self.all
 
     @cached_property
     def rest(self) -> dict[str, float]:
-        """Mass that the modes leave (kg) and its height (m), of x and of y.
+        """Mass (kg) that no mode moves, and its height (m), for motions along x and along y.
 
         Each direction has a sum of its own: a mass that swings along y alone is rigid along x.
         """
@@ -109,7 +109,7 @@ class LiquidModes:
     def table(self, direction: str = "y", modes: int = 1) -> "dict[str, Value]":
         """Return the modes along x or y as HubSlosh's ``slosh.table``.
 
-        Of a tank that stands on the hub with this direction tangential; O is where the tank stands,
+        The tank stands on the hub with this direction tangential, and with O at the distance
         `tank.r` from the axis. Modes that move along both directions are refused.
         """
         if direction not in ("x", "y"):
@@ -154,14 +154,15 @@ class LiquidModes:
     ) -> "dict[str, Value]":
         """Return the liquid as tank ``number`` (1 to 4) of Spacecraft, for `simulate`, `Loop`, ….
 
-        model: Spacecraft, or SloshTank, which has one tank.
+        * ``model``: Spacecraft, or SloshTank, which has one tank.
 
-        Each of its modes is planar, with its own direction. modes: how many, 1 to 3, the heaviest;
-        by default 3, or as many as there are with displacement. position: of O in body axes, m; the
-        axes are parallel. Damping ratios are 0.
+        * ``modes``: Number of modes, 1 to 3; the heaviest come first. By default 3, or all modes
+          with displacement.
+        * ``position``: Position of O in body axes, m; the axes are parallel.
 
-        The bobs hang at r_n from the liquid's centre, which the tank's axis passes through. What is
-        left is a rigid body, so that mass, centre and inertia under a lid are the liquid's:
+        Each mode is planar, with its own direction; damping ratios are 0. The bobs hang at r_n from
+        the liquid's centre, which the tank's axis passes through. A rigid body completes mass,
+        centre and inertia of the liquid under a lid:
 
             m_0 = m − Σ m_n,   m_0 r_0 = −Σ m_n r_n,
             J_0 = J − Σ m_n (|r_n|² 1 − r_n⊗r_n) − m_0 (|r_0|² 1 − r_0⊗r_0)
@@ -229,15 +230,18 @@ def liquid_modes(
 ) -> LiquidModes:
     """Return the slosh modes of a tank of any shape by finite elements in three dimensions.
 
-    shape: one of `SHAPES` with its dimensions, ``{"horizontal_cylinder": {"radius": 0.5, "length":
-    2}}``. O is the middle of the lowest plane or point of the upright shape, of a sector the point
-    where its axis meets the floor (x bisects the sector); a lying cylinder's axis is x.
-    ``{"step": "tank.step"}``: the inside of a tank as a solid, O and axes as in the file, m.
-    fill: height of the surface above the lowest point along the specific force, m, or ``"60%"`` of
-    the volume. density: kg/m³. specific_force: along the tank's z, or its three components in the
-    tank's axes (of a tank at rest: gravity, upwards), m/s².
-    resolution: elements across the surface of the finer of two meshes, from whose difference
-    `LiquidModes.error` follows. Takes 5 to 60 s.
+    * ``shape``: One of `SHAPES` with its dimensions, ``{"horizontal_cylinder": {"radius": 0.5,
+      "length": 2}}``. O is the middle of the lowest plane or point of the upright shape; for a
+      sector, the point where its axis meets the floor (x bisects the sector). A lying cylinder's
+      axis is x. ``{"step": "tank.step"}`` reads the inside of a tank as a solid, with O and axes
+      as in the file, m.
+    * ``fill``: Height of the surface above the lowest point along the specific force, m, or
+      ``"60%"`` of the volume.
+    * ``density``: kg/m³.
+    * ``specific_force``: Specific force along the tank's z, or its three components in the tank's
+      axes, m/s². For a tank at rest it is gravity, upwards.
+    * ``resolution``: Elements across the surface of the finer of two meshes. Their difference gives
+      `LiquidModes.error`. A call takes 5 to 60 s.
     """
     import pandas as pd
 

@@ -32,16 +32,16 @@ def posterior(
     seed: int = 1,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Sample the posterior of what :func:`hubslosh.identify` has found with ``free=``.
+    """Sample the posterior of a result of :func:`hubslosh.identify` with ``free=``.
 
-    found: its result; the other arguments are those that it was given. walkers: of the ensemble,
-    at least twice as many as unknowns, by default four times. steps: of each walker, of which the
-    first ``burn`` are dropped. The walkers start from the normal distribution that the result
-    states.
+    * ``found``: The result. The arguments of `identify` are repeated unchanged.
+    * ``walkers``: Number of walkers, at least twice the number of unknowns; by default four times.
+    * ``steps``: Steps of each walker; the first ``burn`` are dropped. The walkers start from the
+      normal distribution of the result.
 
-    Returns a row a sample and a column an unknown; ``table.quantile([0.025, 0.975])`` are the 95 %
-    intervals. ``.attrs["autocorrelation"]`` are the chains' correlation times in steps: where
-    ``steps - burn`` is less than some ten of them, the intervals are rough.
+    Returns a row for each sample and a column for each unknown; ``table.quantile([0.025, 0.975])``
+    gives 95 % intervals. ``.attrs["autocorrelation"]`` has the chains' correlation times in steps.
+    If ``steps - burn`` is less than ten correlation times, the intervals are rough.
     """
     try:
         import emcee

@@ -45,20 +45,21 @@ def mode_errors(
     below: float | None = None,
     fmu: str | Path = "HubSlosh",
 ) -> pd.DataFrame:
-    """Say what the force on HubSlosh's tank lacks with fewer modes than ``slosh.modes``.
+    """Return the errors of the force on HubSlosh's tank with fewer modes than ``slosh.modes``.
 
-    parameters: of HubSlosh, as for `simulate`; ``slosh.modes``, the reference, is 10 if not said.
-    below: band that matters, from 0, Hz; by default up to 1.5 times the first mode's frequency.
+    * ``parameters``: Parameters of HubSlosh, as for `simulate`. ``slosh.modes`` is the reference,
+      by default 10.
+    * ``below``: Upper end of the band, Hz; by default 1.5 times the first mode's frequency.
 
-    Returns a row a number of modes, with the columns
+    Returns a row for each number of modes, with the columns
 
     * ``impulse``: the error of the force after an impulse of the tank, over the largest force of
       the reference (4.24 of the thesis);
     * ``band``: the largest error below ``below`` of force over acceleration, over the liquid's
       mass.
 
-    ``.attrs["needed"]`` says how many modes are enough for 5 % and 1 % of each. The impulse excites
-    every frequency alike; a loop does not: `band` is what counts there.
+    ``.attrs["needed"]`` has the numbers of modes for 5 % and 1 % of each. The impulse excites every
+    frequency equally. A loop does not: use `band` for loops.
     """
     settings: dict[str, Quantity] = {"slosh.modes": 10} | dict(parameters_of(parameters))
     with Plant(fmu, settings) as plant:

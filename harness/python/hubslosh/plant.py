@@ -1,8 +1,8 @@
 """Instances of an FMU, and the HubSlosh FMU driven through a torque history.
 
-The torque comes as rows of time (s) and ``tau_cmd`` (N·m). At every row the FMU is given the
-torque and the slope of the chord to the next row, so that it sees straight lines; this is what
-``hubslosh run`` does. All variables have their FMU names and SI units.
+The torque comes as rows of time (s) and ``tau_cmd`` (N·m). At every row the package sets the torque
+and the slope of the chord to the next row, as ``hubslosh run`` does: the FMU receives straight
+lines. All variables have their FMU names and SI units.
 """
 
 from collections.abc import Mapping, Sequence
@@ -115,9 +115,12 @@ class Plant(Instance):
     ) -> None:
         """Instantiate and initialise.
 
-        fmu: the packed FMU, or the name of one of this package's. settings: values of parameters
-        and inputs by name. tolerance: relative, for the FMU's solver; None: its own choice. start,
-        stop: s. inputs: values at the start. torque: ``tau_cmd`` among them, N·m.
+        * ``fmu``: File of an FMU, or the name of one in this package.
+        * ``settings``: Values of parameters and inputs by name.
+        * ``tolerance``: Relative tolerance of the FMU's solver; None: its own choice.
+        * ``start``, ``stop``: Start and stop time, s.
+        * ``inputs``: Values at the start.
+        * ``torque``: Value of ``tau_cmd`` at the start, N·m.
         """
         super().__init__(Fmu.open(fmu))
         self.time = start
@@ -137,8 +140,8 @@ class Plant(Instance):
     def step(self, end: float, torque: float | None = None, slope: float | None = None) -> None:
         """Go on to the time ``end`` (s).
 
-        torque: at the beginning of the step, N·m; None: as it is. slope: its derivative during
-        the step, N·m/s; None: the torque is held.
+        * ``torque``: Value at the beginning of the step, N·m; None: unchanged.
+        * ``slope``: Its derivative during the step, N·m/s; None: the torque is held.
         """
         if torque is not None:
             self.set(TORQUE, torque)
@@ -161,11 +164,14 @@ class Plant(Instance):
     ) -> dict[str, np.ndarray]:
         """Step from row to row in one call and return ``columns`` at every row.
 
-        time: communication points, s, from the present one on, growing. inputs: by name, their
-        values from each row to the next. slopes: the derivatives of the Real ones, per s; None:
-        inputs are held. feedback: a controller, of other inputs. Returns an array per column:
-        floats, integers (enumerations by number) or bools. An output that follows an input at once
-        shows its jump in the next row: rows are read before inputs are set.
+        * ``time``: Communication points from the present one on, ascending, s.
+        * ``inputs``: By name, their values from each row to the next.
+        * ``slopes``: Derivatives of the Real inputs, per s; None: inputs are held.
+        * ``feedback``: Controller that sets other inputs.
+
+        Returns an array per column: floats, integers (enumerations by number) or bools. Rows are
+        read before inputs are set, so an output with direct feedthrough shows a jump of an input
+        in the next row.
         """
         self._must_be_numbers(columns)
         time = np.ascontiguousarray(time, float)
@@ -221,9 +227,12 @@ def drive(
 ) -> dict[str, np.ndarray]:
     """Drive a new instance through a torque history, one step from row to row.
 
-    time: communication points, s, growing. torque: ``tau_cmd`` there, N·m. slope: its derivative
-    from each row to the next, N·m/s; None: straight lines between the rows. hold: the torque is
-    held from row to row, whatever the slope. settings, tolerance: as for `Plant`.
+    * ``time``: Communication points, ascending, s.
+    * ``torque``: ``tau_cmd`` there, N·m.
+    * ``slope``: Its derivative from each row to the next, N·m/s; None: straight lines between the
+      rows.
+    * ``hold``: The torque is held from row to row, whatever the slope.
+    * ``settings``, ``tolerance``: As for `Plant`.
 
     Returns the columns ``time``, ``tau_cmd`` and ``columns`` as floats, one row per communication
     point.

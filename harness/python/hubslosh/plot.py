@@ -144,7 +144,7 @@ def bode(
 
 
 def band(*models: "LinearModel") -> tuple[float, float]:
-    """Return the band in which models do something, Hz: a fifth of the lowest pole or zero on."""
+    """Return the band of the models' poles and zeros, Hz, from a fifth of the lowest one on."""
     from scipy.linalg import eigvals
 
     found, highest = [], np.inf
@@ -183,8 +183,8 @@ def margins(
     """Draw gain (dB) and phase of a `Loop`'s gain with all its crossings, a colour per command.
 
     Each loop is drawn with the others closed, as `hubslosh.margins` takes it, which this calls.
-    Gain crossings are dots, phase crossings squares. The smallest margins are written beside them,
-    and those of crossings near slosh.
+    Gain crossings are dots, phase crossings squares. Labels give the smallest margins and those
+    near slosh.
     """
     from .stability import _broken_at, margins_and_gain
 
@@ -262,8 +262,8 @@ def closed_loop(
 ) -> "Sequence[Axes]":
     """Draw attitude, rates and torques of a run of `hubslosh.closed_loop`, in degrees.
 
-    Of Spacecraft roll, pitch and yaw from its quaternion, of HubSlosh the hub's angle. With the
-    reference that the run had there is also what is left to turn about each axis.
+    Spacecraft has roll, pitch and yaw from its quaternion, HubSlosh the hub's angle. With
+    ``reference`` the figure also has the remaining rotation about each axis.
     """
     from .attitude import NAMES, angles, error
 
@@ -318,8 +318,8 @@ def monte_carlo(
 ) -> "Sequence[Axes]":
     """Draw the share of runs below each value, of each result of `hubslosh.monte_carlo`.
 
-    columns: by default every number that is no drawn parameter's, the names with a dot or bracket.
-    A vertical line and a band are the quantile ``at`` with its 95 % interval.
+    * ``columns``: Results to draw; by default all numbers except drawn parameters (names with a dot
+      or bracket). A vertical line and a band show the quantile ``at`` with its 95 % interval.
     """
     from .sampling import quantiles
 

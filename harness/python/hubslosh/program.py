@@ -1,6 +1,6 @@
 """Calls of the program ``hubslosh``: campaigns and identification.
 
-It comes with this package's wheel, or is built from the project's source.
+The program comes with this package's wheel, or from a build of the source.
 """
 
 import json
@@ -20,10 +20,9 @@ from .fmu import FmuError, find, source_tree
 
 
 def find_program(path: str | Path | None = None) -> Path:
-    """Return where the program is.
+    """Return the path of the program.
 
-    At ``path``; named in $HUBSLOSH; where pip has put it with this package; on PATH; in the source
-    tree.
+    The search order is ``path``, $HUBSLOSH, pip's folder of scripts, PATH, the source tree.
     """
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     named = path or os.environ.get("HUBSLOSH")
@@ -75,14 +74,14 @@ def campaign(
     force: bool = False,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Make a plan's runs with the program ``hubslosh`` and return its table of runs.
+    """Simulate a plan with the program ``hubslosh`` and return its table of runs.
 
-    plan: a TOML file, the name of a built-in plan, or the TOML text itself (several lines).
-    out: directory for runs, tables and report.html; by default dist/ and the plan's name. Runs
-    that are there already are reused, unless ``force``.
+    * ``plan``: A TOML file, the name of a built-in plan, or the TOML text itself (several lines).
+    * ``out``: Directory for runs, tables and report.html; by default dist/ and the plan's name.
+      Stored runs are reused, unless ``force``.
 
-    Returns ``runs.csv``: a row per run with what it was made from and its results.
-    ``.attrs["directory"]`` is where all of it is.
+    Returns ``runs.csv``: a row per run with its settings and results. ``.attrs["directory"]`` is
+    the directory.
     """
     path = find_program(program)
     with temporary.folder() as folder:
@@ -112,10 +111,12 @@ def analyse(
 ) -> pd.DataFrame:
     """Analyse recordings of a bench with ``hubslosh analyse``, and return its table of runs.
 
-    recordings: files (text, .parquet, .mat) with torque and one to three rates. out: directory for
-    runs, tables and report.html. columns: which columns they are, in what units, as
-    ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``. settings: what is known of the bench by its
-    FMU name, ``{"tank.h": 0.1}``. arguments: further flags of the command.
+    * ``recordings``: Files (text, .parquet, .mat) with torque and one to three rates.
+    * ``out``: Directory for runs, tables and report.html.
+    * ``columns``: Columns of the signals, with units, such as
+      ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``.
+    * ``settings``: Known parameters of the bench by FMU name, ``{"tank.h": 0.1}``.
+    * ``arguments``: Further flags of the command.
 
     Returns ``runs.csv``, as :func:`campaign` does; the model of a recording is ``recording``.
     """
@@ -137,15 +138,14 @@ class Estimated:
 
     value: float
     std: float
-    """Standard deviation, everything in it."""
+    """Standard deviation from all sources of error."""
     std_noise: float
     """Standard deviation from the noise alone."""
     interval: tuple[float, float | None]
     """95 % interval; None: the recording sets no upper end."""
     unit: str
     determined: bool = True
-    """The recording shows it: the interval has both ends, and it is known to better than half its
-    size."""
+    """True if the interval has both ends and the standard deviation is below half the value."""
 
 
 Method = Literal[
@@ -167,12 +167,12 @@ class Identification:
     settings: dict[str, str]
     """Settings of the FMU that belong to the parameters."""
     converged: bool
-    """The search ended at a minimum."""
+    """True if the search ended at a minimum."""
     fits: bool | None
-    """The residual is the gyro's noise; if not, the model is invalidated, and no interval is to be
-    trusted. None: not known."""
+    """True if the model fits: the residual is the gyro's noise. If False, the model is
+    invalidated and no interval can be trusted. None: not tested."""
     verdict: tuple[str, ...]
-    """The answer in words."""
+    """The verdict in words."""
     all: dict[str, Any]
 
 
@@ -232,27 +232,30 @@ def identify(
     out: str | Path | None = None,
     program: str | Path | None = None,
 ) -> Identification:
-    """Estimate the FMU's parameters from a measurement, with the program ``hubslosh identify``.
+    """Estimate an FMU's parameters from recordings, with the program ``hubslosh identify``.
 
-    data: a table, or a file (text, .parquet, .mat), with the columns ``time`` (s), ``tau_cmd``
-    (N·m) and ``omega`` (rad/s), or others by the flag ``--columns``. model: the slosh model.
-    arguments: further flags of the command. fmu: the name of an FMU of this package, or the file
-    of a HubSlosh. out: where to keep the result, .json.
+    * ``data``: A table, or a file (text, .parquet, .mat), with the columns ``time`` (s),
+      ``tau_cmd`` (N·m) and ``omega`` (rad/s), or others by the flag ``--columns``.
+    * ``model``: The slosh model.
+    * ``arguments``: Further flags of the command.
+    * ``fmu``: The name of an FMU of this package, or the file of a HubSlosh.
+    * ``out``: File for the result, .json.
 
     The parameters with ``settings`` simulate the bench:
     ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
     ``simulate(parameters="result.json")``.
 
-    method: "output-error" simulates the FMU; "acceleration" finds friction and inertia where no
-    liquid moves; "frequency" three poles and two zeros; "multisine" and "black-box" estimate no
-    parameters of the FMU, `all` has their results; "free-decay" takes data without torque, with
-    ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or ``omega``, and finds frequency and
-    damping.
+    * ``method``: "output-error" simulates the FMU. "acceleration" fits friction and inertia if no
+      liquid moves. "frequency" fits three poles and two zeros. "multisine" and "black-box" estimate
+      no parameters of the FMU; `all` has their results. "free-decay" finds frequency and damping
+      from data without torque: ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or ``omega``.
 
-    free: fits any FMU, of others too: its Real parameters and start values with their starts,
-    ``{"mu": 1.0}``, or starts and bounds, ``{"mu": (1.0, 0.1, 5.0)}``; ``"x0@each"`` is another one
-    in each recording. inputs, outputs: columns of the data, by the FMU's names. prior: what is
-    known of an unknown beforehand, mean and standard deviation. settings: what is set.
+    * ``free``: Unknowns of any FMU, for ``fmu`` of other makers too. They are Real parameters and
+      start values with a start, ``{"mu": 1.0}``, or with start and bounds, ``{"mu": (1.0, 0.1,
+      5.0)}``. ``"x0@each"`` has a value of its own in each recording.
+    * ``inputs``, ``outputs``: Columns of the data, by the FMU's names.
+    * ``prior``: Mean and standard deviation of an unknown.
+    * ``settings``: Values of other parameters.
     """
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("--method is given as method=")

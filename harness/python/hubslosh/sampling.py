@@ -1,4 +1,4 @@
-"""Monte Carlo: parameters drawn at random, one run each, resumable; quantiles of what comes out."""
+"""Monte Carlo studies: runs with random parameters, resumable, and quantiles of the results."""
 
 import hashlib
 import json
@@ -32,8 +32,7 @@ FAILED = "refused"
 def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]:
     """Return the values of one run, counted from 0; see `monte_carlo`.
 
-    They depend on the seed, the run and the order of the names, on nothing else: not on how many
-    runs there are, nor on names that follow.
+    They depend only on the seed, the run and the names up to each value, not on the number of runs.
     """
     if wrong := _wrong(ranges) + _not_whole(run=(run, 0), seed=(seed, 0)):
         raise FmuError("; ".join(wrong))
@@ -94,27 +93,28 @@ def monte_carlo(
     workers: int | None = None,
     progress: bool | None = None,
 ) -> "pd.DataFrame":
-    """Draw values at random, make a run with each, and return a row for each.
+    """Draw random values, make a run with each draw, and return a row for each run.
 
-    ranges: by name, (low, high) for a uniform distribution, a list of values, or a frozen
-    distribution of ``scipy.stats``. A run's values depend on seed and run alone: 400 runs begin
-    with the 200 that there were. An item of a list is drawn as it is, with its type.
-    outcome: a function of the values (by name) that makes the run and returns numbers by name.
-    Without it the draws alone are returned.
-    folder: for a study that can be stopped. Each run is stored there as soon as it is done, and the
-    same call goes on where the study was stopped, after kill -9 too. Every stored run is verified:
-    by its SHA-256 in ``manifest.sha256``, and its values by the seed. A run that was changed from
-    outside raises FmuError with its name and what differs. ``runs.csv`` is written at the end. One
-    process at a time holds the folder; others, and other studies, are refused. The function is not
-    compared: give another folder when you change it.
-    client: of dask.distributed; its workers need this package. Otherwise ``workers`` threads, by
-    default one per core: closed loops with a linear controller and `simulate` run in compiled code
-    side by side, a controller in Python runs on one core at a time.
-    progress: a line on stderr with runs done and time left; by default on a terminal.
+    * ``ranges``: Ranges by name: (low, high) for a uniform distribution, a list of values, or a
+      frozen distribution of ``scipy.stats``. A run's values depend only on seed and number: 400
+      runs begin with the same 200. Items of a list keep their type.
+    * ``outcome``: A function of the values (by name) that makes the run and returns numbers by
+      name. Without it the table has only the draws.
+    * ``folder``: Makes the study resumable. Each run is stored as soon as it is done, and the same
+      call continues a stopped study, even after kill -9. Stored runs are verified by their SHA-256
+      in ``manifest.sha256`` and by the seed. A run that was changed from outside raises FmuError
+      with its name and the difference. ``runs.csv`` is written at the end. One process at a time
+      holds the folder; other processes and other studies are refused. The function is not compared:
+      use another folder if you change it.
+    * ``client``: Client of dask.distributed; its workers need this package. Without a client the
+      study uses ``workers`` threads, by default one per core. `simulate` and loops with a linear
+      controller run in parallel; a controller in Python runs on one core at a time.
+    * ``progress``: Shows a line on stderr with finished runs and remaining time; by default on a
+      terminal.
 
-    Returns a table with the columns ``run``, the names of the ranges, and what the outcomes have. A
-    run that the FMU refuses has NaN there, and the reason in the column ``refused``. Any other
-    exception ends the study; what is in the folder stays. `quantiles` sums it up.
+    Returns a table with the columns ``run``, the names of the ranges, and the names of the
+    outcomes. If the FMU refuses a run, its outcomes are NaN, and the column ``refused`` has the
+    reason. Any other exception ends the study; stored runs stay. `quantiles` summarises the table.
     """
     import pandas as pd
 
@@ -311,11 +311,14 @@ def quantiles(
 ) -> "pd.DataFrame":
     """Return quantiles of a study's results with their confidence intervals.
 
-    table: of `monte_carlo`; runs without a number are left out. columns: by default all but
-    ``run``. Columns: ``result``, ``quantile``, ``value`` (linear between order statistics), ``low``
-    and ``high``: order statistics between which the true quantile lies with ``confidence`` or more,
-    whatever the distribution (binomial; Conover, Practical Nonparametric Statistics, section 3.2);
-    infinite where there are too few runs to say; and ``runs``, their number.
+    * ``table``: Result of `monte_carlo`; runs with NaN are left out.
+    * ``columns``: Results; by default all columns except ``run``.
+    * ``at``, ``confidence``: Quantiles, and the probability of their intervals.
+
+    Returns a table with ``result``, ``quantile``, ``value`` (linear between order statistics),
+    ``low``, ``high`` and the number of ``runs``. The true quantile lies between ``low`` and
+    ``high`` with at least ``confidence``, for any distribution (binomial; Conover, Practical
+    Nonparametric Statistics, section 3.2). They are infinite if there are too few runs.
     """
     import pandas as pd
     from scipy.stats import binom

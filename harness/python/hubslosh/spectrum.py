@@ -1,6 +1,6 @@
 """Frequency responses from time histories, by scipy.signal.
 
-This is an estimate of its own, independent of the one in the program ``hubslosh``.
+This estimate is independent of the one in the program ``hubslosh``.
 """
 
 import numpy as np
@@ -27,19 +27,19 @@ def frequency_response(
 ) -> pd.DataFrame:
     """Estimate the frequency response from one column of a time history to another.
 
-    data: a table with the column ``time`` (s, in equal steps), as `simulate` returns it.
-    resolution: half the width of the smoothing, Hz; by default three lines of the spectrum. Wider
-    averages more noise away, and flattens a resonance that is narrower: keep it below ζ f.
-    band: lowest and highest frequency wanted, Hz; by default all.
-    hold: the input is held from row to row; otherwise it is straight lines between the rows.
+    * ``data``: A table with the column ``time`` (s, in equal steps), as `simulate` returns it.
+    * ``resolution``: Half the width of the smoothing, Hz; by default three lines of the spectrum. A
+      wider window reduces noise more, but flattens a narrow resonance: keep it below ζ f.
+    * ``band``: Lowest and highest frequency, Hz; by default all.
+    * ``hold``: True if the input is held from row to row; otherwise it is linear between rows.
 
     The estimate is H1 = S_uy / S_uu with the spectra of the whole record smoothed over frequency by
-    a Hann window (Ljung, *System Identification*, section 6.4). It takes the record as all there
-    is: the motion should begin at rest, and end at rest or long after its start against the time
-    in which it decays. What the input does between two rows is divided out: sinc²(f Δt) for lines,
-    sinc(f Δt) and half a step's delay if it is held; what a held input's steps do above half the
-    sampling rate stays in the estimate, some f Δt of it. Frequencies at which the input has less
-    than 1e-4 of its largest power are left out.
+    a Hann window (Ljung, *System Identification*, section 6.4). The record must contain the whole
+    motion: it begins at rest, and ends at rest or is much longer than the decay time. The estimate
+    is corrected for the input between rows: by sinc²(f Δt) for lines, by sinc(f Δt) and half a
+    step's delay if held. For a held input an error of about f Δt remains, from its steps' power
+    above half the sampling rate. Frequencies with less than 1e-4 of the input's largest power are
+    left out.
 
     Returns a table with the columns ``frequency`` (Hz), ``real`` and ``imag`` (unit of the output
     per unit of the input), ``gain`` (their magnitude), ``phase`` (deg, unwrapped), ``coherence``

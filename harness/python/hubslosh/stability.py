@@ -43,13 +43,13 @@ class Margins:
     to 360 deg over frequency), ``near``: the lightly damped modes of the plant within a fifth of
     its frequency, of which tank or by the states that take most part."""
     stable: bool
-    """The closed loop is: of a `Loop` the part that the commands move and the measurements show."""
+    """True if the closed loop is stable; for a `Loop`, its controllable and observable part."""
     poles: NDArray[np.complex128]
     """Poles of the closed loop by magnitude: rad/s, or in the z plane."""
     modulus_margin: float
     """Least distance of the loop gain to -1."""
     delay_margin: float
-    """s, by which all commands may come later until the loop is unstable; 0 if it is so already."""
+    """Further delay of all commands, s, at which the loop becomes unstable; 0 if it already is."""
     modes: "pd.DataFrame"
     """Modes of the plant with damping ratios below 0.2: see `LinearModel.modes`."""
 
@@ -103,15 +103,15 @@ def margins(
 ) -> Margins:
     """Return every gain and phase crossing of a loop, its margins, and whether it is stable.
 
-    loop: a `Loop`, whose sampled loop gain is exact, delay included. Or a loop gain L that is
-    closed with u = -L u: a `LinearModel` or a system of python-control, continuous or discrete.
-    With several commands each loop is broken in turn while the others are closed.
-    parameters: of the FMU, beside the loop's own.
+    * ``loop``: A `Loop`, whose sampled loop gain is exact, delay included. Or a loop gain L that is
+      closed with u = -L u: a `LinearModel` or a system of python-control, continuous or discrete.
+      With several commands each loop is broken in turn while the others are closed.
+    * ``parameters``: Parameters of the FMU in addition to the loop's own.
 
-    No frequency grid decides what is found: crossings are eigenvalues of a matrix pencil, the roots
-    of 1 - L(s) L(-s), of L(s) - L(-s), or in z. They part the frequencies into intervals on each of
-    which nothing changes; a sign that changes from one to the next is a crossing, refined by
-    bisection to rounding.
+    No frequency grid is involved: crossings are eigenvalues of a matrix pencil, the roots of 1 -
+    L(s) L(-s) and of L(s) - L(-s), or the same in z. These roots divide the frequencies into
+    intervals. A change of sign from one interval to the next is a crossing, which bisection refines
+    to rounding.
     """
     return margins_and_gain(loop, parameters)[0]
 

@@ -100,7 +100,7 @@ class Store:
     """A study's folder, held from ``with`` to its end."""
 
     def __init__(self, folder: str | Path, seed: int, ranges: Mapping[str, Any]) -> None:
-        """Take what the study is: its seed, and a text for each range."""
+        """Store the definition of the study: its seed, and a text for each range."""
         # Absolute: loading an FMU changes the working directory for a moment.
         self.path = Path(folder).absolute()
         self.study = {"format": FORMAT, "seed": seed, "ranges": dict(ranges)}
@@ -228,9 +228,9 @@ class Store:
         raise FmuError(f"{self.path} holds another study, different in {what}; give another folder")
 
     def rows(self, draws: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
-        """Return what was found of each stored run, by number; draws: the values by the seed.
+        """Return the results of each stored run, by number; draws: the values by the seed.
 
-        Raises FmuError if a stored run is not what was stored, or if its values are not the draws.
+        Raises FmuError if a stored run was changed, or if its values are not the draws.
         """
         found, wrong = {}, []
         for path in sorted((self.path / RUNS).iterdir()):

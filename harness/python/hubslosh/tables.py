@@ -169,10 +169,10 @@ _SCALE = {"factor": "1", "offset": "0"}
 def write_table(
     path: Path, table: Mapping[str, np.ndarray], notes: Mapping[str, str] | None = None
 ) -> None:
-    """Write columns of numbers to a .csv or .parquet file; every digit comes back.
+    """Write columns of numbers to a .csv or .parquet file without loss of digits.
 
-    notes: for a Parquet file's key-value metadata. The file appears whole or not at all: it is
-    written beside its place under another name, then renamed.
+    * ``notes``: Key-value metadata of a Parquet file. The file appears complete or not at all: it
+      is written to a temporary folder next to its place, then moved.
     """
     import pyarrow.csv
     import pyarrow.parquet

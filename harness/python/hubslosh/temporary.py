@@ -1,8 +1,8 @@
 """Temporary folders that go however the program ends; after a kill, at the next start.
 
-The scheme is that of the program ``hubslosh`` (``harness/files/src/temporary.rs``): a folder
-``hubslosh-…`` has a file ``alive``, locked as long as its process lives, and the folder ``files``.
-Either program removes the folders of both.
+The scheme is that of the program ``hubslosh`` (``harness/files/src/temporary.rs``). A folder
+``hubslosh-…`` contains the folder ``files`` and a file ``alive``, which is locked while its process
+lives. Either program removes the folders of both.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""A run to be looked at: the page of ``hubslosh view``, in a notebook or a browser."""
+"""Shows runs: the page of ``hubslosh view``, in a notebook or a browser."""
 
 import html
 import os
@@ -61,18 +61,20 @@ def view(
 ) -> View:
     """Show a run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
 
-    run: a table, as ``simulate`` and ``closed_loop`` return it, or a file of ``hubslosh run``.
-    out: also write the page to this .html file.
-    model, parameters: what made the run; by default what the table (``.attrs``) or the file says.
-    tanks: files of tanks (the format of ``hubslosh tank``) to draw them by, in their order or by
-    number from 1.
-    start, stop: s, a part of the run.
+    * ``run``: A table, as ``simulate`` and ``closed_loop`` return it, or a file of ``hubslosh
+      run``.
+    * ``out``: Also write the page to this .html file.
+    * ``model``, ``parameters``: FMU and parameters of the run; by default those in the table's
+      ``.attrs`` or in the file.
+    * ``tanks``: Files of tanks (the format of ``hubslosh tank``) to draw them by, in their order or
+      by number from 1.
+    * ``start``, ``stop``: Ends of the part to show, s.
 
-    Nothing is simulated. The table needs ``theta`` or ``omega``, ``slosh_angle`` and
-    ``slosh_angle_radial`` (HubSlosh), ``q[1]`` to ``q[4]`` (Spacecraft), and of tanks the slosh
-    angles or the directions ``p``, of tanks that drain also ``liquid``: ``simulate`` and
-    ``closed_loop`` record these by default. HubSlosh's modes after the first are drawn if the
-    table has ``slosh.q_radial[n]`` and ``slosh.q_tangential[n]``.
+    Nothing is simulated. The table of HubSlosh needs ``theta`` or ``omega``, ``slosh_angle`` and
+    ``slosh_angle_radial``; that of Spacecraft ``q[1]`` to ``q[4]``. Tanks need slosh angles or the
+    directions ``p``, draining tanks also ``liquid``. ``simulate`` and ``closed_loop`` record these
+    by default. HubSlosh's modes after the first are drawn if the table has ``slosh.q_radial[n]``
+    and ``slosh.q_tangential[n]``.
 
     Raises FmuError with the columns that are missing.
     """
