@@ -7,11 +7,11 @@ the instruction counts, valgrind; the first run makes a virtual environment in t
 directory and needs the network. It takes some ten minutes, most of them SciPy's. Better leave the
 machine alone meanwhile: times are compared with each other.
 
-All methods solve the same motion: 2700 s of exponential sweep, 0.1 N·m, 10 cm fill, torque as
-straight lines between knots 20 ms apart, the rate wanted at every knot. The FMU has the
-set-valued friction law; the others, which have no events, smooth sgn(omega) to
-tanh(omega / 1e-5 rad/s), whose own error is 1.5e-5 rad/s; Dopri5 also with 1e-8 rad/s in the
-place of 1e-5, to get further. Errors are against the FMU's solution at tolerance 1e-13, which meets
+All methods solve the same motion: an exponential sweep of 2700 s at 0.1 N·m and 10 cm fill, with
+the torque linear between knots 20 ms apart. They return the rate at every knot. The FMU has the
+set-valued friction law. The others have no events, so they smooth sgn(omega) to
+tanh(omega / 1e-5 rad/s), with an error of 1.5e-5 rad/s; Dopri5 also with 1e-8 rad/s, for smaller
+errors. Errors are against the FMU's solution at tolerance 1e-13, which meets
 the reference trajectories to their last digits (fmu/plant/tests/plant/trajectories.rs).
 """
 
@@ -251,6 +251,8 @@ def main() -> None:
         "",
         "<!-- Written by harness/studies/work_precision.py. -->",
         "",
+        "How much CPU time does the FMU need for a given error, compared with other integrators?",
+        "",
         *(__doc__ or "").split("\n\n")[3].splitlines(),
         "",
         "![work-precision diagram](work_precision.svg)",
@@ -259,14 +261,13 @@ def main() -> None:
         "A step of 5 ms cannot follow a friction as steep as that; tanh is nearly always 1 and "
         "costs nothing. Smoothed over 1e-3 rad/s, where it has to be computed, a step took "
         f"{smoother:.0f} ns: in that unit all costs are {unit / smoother:.2f} times these. "
-        "Instructions are callgrind's and repeat on any machine: the FMU's in its own functions, "
-        "the others' without those that make the torque; times are CPU times, the least of "
-        "ten runs, piece by piece of 10 s, of three whole runs for ode_solvers, of one for SciPy. "
-        "The FMU's cost is that of the whole round through its C interface: two sets, "
-        "fmi2DoStep, one get.",
+        "Instructions come from callgrind and are the same on any machine: the FMU's in its own "
+        "functions, the others' without the torque. Times are CPU times: the least of ten runs, "
+        "for each piece of 10 s; of three whole runs for ode_solvers; of one for SciPy. "
+        "The FMU's cost includes its C interface: two sets, fmi2DoStep, one get.",
         "",
         "| error at most, rad/s | RK4 steps per 20 ms: linear | spherical "
-        "| best other method, beside linear |",
+        "| best other method, relative to linear |",
         "| --- | --- | --- | --- |",
         *ratios,
         "",

@@ -18,24 +18,23 @@ const CHAPTERS: [(Causality, &str, &str); 5] = [
         "The host sets them at any time, also before the first step. They are held over a step, \
          or run along the slope that the host sets.",
     ),
-    (Causality::Output, "Outputs", "Meant to be connected and plotted."),
+    (Causality::Output, "Outputs", "Results to connect and plot."),
     (
         Causality::Parameter,
         "Parameters",
         "The host sets them before the simulation starts; those marked *tunable* between steps \
-         as well. A value outside its range is refused with its name and what is allowed; what \
-         only together makes no sense is reported when initialization mode ends, all of it at \
-         once.",
+         as well. The FMU refuses a value outside its range, with its name and the allowed range. \
+         It reports all contradictions between parameters in one message at the end of initialization mode.",
     ),
     (
         Causality::CalculatedParameter,
         "Calculated parameters",
-        "What follows from the parameters, known when initialization mode is entered.",
+        "Values that follow from the parameters; known when initialization mode begins.",
     ),
     (
         Causality::Local,
         "Local variables",
-        "For looking inside: balances, events, the continuous states and their derivatives.",
+        "Internal values: balances, events, the continuous states and their derivatives.",
     ),
 ];
 
@@ -44,8 +43,9 @@ pub fn page<M: Model>() -> String {
     let mut page = String::from(
         "<!-- Written by `cargo run --release -p model-description`; do not edit. -->\n\
          # All variables\n\n\
-         Values cross the interface in the unit given first; the one in brackets is what tools \
-         are asked to display. Ranges are those the FMU holds the host to.",
+         Which variables has the FMU, in which units and ranges?\n\n\
+         Values cross the interface in the first unit; the unit in brackets is for display. The FMU refuses values outside \
+         the ranges.",
     );
     if let Some(array) = M::table().variables.iter().find(|v| !v.shape.is_empty()) {
         let _ = write!(
