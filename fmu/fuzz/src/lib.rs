@@ -53,9 +53,9 @@ pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
 
 /// The calls of a version of FMI that get and set values: of reals, integers, enumerations and Booleans.
 pub trait Values: Version {
-    /// Those that get.
+    /// Calls that get values.
     const GET: [&'static Call; 4];
-    /// Those that set.
+    /// Calls that set values.
     const SET: [&'static Call; 4];
 }
 
@@ -106,7 +106,7 @@ fn step<M: Model, V: Version>(
     Ok(info)
 }
 
-/// From event mode on, where steps follow.
+/// Leaves event mode, so that steps can follow.
 fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
     if instance.state() == InstanceState::Event {
         let next = instance.new_discrete_states().expect("in event mode").next_time;

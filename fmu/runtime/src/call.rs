@@ -173,12 +173,12 @@ impl Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
 
-    /// It passes values of a type.
+    /// Makes it a call that passes values of a type.
     pub(crate) const fn of(self, c_type: CType) -> Call {
         Call { c_type: Some(c_type), ..self }
     }
 
-    /// It belongs to one interface.
+    /// Makes it a call of one interface only.
     pub(crate) const fn only_in(self, interface: Interface) -> Call {
         Call { only_in: Some(interface), ..self }
     }
@@ -236,13 +236,13 @@ impl Call {
         )))
     }
 
-    /// This call failed.
+    /// Returns the fault of a failed call.
     #[cold]
     pub fn error(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Error, text: format!("{}: {why}", self.name) }
     }
 
-    /// This call has no answer, and nothing is wrong with the instance.
+    /// Returns the fault of a call without an answer; the instance is unharmed.
     #[cold]
     pub fn discard(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Discard, text: format!("{}: {why}", self.name) }

@@ -70,7 +70,7 @@ pub struct Instance<M: Model, V: Version> {
 pub struct StepInfo {
     /// There is an event to be handled.
     pub event: bool,
-    /// It has stopped before its end.
+    /// True if the step has stopped before its end.
     pub early: bool,
 }
 
@@ -95,7 +95,7 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
         }
     }
 
-    /// Without taking memory where there is some already.
+    /// Copies without allocating if the memory is large enough.
     fn clone_from(&mut self, other: &Self) {
         let mut parameters = std::mem::take(&mut self.parameters);
         parameters.clone_from(&other.parameters);
@@ -161,7 +161,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.time
     }
 
-    /// After a panic nothing it says can be trusted.
+    /// Makes the instance unusable after a panic: its values cannot be trusted.
     pub fn poison(&mut self) {
         self.state = InstanceState::Fatal;
     }
@@ -208,7 +208,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// From here on all variables can be read.
+    /// Enters initialization mode; all variables can be read from here on.
     pub fn enter_initialization_mode(&mut self) -> Result<(), Fault> {
         self.check(V::ENTER_INITIALIZATION)?;
         self.state = InstanceState::Initialization;
@@ -289,13 +289,13 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// One value, by one of the version's calls.
+    /// Returns one value, for a call of the version.
     pub fn get(&mut self, call: &'static Call, reference: u32) -> Result<Value, Fault> {
         let call = self.check(call)?;
         self.value(call, reference)
     }
 
-    /// One value, for a call that [`Instance::check`] allows.
+    /// Returns one value, for a call that [`Instance::check`] allows.
     #[inline(always)]
     pub fn value(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
         let scalar = scalar::<M, V>(call, reference)?;
@@ -934,7 +934,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(ended)
     }
 
-    /// From here on the inputs are held, unless slopes are set.
+    /// Drops the slopes of the last step: inputs are held unless slopes are set.
     #[inline]
     fn drop_past_slopes(&mut self) {
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
@@ -950,7 +950,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.state = InstanceState::Intermediate;
     }
 
-    /// It has looked in.
+    /// Ends an intermediate update.
     pub(crate) fn leave_intermediate(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state != InstanceState::Intermediate {
             return Err(call.error("a call of the host's failed within the intermediate update"));
@@ -1006,7 +1006,7 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     // ---- Events and continuous time, by the host ----
 
-    /// At an event.
+    /// Enters event mode.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_EVENT)?;
         if self.events == Events::InStep {
@@ -1061,7 +1061,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Between events.
+    /// Enters continuous-time mode.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_CONTINUOUS_TIME)?;
         self.leave_initialized(call)?;

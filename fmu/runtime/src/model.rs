@@ -7,7 +7,7 @@ use crate::table::Table;
 /// Failure of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepFailure {
-    /// In words.
+    /// Reason, in words.
     pub text: String,
     /// True if a shorter step may succeed.
     pub shorter_may_succeed: bool,
@@ -23,11 +23,11 @@ impl From<&str> for StepFailure {
 /// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepEnd {
-    /// At its end.
+    /// The end of the step.
     End,
-    /// At its end, where there is an event.
+    /// The end of the step, at an event.
     EventAtEnd,
-    /// At an event before, at this time, s.
+    /// An event before the end, at this time, s.
     Event(f64),
 }
 

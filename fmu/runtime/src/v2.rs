@@ -128,7 +128,8 @@ const fn me(call: Call) -> Call {
     call.only_in(Interface::ModelExchange)
 }
 
-/// The functions that one operation of an instance has several of, and those that are the C interface's own.
+/// Functions of FMI 2.0, with the instance states that allow them: those for several types of one operation, and those that only
+/// the C interface has.
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {
@@ -364,7 +365,7 @@ pub unsafe fn fmi2SetupExperiment<M: Model>(
     }
 }
 
-/// From here on all variables can be read.
+/// Enters initialization mode; all variables can be read from here on.
 pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on::<M, Fmi2>(c, Fmi2::ENTER_INITIALIZATION, |component| {
@@ -373,8 +374,7 @@ pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Sta
     }
 }
 
-/// From here on parameters are fixed (in Model Exchange from the next call that goes on), and
-/// steps can be made.
+/// Leaves initialization mode: parameters are fixed (in Model Exchange from the next call that goes on), and steps are allowed.
 pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on_start::<M, Fmi2>(c, Fmi2::EXIT_INITIALIZATION, |component| {
@@ -674,7 +674,7 @@ pub struct fmi2EventInfo {
     pub nextEventTime: fmi2Real,
 }
 
-/// At an event.
+/// Enters event mode.
 pub unsafe fn fmi2EnterEventMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode())
@@ -705,7 +705,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(
     }
 }
 
-/// Between events.
+/// Enters continuous-time mode.
 pub unsafe fn fmi2EnterContinuousTimeMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| {
@@ -852,8 +852,7 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Model>(
     }
 }
 
-/// One step. `noSetFMUStatePriorToCurrentPoint` changes nothing here: no past is
-/// kept.
+/// Makes one step. `noSetFMUStatePriorToCurrentPoint` has no effect: no past is kept.
 pub unsafe fn fmi2DoStep<M: Model>(
     c: fmi2Component,
     currentCommunicationPoint: fmi2Real,

@@ -22,7 +22,7 @@ pub enum Causality {
     Input,
     /// Meant to be connected or plotted.
     Output,
-    /// For looking inside.
+    /// Internal value.
     Local,
     /// Set by the host before the end of the initialization mode.
     Parameter,
@@ -86,7 +86,7 @@ pub enum Kind {
     },
     /// Yes or no.
     Boolean,
-    /// One of several named things.
+    /// Item of an enumeration.
     Enumeration(&'static Enumeration),
 }
 
@@ -427,13 +427,13 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// It is an array with these dimensions.
+    /// Makes it an array with these dimensions.
     pub const fn shape(mut self, shape: &'static [Dimension]) -> Self {
         self.shape = shape;
         self
     }
 
-    /// It is a continuous state of the model.
+    /// Makes it a continuous state of the model.
     pub const fn is_state(mut self, place: Place) -> Self {
         self.state = Some(place);
         self
@@ -451,13 +451,13 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// It can be set while the simulation runs.
+    /// Makes it tunable: it can be set while the simulation runs.
     pub const fn tunable(mut self) -> Self {
         self.tunable = true;
         self
     }
 
-    /// It depends on these inputs and states without delay.
+    /// Lists the inputs and states that it depends on without delay.
     pub const fn depends_on(mut self, known: &'static [&'static str]) -> Self {
         self.depends_on = known;
         self

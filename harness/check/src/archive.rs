@@ -38,7 +38,7 @@ pub struct Entry {
 
 /// An archive, unpacked.
 pub struct Archive {
-    /// In the order of its directory, repeated names included.
+    /// Entries in the order of the zip directory, repeated names included.
     pub entries: Vec<Entry>,
     /// Reason why the directory could not be read to its end, or is too large to unpack.
     broken: Option<String>,

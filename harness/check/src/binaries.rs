@@ -73,9 +73,9 @@ struct Placed {
 
 /// All binaries of an FMU.
 pub struct Binaries {
-    /// Those where hosts look for them.
+    /// Binaries in the folders where hosts look for them.
     placed: Vec<Placed>,
-    /// Those of the model's name in folders that vendors have named.
+    /// Number of binaries with the model's name in folders that vendors have named.
     of_vendors: usize,
     /// Files in folders of FMI 2.0 that no host will find, each with the names it looks for.
     elsewhere: Vec<(String, String)>,
@@ -147,7 +147,7 @@ impl Binaries {
         self.placed.iter().find(|p| p.folder == PLATFORM).map(|p| p.name.as_str())
     }
 
-    /// Those that could be read.
+    /// Returns the binaries that could be read.
     fn read(&self) -> impl Iterator<Item = (&str, &Binary)> {
         self.placed.iter().filter_map(|p| Some((p.name.as_str(), p.binary.as_ref().ok()?)))
     }

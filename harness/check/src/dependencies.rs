@@ -96,7 +96,7 @@ fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
 struct Seen {
     /// (unknown, known), by index.
     pairs: BTreeSet<(usize, usize)>,
-    /// Those of them that were a change of at least the last bit.
+    /// Pairs that changed by at least the last bit.
     traces: BTreeSet<(usize, usize)>,
     /// Known variables that could be moved at all.
     moved: BTreeSet<usize>,

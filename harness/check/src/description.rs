@@ -15,7 +15,7 @@ pub struct Description {
     pub model_exchange: Option<Element>,
     /// The element CoSimulation.
     pub co_simulation: Option<Element>,
-    /// In the order of the file.
+    /// Variables in the order of the file.
     pub variables: Vec<Variable>,
     /// ModelStructure's Outputs, as written.
     pub outputs: Vec<Unknown>,

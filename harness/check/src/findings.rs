@@ -12,7 +12,7 @@ const KEPT: usize = 1000;
 pub enum Severity {
     /// The standard forbids it, or hosts fail.
     Error,
-    /// Some host stumbles, or people are left in the dark.
+    /// Some importers fail on it, or their users get no useful message.
     Warning,
 }
 

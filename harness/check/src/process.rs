@@ -16,7 +16,7 @@ use super::{Check, Findings, Options, RULES, Rule, life, v3};
 
 /// The hidden subcommand of `hubslosh`.
 pub const SUBCOMMAND: &str = "check-calls";
-/// After so many endless calls no more are made: the check would take for ever as well.
+/// Number of endless calls after which the check stops calling.
 const HANGS: usize = 2;
 /// Least time that one call may take if the rule has so much, and what part of the limit: [`HANGS`] of them
 /// are not to take more than 10 s.

@@ -45,7 +45,7 @@ impl Report {
         self.outcomes.iter().flat_map(|o| o.findings.list.iter().map(move |f| (o.rule, f)))
     }
 
-    /// For people: every finding, what was skipped and why, and a sum.
+    /// Returns the report as text: every finding, the skipped rules with reasons, and a summary.
     pub fn text(&self) -> String {
         let mut text = String::new();
         for outcome in &self.outcomes {

@@ -459,7 +459,7 @@ const VARIABLE: &str = "canHandleVariableCommunicationStepSize is declared";
 pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// Steps that are tried instead of the usual ones, s.
     const SMALL: [f64; 2] = [4e-4, 1e-5];
-    /// At most so many of them.
+    /// Largest number of steps.
     const MOST: f64 = 5000.0;
     let Some(session) = able(fmu, findings)? else { return Ok(()) };
     let usual = session.step;

@@ -401,13 +401,13 @@ impl FmuUnderTest {
 /// The states of an instance's life in which rules call it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// After fmi2Instantiate.
+    /// Instance after fmi2Instantiate.
     Instantiated,
-    /// After fmi2EnterInitializationMode.
+    /// Instance after fmi2EnterInitializationMode.
     Initialization,
     /// Ready for a step; in Model Exchange in continuous-time mode.
     Initialised,
-    /// After fmi2Terminate.
+    /// Instance after fmi2Terminate.
     Terminated,
 }
 
@@ -581,7 +581,7 @@ impl<'f> Session<'f> {
         self.ended
     }
 
-    /// The first time at which nextEventTime had passed, and nextEventTime.
+    /// Returns the first time at which the run had passed a nextEventTime, and that nextEventTime.
     pub fn past_event(&self) -> Option<(f64, f64)> {
         self.past_event
     }

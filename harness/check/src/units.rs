@@ -27,7 +27,7 @@ struct Unit {
 impl Unit {
     const ONE: Unit = Unit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
 
-    /// This unit times a power of another one; an offset counts for a unit alone.
+    /// Returns this unit times a power of another one. An offset only counts for a unit by itself.
     fn times(self, other: Unit, power: i32) -> Unit {
         let mut exponents = self.exponents;
         for (e, o) in exponents.iter_mut().zip(other.exponents) {

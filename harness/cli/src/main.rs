@@ -58,7 +58,7 @@ struct Cli {
     /// Understands the command line, and does nothing: for the tests of examples.
     #[arg(long, hide = true)]
     parse_only: bool,
-    /// This process runs FMUs for another one.
+    /// Internal: runs FMUs for another process.
     #[arg(long, hide = true)]
     guarded: bool,
     #[command(flatten)]

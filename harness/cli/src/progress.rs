@@ -44,7 +44,7 @@ pub fn tell(bar: &ProgressBar, line: &str) {
     }
 }
 
-/// Not drawn where stderr is no terminal, nor with `--quiet`.
+/// Returns a progress bar; it is hidden with `--quiet`, or if stderr is not a terminal.
 fn bar(template: &str) -> Result<ProgressBar> {
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?);
     if terminal::is_quiet() {

@@ -29,7 +29,7 @@ static TERMINAL: OnceLock<Terminal> = OnceLock::new();
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
 impl Terminal {
-    /// From now on.
+    /// Applies these settings from now on.
     pub fn set(self) {
         TERMINAL.get_or_init(|| self);
     }

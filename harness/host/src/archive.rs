@@ -83,7 +83,7 @@ pub fn place(name: &str) -> String {
 /// An archive whose directory was read.
 pub struct Archive {
     file: File,
-    /// In the order of its directory, repeated names included; those up to the fault if there is one.
+    /// Entries in the order of the zip directory, repeated names included, up to the first fault.
     pub entries: Vec<Entry>,
     /// Error in its directory, or the exceeded budget: nothing of the archive should
     /// be unpacked then.

@@ -58,7 +58,7 @@ pub struct Array {
     pub c_type: CType,
     /// Their start values, as written: none, one for all, or one for each.
     pub start: Vec<String>,
-    /// It has start values, but of another size.
+    /// True if its start values are for another size.
     pub(crate) is_resized: bool,
 }
 
@@ -76,8 +76,7 @@ pub struct ArrayElement {
 pub struct Interface {
     /// Name of the binary, without the platform's ending.
     pub model_identifier: String,
-    /// In co-simulation: whether it takes derivatives of its inputs (FMI 2.0), or new values of them within a
-    /// step (FMI 3.0).
+    /// True if Co-Simulation takes derivatives of inputs (FMI 2.0), or new values of inputs within a step (FMI 3.0).
     pub can_interpolate_inputs: bool,
     /// True if there are directional derivatives.
     pub directional_derivatives: bool,
@@ -183,7 +182,7 @@ pub struct Variable {
     pub variability: Variability,
     /// Description; empty if there is none.
     pub description: String,
-    /// In FMI 3.0: it may be set or read within a step.
+    /// FMI 3.0: true if it may be set or read within a step.
     pub intermediate: bool,
     c_type: CType,
     kind: Type,
@@ -226,7 +225,7 @@ pub enum Type {
     Clock,
 }
 
-/// In which type calls exchange a variable: those of FMI 3.0. Of FMI 2.0 a Real is a Float64, an Integer an Int32.
+/// Type in which calls exchange a variable, by the names of FMI 3.0. A Real of FMI 2.0 is a Float64, an Integer an Int32.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[allow(missing_docs)]
 pub enum CType {
@@ -316,7 +315,7 @@ impl Variable {
         self.kind
     }
 
-    /// In which type calls exchange it.
+    /// Returns the type in which calls exchange the variable.
     pub fn c_type(&self) -> CType {
         self.c_type
     }

@@ -395,7 +395,7 @@ impl Fmu {
         })
     }
 
-    /// For tests: what each function that takes an instance answers to NULL.
+    /// Returns the status of each function when its instance is NULL; for tests.
     pub fn calls_with_null_instance(&self) -> Vec<(&'static str, Status)> {
         let c: Component = null_mut();
         let (mut i, mut x, mut n, mut s, mut t) = (0, 0.0, 0, null_mut(), null());

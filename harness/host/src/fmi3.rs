@@ -386,7 +386,7 @@ impl Version for Fmi3 {
         }
     }
 
-    /// With the separator at its end (section 2.3.1).
+    /// Returns the path of the resources, with a separator at its end (section 2.3.1).
     fn resources(directory: &Path) -> Option<String> {
         let resources = directory.join("resources");
         let separator = std::path::MAIN_SEPARATOR;

@@ -64,21 +64,19 @@ pub struct Limits {
 /// End of a process.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cause {
-    /// It called [`done`] with this code.
+    /// The process called [`done`] with this code.
     Done(u8),
     /// Something else ended it.
     Ended(ExitStatus),
-    /// It was ended because a call of the FMU did not return in time.
+    /// The process was ended because a call of the FMU did not return in time.
     EndlessCall,
-    /// It was ended because it took too long.
+    /// The process was ended because it took too long.
     TooLong,
-    /// It was ended because it printed more than [`FLOOD`] or [`FLOOD_SHOWN`].
+    /// The process was ended because it printed more than [`FLOOD`] or [`FLOOD_SHOWN`].
     Flood,
-    /// It was ended because its temporary files or its shared memory took more than
-    /// [`Limits::memory`].
+    /// The process was ended because its temporary files or its shared memory took more than [`Limits::memory`].
     Hoard,
-    /// It was ended because something else than its messages came over its connection, or because the connection was
-    /// closed.
+    /// The process was ended because its connection was closed or carried something other than its messages.
     Interfered,
     /// Our own code in it has panicked; the report for the user.
     Panicked(String),
@@ -105,7 +103,7 @@ impl Outcome {
 /// Treatment of a process's output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output {
-    /// It is kept for the parent.
+    /// Output is kept for the parent.
     Kept,
     /// The process has the parent's stdout and stderr; what the FMU's binary prints comes to stderr.
     Shown,
@@ -329,8 +327,8 @@ fn end(id: u32, child: &mut Child, files: &Path) {
     }
 }
 
-/// For a program that a signal ends: lets what runs remove its half-written files, for a second at
-/// most, and ends it. Whatever would be started from here on waits for that end.
+/// Ends all guarded processes when a signal ends the program. They have a second to remove half-written files; new ones do not
+/// start any more.
 pub fn end_all() {
     let running = lock(&RUNNING);
     #[cfg(unix)]

@@ -23,11 +23,11 @@ pub const MOST_NAMESPACES: usize = 100;
 /// Reasons for refusing a file. The texts of all but `TooLarge` begin with line and column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
-    /// It is not well-formed, or not UTF-8.
+    /// The file is not well-formed XML or not UTF-8.
     Malformed(String),
-    /// It goes beyond one of the budgets above.
+    /// The file exceeds one of the budgets above.
     TooLarge(String),
-    /// It has a document type declaration, which can define entities and name other files.
+    /// The file has a document type declaration, which can define entities and name other files.
     Doctype(String),
 }
 

@@ -30,7 +30,7 @@ pub struct Effect {
     pub source: String,
     /// Change of each parameter, SI.
     pub change: BTreeMap<String, f64>,
-    /// It is a tolerance: a standard deviation of what is known, and part of the intervals.
+    /// True for a tolerance, which is a standard deviation and part of the intervals.
     pub tolerance: bool,
     /// Change of the variables x.
     #[serde(skip)]

@@ -44,7 +44,7 @@ pub struct ModelFit {
     pub noise_white: f64,
     /// Simulations that were needed, of all recordings; those of a part of them count as that part.
     pub simulations: f64,
-    /// Neither noise nor a small effect explains the residual.
+    /// True if neither noise nor a small effect explains the residual.
     #[serde(skip)]
     pub poor: bool,
 }
@@ -71,7 +71,7 @@ pub struct Fitted<'a> {
     pub problem: Problem<'a>,
     /// The minimum.
     pub polished: Polished,
-    /// In numbers for the reader.
+    /// Results of the fit, for the report.
     pub fit: ModelFit,
     /// Stribeck speeds that were tried, rad/s, with what they add to the sum of squares at least.
     pub speeds: Vec<(f64, f64)>,

@@ -169,9 +169,9 @@ impl Polished {
 pub enum Known<'j> {
     /// Nothing.
     Nothing,
-    /// Those of a similar problem, which give the directions of the first differences.
+    /// Sensitivities of a similar problem: they give the directions of the first differences.
     Directions(&'j DMatrix<f64>),
-    /// Those of nearly the same problem: they are the first ones.
+    /// Sensitivities of nearly the same problem: the search starts with them.
     Sensitivities(&'j DMatrix<f64>),
 }
 
@@ -191,12 +191,12 @@ pub struct Until {
 }
 
 impl Until {
-    /// At the minimum, whatever its sum of squares.
+    /// Returns the condition to end at the minimum, whatever its sum of squares.
     fn minimum(rounds: usize) -> Self {
         Until { decrement: DECREMENT, rounds, ..Until::at_most(f64::INFINITY) }
     }
 
-    /// At the minimum, unless its sum of squares is above `cost`.
+    /// Returns the condition to end at the minimum, or if the minimum's sum of squares is above `cost`.
     pub fn at_most(cost: f64) -> Self {
         let (decrement, rounds) = (DECREMENT, ROUNDS);
         Until { decrement, rounds, cost, trust: f64::INFINITY, far: f64::INFINITY }

@@ -1,4 +1,4 @@
-//! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
+//! Estimates the FMU's parameters, with their uncertainty, from recordings of torque and hub rate.
 
 pub mod any_fmu;
 pub mod between;

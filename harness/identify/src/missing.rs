@@ -38,7 +38,7 @@ const LIMIT: f64 = 4.0;
 
 /// A row of the model's motion.
 struct Row {
-    /// From the recording's first row, s.
+    /// Time from the recording's first row, s.
     time: f64,
     /// Commanded, N·m.
     torque: f64,
@@ -91,7 +91,7 @@ pub struct Missing {
 }
 
 impl Missing {
-    /// In words.
+    /// Returns the result in words.
     pub fn words(&self) -> String {
         format!(
             "a torque that follows {} is missing, {:.2e} ± {:.1e} {} ({:.0} σ)",

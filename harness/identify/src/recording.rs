@@ -54,7 +54,7 @@ pub struct Recording {
     pub wheel_speed: Option<Vec<f64>>,
     /// Rates about the hub's x and y axes, rad/s: what the model leaves out.
     pub off_axis: [Option<Vec<f64>>; 2],
-    /// It begins at rest (else the initial state is unknown).
+    /// True if the recording begins at rest; otherwise the initial state is unknown.
     pub from_rest: bool,
     /// Rows with a new value of the gyro that belongs to its motion; the others are not fitted. `None`: all.
     pub fresh: Option<Vec<bool>>,

@@ -70,11 +70,11 @@ struct Attempt {
 /// Start of an attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum From {
-    /// At one of the starts.
+    /// One of the starts.
     Start(usize),
-    /// At the best minimum so far.
+    /// The best minimum so far.
     Best,
-    /// At the other model's minimum, with its noise.
+    /// The other model's minimum, with its noise.
     Sibling,
 }
 
@@ -131,12 +131,12 @@ struct Best {
 }
 
 impl Attempt {
-    /// From a minimum that is near.
+    /// Returns an attempt from a nearby minimum.
     fn near(from: From, how: How, when: When) -> Self {
         Attempt { from, how, when, accept: Accept::LessCost }
     }
 
-    /// Over windows, with a noise of its own.
+    /// Returns an attempt over windows, with its own noise.
     fn over(from: From, how: How, when: When) -> Self {
         Attempt { from, how, when, accept: Accept::BetterFit }
     }
@@ -243,7 +243,7 @@ impl<'a> Search<'a, '_> {
         self.polish(&rough.x, Some(&rough.jacobian), ROUNDS)
     }
 
-    /// From variables x, over windows that grow.
+    /// Searches from x over growing windows.
     fn windows(&mut self, x: &[f64], windows: &[f64]) -> Result<Polished> {
         let (label, problem) = (self.model, &self.problem);
         let (since, progress) = (&mut self.since, &mut *self.progress);
@@ -253,14 +253,14 @@ impl<'a> Search<'a, '_> {
         self.on(rough)
     }
 
-    /// From variables x, over the loudest parts.
+    /// Searches from x over the loudest parts.
     fn loudest(&mut self, x: &[f64]) -> Result<Polished> {
         let rough = self.problem.search_loudest(x)?;
         self.say(format!("{}: the loudest part", self.model));
         self.on(rough)
     }
 
-    /// On from a rough estimate, over the whole recordings; the noise is estimated on the way.
+    /// Continues from a rough estimate over the whole recordings, and estimates the noise.
     fn on(&mut self, rough: Rough) -> Result<Polished> {
         let (mut x, mut known) = (rough.x, rough.jacobian);
         let mut answer = self.problem.answer(&x)?;

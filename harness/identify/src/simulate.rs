@@ -52,7 +52,7 @@ impl Intersample {
     pub const ALL: [Intersample; 3] =
         [Intersample::FirstOrderHold, Intersample::BandLimited, Intersample::ZeroOrderHold];
 
-    /// In words.
+    /// Returns the behaviour in words.
     pub fn words(self) -> &'static str {
         match self {
             Intersample::FirstOrderHold => "linear between rows (first-order hold)",

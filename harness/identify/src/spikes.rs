@@ -136,7 +136,7 @@ impl Sound {
     }
 }
 
-/// At row k, the cubic through the two nearest sound values on either side.
+/// Returns the value at row k of the cubic through the two nearest sound values on either side.
 fn cubic(y: &[f64], sound: &Sound, k: usize) -> f64 {
     let nodes: Vec<usize> = sound.near(k).collect();
     let (at, gap) = (k as f64, |a: usize, b: usize| a as f64 - b as f64);

@@ -104,7 +104,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// From the coefficients; `None` where they are not those of such a hub.
+    /// Returns the hub's quantities from the coefficients; `None` if no such hub has them.
     pub fn of([b2, b1, b0]: [f64; 3], [a2, a1, a0]: [f64; 3]) -> Option<Self> {
         let omega = (b2 > 0.0 && b0 > 0.0).then(|| (b0 / b2).sqrt())?;
         let zeta = b1 / b2 / (2.0 * omega);

@@ -34,7 +34,7 @@ impl Tolerances {
     pub const NONE: Tolerances =
         Tolerances { torque: 0.0, clock: 0.0, gravity: 0.0, arm: 0.0, density: 0.0 };
 
-    /// In the order of [`NAMES`].
+    /// Returns the tolerances in the order of [`NAMES`].
     pub fn all(&self) -> [f64; 5] {
         [self.torque, self.clock, self.gravity, self.arm, self.density]
     }

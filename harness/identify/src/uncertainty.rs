@@ -37,7 +37,8 @@ pub struct Covariance {
 }
 
 impl Covariance {
-    /// From sensitivities to unknowns with these names; `None` if some combination of unknowns has no influence at all.
+    /// Computes the covariance from the sensitivities to unknowns with these names; `None` if some combination of unknowns has no
+    /// influence.
     ///
     /// # Errors
     /// If a sensitivity is not finite.
@@ -196,7 +197,7 @@ pub struct Combination {
 }
 
 impl Combination {
-    /// In words.
+    /// Returns the combination in words.
     pub fn words(&self) -> String {
         format!(
             "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",

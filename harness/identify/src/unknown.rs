@@ -75,7 +75,7 @@ impl Quantity {
     }
 }
 
-/// From a value with bounds to a variable x without.
+/// Transformation of a bounded value to an unbounded variable x.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
     /// x = ln value: positive.

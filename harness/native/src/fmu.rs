@@ -81,7 +81,7 @@ pub struct Fmu {
     description: ModelDescription,
     /// Places in the description by name.
     places: BTreeMap<String, usize>,
-    /// For Co-Simulation and for Model Exchange.
+    /// Loaded FMU for Co-Simulation and for Model Exchange.
     loaded: [Mutex<Option<Arc<host::fmu::Fmu>>>; 2],
 }
 

@@ -86,7 +86,7 @@ pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 pub struct Run<'fmu> {
     time: Vec<f64>,
     inputs: (Columns<'fmu>, Numbers),
-    /// And room for those of the Reals.
+    /// Slopes of the inputs, with buffers for those of the Reals.
     slopes: Option<(Numbers, Vec<f64>)>,
     outputs: (Columns<'fmu>, Numbers),
     feedback: Option<Feedback>,

@@ -17,7 +17,7 @@ impl Fmi {
     /// All of them.
     pub const ALL: [Fmi; 3] = [Fmi::V2, Fmi::V3, Fmi::V3Arrays];
 
-    /// Those in releases and wheels.
+    /// Versions of FMI in releases and wheels.
     pub const RELEASED: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
     /// Folders under `binaries/` for a platform that is known by its folder in FMI 2.0. A universal binary for macOS

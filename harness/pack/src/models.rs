@@ -35,7 +35,7 @@ pub struct Sizes {
     pub modes: usize,
 }
 
-/// Those of Spacecraft.fmu.
+/// Sizes of Spacecraft.fmu.
 const MOST: Sizes = Sizes { tanks: 4, modes: 3 };
 
 /// All of them; the first is packed unless another is named.

@@ -49,9 +49,9 @@ pub struct Target {
 
 #[derive(Clone, Copy, Debug)]
 enum Cargo {
-    /// With the linker that Rust takes for the target.
+    /// The linker that Rust takes for the target.
     Plain,
-    /// With zig as linker, which brings the symbols of every glibc and of macOS.
+    /// Zig as linker, which brings the symbols of every glibc and of macOS.
     Zig,
 }
 

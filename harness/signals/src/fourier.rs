@@ -16,11 +16,11 @@ fn planner() -> MutexGuard<'static, RealFftPlanner<f64>> {
     PLANNER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// From a signal to its spectrum.
+/// Transform of a signal to its spectrum.
 pub struct Forward(Arc<dyn RealToComplex<f64>>);
 
 impl Forward {
-    /// For signals of `length` samples.
+    /// Returns the transform for signals of `length` samples.
     pub fn new(length: usize) -> Self {
         Forward(planner().plan_fft_forward(length))
     }
@@ -36,11 +36,11 @@ impl Forward {
     }
 }
 
-/// From a spectrum to N times its signal.
+/// Transform of a spectrum to N times its signal.
 pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 
 impl Inverse {
-    /// For signals of `length` samples.
+    /// Returns the transform for signals of `length` samples.
     pub fn new(length: usize) -> Self {
         Inverse(planner().plan_fft_inverse(length))
     }

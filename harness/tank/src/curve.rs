@@ -30,9 +30,9 @@ pub(crate) fn cross(a: Point, b: Point) -> f64 {
 pub enum Curve {
     /// Straight from one point to the other, t = 0..1.
     Line {
-        /// At t = 0.
+        /// Point at t = 0.
         from: Point,
-        /// At t = 1.
+        /// Point at t = 1.
         to: Point,
     },
     /// center + (a_r cos t, a_z sin t), t the eccentric angle in rad. A circle has a_r = a_z.

@@ -172,7 +172,7 @@ pub struct Capillarity {
     pub bond: Option<f64>,
     /// The modes, in the order of [`ModalData::modes`]; for a box those along its first length.
     pub modes: Vec<CapillaryMode>,
-    /// For a box, the modes along its second length.
+    /// Modes along the second length of a box.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modes_y: Vec<CapillaryMode>,
     /// Ranges that a formula leaves, one sentence each.

@@ -26,7 +26,7 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// At the sizes that an instance's parameters say, in the table's order.
+    /// Returns the arrays with the sizes in an instance's parameters, in the table's order.
     pub fn new<M: Model>(parameters: &[Value]) -> Arrays {
         let table = M::table();
         let mut arrays = Arrays::default();

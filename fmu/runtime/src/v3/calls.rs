@@ -26,7 +26,7 @@ const fn me(call: Call) -> Call {
     call.only_in(Interface::ModelExchange)
 }
 
-/// In which states values are got and set.
+/// Instance states in which values can be got and set.
 pub(super) const GET: u16 = ANY;
 pub(super) const SET: u16 = I | M | S | E | C;
 

@@ -242,7 +242,7 @@ pub unsafe fn fmi3EnterInitializationMode<M: Model>(
     }
 }
 
-/// From here on parameters are fixed, and events are handled or steps made.
+/// Leaves initialization mode: parameters are fixed, and events or steps follow.
 pub unsafe fn fmi3ExitInitializationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on_start::<M, Fmi3>(instance, Fmi3::EXIT_INITIALIZATION, |component| {
@@ -251,7 +251,7 @@ pub unsafe fn fmi3ExitInitializationMode<M: Model>(instance: fmi3Instance) -> fm
     }
 }
 
-/// At an event.
+/// Enters event mode.
 pub unsafe fn fmi3EnterEventMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, Fmi3::ENTER_EVENT, |component| {
@@ -276,7 +276,7 @@ pub unsafe fn fmi3Reset<M: Model>(instance: fmi3Instance) -> fmi3Status {
     }
 }
 
-/// From here on structural parameters can be set, if there are any.
+/// Enters configuration mode, in which structural parameters can be set.
 pub unsafe fn fmi3EnterConfigurationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, &ENTER_CONFIGURATION, |component| {

@@ -12,7 +12,7 @@ use crate::instance::Instance;
 use crate::model::Model;
 use crate::version::Version;
 
-/// Between events.
+/// Enters continuous-time mode.
 pub unsafe fn fmi3EnterContinuousTimeMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| {

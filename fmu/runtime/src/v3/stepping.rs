@@ -67,7 +67,7 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
 /// Answer of the host to an intermediate update.
 #[derive(Clone, Copy)]
 struct Wish {
-    /// To return early, at this time.
+    /// Time of an early return that the host requested.
     early_return: Option<f64>,
 }
 

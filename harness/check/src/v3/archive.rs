@@ -135,7 +135,7 @@ pub struct Binaries<'a> {
 }
 
 impl<'a> Binaries<'a> {
-    /// Those of an FMU.
+    /// Returns the binaries of an FMU.
     pub fn new(archive: &'a Archive, description: Option<&Description>) -> Binaries<'a> {
         let interfaces = description.into_iter().flat_map(Description::interfaces);
         let mut identifiers: Vec<String> =

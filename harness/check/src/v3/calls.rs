@@ -367,7 +367,7 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- states
 
-/// Those uses in which states can be got and set.
+/// Returns the uses in which states can be got and set.
 fn saving(subject: &Subject, flag: &str) -> Vec<Use> {
     subject.uses().into_iter().filter(|u| subject.can(u.interface, flag)).collect()
 }

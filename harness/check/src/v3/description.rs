@@ -11,7 +11,7 @@ use host::xml::Element;
 pub struct Description {
     /// All of it.
     pub root: Element,
-    /// In the order of the file.
+    /// Variables in the order of the file.
     pub variables: Vec<Variable>,
     /// The elements of ModelStructure, in the order of the file.
     pub structure: Vec<Unknown>,
@@ -32,7 +32,7 @@ pub struct Variable {
     pub variability: Variability,
     /// Value in the file, or the default for causality and variability, if there is one.
     pub initial: Option<String>,
-    /// In which type calls exchange it.
+    /// Type in which calls exchange the variable.
     pub c_type: CType,
     /// Type for display.
     pub kind: Type,

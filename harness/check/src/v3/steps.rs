@@ -64,7 +64,7 @@ fn stepping_uses(subject: &Subject) -> Vec<Use> {
     uses.filter(|u| u.interface == Interface::CoSimulation).collect()
 }
 
-/// Those in which the host handles events; the rule is skipped if there are none.
+/// Returns the uses in which the host handles events. Skips the rule if there are none.
 fn uses_with_events(subject: &Subject, findings: &mut Findings) -> Vec<Use> {
     let uses = subject.uses().into_iter();
     let uses: Vec<Use> =

@@ -256,7 +256,7 @@ pub struct Session<'s> {
 }
 
 impl Session<'_> {
-    /// From instantiated to the first step.
+    /// Initialises the instance, up to the first step.
     pub fn initialise(&mut self) -> Result<()> {
         self.enter_initialization()?;
         self.leave_initialization()

@@ -35,7 +35,7 @@ pub struct AnyFmuArgs {
     /// Inputs that the recordings drive.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     inputs: Vec<String>,
-    /// Those inputs that are held from row to row; the others go along lines.
+    /// Inputs that are held from row to row; the others are interpolated linearly.
     #[arg(long, value_name = "NAME,…", requires = "inputs")]
     held: Vec<String>,
     /// Outputs that were recorded.

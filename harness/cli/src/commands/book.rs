@@ -17,7 +17,8 @@ pub struct BookArgs {
     /// Directory for the site.
     #[arg(long, value_name = "DIRECTORY", default_value = "dist/book")]
     out: PathBuf,
-    /// With plants in the live pages: FMUs and tank solver as WebAssembly; harness/platforms/setup --wasm gets what that takes.
+    /// Adds running plants to the live pages: FMUs and tank solver as WebAssembly. harness/platforms/setup --wasm installs the
+    /// tools.
     #[arg(long)]
     live: bool,
 }

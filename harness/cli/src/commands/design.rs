@@ -221,9 +221,9 @@ impl DesignArgs {
 /// Bench on which a plan is tried.
 struct Bench<'f> {
     fmu: &'f Fmu,
-    /// With the damping as the FMU has it, whether by the correlation or not.
+    /// Setup with the FMU's own damping, by the correlation or not.
     setup: Setup,
-    /// With the damping ratio of the unknowns.
+    /// Setup with the damping ratio of the unknowns.
     fitted: Setup,
     unknowns: Vec<Unknown>,
     noise: Noise,

@@ -44,8 +44,8 @@ pub struct PackArgs {
     /// Spacecraft only: packs a variant with this many slosh modes of each tank, 1 to 3.
     #[arg(long, value_name = "NUMBER", conflicts_with = "python")]
     modes: Option<usize>,
-    /// For Linux, Windows and macOS instead of this machine's platform: one FMU for all, one wheel for each;
-    /// on a Debian machine harness/platforms/setup gets what that takes.
+    /// Builds for Linux, Windows and macOS instead of this machine's platform: one FMU for all, one wheel for each. On Debian,
+    /// harness/platforms/setup installs the tools.
     #[arg(long)]
     all_platforms: bool,
     /// Adds binaries/wasm32/NAME.wasm, a WebAssembly module for web pages and Node.js (harness/web/fmu/host.js).

@@ -34,7 +34,7 @@ pub struct TankArgs {
     /// end of the wall if the tank is open at the top). A full tank has no free surface and no modes.
     #[arg(long, value_name = "METRES|PERCENT%", required_unless_present_any = ["sweep", "fill_mass"])]
     fill: Option<Fill>,
-    /// In place of --fill: mass of the liquid, kg, at the tank's density.
+    /// Mass of the liquid, kg, at the tank's density, in place of --fill.
     #[arg(long, value_name = "KG", conflicts_with = "fill")]
     fill_mass: Option<f64>,
     /// Several fills, m or %: a table of them (CSV). With --parameters the table of a tank that drains: of two fills

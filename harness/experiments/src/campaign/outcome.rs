@@ -630,7 +630,7 @@ impl Passing {
 }
 
 impl Outcome {
-    /// From a stored run, and an initialised instance that tells the parameters.
+    /// Computes the outcome of a stored run; an initialised instance has the parameters.
     pub(super) fn of(
         case: &Case,
         run: &Run,

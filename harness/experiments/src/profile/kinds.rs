@@ -127,7 +127,7 @@ const fn sweep_from(first: Allowed) -> [Parameter; 4] {
 }
 /// No sweep stays where it is.
 const MOVES: Demand = (|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine");
-/// Beyond it a phase has no digit left that its sine depends on.
+/// Range of frequencies; above it, the phase of a sine has no valid digits.
 const BAND: Demand = (
     |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.of(name))),
     "f0 and f1 must be from 1e-9 to 1e9 Hz",

@@ -51,7 +51,7 @@ impl Values<'_> {
 }
 
 impl Kind {
-    /// It with these values, as the parser takes it.
+    /// Returns the profile's text with these values, as the parser takes it.
     fn written(&self, values: &[f64]) -> String {
         let pairs = self.parameters.iter().zip(values);
         let pairs: Vec<_> = pairs.map(|(p, value)| format!("{}={value}", p.name)).collect();
@@ -319,8 +319,7 @@ impl Torque {
             .with_context(|| format!("{} cannot be used", path.display()))
     }
 
-    /// From rows; with `slopes` the torque runs on from each row with its own slope until the next,
-    /// and jumps there if the two do not meet.
+    /// Returns a torque from rows. With `slopes` the torque follows each row's slope until the next row, and may jump there.
     pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
         ensure!(time.len() >= 2, "it has {} rows; a history needs two", time.len());
         if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {

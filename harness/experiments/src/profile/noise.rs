@@ -78,7 +78,7 @@ impl Shape for Noise {
         sum.clamp(-self.limit, self.limit)
     }
 
-    /// From its second tone on: where it begins at 0 the first may be anywhere near.
+    /// Returns the band from the second tone on: if the band begins at 0, the first tone may be anywhere near it.
     fn band(&self) -> Option<(f64, f64)> {
         let tone = (self.f1 - self.f0) / TONES as f64;
         Some((if self.f0 > 0.0 { self.f0 } else { tone }, self.f1))

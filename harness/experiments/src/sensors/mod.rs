@@ -32,7 +32,7 @@ pub struct Kind {
     pub parameters: &'static [Parameter],
     /// Unit of its readings; empty: that of the variable.
     pub unit: &'static str,
-    /// It reads a variable, this one where none is named by `of`.
+    /// Variable that the sensor reads, by default this one; `of` names another.
     of: Option<Option<&'static str>>,
 }
 

@@ -46,7 +46,7 @@ enum Rule {
 /// Relation between the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh and slosh angles.
 #[derive(Clone, Copy, Debug)]
 pub enum Coordinate {
-    /// It is the angle.
+    /// The angle itself.
     Angle,
     /// The tangent of half the angle from the vertical, times the direction.
     Stereographic,

@@ -10,7 +10,7 @@ use crate::run::Run;
 
 /// Steps that are counted around the median.
 const MIDDLE: usize = 9;
-/// After this time nobody counts on: steps of millions of instructions.
+/// Time after which counting stops, for steps of millions of instructions.
 #[cfg(target_os = "linux")]
 const TIME: std::time::Duration = std::time::Duration::from_secs(30);
 

@@ -316,7 +316,7 @@ fn worst(fmu: &Fmu, run: &Run, max_steps: u64, allowed: f64) -> Result<f64> {
 /// Choice for a deadline.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice {
-    /// For `solver.max_steps`.
+    /// Value for `solver.max_steps`.
     pub max_steps: u64,
     /// Worst time of this many internal steps, s.
     pub worst: f64,

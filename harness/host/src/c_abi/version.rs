@@ -453,7 +453,7 @@ impl<V: Version> Fmu<V> {
         Ok(instance)
     }
 
-    /// For tests: fmi2FreeInstance(NULL) or fmi3FreeInstance(NULL), which does nothing.
+    /// Calls fmi2FreeInstance(NULL) or fmi3FreeInstance(NULL), which does nothing; for tests.
     pub fn free_null_instance(&self) {
         // SAFETY: the standard allows NULL here (FMI 2.0.5, section 2.1.5; FMI 3.0.2, section 2.3.1).
         unsafe { (self.common.free_instance.call)(null_mut()) }

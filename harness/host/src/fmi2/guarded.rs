@@ -115,8 +115,7 @@ fn lengths(all: usize) -> Vec<usize> {
 }
 
 impl Instance<'_> {
-    /// For tests: makes calls with margins around every array, and tells what was written there.
-    /// The statuses of the calls do not matter.
+    /// Makes calls with margins around every array and returns writes into the margins, whatever the calls' status; for tests.
     pub fn writes_beside(&mut self, lists: &Lists) -> Vec<Beside> {
         let mut found = Vec::new();
         self.begin_call();

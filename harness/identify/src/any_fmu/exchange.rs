@@ -64,7 +64,8 @@ pub struct Run<'fmu> {
 }
 
 impl<'fmu> Run<'fmu> {
-    /// From an instance in event mode, as initialization leaves it; `most_steps`: from one row to the next.
+    /// Starts a run from an instance in event mode, as initialization leaves it. `most_steps` limits the steps from one row to
+    /// the next.
     pub fn new(
         mut instance: Instance<'fmu>,
         tolerance: f64,

@@ -97,7 +97,8 @@ pub struct Answer {
 }
 
 impl<'a> Problem<'a> {
-    /// With white noise of the size that each output shows from row to row; a `floor` is the least, in parts of its spread.
+    /// Returns the problem with white noise estimated from each output's differences from row to row. `floor` is the least noise,
+    /// relative to the output's spread.
     pub fn new(
         model: &'a Model,
         setup: &'a Setup,

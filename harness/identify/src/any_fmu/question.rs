@@ -178,7 +178,7 @@ pub struct Question {
     pub settings: Vec<Setting>,
     /// Inputs that are driven.
     pub inputs: Vec<String>,
-    /// Those of them that are held from row to row; the others go along lines.
+    /// Inputs that are held from row to row; the others are interpolated linearly.
     pub held: Vec<String>,
     /// Outputs that were recorded: of the FMU, or columns of `sensors`.
     pub outputs: Vec<String>,

@@ -91,7 +91,7 @@ pub fn search(
     )
 }
 
-/// From a start that may be far off: over windows that grow, each unknown held by a spring of its reach.
+/// Searches from a distant start over growing windows, with a wide prior on each unknown.
 fn from_afar(problem: &Problem, x: &[f64], news: &mut dyn FnMut(&News)) -> Result<Vec<f64>> {
     let mut x = x.to_vec();
     for part in WINDOWS {

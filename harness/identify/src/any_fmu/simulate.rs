@@ -16,7 +16,7 @@ use super::record::Record;
 
 /// An FMU for one solver.
 pub enum Model {
-    /// It steps itself (Co-Simulation).
+    /// Co-Simulation, by the FMU's own solver.
     Own(Fmu),
     /// The host integrates (Model Exchange).
     Host(Fmu),
@@ -122,7 +122,7 @@ impl Output {
 
 /// An instance that is ready for its first step.
 enum Initialised<'m> {
-    /// It steps itself.
+    /// Co-Simulation.
     Own(Instance<'m>),
     /// The host integrates.
     Host(exchange::Run<'m>),

@@ -61,9 +61,9 @@ pub enum Weights {
 /// Torques compared with the difference of rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Those at t_k; the residual is the thesis's, r_k (5.4).
+    /// Torques at t_k; the residual is the thesis's, r_k (5.4).
     AtRow,
-    /// Their means from t_{k−1} to t_{k+1}; the residual is r_k/I.
+    /// Mean torques from t_{k−1} to t_{k+1}; the residual is r_k/I.
     Averaged,
 }
 
@@ -213,7 +213,7 @@ struct Rows {
     torque: Vec<f64>,
     /// Integral of the torque, N·m·s.
     impulse: Vec<f64>,
-    /// In the middle of each block.
+    /// Angle in the middle of each block, rad.
     angle: Option<Vec<f64>>,
     /// Time between rows, s.
     step: f64,

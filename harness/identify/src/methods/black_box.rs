@@ -52,7 +52,7 @@ pub struct Details {
     pub armax: usize,
     /// Frequency and damping ratio of each one's least damped poles within the band, Hz.
     pub poles: Vec<Option<(f64, f64)>>,
-    /// From when on rows were held back, s.
+    /// Time from which rows were held back, s.
     pub held_out_from: f64,
 }
 

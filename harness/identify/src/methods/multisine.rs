@@ -64,7 +64,7 @@ pub struct Details {
     pub periods: usize,
     /// Excited lines.
     pub lines: Vec<Line>,
-    /// Over the whole band.
+    /// Levels over the whole band.
     pub levels: Levels,
     /// Significance of odd and even distortion, in standard deviations of noise alone.
     pub significance: (f64, f64),

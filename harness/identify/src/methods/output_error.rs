@@ -69,7 +69,7 @@ impl Method for OutputError {
 const ORDER: [&str; 5] =
     [Linear.name(), Planar.name(), Spherical.name(), Paraboloid.name(), Frozen.name()];
 
-/// From the simplest slosh model to the richest.
+/// Slosh models, the simplest first.
 const SIMPLEST: [&str; 5] =
     [Frozen.name(), Linear.name(), Planar.name(), Spherical.name(), Paraboloid.name()];
 

@@ -91,7 +91,7 @@ pub(crate) fn drawn(chart: &Chart) -> Markup {
     html! { div class="scroll" { (PreEscaped(chart.svg())) } }
 }
 
-/// With as many digits as the standard deviation has a meaning for; what is small, with a power of ten.
+/// Returns a number with the digits that its standard deviation justifies, small numbers in scientific notation.
 pub(crate) fn digits(value: f64, deviation: f64) -> String {
     let places = if deviation > 0.0 { 1.0 - deviation.log10().floor() } else { 6.0 };
     match value {

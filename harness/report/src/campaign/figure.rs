@@ -23,7 +23,7 @@ pub(super) struct Figure {
     pub shared: bool,
     pub panels: Vec<Panel>,
     pub traces: Vec<Value>,
-    /// At the right end of lines in the first panel, instead of a legend where there is room.
+    /// Labels at the right end of lines in the first panel, in place of a legend.
     pub labels: Vec<Label>,
 }
 

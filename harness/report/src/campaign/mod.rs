@@ -284,7 +284,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
     }
 }
 
-/// To the page that shows one run.
+/// Returns the link to the page of one run.
 fn link(file: &str, run: &Outcome) -> Markup {
     let radial = run.totals.peak_radial_angle;
     let degrees = |angle: f64| format!("{:.1}°", angle.to_degrees());

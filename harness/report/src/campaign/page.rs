@@ -19,7 +19,7 @@ pub(super) struct Group<'a> {
     /// Further differences from the other groups, such as `tank.d 111 mm`.
     pub others: Vec<String>,
     pub runs: Vec<&'a Outcome>,
-    /// Those of them whose curves are there.
+    /// Runs whose curves are stored.
     pub drawn: Vec<&'a Outcome>,
     /// The sweep of its first run.
     pub sweep: Option<&'a Sweep>,
@@ -56,7 +56,7 @@ pub(super) struct Axis {
     /// Its place among what is varied.
     pub place: usize,
     pub name: String,
-    /// With its unit.
+    /// Label with unit.
     pub label: String,
     /// Factor from SI to the displayed unit.
     pub scale: f64,

@@ -27,11 +27,11 @@ type Linear = ([f64; 5], f64);
 /// State of the hub at a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// It turns.
+    /// The hub turns.
     Slips,
-    /// It sticks, or nearly: the row says nothing.
+    /// The hub sticks, or nearly: the row is not used.
     Sticks,
-    /// It stands still: the row shows the gyro's bias.
+    /// The hub stands still: the row shows the gyro's bias.
     Rests,
 }
 
