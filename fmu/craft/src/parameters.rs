@@ -123,8 +123,8 @@ pub struct Ball {
     /// Distance along the axis from the settled liquid's centre at the bottom to that at the top,
     /// m. 0: no model of detached liquid.
     pub travel: f64,
-    /// Largest distance of the liquid's centre from the axis, m. With 0 the surface within reach has, at the bottom,
-    /// the curvature of the path of the pendulums' common centre.
+    /// Largest distance of the liquid's centre from the axis, m. 0: the radius follows from the pendulums; the surface that
+    /// bounds the centre then has, at the bottom, the curvature of the path of their common centre.
     pub radius: f64,
     /// Coefficient of restitution of an impact on the wall, 0 to 1.
     pub restitution: f64,

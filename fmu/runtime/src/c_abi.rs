@@ -61,13 +61,13 @@ impl Log {
         Log { logger, filter: Filter::FAILURES, step_warned: false }
     }
 
-    /// Tells why a call has failed.
+    /// Logs the reason why a call has failed.
     pub fn report(&self, fault: &Fault) {
         self.write(status(fault.severity), Topic::Failure(fault.severity), || fault.text.clone());
     }
 
     #[cold]
-    /// Tells what there is to be warned of in the motion that begins.
+    /// Logs the model's warnings at the start of a motion.
     pub fn report_warnings<M: Model, V: Version>(&self, instance: &Instance<M, V>) {
         if self.filter.wants(Topic::Warning) {
             for warning in instance.warnings() {
@@ -93,8 +93,7 @@ impl Log {
         }
     }
 
-    /// Tells of the last event, if there was one since `before` were counted and if somebody wants
-    /// to know.
+    /// Logs the last event, if there was one since `before` were counted and if somebody wants to know.
     #[inline(always)]
     pub fn report_event<M: Model, V: Version>(
         &self,

@@ -347,7 +347,7 @@ pub unsafe fn fmi2FreeInstance<M: Model>(c: fmi2Component) {
     unsafe { free_component::<M, Fmi2>(c) }
 }
 
-/// Tells times and tolerance.
+/// Sets start time, stop time and tolerance.
 pub unsafe fn fmi2SetupExperiment<M: Model>(
     c: fmi2Component,
     toleranceDefined: fmi2Boolean,

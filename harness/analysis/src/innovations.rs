@@ -33,9 +33,9 @@ pub const LIMIT: f64 = 5.0;
 pub struct Tests {
     /// Result of the whiteness test.
     pub whiteness: f64,
-    /// Largest excess of a window in time, and its time, s.
+    /// Largest excess of the power in a window of time, and the time, s.
     pub in_time: (f64, f64),
-    /// Largest excess of a band, and its frequency, Hz.
+    /// Largest excess of the power in a band, and its frequency, Hz.
     pub in_frequency: (f64, f64),
     /// Largest cross-correlation with the torque up to 2 s.
     pub torque: f64,

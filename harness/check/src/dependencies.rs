@@ -132,8 +132,7 @@ impl Seen {
         feedthrough.iter().all(|pair| self.traces.contains(pair))
     }
 
-    /// Tells what was seen and not declared. That a state which is an output moves with itself is
-    /// nothing to tell.
+    /// Reports dependencies that were seen but are not declared, except of a state on itself.
     fn tell(&self, fmu: &FmuUnderTest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
         for unknown in lists {
             let Some(declared) = &unknown.dependencies else { continue };

@@ -7,7 +7,7 @@ use host::causality::Causality;
 use super::Findings;
 use super::description::{Description, Unknown, Variable};
 
-/// Says what is missing, repeated, or listed although it must not be.
+/// Reports entries that are missing, repeated or not allowed.
 fn compare(
     d: &Description,
     findings: &mut Findings,

@@ -1,4 +1,4 @@
-//! Answers of a rule's process: what it is about to do and what it found.
+//! Messages from a rule's process to its parent: the next call and the findings.
 
 use anyhow::Result;
 use host::guard;
@@ -26,13 +26,13 @@ pub(super) enum Answer {
     Done(Findings),
 }
 
-/// Tells what comes next.
+/// Announces the next call to the parent.
 pub fn doing(what: &str, crash: Crash) {
     // without it, the report of a crash does not name the call
     let _ = send(&Answer::Doing(what.into(), crash));
 }
 
-/// Tells what was found; nothing comes after it.
+/// Sends the findings to the parent, as the last message.
 pub fn done(findings: Findings) -> Result<()> {
     send(&Answer::Done(findings))
 }

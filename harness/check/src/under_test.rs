@@ -194,7 +194,7 @@ impl FmuUnderTest {
         FmuUnderTest::open(directory, &self.path, self.deadline)
     }
 
-    /// Tells what comes next: the place of what goes wrong then.
+    /// Announces the next call: a crash or a hang is then reported at this place.
     pub fn doing(&self, what: impl Into<String>) {
         let what = what.into();
         trace::doing(&what, self.crash.borrow().clone());

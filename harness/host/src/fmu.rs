@@ -196,7 +196,7 @@ impl<'fmu> Instance<'fmu> {
         each!(Instance, self, instance => Version::step(instance, time, step))
     }
 
-    /// Tells an FMU 2.0 the slopes of inputs from now on, per s. An FMU 3.0 hears of them within the step alone.
+    /// Sets the slopes of inputs of an FMU 2.0 from now on, per s. An FMU 3.0 receives them only within the step.
     pub fn set_slopes(&mut self, references: &[u32], slopes: &[f64]) -> Called {
         each!(Instance, self, instance => Version::set_slopes(instance, references, slopes))
     }

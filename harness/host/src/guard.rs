@@ -552,7 +552,7 @@ pub fn answer(content: &[u8]) {
     tell(ANSWER, content);
 }
 
-/// Tells the parent that all is done, with this exit code. Without a parent it is nothing.
+/// Reports to the parent that the work is done, with this exit code. Does nothing without a parent.
 pub fn done(code: u8) {
     tell(DONE, &[code]);
 }
@@ -572,7 +572,7 @@ pub fn streams() -> Option<(&'static File, &'static File)> {
     None
 }
 
-/// Tells four times a second that the process lives, until a call takes too long.
+/// Sends a sign of life four times a second, until a call takes too long.
 fn tell_of_life() {
     let Some(guarded) = GUARDED.get() else { return };
     let mut seen: Vec<(Weak<AtomicU64>, u64, Instant)> = Vec::new();

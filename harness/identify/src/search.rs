@@ -182,7 +182,7 @@ impl When {
 }
 
 impl<'a> Search<'a, '_> {
-    /// Tells a line, with the simulations since the line before.
+    /// Reports progress in one line, with the number of simulations since the last line.
     fn say(&mut self, line: String) {
         (self.progress)(self.since.line(line, self.problem.simulations()));
     }

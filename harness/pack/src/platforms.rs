@@ -324,7 +324,7 @@ impl Toolchain {
         folder.read_dir().is_ok_and(|mut entries| entries.any(named))
     }
 
-    /// Says all that is missing, for which platforms, and how to get it.
+    /// Returns an error with all missing tools, their platforms, and how to install them.
     pub fn check(&self, platforms: &[&Platform]) -> Result<()> {
         let mut missing: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for platform in platforms {

@@ -223,7 +223,7 @@ pub unsafe fn fmi3FreeInstance<M: Model>(instance: fmi3Instance) {
     unsafe { free_component::<M, Fmi3>(instance) }
 }
 
-/// Tells times and tolerance; from here on all variables can be read.
+/// Sets times and tolerance and enters initialization mode; all variables can be read from here on.
 pub unsafe fn fmi3EnterInitializationMode<M: Model>(
     instance: fmi3Instance,
     toleranceDefined: fmi3Boolean,

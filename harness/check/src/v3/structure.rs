@@ -11,7 +11,7 @@ fn place(d: &Description, u: &Unknown) -> String {
     format!("line {}, {}, {}", u.line, u.list, d.name_of(u.reference))
 }
 
-/// Says what is missing, repeated, or listed although it must not be.
+/// Reports entries that are missing, repeated or not allowed.
 fn compare(
     d: &Description,
     findings: &mut Findings,

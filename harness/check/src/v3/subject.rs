@@ -93,7 +93,7 @@ impl Subject {
         Ok(Subject { binaries, description, doing, deadline })
     }
 
-    /// Tells what comes next: the place of what goes wrong then.
+    /// Announces the next call: a crash or a hang is then reported at this place.
     pub fn doing(&self, what: impl Into<String>) {
         let what = what.into();
         trace::doing(&what, Crash::Error);

@@ -249,7 +249,7 @@ impl AnyFmuArgs {
         Ok(())
     }
 
-    /// Says what recordings with these inputs will tell; `noise`: `OUTPUT=STD,…`.
+    /// Predicts the uncertainty of a fit to recordings with these inputs; `noise`: `OUTPUT=STD,…`.
     pub fn design(&self, told: &Told, noise: &[String]) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;

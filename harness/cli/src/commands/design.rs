@@ -21,7 +21,7 @@ use super::any_fmu::{AnyFmuArgs, Told};
 use super::{DEFAULT_FMU, estimates, open, setting};
 use crate::terminal;
 
-/// Says beforehand what a planned experiment will tell about each parameter (Cramér–Rao bound).
+/// Predicts the uncertainty of each parameter from a planned experiment (Cramér–Rao bound).
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh design --profile lin-sweep:amplitude=0.1\n  \
     hubslosh design --snr 20 --band 1.25,20\n  \
