@@ -19,6 +19,8 @@
 //! p'' = -(1 - p p^T - b b^T) G/l - |p'|^2 p                  p.b = p'.b = 0
 //! ```
 //!
+//! A bob with other coefficients of the third order than a pendulum's is on another surface than a sphere (`surface.rs`).
+//!
 //! A tank with planar modes does not drain. Perpendicular to its plane the bob moves as rigid liquid. With modes along two
 //! directions m_0 is the liquid less the masses of both and may be negative.
 //!
@@ -68,6 +70,7 @@ use crate::parameters::{Limits, Tank};
 use crate::rigid::{Mat6, Rigid, along_rod};
 use crate::sizes::MODES;
 use crate::state::Line;
+use crate::surface::{LEAST_INERTIA, Lift, Meridian, Surface};
 use crate::table::{FillCurves, Jet};
 
 /// A tank in its mounting position.
@@ -81,6 +84,9 @@ pub struct MountedTank {
     /// True if there are planar modes; their b, body axes.
     planar: bool,
     across: [Option<Vec3>; MODES],
+    /// True if there are surfaces other than spheres; they.
+    curved: bool,
+    surfaces: [Option<Surface>; MODES],
     /// The rigid liquid and all liquid at rest, if they are not axially symmetric.
     uneven: Option<[Rigid; 2]>,
 }
@@ -111,6 +117,15 @@ pub struct Swing<T> {
     end_rate: Vec3<T>,
     /// k l l' |p_perp|^2
     centring_d: T,
+    surface: Option<OnSurface<T>>,
+}
+
+/// Terms of a bob on a surface other than a sphere.
+struct OnSurface<T> {
+    meridian: Meridian<T>,
+    /// z, and i.
+    z: T,
+    inner: Vec3<T>,
 }
 
 /// A tank's contents at an instant.
@@ -145,7 +160,9 @@ impl MountedTank {
         let across = core::array::from_fn(|n| {
             (n < tank.modes).then(|| tank.hinge_and_across(n).1).flatten()
         });
-        MountedTank { tank: *tank, curves, axes, e, d, planar: tank.is_planar(), across, uneven }
+        let surfaces = core::array::from_fn(|n| tank.surface(n));
+        let (planar, curved) = (tank.is_planar(), tank.has_surface());
+        MountedTank { tank: *tank, curves, axes, e, d, planar, across, curved, surfaces, uneven }
     }
 
     /// Returns true if the drag of any mode depends on acceleration or amplitude.
@@ -188,6 +205,20 @@ impl MountedTank {
         let Some(b) = self.across[n].map(constant) else { return [hinge, p, p_d] };
         let [p, p_d] = [p, p_d].map(|x| sub(x, scale(dot(b, x), b)));
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
+    }
+
+    /// Returns surface and height of the bob of mode n (from 0) from l with its derivatives, and p and p'.
+    #[inline(never)]
+    fn on_surface<T: Number>(
+        &self,
+        n: usize,
+        l: Jet<T>,
+        [p, p_d]: [Vec3<T>; 2],
+    ) -> Option<(Meridian<T>, Lift<T>)> {
+        let across = self.across[n].map(constant);
+        let meridian = Meridian::new(self.surfaces[n]?, constant(self.e), p, across);
+        let lift = meridian.lift(l, p_d);
+        Some((meridian, lift))
     }
 
     /// Evaluates the contents. x: p and p' of each mode, tank axes. `a` and `w_d` give the acceleration along the tank
@@ -239,8 +270,12 @@ impl MountedTank {
                 [hinge, p, p_d] = self.guided(n, [hinge, p, p_d]);
             }
             let [p, p_d] = on_sphere(p, p_d);
-            let rho = add(hinge, scale(l[0], p));
-            let rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
+            let mut rho = add(hinge, scale(l[0], p));
+            let mut rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
+            let on_surface = if self.curved { self.on_surface(n, l, [p, p_d]) } else { None };
+            if let Some((_, lift)) = &on_surface {
+                (rho, rho_d) = (add(rho, scale(lift.z, e)), add(rho_d, scale(lift.z_d, e)));
+            }
             let (height, height_d) = (dot(e, p), dot(e, p_d));
             let p_perp = sub(p, scale(height, e));
             let p_perp_d = sub(p_d, scale(height_d, e));
@@ -248,16 +283,32 @@ impl MountedTank {
             let chord = add(p, e);
             let motion = [dot(chord, chord), dot(p_d, p_d)];
             let drag = damping::coefficient(tank, n, [m[0], l[0]], dot(e, at_hinge), motion);
-            let phi = add(scale(drag * l[0], p_d), scale(l[0] * k, p_perp));
+            let moved = match &on_surface {
+                Some((meridian, _)) => meridian.along(p_d),
+                None => p_d,
+            };
+            let phi = add(scale(drag * l[0], moved), scale(l[0] * k, p_perp));
             let centripetal = add(cross(w, cross(w, rho)), cross(w, rho_d).map(|x| x * 2.0));
             let settling = add(centripetal, scale(h[2], e));
             let t_0 = m[0] * (l[0] * dot(p_d, p_d) - dot(p, settling) - l[2])
                 - l[0] * dot(p_perp, p_perp) * k;
-            let known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
+            let mut known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
             let turned = cross(hinge, p);
             // Flow out of the bob.
-            let b = h[0] + l[0] * height;
-            let b_d = h[1] + l[1] * height + l[0] * height_d;
+            let mut b = h[0] + l[0] * height;
+            let mut b_d = h[1] + l[1] * height + l[0] * height_d;
+            let mut end_rate = add(scale(h[1], e), scale(l[1], p));
+            let mut centring = l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k);
+            let mut centring_d = l[0] * l[1] * dot(p_perp, p_perp) * k;
+            let surface = on_surface.map(|(meridian, lift)| {
+                (b, b_d) = (b + lift.z, b_d + lift.z_d);
+                end_rate = add(end_rate, scale(lift.z_by_length, e));
+                centring = centring + m[0] * lift.energy;
+                centring_d = centring_d + m[0] * lift.energy_d + m[1] * lift.energy;
+                known = add(known, scale(l[2] - l[0] * dot(p_d, p_d), p));
+                known = add(known, scale(lift.z_dd, e));
+                OnSurface { meridian, z: lift.z, inner: lift.inner }
+            });
             let lost = scale(m[1] * l[0], p_perp);
             let lost_d =
                 add(scale(m[2] * l[0] + m[1] * l[1], p_perp), scale(m[1] * l[0], p_perp_d));
@@ -273,7 +324,7 @@ impl MountedTank {
                 sub(flow_wrench[0], scale(m[1], rho_d)),
                 sub(flow_wrench[1], scale(m[1], cross(rho, speed))),
             ];
-            dissipation = dissipation + drag * l[0] * l[0] * dot(p_d, p_d);
+            dissipation = dissipation + drag * l[0] * l[0] * dot(moved, moved);
             bobs[n] = Some(Swing {
                 m: m[0],
                 l: l[0],
@@ -285,10 +336,11 @@ impl MountedTank {
                 t_0,
                 phi,
                 known,
-                centring: l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k),
+                centring,
                 m_d: m[1],
-                end_rate: add(scale(h[1], e), scale(l[1], p)),
-                centring_d: l[0] * l[1] * dot(p_perp, p_perp) * k,
+                end_rate,
+                centring_d,
+                surface,
             });
         }
         let [h_0, i_0, i_z] = match place {
@@ -350,7 +402,9 @@ impl MountedTank {
         for (n, bob) in contents.bobs.iter().flatten().enumerate() {
             let g = bob.acceleration(a, w_d);
             let mut across = sub(g, scale(dot(bob.p, g), bob.p));
-            if self.planar
+            if let Some(surface) = &bob.surface {
+                across = surface.slide(g);
+            } else if self.planar
                 && let Some(b) = self.across[n].map(constant)
             {
                 across = sub(across, scale(dot(b, g), b));
@@ -370,7 +424,13 @@ impl MountedTank {
                 m: bob.m,
                 rho: bob.rho,
                 rate: bob.rho_d,
-                hinge: sub(bob.rho, scale(bob.l, bob.p)),
+                hinge: match &bob.surface {
+                    Some(on) => sub(
+                        sub(bob.rho, scale(bob.l, bob.p)),
+                        constant(self.e).map(|x: T| x * on.z),
+                    ),
+                    None => sub(bob.rho, scale(bob.l, bob.p)),
+                },
                 e: self.e,
                 in_tank: transposed_times(&axes, bob.p),
                 wave: self.tank.wave[n],
@@ -391,6 +451,35 @@ impl MountedTank {
         }
     }
 
+    /// Returns true if a bob is where the inertia along its meridian is too small; x as in [`MountedTank::contents`].
+    #[inline(never)]
+    pub fn is_beyond(&self, x: &[f64]) -> bool {
+        (0..MODES).any(|n| self.inertia_along_meridian(n, x) < LEAST_INERTIA)
+    }
+
+    /// Returns the inertia along its meridian of the bob of mode n (from 0), relative to a pendulum's.
+    fn inertia_along_meridian(&self, n: usize, x: &[f64]) -> f64 {
+        let Some(surface) = self.surfaces[n] else { return 1.0 };
+        let [p, _] = on_sphere(vec_of(x, 6 * n), [0.0; 3]);
+        surface.meridian_inertia(p[2], p[0] * p[0] + p[1] * p[1])
+    }
+
+    /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's number from 1, 0
+    /// if the system has only one. The slack recognises a step that could not pass the bound.
+    pub fn check_surfaces(&self, x: &[f64], tank: usize) -> Result<(), StepError> {
+        let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
+        let is_near = |n: &usize| self.inertia_along_meridian(*n, x) < LEAST_INERTIA * (1.0 + 1e-6);
+        match (0..MODES).find(is_near) {
+            Some(n) => Err(StepError::Model(self.tank.beyond(n, &format!("tank{index}")))),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns true if any bob is on a surface other than a sphere.
+    pub fn is_curved(&self) -> bool {
+        self.curved
+    }
+
     /// Returns true if the tank's liquid follows a table.
     pub fn drains(&self) -> bool {
         self.tank.fill.points > 0
@@ -409,10 +498,42 @@ impl<T: Number> Swing<T> {
         add(add(a, cross(w_d, self.rho)), self.known)
     }
 
-    /// Returns force and torque about O on the craft at the tension T.
-    fn wrench(&self, tension: T) -> [Vec3<T>; 2] {
+    /// Returns force and torque about O on the craft under [a; w'], without the guide of a pendulum in a plane.
+    fn wrench(&self, a: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
+        match &self.surface {
+            Some(surface) => {
+                let slowed = surface.share(self.acceleration(a, w_d));
+                let force = sub(self.phi, scale(self.m, slowed));
+                [force, cross(self.rho, force)]
+            }
+            None => self.wrench_at(self.tension(a, w_d)),
+        }
+    }
+
+    /// Returns force and torque about O on the craft at a = w' = 0.
+    fn load(&self) -> [Vec3<T>; 2] {
+        if self.surface.is_some() {
+            return self.wrench(constant([0.0; 3]), constant([0.0; 3]));
+        }
+        self.wrench_at(self.t_0)
+    }
+
+    /// Returns force and torque about O on the craft at the tension T of a rod.
+    fn wrench_at(&self, tension: T) -> [Vec3<T>; 2] {
         let force = add(scale(tension, self.p), self.phi);
         [force, cross(self.rho, force)]
+    }
+}
+
+impl<T: Number> OnSurface<T> {
+    /// Returns -l y under G.
+    fn slide(&self, g: Vec3<T>) -> Vec3<T> {
+        self.meridian.free(add(self.meridian.back(g), self.inner))
+    }
+
+    /// Returns G + l D y under G.
+    fn share(&self, g: Vec3<T>) -> Vec3<T> {
+        sub(g, self.meridian.along(self.slide(g)))
     }
 }
 
@@ -420,6 +541,15 @@ impl<T: Number> Contents<'_, T> {
     /// Adds the bobs' inertia along their rods and perpendicular to the planes of planar modes, m u u^T.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
+            if let Some(surface) = &bob.surface {
+                let held = surface.meridian.mass_matrix(bob.m, bob.rho);
+                for i in 0..6 {
+                    for k in 0..6 {
+                        matrix[i][k] = matrix[i][k] + held[i][k];
+                    }
+                }
+                continue;
+            }
             for i in 0..6 {
                 for k in 0..6 {
                     matrix[i][k] = matrix[i][k] + bob.m * bob.u[i] * bob.u[k];
@@ -443,10 +573,12 @@ impl<T: Number> Contents<'_, T> {
         }
     }
 
-    /// Iterates over the bobs of planar modes and their b.
+    /// Iterates over the pendulums of planar modes and their b.
     fn planar(&self) -> impl Iterator<Item = (&Swing<T>, Vec3<T>)> {
         let across = self.bobs.iter().zip(&self.mounted.across);
-        across.filter_map(|(bob, b)| Some((bob.as_ref()?, constant((*b)?))))
+        let pendulums = across.filter_map(|(bob, b)| Some((bob.as_ref()?, (*b)?)));
+        let pendulums = pendulums.filter(|(bob, _)| bob.surface.is_none());
+        pendulums.map(|(bob, b)| (bob, constant(b)))
     }
 
     /// Adds the guiding forces of planar modes under [a; w'].
@@ -463,7 +595,7 @@ impl<T: Number> Contents<'_, T> {
     /// Returns force and torque about O on the craft at a = w' = 0, without the rigid liquid's
     /// inertia.
     pub fn loads(&self) -> [Vec3<T>; 2] {
-        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.t_0));
+        let bobs = self.bobs.iter().flatten().map(Swing::load);
         let sum =
             bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
         match self.mounted.planar {
@@ -475,7 +607,7 @@ impl<T: Number> Contents<'_, T> {
     /// Returns force and torque about O on the craft.
     pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let rigid = self.rigid.inertial_wrench(a, w, w_d);
-        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.tension(a, w_d)));
+        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(a, w_d));
         let mut sum =
             bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
         if self.mounted.planar {
@@ -497,8 +629,8 @@ impl<T: Number> Contents<'_, T> {
         let mut moment_d = s_d;
         for bob in self.bobs.iter().flatten() {
             let speed = add(v, add(cross(w, bob.rho), bob.rho_d));
-            let tension = add(scale(bob.tension(a, w_d), bob.p), bob.phi);
-            power = power + dot(speed, speed) * bob.m_d * half - dot(tension, bob.end_rate)
+            let [pull, _] = bob.wrench(a, w_d);
+            power = power + dot(speed, speed) * bob.m_d * half - dot(pull, bob.end_rate)
                 + bob.centring_d;
             moment_d = add(moment_d, scale(bob.m_d, bob.rho));
         }
@@ -587,6 +719,9 @@ pub trait Drains<const D: usize>: System<D> + Sized {
     /// Iterates over the outflows of its tanks.
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>>;
 
+    /// Refuses bobs beyond the bounds of their surfaces.
+    fn check_surfaces(&self, x: &[f64; D]) -> Result<(), StepError>;
+
     /// Advances the states by `h` from the time `begin`.
     fn advance(
         &self,
@@ -602,8 +737,10 @@ pub trait Drains<const D: usize>: System<D> + Sized {
         let (mut t, mut pace) = (0.0, Pace::new(h, limits.steps()));
         while t < h {
             let end = self.outflows().fold(h, |end, flow| flow.next_point(start[flow.at], t, end));
-            extrapolation::advance(self, x, (t, end), limits.tolerance, &mut pace)
-                .map_err(|why| why.after(begin))?;
+            let done = extrapolation::advance(self, x, (t, end), limits.tolerance, &mut pace);
+            // A step that cannot pass the bound of a surface ends just before it.
+            self.check_surfaces(x)?;
+            done.map_err(|why| why.after(begin))?;
             self.normalise(x, end);
             for flow in self.outflows() {
                 x[flow.at] = flow.left(start[flow.at], end);

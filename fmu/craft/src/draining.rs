@@ -1,4 +1,5 @@
-//! A craft with tanks that drain or have planar modes, each with its contents from `contents.rs`.
+//! A craft with tanks that drain, have planar modes or other bobs than pendulums (`surface.rs`), each with its contents
+//! from `contents.rs`.
 //!
 //! ```text
 //! M [a; w'] = [ f - w x (w x S) + sum of force ; tau - h_w' - w x (I w + h_w) + sum of torque ]
@@ -76,7 +77,7 @@ impl Acting<Dual> {
         }
     }
 }
-/// A craft with at least one tank that can drain or has planar modes.
+/// A craft with at least one tank that can drain, or has planar modes or other bobs than pendulums.
 #[derive(Clone, Debug)]
 pub struct Draining {
     craft: Rigid,
@@ -109,7 +110,7 @@ fn scales(turn: f64, position: f64, velocity: f64, swing: impl Fn(usize) -> f64)
 
 impl System<STATES> for Run<'_> {
     fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
-        if has_diverged(x) {
+        if has_diverged(x) || self.craft.is_beyond(x) {
             return [0.0; STATES];
         }
         self.craft.evaluate(x, &Acting::of(self.inputs, t)).0
@@ -143,10 +144,14 @@ impl Drains<STATES> for Run<'_> {
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>> {
         self.craft.outflows(&self.inputs.mass_flow)
     }
+
+    fn check_surfaces(&self, x: &[f64; STATES]) -> Result<(), StepError> {
+        self.craft.check_surfaces(x)
+    }
 }
 
 impl Draining {
-    /// Creates the equations; `None` if no tank can drain and none has planar modes.
+    /// Creates the equations; `None` if all tanks keep their liquid and have pendulums that swing in every direction.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
         tanks.iter().any(Tank::is_extrapolated).then(|| Draining {
@@ -174,9 +179,24 @@ impl Draining {
         })
     }
 
-    /// Refuses masses of liquid outside their tables.
+    /// Refuses masses of liquid outside their tables and bobs beyond the bounds of their surfaces.
     pub fn check(&self, x: &[f64; STATES]) -> Result<(), StepError> {
-        self.outflows(&Default::default()).try_for_each(|flow| flow.check(x[flow.at], 0.0))
+        self.outflows(&Default::default()).try_for_each(|flow| flow.check(x[flow.at], 0.0))?;
+        self.check_surfaces(x)
+    }
+
+    /// Iterates over the tanks with surfaces other than spheres and their numbers from 0.
+    fn curved(&self) -> impl Iterator<Item = (usize, &MountedTank)> {
+        self.tanks.iter().enumerate().filter(|(_, mounted)| mounted.is_curved())
+    }
+
+    fn is_beyond(&self, x: &[f64; STATES]) -> bool {
+        self.curved().any(|(i, mounted)| mounted.is_beyond(&x[index::bob(i, 0)..]))
+    }
+
+    fn check_surfaces(&self, x: &[f64; STATES]) -> Result<(), StepError> {
+        self.curved()
+            .try_for_each(|(i, mounted)| mounted.check_surfaces(&x[index::bob(i, 0)..], i + 1))
     }
 
     /// Applies a change of the flows to `flow`. Where a flow jumps, the momentum of the flow within the tank jumps by
@@ -403,6 +423,10 @@ mod tests {
 
         fn outflows(&self) -> impl Iterator<Item = Outflow<'_>> {
             self.run.outflows()
+        }
+
+        fn check_surfaces(&self, x: &[f64; STATES]) -> Result<(), StepError> {
+            self.run.check_surfaces(x)
         }
     }
 

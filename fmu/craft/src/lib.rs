@@ -47,6 +47,7 @@ mod sizes;
 mod slosh_tank;
 mod spacecraft;
 mod state;
+mod surface;
 mod table;
 
 pub use formulas::regime::Regime;

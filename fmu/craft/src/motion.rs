@@ -231,8 +231,8 @@ impl CraftMotion {
         }
     }
 
-    /// Replaces rigid liquids and bobs by those of `tanks`, with as many tanks and modes. Bobs of planar modes count at
-    /// their current positions.
+    /// Replaces rigid liquids and bobs by those of `tanks`, with as many tanks and modes. Bobs of planar modes and
+    /// those that are no pendulums count at their current positions.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
@@ -245,9 +245,7 @@ impl CraftMotion {
                 *bob = Bob::new(tank, bob.tank, bob.mode);
             }
             let at = index::bob(bob.tank, bob.mode);
-            if let Some(u) = bob.carried_along(&self.state.x[at..at + 3]) {
-                add_rank_one(&mut self.mass_matrix, bob.m, &u);
-            }
+            bob.add_held(&mut self.mass_matrix, &self.state.x[at..at + 3]);
         }
         self.freeze();
     }

@@ -15,6 +15,7 @@ use taylor::vector::{
 use crate::pivot::Pivot;
 use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod, smallest_pivot};
 use crate::sizes::{MODES, POINTS, TANKS, modes_of};
+use crate::surface::Surface;
 use crate::table::{FillTable, LIGHTEST, SHORTEST};
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
@@ -214,6 +215,10 @@ pub struct Tank {
     pub g_floor: f64,
     /// Growth of the damping ratio with the amplitude, 1/rad.
     pub zeta_amplitude: [f64; MODES],
+    /// Coefficient s of the mode's inertia at finite amplitude, 1 for a pendulum (`surface.rs`).
+    pub nonlinear_inertia: [f64; MODES],
+    /// Coefficient kappa of the mode's stiffness at finite amplitude, 1 for a pendulum (`surface.rs`).
+    pub nonlinear_stiffness: [f64; MODES],
     /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
     /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and the table
@@ -316,10 +321,35 @@ impl Tank {
         self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
-    /// Returns true if the motion is integrated by extrapolation (`contents.rs`): the tank can drain or has planar
-    /// modes.
+    /// Returns the surface of mode n (from 0), `None` for a pendulum.
+    pub(crate) fn surface(&self, n: usize) -> Option<Surface> {
+        let surface = Surface::new(self.nonlinear_inertia[n], self.nonlinear_stiffness[n]);
+        surface.filter(|_| n < self.modes)
+    }
+
+    /// Returns true if any mode has other coefficients of the third order than a pendulum.
+    pub(crate) fn has_surface(&self) -> bool {
+        (0..MODES).any(|n| self.surface(n).is_some())
+    }
+
+    /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface; `name` is that of the tank.
+    pub(crate) fn beyond(&self, n: usize, name: &str) -> String {
+        let (s, kappa) = (self.nonlinear_inertia[n], self.nonlinear_stiffness[n]);
+        let most = self.surface(n).map_or(0.0, |surface| surface.largest_angle().to_degrees());
+        format!(
+            "the slosh angle of mode {} of {name} exceeds {most:.1} degrees, where {name}.nonlinear_inertia[{}] = {s:?} and \
+             {name}.nonlinear_stiffness[{}] = {kappa:?} leave too little inertia for the third order to be valid (allowed: \
+             smaller angles)",
+            n + 1,
+            n + 1,
+            n + 1
+        )
+    }
+
+    /// Returns true if the motion is integrated by extrapolation (`contents.rs`): the tank can drain, or has planar
+    /// modes or other coefficients of the third order than pendulums.
     pub(crate) fn is_extrapolated(&self) -> bool {
-        self.fill.points > 0 || self.is_planar()
+        self.fill.points > 0 || self.is_planar() || self.has_surface()
     }
 
     /// Returns the mass of the whole liquid, kg.
@@ -372,6 +402,16 @@ impl Tank {
             return Tank { liquid_0: self.fill.liquid[0], ..*self }.resolve().rigid();
         }
         self.rigid()
+    }
+
+    /// Returns the inertia that craft and rigid liquid must have for bobs with s < 1 within 45 degrees, as a body of
+    /// negative mass.
+    fn lent(&self) -> Rigid {
+        let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
+        (0..self.modes).fold(none, |sum, n| {
+            let lent = self.surface(n).map_or(0.0, |surface| surface.lent_inertia());
+            sum.and(&Rigid::new(-lent * self.mass[n], self.hinge_and_across(n).0, &none.inertia))
+        })
     }
 
     /// Returns direction and rate of the bob of mode n (from 0) at the start, tank axes.
@@ -524,6 +564,8 @@ impl Default for Tank {
             damping_law: DampingLaw::Laminar,
             g_floor: 0.0,
             zeta_amplitude: [0.0; MODES],
+            nonlinear_inertia: [1.0; MODES],
+            nonlinear_stiffness: [1.0; MODES],
             wave: modes_of([0.376618, 0.0328144, 0.0125218]),
             ball: Ball::default(),
             fill: FillTable { points: 0, ..CYLINDER },
@@ -753,6 +795,12 @@ impl Tank {
             problems.number(&format!("{name}.zeta[{i}]"), self.zeta[n], 0.0, 10.0, "");
             let growth = self.zeta_amplitude[n];
             problems.number(&format!("{name}.zeta_amplitude[{i}]"), growth, 0.0, 10.0, "1/rad");
+            for (what, value) in [
+                ("nonlinear_inertia", self.nonlinear_inertia[n]),
+                ("nonlinear_stiffness", self.nonlinear_stiffness[n]),
+            ] {
+                problems.number(&format!("{name}.{what}[{i}]"), value, -1e3, 1e3, "");
+            }
             problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
             let before = problems.0.len();
             if self.direction[n] != [0.0; 2] {
@@ -770,6 +818,14 @@ impl Tank {
                          axis (allowed: length above 1e-6 in it)",
                         self.p_0[n]
                     ));
+                }
+            }
+            if problems.0.len() == before
+                && let Some(surface) = self.surface(n)
+            {
+                let [p, _] = self.at_start(n);
+                if libm::acos(-p[2].clamp(-1.0, 1.0)) >= surface.largest_angle() {
+                    problems.0.push(format!("{name}.p_0[{i}]: {}", self.beyond(n, name)));
                 }
             }
             problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
@@ -792,6 +848,12 @@ impl Tank {
             ("fill.points", self.fill.points > 0),
             ("ball.travel", self.ball.travel > 0.0),
         ];
+        if self.ball.travel > 0.0 && self.has_surface() {
+            problems.0.push(format!(
+                "{name}.ball.travel with {name}.nonlinear_inertia or {name}.nonlinear_stiffness (allowed: ball.travel = 0, or \
+                 both 1 in every mode, because liquid detaches from pendulums only)"
+            ));
+        }
         for (what, _) in uneven.iter().filter(|(_, is_set)| *is_set) {
             for (other, _) in axial.iter().filter(|(_, is_set)| *is_set) {
                 problems.0.push(format!(
@@ -954,6 +1016,12 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     if smallest_pivot(&at_rest) < SINGULAR {
         return Some(String::new());
     }
+    let lent = tanks.iter().fold(body, |sum, tank| sum.and(&tank.rigid()).and(&tank.lent()));
+    if tanks.iter().any(Tank::has_surface) && smallest_pivot(&lent.mass_matrix()) < SINGULAR {
+        let within =
+            " at slosh angles up to 45 degrees: a nonlinear_inertia below 1 needs a heavier craft";
+        return Some(within.into());
+    }
     let flies = smallest_pivot(&matrix(Tank::least_rigid)) < SINGULAR;
     (flies && !tanks.iter().any(Tank::is_planar))
         .then(|| " in flight of detached liquid or with tanks at the start of their tables".into())
@@ -1007,6 +1075,17 @@ impl Parameters {
                  liquid cannot have planar modes)",
                 ball + 1,
                 planar + 1
+            ));
+        }
+        let with_surface = tanks.iter().position(Tank::has_surface);
+        if let (Some(ball), Some(surface)) = (with_ball, with_surface)
+            && ball != surface
+        {
+            problems.0.push(format!(
+                "tank[{}].ball.travel with tank[{}].nonlinear_inertia or nonlinear_stiffness (allowed: ball.travel = 0, or both \
+                 1 in every mode, because a craft with detached liquid has pendulums only)",
+                ball + 1,
+                surface + 1
             ));
         }
         if let (Some(ball), Mount::Pivot) = (with_ball, self.mount) {

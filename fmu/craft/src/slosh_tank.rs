@@ -43,7 +43,11 @@
 //!
 //! Within a step a and w' are linear in time, and w = w_n + w'_n t + w''_n t^2/2.
 //!
-//! A tank that drains or has planar modes (`contents.rs`) is integrated by extrapolation instead of power series, as in
+//! A bob on another surface than a sphere (`surface.rs`) adds m J^T N J, J [a; w'] = a + w' x rho, with N of at most 1. It
+//! counts with 2 m at its hinge and the inertia 2 m r^2 about it, r its distance from the hinge within 45 degrees, because
+//! |a_P + w' x (rho - P)|^2 <= 2 |a_P|^2 + 2 r^2 |w'|^2.
+//!
+//! A tank that drains, has planar modes or such bobs (`contents.rs`) is integrated by extrapolation instead of power series, as in
 //! a craft. A jump of its flow is an impulse on the host, which a force cannot represent. The model leaves it out, for
 //! host and bobs.
 //!
@@ -164,7 +168,7 @@ impl TankParameters {
             problems.extend(host.problems("host"));
         }
         problems.extend(steps_problem(self.max_steps));
-        if problems.is_empty() && !self.tank.is_axial() {
+        if problems.is_empty() && (!self.tank.is_axial() || self.tank.has_surface()) {
             problems.extend(self.uneven_problem());
         }
         if self.tank.ball.travel > 0.0 {
@@ -351,13 +355,13 @@ pub struct SloshTank {
     host: Option<Craft>,
     /// M of [`Coupling::Lumped`].
     lumped: Rigid,
-    /// Equations of a tank that can drain or has planar modes.
+    /// Equations of a tank that can drain, or has planar modes or other bobs than pendulums.
     draining: Option<Box<MountedTank>>,
     limits: Limits,
     bounds: ranges::Bounds,
 }
 
-/// The motion of a tank that drains or has planar modes over one step.
+/// The motion of a tank with the equations of `contents.rs` over one step.
 struct Run<'a> {
     mounted: &'a MountedTank,
     inputs: &'a TankInputs,
@@ -380,7 +384,7 @@ fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
 
 impl System<TANK_STATES> for Run<'_> {
     fn rates(&self, t: f64, x: &[f64; TANK_STATES]) -> [f64; TANK_STATES] {
-        if has_diverged(x) {
+        if has_diverged(x) || self.mounted.is_curved() && self.mounted.is_beyond(x) {
             return [0.0; TANK_STATES];
         }
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
@@ -411,6 +415,10 @@ impl Drains<TANK_STATES> for Run<'_> {
         let Run { mounted, inputs } = *self;
         let flow = Outflow { mounted, flow: inputs.mass_flow, at: LIQUID, tank: 0 };
         mounted.drains().then_some(flow).into_iter()
+    }
+
+    fn check_surfaces(&self, x: &[f64; TANK_STATES]) -> Result<(), StepError> {
+        if self.mounted.is_curved() { self.mounted.check_surfaces(x, 0) } else { Ok(()) }
     }
 }
 
@@ -1142,6 +1150,14 @@ impl SloshTank {
         Ok(changed)
     }
 
+    /// Refuses slosh angles, as integrated by the host, beyond the bound of a mode's surface.
+    pub fn check_surfaces(&self) -> Result<(), StepError> {
+        match &self.draining {
+            Some(mounted) if mounted.is_curved() => mounted.check_surfaces(&self.motion.state.x, 0),
+            _ => Ok(()),
+        }
+    }
+
     /// Returns the outputs under the inputs' current values.
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let mut outputs = self.outputs_held(inputs);
@@ -1324,9 +1340,7 @@ impl SloshTank {
         let mut matrix = self.motion.rigid.mass_matrix();
         for bob in &self.motion.bobs {
             add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
-            if let Some(u) = bob.carried_along(&self.motion.state.x[6 * bob.mode..]) {
-                add_rank_one(&mut matrix, bob.m, &u);
-            }
+            bob.add_held(&mut matrix, &self.motion.state.x[6 * bob.mode..]);
         }
         Some(largest_eigenvalue(&Factors::of(&host.rigid().mass_matrix()), &matrix))
     }

@@ -245,6 +245,7 @@ impl runtime::Model for Model {
     }
 
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
+        self.tank.check_surfaces().map_err(|why| why.to_string())?;
         let ranges = self.tank.ranges(&inputs.tank);
         self.has_left_range |= !ranges.in_range && !self.tank.has_ball();
         self.has_had_lump |= self.tank.has_lump();

@@ -95,8 +95,11 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
         (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         p.pivot = random.pivot();
     }
-    if seed >= 60 {
+    if seed >= 60 && seed < 85 {
         random.make_all_planar(&mut p);
+    }
+    if seed >= 80 {
+        random.bend_all(&mut p);
     }
     if seed.is_multiple_of(2) {
         p.tank.iter_mut().for_each(|tank| random.follow(tank));
@@ -118,7 +121,7 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
 /// Along a direction of every kind of state and input at once, of the size of 1 for each.
 #[test]
 fn directional_derivatives_are_those_by_differences() {
-    for seed in 0..80 {
+    for seed in 0..90 {
         let (mut random, p, mut craft, u) = somewhere(seed);
         let (mut dx, du): ([f64; STATES], _) = (random.vector(1.0), random.vector(100.0));
         if p.mount == Mount::Pivot {
@@ -147,11 +150,14 @@ fn directional_derivatives_are_those_by_differences() {
 
 #[test]
 fn a_tank_s_directional_derivatives_are_those_by_differences() {
-    for seed in 0..72 {
+    for seed in 0..84 {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };
         if seed >= 60 {
             random.make_planar(&mut p.tank);
+        }
+        if seed >= 72 {
+            random.bend(&mut p.tank);
         }
         p.coupling = Coupling::ALL[seed as usize % 3];
         let mut ramp = || Ramp { value: random.vector(1.0), slope: random.vector(1.0) };

@@ -128,6 +128,58 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
     2.0 * m * w(above) * (zeta + tank.zeta_amplitude[n] * amplitude)
 }
 
+/// A bob's place x from its hinge on the surface
+///
+/// ```text
+/// |q|^2 + (x.e - z)^2 = l^2,   z = (kappa - 1) |q|^4/(8 l^3),   q = x - e (e.x)
+/// ```
+struct Shape {
+    at: V,
+    rate: V,
+    q: V,
+    q_d: V,
+    /// dz/d|q|^2 and its derivative
+    slope: f64,
+    bend: f64,
+    /// Half the gradient of the left side, over l, and what its second derivative leaves without x''.
+    normal: V,
+    curving: f64,
+}
+
+impl Shape {
+    /// `rod` and its rate, both of a pendulum with the same q.
+    fn of(tank: &Tank, n: usize, e: V, rod: V, rod_d: V) -> Shape {
+        let l = tank.length[n];
+        let across = |x: V| x - e * e.dot(&x);
+        let (q, q_d) = (across(rod), across(rod_d));
+        let bend = (tank.nonlinear_stiffness[n] - 1.0) / (4.0 * l.powi(3));
+        let slope = bend * q.norm_squared();
+        let z = slope * q.norm_squared() / 2.0;
+        let z_d = slope * 2.0 * q.dot(&q_d);
+        let (h, h_d) = (e.dot(&rod), e.dot(&rod_d));
+        let mut shape = Shape {
+            at: rod + e * z,
+            rate: rod_d + e * z_d,
+            q,
+            q_d,
+            slope,
+            bend,
+            normal: (q + (e - q * (2.0 * slope)) * h) / l,
+            curving: 0.0,
+        };
+        let left = q_d.norm_squared() + h_d * h_d - h * shape.height_dd(V::zeros());
+        shape.curving = -left / l;
+        shape
+    }
+
+    /// z'' at x''.
+    fn height_dd(&self, x_dd: V) -> f64 {
+        let rate = 2.0 * self.q.dot(&self.q_d);
+        let rate_d = 2.0 * (self.q_d.norm_squared() + self.q.dot(&x_dd));
+        self.bend * rate * rate + self.slope * rate_d
+    }
+}
+
 /// Deliberate mistakes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mistake {
@@ -206,6 +258,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
     }
     let [rigid_a, rigid_w_d] = rigid_motion(p, x, u);
     let mut seen = Vec::new();
+    let mut shapes = Vec::new();
     for (b, &(i, n)) in bobs.iter().enumerate() {
         let tank = &p.tank[i];
         let axes = rotation(&tank.q);
@@ -217,12 +270,13 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let rate = axes * flat(v(&x[at + 3..]));
         let rate = rate - dir * dir.dot(&rate);
         let (e, l, mass) = (axes * V::z(), tank.length[n], tank.mass[n]);
-        let rho = v(&tank.position) + axes * hinge + dir * l;
+        let hinge = v(&tank.position) + axes * hinge;
+        let shape = Shape::of(tank, n, e, dir * l, rate * l);
+        let (rho, moved) = (hinge + shape.at, shape.rate / l);
         let perp = dir - e * e.dot(&dir);
-        let hinge = rho - dir * l;
         let along = e.dot(&(rigid_a + rigid_w_d.cross(&hinge) + w.cross(&w.cross(&hinge))));
         let c = drag(tank, n, along, e.dot(&dir), rate.norm_squared());
-        let (drag, centring) = (rate * (c * l), perp * (tank.k[n] * l));
+        let (drag, centring) = (moved * (c * l), perp * (tank.k[n] * l));
         let phi = drag + centring;
         let at = 6 + 5 * b;
         // Newton's law of the bob.
@@ -231,14 +285,23 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         put(&mut m, at, 3, -rho.cross_matrix() * (mass * euler));
         put(&mut m, at, at, one * (mass * l));
         for k in 0..3 {
-            m[(at + k, at + 3)] = dir[k];
-            // |p| = 1 twice differentiated.
-            m[(at + 3, at + k)] = dir[k];
+            m[(at + k, at + 3)] = shape.normal[k];
+            // The surface, for a pendulum |p| = 1, twice differentiated.
+            m[(at + 3, at + k)] = shape.normal[k];
             // The pull on the craft.
             let arm = if wrong(PullAboutTank) { rho - v(&tank.position) } else { rho };
-            m[(k, at + 3)] = -dir[k] * unless(NoAddedMass);
-            m[(3 + k, at + 3)] = -arm.cross(&dir)[k] * unless(NoAddedMass);
+            m[(k, at + 3)] = -shape.normal[k] * unless(NoAddedMass);
+            m[(3 + k, at + 3)] = -arm.cross(&shape.normal)[k] * unless(NoAddedMass);
         }
+        // The inner kinetic energy pulls bob and craft together with m_i (|q'|^2 + q.q'') q.
+        let q = perp * l;
+        let m_i = mass * (tank.nonlinear_inertia[n] - 1.0) / (l * l);
+        let q_d = rate * l - e * (e.dot(&rate) * l);
+        let own = q * q.transpose() * (m_i * l);
+        put(&mut m, at, at, own);
+        put(&mut m, 0, at, -own);
+        put(&mut m, 3, at, -rho.cross_matrix() * own);
+        let inner = q * (m_i * q_d.norm_squared());
         match across.map(|b| axes * b) {
             // b.p = 0 twice differentiated, and what holds it there.
             Some(b) => {
@@ -252,9 +315,11 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
             None => m[(at + 4, at + 4)] = 1.0,
         }
         let coriolis = if wrong(CoriolisOnce) { l } else { 2.0 * l };
-        let inertial = w.cross(&w.cross(&rho)) + w.cross(&rate) * coriolis;
-        rhs.rows_mut(at, 3).copy_from(&(-inertial * mass - phi));
-        rhs[at + 3] = -rate.norm_squared();
+        let inertial = w.cross(&w.cross(&rho)) + w.cross(&moved) * coriolis;
+        rhs.rows_mut(at, 3).copy_from(&(-inertial * mass - phi - inner));
+        rhs[at + 3] = shape.curving / l;
+        force += inner;
+        torque += rho.cross(&inner);
         // The pull at a = w' = 0, which takes the place of the pull where there is no added
         // mass, and what of the pull goes astray.
         let velocity = rate + w.cross(&dir);
@@ -274,7 +339,9 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let arm = |at_hinge: Mistake| if wrong(at_hinge) { hinge } else { rho };
         torque += arm(DragAtHinge).cross(&drag) * unless(DragWithoutReaction);
         torque += arm(CentringAtHinge).cross(&centring) * unless(CentringWithoutReaction);
-        seen.push((i, axes, dir, across.map_or(V::zeros(), |b| axes * b), rho, phi));
+        let across = across.map_or(V::zeros(), |b| axes * b);
+        seen.push((i, axes, shape.normal, across, rho, phi + inner, own));
+        shapes.push((shape, l, e));
     }
     rhs.rows_mut(0, 3).copy_from(&force);
     rhs.rows_mut(3, 3).copy_from(&torque);
@@ -297,10 +364,11 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         })
         .collect();
     let mut p_dd = Vec::new();
-    for (b, (i, axes, dir, across, rho, phi)) in seen.iter().enumerate() {
+    for (b, (i, axes, dir, across, rho, phi, own)) in seen.iter().enumerate() {
         let at = 6 + 5 * b;
-        p_dd.push(axes.inverse() * v(&y.as_slice()[at..]));
-        let f = dir * y[at + 3] + across * y[at + 4] + phi;
+        let (moved, (shape, l, e)) = (v(&y.as_slice()[at..]), &shapes[b]);
+        p_dd.push(axes.inverse() * (moved - e * (shape.height_dd(moved * *l) / l)));
+        let f = dir * y[at + 3] + across * y[at + 4] + phi + own * moved;
         wrench[*i][0] += f;
         wrench[*i][1] += rho.cross(&f);
     }
@@ -368,6 +436,24 @@ fn planar_modes_are_those_of_newtons_law_with_what_holds_them_as_unknowns() {
     }
 }
 
+/// Bobs on other surfaces than spheres, some in planes, with the force of the surface as unknown.
+#[test]
+fn bobs_on_surfaces_are_those_of_newtons_law_with_the_surface_as_a_constraint() {
+    let mut compared = 0;
+    for seed in 0..300 {
+        let change = |random: &mut Random, tank: &mut Tank| {
+            if seed % 3 == 0 {
+                random.make_planar(tank);
+            }
+            random.bend(tank);
+        };
+        let craft = anywhere_with(seed, change);
+        compared += craft.1.tanks;
+        compare_with_newton(seed, craft);
+    }
+    assert!(compared > 300);
+}
+
 fn compare_with_newton(
     seed: u64,
     (mut random, mut p, x, u): (Random, Parameters, [f64; STATES], Inputs),
@@ -430,12 +516,18 @@ fn forces_on_the_dry_craft_balance() {
     }
 }
 
-/// A random tank somewhere on its bobs' spheres, and the host's motion; every third without axial symmetry.
+/// A random tank somewhere on its bobs' spheres, and the host's motion; every third without axial symmetry, every third with bobs on
+/// other surfaces than spheres.
 fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let mut p = TankParameters { tank: random.tank(), coupling, ..TankParameters::default() };
     if seed % 3 == 2 {
         random.make_planar(&mut p.tank);
+    }
+    if seed % 3 == 1 {
+        random.bend(&mut p.tank);
+        // For s < 1 the added mass is not positive.
+        p.tank.nonlinear_inertia = p.tank.nonlinear_inertia.map(|s| s.max(1.0));
     }
     let mut tank = SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap();
     let mut x = tank.continuous_states();
@@ -558,6 +650,9 @@ fn a_tank_alone_has_the_wrench_and_the_bobs_of_newtons_law() {
             if seed % 3 > 0 {
                 random.make_planar(tank);
             }
+            if seed % 4 > 1 {
+                random.bend(tank);
+            }
         };
         let (_, p, x, u) = anywhere_with(seed, planar);
         let want = solve(&p, &x, &u);
@@ -678,6 +773,9 @@ fn coupling_ratio_is_the_largest_eigenvalue() {
         let mut p = TankParameters { tank: random.tank(), host: Some(host), ..Default::default() };
         if seed % 3 == 2 {
             random.make_planar(&mut p.tank);
+        }
+        if seed % 2 == 1 {
+            random.bend(&mut p.tank);
         }
         let u = TankInputs::default();
         let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();

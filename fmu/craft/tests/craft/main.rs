@@ -24,4 +24,5 @@ mod reference;
 mod refusals;
 mod small_motions;
 mod special_cases;
+mod surface;
 mod tilting;

@@ -72,6 +72,22 @@ impl Random {
         p.tank.iter_mut().for_each(|tank| self.make_planar(tank));
     }
 
+    /// [`Random::bend`] for every tank of a craft.
+    pub fn bend_all(&mut self, p: &mut Parameters) {
+        p.tanks = p.tanks.max(1);
+        p.tank.iter_mut().for_each(|tank| self.bend(tank));
+    }
+
+    /// Gives the bobs of a tank surfaces other than spheres.
+    pub fn bend(&mut self, tank: &mut Tank) {
+        for s in &mut tank.nonlinear_inertia {
+            *s = self.between(0.7, 2.5);
+        }
+        for kappa in &mut tank.nonlinear_stiffness {
+            *kappa = self.between(0.3, 2.5);
+        }
+    }
+
     /// Takes a tank its axial symmetry: two thirds of its modes are planar, with less rigid liquid than their masses.
     pub fn make_planar(&mut self, tank: &mut Tank) {
         let bobs: f64 = tank.mass[..tank.modes].iter().sum();

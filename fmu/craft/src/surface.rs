@@ -1,0 +1,217 @@
+//! Finite amplitude: a bob on a surface of revolution about the tank's axis, with two coefficients of the third order.
+//!
+//! ```text
+//! L = m |q'|^2/2 + m s (q.q')^2/(2 l^2) - m w^2 (|q|^2/2 + kappa |q|^4/(8 l^2)),   q = l p_perp,  A = |q|/l
+//! planar motion    frequency^2 = w^2 [1 + (3 kappa/8 - s/2) A^2]
+//! circular motion  frequency^2 = w^2 [1 + kappa A^2/2]
+//! ```
+//!
+//! A pendulum has s = kappa = 1: the sphere rho = P + l p rises by l (A^2/2 + A^4/8), and its rise contributes
+//! (q.q')^2/l^2 to the squared speed. The states p and p' keep their meaning, so that p_perp is the displacement over l.
+//! Other coefficients lift the bob along the axis and add kinetic energy within the liquid, without momentum:
+//!
+//! ```text
+//! rho = P + l p + z e,   z = (kappa - 1) l u^2/8,   u = |p_perp|^2
+//! E_i = m (s - 1) l^2 sigma^2/2,   sigma = p_perp.p' = u'/2
+//! ```
+//!
+//! The specific force, and not a potential, acts on the bob. Its place gives momentum, moments and weight for any motion
+//! of the tank. With dp perpendicular to p (in a planar mode also to b) the bob moves by
+//!
+//! ```text
+//! drho = l D dp,   D = 1 + beta e p_perp^T,   beta = (kappa - 1) u/2
+//! ```
+//!
+//! Newton's law along drho with Lagrange's terms of E_i, per mass and length, determines y, the part of p'' perpendicular
+//! to p (p'' = y - |p'|^2 p), with the projection Pi:
+//!
+//! ```text
+//! Pi { D^T (G + l D y) + (s - 1)(l sigma' + 2 l' sigma) p_perp } = 0,   sigma' = p_perp.y + |p_perp'|^2 - u |p'|^2
+//! G = a + w' x rho + w x (w x rho) + 2 w x rho' + (rho'' without y) + phi/m
+//! ```
+//!
+//! p_perp and e have the projections -eta e_t and e_t = e - eta p, eta = p.e, so only the motion along the meridian differs
+//! from that of a pendulum:
+//!
+//! ```text
+//! M = Pi (D^T D + (s - 1) p_perp p_perp^T) Pi = Pi + gamma e_t e_t^T,   gamma = (1 - beta eta)^2 - 1 + (s - 1) eta^2
+//! l y = -M^-1 Pi [D^T G + i],   i = (s - 1)(l psi + 2 l' sigma) p_perp,   psi = |p_perp'|^2 - u |p'|^2
+//! force on the craft at rho   F = phi - m (G + l D y) = phi - m (N G - D M^-1 Pi i),   N = 1 - D M^-1 Pi D^T
+//! ```
+//!
+//! N takes the place of p p^T in the craft's mass matrix. It is at most 1, and for s < 1 it is not positive: a bob then
+//! lends inertia to a craft that must have it. 1 + gamma u is the bob's inertia along the meridian relative to a pendulum's.
+//! A negative s, as in shallow tanks, bounds the angle at which it is positive. The model ends at [`LEAST_INERTIA`].
+//!
+//! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. While the tank drains, the leaving mass
+//! takes its share of E_i with it.
+//!
+//! Source: the coefficients are those of `formulas::third_order`. The equations are Lagrange's for these energies.
+//! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint.
+
+use taylor::number::Number;
+use taylor::vector::{Vec3, add, dot, scale, sub};
+
+/// Smallest inertia along the meridian, relative to a pendulum's, at which the model is used.
+pub(crate) const LEAST_INERTIA: f64 = 0.5;
+
+/// The two coefficients of a mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Surface {
+    /// s - 1
+    inertia: f64,
+    /// kappa - 1
+    stiffness: f64,
+}
+
+impl Surface {
+    /// Returns the surface of a mode, `None` for a pendulum.
+    pub fn new(s: f64, kappa: f64) -> Option<Surface> {
+        (s != 1.0 || kappa != 1.0).then(|| Surface { inertia: s - 1.0, stiffness: kappa - 1.0 })
+    }
+
+    /// Returns the inertia along the meridian, relative to a pendulum's, from eta = p.e and u.
+    pub fn meridian_inertia<T: Number>(&self, eta: T, u: T) -> T {
+        let tilt = T::constant(1.0) - u * eta * (0.5 * self.stiffness);
+        // eta^2 + u = 1
+        eta * eta * (T::constant(1.0) + u * self.inertia) + u * tilt * tilt
+    }
+
+    /// Returns the largest distance of the bob from its hinge within 45 degrees, over l, or more.
+    pub fn reach(&self) -> f64 {
+        1.0 + self.stiffness.abs() / 32.0
+    }
+
+    /// Returns minus the smallest eigenvalue of N within 45 degrees and the bound of the model, or 0. It is at most 1.
+    pub fn lent_inertia(&self) -> f64 {
+        let at = |k: u32| {
+            let u = 0.5 * f64::from(k) / 64.0;
+            let eta = -libm::sqrt(1.0 - u);
+            let inertia = self.meridian_inertia(eta, u);
+            (inertia >= LEAST_INERTIA).then(|| -self.inertia * eta * eta * u / inertia)
+        };
+        (0..=64).map_while(at).fold(0.0, f64::max)
+    }
+
+    /// Returns the smallest angle from the axis at which the model ends, rad.
+    pub fn largest_angle(&self) -> f64 {
+        let steps = 1800_u32;
+        let angle = |k: u32| core::f64::consts::PI * f64::from(k) / f64::from(steps);
+        let holds = |angle: &f64| {
+            let (sin, cos) = libm::sincos(*angle);
+            self.meridian_inertia(-cos, sin * sin) >= LEAST_INERTIA
+        };
+        (0..=steps).map(angle).take_while(holds).fold(0.0, f64::max)
+    }
+}
+
+/// The surface at the bob.
+pub(crate) struct Meridian<T> {
+    surface: Surface,
+    p: Vec3<T>,
+    e: Vec3<T>,
+    pub p_perp: Vec3<T>,
+    /// u, eta, beta
+    u: T,
+    eta: T,
+    beta: T,
+    /// gamma/(1 + gamma u)
+    eased: T,
+    /// b of a planar mode.
+    across: Option<Vec3<T>>,
+}
+
+/// z with its derivatives, the last one without y.
+pub(crate) struct Lift<T> {
+    pub z: T,
+    pub z_d: T,
+    pub z_dd: T,
+    /// i, and E_i/m.
+    pub inner: Vec3<T>,
+    pub energy: T,
+    /// -(s - 1) l l' sigma^2, the power that E_i/m gains beyond the work of the bob.
+    pub energy_d: T,
+    /// (kappa - 1) l' u^2/8, the rate of z of a bob at rest.
+    pub z_by_length: T,
+}
+
+impl<T: Number> Meridian<T> {
+    /// Creates the surface at the unit vector p; `across` is b of a planar mode.
+    pub fn new(surface: Surface, e: Vec3<T>, p: Vec3<T>, across: Option<Vec3<T>>) -> Meridian<T> {
+        let eta = dot(e, p);
+        let p_perp = sub(p, scale(eta, e));
+        let u = dot(p_perp, p_perp);
+        let beta = u * (0.5 * surface.stiffness);
+        let gamma = beta * (beta * eta - T::constant(2.0)) * eta + eta * eta * surface.inertia;
+        let inertia = surface.meridian_inertia(eta, u).at_least(0.5 * LEAST_INERTIA);
+        Meridian { surface, p, e, p_perp, u, eta, beta, eased: gamma / inertia, across }
+    }
+
+    /// Returns z/l.
+    pub fn relative_lift(&self) -> T {
+        self.u * self.u * (0.125 * self.surface.stiffness)
+    }
+
+    /// Returns D x.
+    pub fn along(&self, x: Vec3<T>) -> Vec3<T> {
+        add(x, scale(self.beta * dot(self.p_perp, x), self.e))
+    }
+
+    /// Returns D^T x.
+    pub fn back(&self, x: Vec3<T>) -> Vec3<T> {
+        add(x, scale(self.beta * dot(self.e, x), self.p_perp))
+    }
+
+    /// Returns M^-1 Pi x.
+    pub fn free(&self, x: Vec3<T>) -> Vec3<T> {
+        let mut x = sub(x, scale(dot(self.p, x), self.p));
+        if let Some(b) = self.across {
+            x = sub(x, scale(dot(b, x), b));
+        }
+        let meridian = sub(self.e, scale(self.eta, self.p));
+        sub(x, scale(self.eased * dot(meridian, x), meridian))
+    }
+
+    /// Returns N x.
+    pub fn held(&self, x: Vec3<T>) -> Vec3<T> {
+        sub(x, self.along(self.free(self.back(x))))
+    }
+
+    /// Returns the mass matrix of the bob, m J^T N J with J [a; w'] = a + w' x rho.
+    pub fn mass_matrix(&self, m: T, rho: Vec3<T>) -> [[T; 6]; 6] {
+        let (zero, one) = (T::constant(0.0), T::constant(1.0));
+        let mut columns = [[zero; 6]; 6];
+        for (k, column) in columns.iter_mut().enumerate() {
+            let mut unit = [zero; 3];
+            unit[k % 3] = one;
+            let moved = if k < 3 { unit } else { taylor::vector::cross(unit, rho) };
+            let force = scale(m, self.held(moved));
+            let torque = taylor::vector::cross(rho, force);
+            column[..3].copy_from_slice(&force);
+            column[3..].copy_from_slice(&torque);
+        }
+        columns
+    }
+
+    /// Returns the bob's height and the terms of E_i at the rate p', with l and its derivatives.
+    pub fn lift(&self, [l, l_d, l_dd]: [T; 3], p_d: Vec3<T>) -> Lift<T> {
+        let Meridian { u, e, p_perp, surface, .. } = *self;
+        let sigma = dot(p_perp, p_d);
+        let p_perp_d = sub(p_d, scale(dot(e, p_d), e));
+        let psi = dot(p_perp_d, p_perp_d) - u * dot(p_d, p_d);
+        let rising = u * u * 0.125;
+        let rate = u * sigma * 0.5;
+        let rate_d = sigma * sigma + u * psi * 0.5;
+        let turning = l * psi + l_d * sigma * 2.0;
+        let own = surface.inertia;
+        Lift {
+            z: l * rising * surface.stiffness,
+            z_d: (l_d * rising + l * rate) * surface.stiffness,
+            z_dd: (l_dd * rising + l_d * rate * 2.0 + l * rate_d) * surface.stiffness,
+            inner: scale(turning * own, p_perp),
+            energy: l * l * sigma * sigma * (0.5 * own),
+            energy_d: -(l * l_d * sigma * sigma * own),
+            z_by_length: l_d * rising * surface.stiffness,
+        }
+    }
+}
