@@ -127,6 +127,8 @@ impl Settings {
             ("k", &tank.k),
             ("zeta", &tank.zeta),
             ("zeta_amplitude", &tank.zeta_amplitude),
+            ("nonlinear_inertia", &tank.nonlinear_inertia),
+            ("nonlinear_stiffness", &tank.nonlinear_stiffness),
             ("wave", &tank.wave),
         ] {
             self.reals(elements(&of(what), MODES), values);

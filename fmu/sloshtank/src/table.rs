@@ -95,7 +95,7 @@ static VARIABLES: &[Variable<Model>] = &[
         "Bias wrench for the right-hand side of the host's equations, host axes: force (1 to 3, N) and torque about O (4 to 6, N.m). The wrench on the host is bias - added_mass [a; omega_dot]. With coupling = split, bias depends on a and omega_dot only through the drag, by about 1e-4 of the bobs' mass times a change of a, so one evaluation is enough. With tank.damping_law = constant it depends on neither. With coupling = rigid_body it suits a host with the constant added_mass in its mass, centre of mass and inertia, also in centrifugal and gyroscopic terms")
         .shape(&[Fixed(6)]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
-        "Symmetric 6 x 6 added-mass matrix about O for the left-hand side of the host's equations, host axes, upper triangle by rows (kg, kg.m, kg.m2). With coupling = split it depends only on tank.p, tank.liquid and, for detached liquid, tank.ball.position. With coupling = lumped or rigid_body it is constant, that of rigid liquid and each bob at its hinge at the start. There the bob of a planar mode counts twice, with 2 m l^2 about the axes in its plane")
+        "Symmetric 6 x 6 added-mass matrix about O for the left-hand side of the host's equations, host axes, upper triangle by rows (kg, kg.m, kg.m2). With coupling = split it depends only on tank.p, tank.liquid and, for detached liquid, tank.ball.position. With coupling = lumped or rigid_body it is constant, that of rigid liquid and each bob at its hinge at the start. There the bob of a planar mode counts twice, with 2 m l^2 about the axes in its plane; a bob with nonlinear_inertia or nonlinear_stiffness counts twice, with 2 m r^2 about every axis, r its distance from the hinge")
         .shape(&[Fixed(TRIANGLE)]).depends_on(PLACES).initial_depends_on(EVERYTHING),
     V::output("impulse", |o, n| o.impulse[n], "",
         "Sum of the impulses of detached liquid on the host since the start, host axes at the time of each: force (1 to 3, N.s) and torque about O (4 to 6, N.m.s). After each step or event the host adds M^-1 times the increase to its velocity and rate, M being its 6 x 6 mass matrix about O (host.mass to host.Jyz). Always 0 if tank.ball.travel is 0")
@@ -244,6 +244,10 @@ static VARIABLES: &[Variable<Model>] = &[
         .range(0.0, 1e6),
     V::parameter("tank.zeta_amplitude", |p, n| &mut p.tank.zeta_amplitude[n], "1/rad", "Growth of a mode's damping ratio with its amplitude A: zeta(A) = zeta + zeta_amplitude A; A combines angle and rate over natural frequency in both directions")
         .shape(PER_MODE).range(0.0, 10.0),
+    V::parameter("tank.nonlinear_inertia", |p, n| &mut p.tank.nonlinear_inertia[n], "1", "Third-order coefficient s of a slosh mode's inertia: the frequency of a planar wave with the slosh angle A changes by the factor 1 + (3 kappa/8 - s/2) A^2/2. 1 is a pendulum. A negative value, for shallow liquid, bounds the slosh angle")
+        .shape(PER_MODE).range(-1e3, 1e3),
+    V::parameter("tank.nonlinear_stiffness", |p, n| &mut p.tank.nonlinear_stiffness[n], "1", "Third-order coefficient kappa of a slosh mode's stiffness: the frequency of a rotary wave with the slosh angle A changes by the factor 1 + kappa A^2/4. 1 is a pendulum")
+        .shape(PER_MODE).range(-1e3, 1e3),
     V::parameter("tank.wave", |p, n| &mut p.tank.wave[n], "m", "Surface elevation at the wall per slosh angle of a slosh mode, used for wave_height only")
         .shape(PER_MODE).range(0.0, 1e9),
     V::parameter("tank.ball.travel", |p, _| &mut p.tank.ball.travel, "m",

@@ -423,6 +423,10 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_TANK).range(0.0, 1e6),
     V::parameter("tank[].zeta_amplitude", |p, n| &mut p.tank[n / MODES].zeta_amplitude[n % MODES], "1/rad", "Growth of a mode's damping ratio with its amplitude A: zeta(A) = zeta + zeta_amplitude A; A combines angle and rate over natural frequency in both directions")
         .shape(PER_MODE).range(0.0, 10.0),
+    V::parameter("tank[].nonlinear_inertia", |p, n| &mut p.tank[n / MODES].nonlinear_inertia[n % MODES], "1", "Third-order coefficient s of a slosh mode's inertia: the frequency of a planar wave with the slosh angle A changes by the factor 1 + (3 kappa/8 - s/2) A^2/2. 1 is a pendulum. A negative value, for shallow liquid, bounds the slosh angle")
+        .shape(PER_MODE).range(-1e3, 1e3),
+    V::parameter("tank[].nonlinear_stiffness", |p, n| &mut p.tank[n / MODES].nonlinear_stiffness[n % MODES], "1", "Third-order coefficient kappa of a slosh mode's stiffness: the frequency of a rotary wave with the slosh angle A changes by the factor 1 + kappa A^2/4. 1 is a pendulum")
+        .shape(PER_MODE).range(-1e3, 1e3),
     V::parameter("tank[].wave", |p, n| &mut p.tank[n / MODES].wave[n % MODES], "m", "Surface elevation at the wall per slosh angle of a slosh mode, used for wave_height only")
         .shape(PER_MODE).range(0.0, 1e9),
     V::parameter("tank[].ball.travel", |p, n| &mut p.tank[n].ball.travel, "m",
