@@ -932,9 +932,8 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
     ];
     let reference_of_model = |group: &str| reference(&format!("{group}.model"));
     let models = items("slosh.model").map(|model| (model, 1));
-    // From a table, of which all models but the liquid are made.
-    let of_table = SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Liquid);
-    for (slosh_model, source) in models.chain(of_table.map(|model| (model as i32, 2))) {
+    let of_table = SloshModel::ALL.into_iter().map(|model| (model as i32, 2));
+    for (slosh_model, source) in models.chain(of_table) {
         let mut instance = fresh();
         set(&mut instance, base);
         set(&mut instance, &[("slosh.model", number(slosh_model))]);
@@ -943,18 +942,16 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
         let before = all(&mut instance);
         for parameter in TABLE.parameters() {
             let refused = match (slosh_model, source) {
-                (6, _) => parameter.name() == "slosh.source",
                 (_, 1) => false,
                 (_, _) => {
-                    // A length is given; number 1 is not the table, model 6 is the liquid.
+                    // A length is given; number 1 is not the table.
                     ["slosh.table.frequency[1]", "slosh.source_kind"]
                         .contains(&parameter.name().as_str())
-                        || slosh_model == 5 && parameter.name() == "slosh.model"
                         // Linear and planar start along the direction of mode 1.
                         || [2, 3].contains(&slosh_model)
                             && parameter.name() == "slosh.table.direction[1]"
-                        // Spherical and paraboloid move along both axes.
-                        || [4, 5].contains(&slosh_model)
+                        // Spherical, paraboloid and liquid move along both axes.
+                        || [4, 5, 6].contains(&slosh_model)
                             && ["slosh.table.one_axis", "slosh.table.direction"]
                                 .iter()
                                 .any(|along_one| parameter.name().starts_with(along_one))

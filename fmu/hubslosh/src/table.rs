@@ -357,7 +357,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
 
     // The modes of a tank of any shape
     V::switch("slosh.table.one_axis", |p| &mut p.slosh.table.one_axis,
-        "True: the table holds the modes along one axis of the tank (a box, for example), and this axis lies along the tangent. Models spherical and paraboloid, which move along both axes, are then refused"),
+        "True: the table holds the modes along one axis of the tank (a box, for example), and this axis lies along the tangent. Models spherical, paraboloid and liquid, which move along both axes, are then refused"),
     V::integer("slosh.table.one_axis_kind", |p, _| &mut p.one_axis_kind,
         "slosh.table.one_axis as an integer, for hosts that misread Booleans (OpenModelica up to 1.27): 0 takes slosh.table.one_axis; 1 (false) and 2 (true) override it")
         .between(0, 2),
@@ -388,6 +388,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("slosh.table.wave", |p, n| &mut p.slosh.table.wave[n], "m/rad",
         "Surface elevation at the wall per slosh angle of a slosh mode, source table; 0: that of an upright cylinder of diameter tank.d")
         .shape(TABLE_OF_MODES).range(0.0, 1e4),
+    V::parameter("slosh.table.nonlinear_inertia", |p, n| &mut p.slosh.table.nonlinear_inertia[n], "1",
+        "Coefficient s of a slosh mode, source table and slosh.model = liquid: its inertia grows with 1 + s A^2 along the amplitude A. The amplitude changes the squared frequency of planar motion by (3 kappa/8 - s/2) A^2. 1 for a pendulum")
+        .shape(TABLE_OF_MODES).range(-1e6, 1e6),
+    V::parameter("slosh.table.nonlinear_stiffness", |p, n| &mut p.slosh.table.nonlinear_stiffness[n], "1",
+        "Coefficient kappa of a slosh mode, source table and slosh.model = liquid: its restoring force grows with 1 + kappa A^2/2 over the amplitude A. The amplitude changes the squared frequency of circular motion by kappa/2 A^2. 1 for a pendulum")
+        .shape(TABLE_OF_MODES).range(-1e6, 1e6),
     V::parameter("slosh.table.direction", |p, n| &mut p.slosh.table.direction[n], "rad",
         "Direction in which a slosh mode moves its mass, source table: angle from the tangent, positive outwards (0 tangential, 90 deg radial). For slosh.model = linear and planar. List modes of the same direction in the order of their frequencies")
         .shape(TABLE_OF_MODES).display_unit("deg").range(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2),
@@ -565,7 +571,7 @@ static SLOSH_MODEL: Enumeration = Enumeration {
         Item::new("paraboloid", "Masses on a paraboloid with a quartic spring"),
         Item::new(
             "liquid",
-            "The first mode of an upright cylinder to third order in its amplitude, from potential flow",
+            "Modes to third order in their amplitude: of an upright cylinder mode 1 from potential flow, of other tanks by slosh.table",
         ),
     ],
 };

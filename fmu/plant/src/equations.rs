@@ -307,6 +307,18 @@ mod tests {
         (table.direction[0], table.direction[1]) = (0.6, -1.2);
     }
 
+    /// Sets a table with another third order than a pendulum's.
+    fn third_order(p: &mut Parameters) {
+        every_option(p);
+        p.slosh.source = SloshSource::Table;
+        let table = &mut p.slosh.table;
+        table.m_liq = 3.0;
+        (table.mass[0], table.mass[1]) = (1.5, 1.2);
+        (table.length[0], table.length[1]) = (0.05, 0.04);
+        (table.nonlinear_inertia[0], table.nonlinear_stiffness[0]) = (1.7, 0.6);
+        (table.nonlinear_inertia[1], table.nonlinear_stiffness[1]) = (0.4, 2.3);
+    }
+
     fn plant_with(
         slosh: SloshModel,
         friction: FrictionModel,
@@ -316,7 +328,9 @@ mod tests {
         change(&mut p);
         p.slosh.model = slosh;
         p.slosh.modes = 2;
-        if !matches!(slosh, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar) {
+        let along_one =
+            matches!(slosh, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar);
+        if p.slosh.table.is_askew(2) && !along_one {
             let whole = Parameters::default().slosh;
             (p.slosh.table, p.slosh.source) = (whole.table, whole.source);
         }
@@ -329,7 +343,7 @@ mod tests {
         p.init.slosh_angle_radial = -0.3;
         p.init.slosh_rate = 2.0;
         p.init.slosh_rate_radial = 3.0;
-        if p.slosh.source == SloshSource::Table {
+        if p.slosh.table.is_askew(2) {
             // along the direction of mode 1
             let across = libm::tan(p.slosh.table.direction[0]);
             p.init.slosh_angle_radial = across * p.init.slosh_angle;
@@ -385,6 +399,7 @@ mod tests {
         compare_directional_derivatives(|_| {});
         compare_directional_derivatives(every_option);
         compare_directional_derivatives(every_direction);
+        compare_directional_derivatives(third_order);
     }
 
     fn compare_directional_derivatives(change: fn(&mut Parameters)) {
@@ -441,6 +456,7 @@ mod tests {
         compare_output_derivatives(|_| {});
         compare_output_derivatives(every_option);
         compare_output_derivatives(every_direction);
+        compare_output_derivatives(third_order);
     }
 
     /// Lists every continuous output with its name.

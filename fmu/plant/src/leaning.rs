@@ -36,7 +36,6 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use formulas::cylinder;
-use formulas::third_order;
 use formulas::tilt::{factors, largest_slope};
 
 use crate::parameters::{Parameters, SloshModel, SloshSource};
@@ -146,11 +145,10 @@ const LENGTHS: usize = 100;
 fn quartic(n: usize, p: &Parameters, length: f64) -> (f64, f64) {
     let radius = p.tank.d / 2.0;
     match p.slosh.model {
-        SloshModel::Liquid if n == 0 => {
-            let (s, kappa) = third_order::coefficients(p.tank.h / radius);
+        SloshModel::Liquid => {
+            let (s, kappa) = p.slosh.third_order(n, p.tank.h / radius);
             (s, kappa / 2.0)
         }
-        SloshModel::Liquid => (1.0, 0.5),
         _ => (1.0, p.slosh.hardening * (length / radius) * (length / radius)),
     }
 }

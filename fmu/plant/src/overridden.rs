@@ -23,6 +23,11 @@ impl Parameters {
             table if table.starts_with("slosh.table.") && !is_table => {
                 Some("slosh.source = geometry".into())
             }
+            "slosh.table.nonlinear_inertia" | "slosh.table.nonlinear_stiffness"
+                if !matches!(slosh.model, SloshModel::Linear | SloshModel::Liquid) =>
+            {
+                Some("it belongs to slosh.model = liquid; other models have a fixed dependence on amplitude".into())
+            }
             "tank.h"
             | "fluid.nu"
             | "slosh.zeta"

@@ -67,7 +67,7 @@ pub enum SloshModel {
     Spherical = 4,
     /// Masses on a paraboloid with a quartic spring.
     Paraboloid = 5,
-    /// The first mode of an upright cylinder to third order in the amplitude.
+    /// Modes to third order in the amplitude, with coefficients of an upright cylinder or from the table.
     Liquid = 6,
 }
 
@@ -150,6 +150,9 @@ pub struct ModeTable {
     pub k: [f64; MODES],
     pub zeta: [f64; MODES],
     pub wave: [f64; MODES],
+    /// Coefficients s and kappa of the third order in the amplitude; 1 and 1 for a pendulum.
+    pub nonlinear_inertia: [f64; MODES],
+    pub nonlinear_stiffness: [f64; MODES],
     /// Angle of the direction in which a mode moves its mass, from the tangent, positive outwards, rad.
     pub direction: [f64; MODES],
 }
@@ -334,6 +337,8 @@ impl Default for ModeTable {
             k: none,
             zeta: none,
             wave: none,
+            nonlinear_inertia: [1.0; MODES],
+            nonlinear_stiffness: [1.0; MODES],
             direction: none,
         }
     }

@@ -23,7 +23,7 @@ use formulas::third_order::{coefficients, secondary_resonance};
 use crate::amplitude::Growth;
 use crate::baffle::{self, Baffle};
 use crate::leaning::{self, Leaning};
-use crate::parameters::{MODES, ModeTable, Parameters, SloshModel, SloshSource};
+use crate::parameters::{MODES, ModeTable, Parameters, Slosh, SloshModel, SloshSource};
 use crate::pendulum::Pendulum;
 
 /// Values calculated from the parameters; 0 for unused modes.
@@ -52,29 +52,21 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (slosh, table) = (&p.slosh, &p.slosh.table);
     let mut problems = baffle::problems(p);
     problems.extend(leaning::problems(p));
-    problems.extend(inertia_problem(p));
+    problems.extend(inertia_problems(p));
     if slosh.source != SloshSource::Table {
         return problems;
     }
-    if slosh.model == SloshModel::Liquid {
+    let along_one =
+        matches!(slosh.model, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar);
+    if table.one_axis && !along_one {
         problems.push(
-            "slosh.model = liquid with slosh.source = table (allowed: slosh.source = geometry, because the \
-             dependence of frequency on amplitude is known only for the upright cylinder)"
-                .to_string(),
-        );
-    }
-    let both = matches!(slosh.model, SloshModel::Spherical | SloshModel::Paraboloid);
-    if table.one_axis && both {
-        problems.push(
-            "slosh.table.one_axis with slosh.model = spherical or paraboloid, which move along both axes with the same \
-             modes (allowed: slosh.model = frozen, linear or planar)"
+            "slosh.table.one_axis with slosh.model = spherical, paraboloid or liquid, which move along both axes with the \
+             same modes (allowed: slosh.model = frozen, linear or planar)"
                 .to_string(),
         );
     }
     let modes = slosh.modes.min(MODES);
     let askew = (0..modes).find(|n| table.direction[*n] != 0.0);
-    let along_one =
-        matches!(slosh.model, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar);
     if let (Some(n), false) = (askew, along_one) {
         problems.push(format!(
             "slosh.table.direction[{}] = {} rad with slosh.model = spherical, paraboloid or liquid, which move along all \
@@ -193,8 +185,16 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
                 .to_string(),
         );
     }
-    if slosh.model == SloshModel::Liquid && geometry {
-        warnings.extend(third_order_warning(p.tank.h / radius));
+    match slosh.source {
+        _ if slosh.model != SloshModel::Liquid => {}
+        SloshSource::Geometry => warnings.extend(third_order_warning(p.tank.h / radius)),
+        SloshSource::Table if slosh.third_order(0, 0.0) == (1.0, 1.0) => warnings.push(
+            "slosh.model = liquid with slosh.table.nonlinear_inertia[1] = 1 and slosh.table.nonlinear_stiffness[1] = 1: \
+             the frequency of mode 1 depends on the amplitude as that of a pendulum, in any tank. Set both to the \
+             coefficients of this tank"
+                .to_string(),
+        ),
+        SloshSource::Table => {}
     }
     let calculated = Calculated::new(p, g);
     let Calculated { bond, mass, centring, .. } = calculated;
@@ -221,18 +221,38 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     warnings
 }
 
-/// Refuses the model `liquid` if its inertia falls with the amplitude. The kinetic energy of hub and liquid would then
-/// be indefinite at amplitudes that depend on the hub.
-fn inertia_problem(p: &Parameters) -> Option<String> {
-    let fill = 2.0 * p.tank.h / p.tank.d;
-    let (s, _) = coefficients(fill);
-    let used = p.slosh.model == SloshModel::Liquid && p.slosh.source == SloshSource::Geometry;
-    (used && s <= 0.0).then(|| {
-        format!(
+impl Slosh {
+    /// Returns s and kappa of mode `n`, from 0, in a tank filled to h/R = `fill`. The modes of an upright cylinder after
+    /// the first, and all modes of the other models, have those of a pendulum.
+    pub(crate) fn third_order(&self, n: usize, fill: f64) -> (f64, f64) {
+        match self.source {
+            _ if self.model != SloshModel::Liquid => (1.0, 1.0),
+            SloshSource::Table => {
+                (self.table.nonlinear_inertia[n], self.table.nonlinear_stiffness[n])
+            }
+            SloshSource::Geometry if n == 0 => coefficients(fill),
+            SloshSource::Geometry => (1.0, 1.0),
+        }
+    }
+}
+
+/// Refuses the model `liquid` if the inertia of a mode falls with the amplitude. The kinetic energy of hub and liquid
+/// would then be indefinite at amplitudes that depend on the hub.
+fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
+    let (fill, slosh) = (2.0 * p.tank.h / p.tank.d, p.slosh);
+    let falling =
+        move |n: usize| Some((n, slosh.third_order(n, fill).0)).filter(|(_, s)| *s <= 0.0);
+    (0..slosh.modes.min(MODES)).filter_map(falling).map(move |(n, s)| match slosh.source {
+        SloshSource::Geometry => format!(
             "slosh.model = liquid at tank.h / (tank.d/2) = {fill:.4}: the inertia coefficient s = {s:.3} is not above 0, so \
              the kinetic energy would be indefinite. Use a fill with s above 0, such as 0.35 to 0.82 or above 1.02, or \
              slosh.model = spherical or paraboloid"
-        )
+        ),
+        SloshSource::Table => format!(
+            "slosh.table.nonlinear_inertia[{}] = {s} with slosh.model = liquid (allowed: greater than 0, because the kinetic \
+             energy would be indefinite; or slosh.model = spherical or paraboloid)",
+            n + 1
+        ),
     })
 }
 
@@ -332,10 +352,6 @@ impl Calculated {
     pub fn pendulums(&self, p: &Parameters) -> impl Iterator<Item = Pendulum> {
         let radius = p.tank.d / 2.0;
         let (r, slosh, p) = (p.tank.r, p.slosh, *p);
-        let (s_1, kappa_1) = match slosh.model {
-            SloshModel::Liquid => coefficients(p.tank.h / radius),
-            _ => (1.0, 1.0),
-        };
         (0..MODES).take_while(|&n| self.mass[n] > 0.0).map(move |n| {
             let (m, l) = (self.mass[n], self.length[n]);
             let c = 2.0 * self.damping[n] * core::f64::consts::TAU * self.frequency[n] * m;
@@ -348,7 +364,7 @@ impl Calculated {
                 SloshSource::Geometry => [0.0, 1.0],
             };
             let [r_x, r_t] = along.map(|component| r * component);
-            let (s, kappa) = if n == 0 { (s_1, kappa_1) } else { (1.0, 1.0) };
+            let (s, kappa) = slosh.third_order(n, p.tank.h / radius);
             let hardening = match slosh.model {
                 SloshModel::Liquid => kappa / (2.0 * l * l),
                 _ => slosh.hardening / (radius * radius),

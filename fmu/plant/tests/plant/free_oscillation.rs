@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use plant::{FrictionModel, Inputs, Parameters, Plant, SloshModel};
 
 /// A hub that hardly moves (the liquid, 2 kg, against 1e9 kg m2), no damping, no friction.
-fn held(model: SloshModel, depth: f64) -> Parameters {
+pub fn held(model: SloshModel, depth: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
     p.hub.inertia = 1e9;
@@ -33,11 +33,15 @@ fn frequency(p: &Parameters, h: f64) -> f64 {
     TAU * cycles / (crossings[crossings.len() - 1] - crossings[0])
 }
 
+/// [`shifts_of`] the bench with this model and depth.
+pub fn shifts(model: SloshModel, depth: f64, h: f64) -> [f64; 2] {
+    shifts_of(held(model, depth), h)
+}
+
 /// Relative shift of omega^2 per squared slosh angle of planar and circular motion at 0.05 rad. The next
 /// order is that share squared of it, 2.5e-3, times numbers of order 1. The motion is sampled every `h` seconds.
-pub fn shifts(model: SloshModel, depth: f64, h: f64) -> [f64; 2] {
+pub fn shifts_of(mut p: Parameters, h: f64) -> [f64; 2] {
     let amplitude: f64 = 0.05;
-    let mut p = held(model, depth);
     let plant = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();
     let linear = (9.81 / plant.calculated().length[0]).sqrt();
     let shift = |omega: f64| ((omega / linear).powi(2) - 1.0) / amplitude.powi(2);

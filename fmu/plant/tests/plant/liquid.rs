@@ -1,9 +1,9 @@
 //! Dependence of the frequency of free oscillations on amplitude: a pendulum, and a liquid
 //! to third order.
 
-use super::free_oscillation::shifts;
+use super::free_oscillation::{held, shifts, shifts_of};
 use formulas::third_order::coefficients;
-use plant::SloshModel;
+use plant::{Inputs, Parameters, Plant, SloshModel, SloshSource};
 
 /// Sampling interval of motions, s.
 const SAMPLE: f64 = 1e-3;
@@ -27,6 +27,50 @@ fn a_liquid_has_the_shifts_of_the_third_order() {
             assert!((found[i] / expected[i] - 1.0).abs() < 0.01, "{found:?} {expected:?}");
             let known = potential_flow[i];
             assert!((expected[i] - known).abs() < 1e-4, "{expected:?}");
+        }
+    }
+}
+
+/// A tank given by a table, with these coefficients of mode 1.
+fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
+    p.slosh.source = SloshSource::Table;
+    let table = &mut p.slosh.table;
+    (table.m_liq, table.mass[0], table.length[0]) = (2.0, 0.8, 0.05);
+    (table.nonlinear_inertia[0], table.nonlinear_stiffness[0]) = (s, kappa);
+    p
+}
+
+/// Coefficients of a table, with soft and hard springs: the shifts are those of the same expansion at any s and kappa.
+#[test]
+fn coefficients_of_a_table_give_their_shifts() {
+    for (s, kappa) in [(1.0, 1.0), (1.4, 0.73), (0.3, 2.0), (3.0, 1.2), (1.0, -0.8)] {
+        let p = table(held(SloshModel::Liquid, 0.1), s, kappa);
+        let found = shifts_of(p, SAMPLE);
+        let expected = [3.0 * kappa / 8.0 - s / 2.0, kappa / 2.0];
+        for i in 0..2 {
+            assert!((found[i] - expected[i]).abs() < 0.015, "{s} {kappa}: {found:?} {expected:?}");
+        }
+    }
+}
+
+/// A pendulum's coefficients are a warning in the model that is meant for a tank's own.
+#[test]
+fn coefficients_of_a_table_are_asked_for() {
+    let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());
+    let p = table(held(SloshModel::Liquid, 0.1), 1.0, 1.0);
+    assert!(warnings(&p)[0].contains("as that of a pendulum"), "{:?}", warnings(&p));
+    assert_eq!(warnings(&table(p, 1.0, 1.1)), [""; 0]);
+    for (model, is_used) in [
+        (SloshModel::Linear, true),
+        (SloshModel::Planar, false),
+        (SloshModel::Spherical, false),
+        (SloshModel::Paraboloid, false),
+        (SloshModel::Liquid, true),
+    ] {
+        let mut other = p;
+        other.slosh.model = model;
+        for name in ["slosh.table.nonlinear_inertia", "slosh.table.nonlinear_stiffness"] {
+            assert_eq!(other.overridden(name).is_none(), is_used, "{model:?} {name}");
         }
     }
 }

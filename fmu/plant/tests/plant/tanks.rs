@@ -1,7 +1,7 @@
 //! Tanks of any shape through a table of modes.
 
-use super::common::bench;
-use formulas::cylinder;
+use super::common::{SLOSHING, bench};
+use formulas::{cylinder, third_order};
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
 fn plant(p: &Parameters) -> Plant {
@@ -34,9 +34,7 @@ fn run(p: &Parameters) -> Vec<Outputs> {
 /// With and without a height of the wave, which defaults to that of a cylinder of the diameter tank.d.
 #[test]
 fn table_of_a_cylinder_moves_as_the_cylinder_does() {
-    for model in
-        [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid]
-    {
+    for model in SLOSHING {
         let mut p = bench(model, FrictionModel::Stribeck);
         p.slosh.modes = 3;
         let (expected, known) = (run(&p), *plant(&p).calculated());
@@ -47,6 +45,8 @@ fn table_of_a_cylinder_moves_as_the_cylinder_does() {
             (p.slosh.table.mass[n], p.slosh.table.length[n]) = (of.mass, of.length);
             p.slosh.table.zeta[n] = known.damping[n];
         }
+        let (s, kappa) = third_order::coefficients(p.tank.h / (p.tank.d / 2.0));
+        (p.slosh.table.nonlinear_inertia[0], p.slosh.table.nonlinear_stiffness[0]) = (s, kappa);
         assert_eq!(run(&p), expected, "{model:?}");
         // Waves of another height, and nothing else.
         p.slosh.table.wave[..3].copy_from_slice(&[0.1, 0.2, 0.3]);
@@ -94,11 +94,16 @@ fn a_table_that_is_no_tank_is_refused_with_everything_that_is_wrong() {
         p.slosh.table.mass[1] = 0.0;
         p.slosh.table.length[2] = 0.0;
         p.slosh.model = SloshModel::Liquid;
+        (p.slosh.table.nonlinear_inertia[0], p.slosh.table.nonlinear_inertia[2]) = (0.0, -2.0);
     });
-    assert_eq!(all.len(), 4, "{all:?}");
-    for (what, place) in
-        [("liquid", 0), ("slosh.table.m_liq", 1), ("slosh.table.mass[2]", 2), ("length[3]", 3)]
-    {
+    assert_eq!(all.len(), 5, "{all:?}");
+    for (what, place) in [
+        ("slosh.table.nonlinear_inertia[1] = 0", 0),
+        ("slosh.table.nonlinear_inertia[3] = -2", 1),
+        ("slosh.table.m_liq", 2),
+        ("slosh.table.mass[2]", 3),
+        ("length[3]", 4),
+    ] {
         assert!(all[place].contains(what), "{all:?}");
     }
     let one = |change: fn(&mut Parameters), what: &str| {
@@ -141,11 +146,12 @@ fn the_tanks_own_inertia_is_turned_with_the_hub() {
 /// A box's modes along one axis are not those along the other.
 #[test]
 fn modes_along_one_axis_are_refused_where_the_liquid_moves_along_both() {
-    for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Liquid) {
+    for model in SloshModel::ALL {
         let mut p = sphere();
         (p.slosh.model, p.slosh.table.one_axis) = (model, true);
         let refused = Plant::new(&p, &Inputs::default(), 0.0, 1e-10).err();
-        let both = matches!(model, SloshModel::Spherical | SloshModel::Paraboloid);
+        let both =
+            matches!(model, SloshModel::Spherical | SloshModel::Paraboloid | SloshModel::Liquid);
         let named = refused.is_some_and(|problems| problems[0].starts_with("slosh.table.one_axis"));
         assert_eq!(named, both, "{model:?}");
     }
