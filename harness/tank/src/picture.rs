@@ -417,7 +417,8 @@ pub fn third_order(overlaps: &Overlaps) -> String {
     let mut svg = String::new();
     frame.axes(&mut svg, "h/R", Some("shift of ω² per squared slosh angle"));
     frame.curve(&mut svg, &[[frame.x[0], 0.0], [frame.x[1], 0.0]], &format!("stroke=\"{FAINT}\""));
-    for (depth, azimuth, number) in overlaps.resonances() {
+    let resonances = overlaps.resonances();
+    for &(depth, [azimuth, number]) in &resonances {
         let dashed = format!("stroke=\"{FAINT}\" stroke-dasharray=\"5 4\"");
         frame.curve(&mut svg, &[[depth, frame.y[0]], [depth, frame.y[1]]], &dashed);
         let (x, y) = frame.place(depth, frame.y[1]);
@@ -426,7 +427,7 @@ pub fn third_order(overlaps: &Overlaps) -> String {
     // Intervals between the poles, with points ever closer to them.
     let mut ends = vec![frame.x[0]];
     ends.extend(
-        overlaps.resonant_depths().into_iter().filter(|d| (frame.x[0]..frame.x[1]).contains(d)),
+        resonances.iter().map(|(depth, _)| *depth).filter(|d| (frame.x[0]..frame.x[1]).contains(d)),
     );
     ends.push(frame.x[1]);
     let depth = |ends: &[f64], i: i32| {

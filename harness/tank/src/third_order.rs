@@ -1,5 +1,5 @@
-//! Amplitude dependence of the frequency of an upright cylinder's first mode: potential
-//! flow to third order, for the planar and for the circular (rotary) wave.
+//! Amplitude dependence of the frequency of the first mode of a tank with vertical walls and a flat
+//! bottom: potential flow to third order.
 //!
 //! Surface elevation eta and surface potential Phi are canonical variables (Zakharov 1968) with
 //!
@@ -10,16 +10,21 @@
 //! ```
 //!
 //! This holds unchanged for a vertical wall, because products of functions with zero slope at the
-//! wall also have zero slope. With R = g = 1, psi = J1(k r) cos theta is the first mode, with k =
-//! xi_1 and T = k tanh k h = omega^2. Its square excites the modes chi of the azimuthal numbers 0
-//! and 2 (wave number kappa, t = kappa tanh kappa h) at frequencies 0 and 2 omega:
+//! wall also have zero slope. With g = 1, psi is the first mode of the cross-section, with wave number
+//! k and T = k tanh k h = omega^2. A wave of two such modes X and Y of the same frequency,
 //!
 //! ```text
-//! planar     eta = a cos(wt) psi + sum (p_0 + p_2 cos 2wt) chi,  Phi = b sin(wt) psi + sum f sin(2wt) chi
-//! circular   the same with theta - wt in place of theta: p at azimuthal number 0, f and q at 2
+//! eta = a (X cos wt + Y sin wt),   Phi = b (X sin wt - Y cos wt)
+//! planar     X = psi, Y = 0        circular   X and Y: psi and psi turned by 90 degrees
 //! ```
 //!
-//! L averaged over a period is stationary in p_0, p_2, q and f. The remaining L = L_2 a^2 + L_4 a^4
+//! excites the modes chi (wave number kappa, t = kappa tanh kappa h) at the frequencies 0 and 2 omega:
+//!
+//! ```text
+//! eta_2 = sum (p_0 + p_2 cos 2wt + q_2 sin 2wt) chi,   Phi_2 = sum (f sin 2wt + g cos 2wt) chi
+//! ```
+//!
+//! L averaged over a period is stationary in p_0, p_2, q_2, f and g. The remaining L = L_2 a^2 + L_4 a^4
 //! is stationary in a, which is the nonlinear dispersion relation (Whitham 1974). The integrals are
 //! C = int chi psi^2, N = int chi^2 and by grad psi.grad psi = k^2 psi^2 + (1/2) Lap psi^2
 //!
@@ -28,7 +33,9 @@
 //! int psi^2 G_0 psi^2 = sum t C^2/N
 //! ```
 //!
-//! The equivalent mass on a surface, with q/l the slosh angle (wave 2 R/(xi^2 - 1) per angle),
+//! and likewise for X^2, Y^2 and X Y. The cross-section enters only by k, C, N and int psi^4.
+//!
+//! The equivalent mass on a surface, with q/l the slosh angle,
 //!
 //! ```text
 //! L = (1/2) m (q'^2 + s (q.q')^2/l^2) - (1/2) m omega^2 (q^2 + kappa q^4/(4 l^2))
@@ -37,124 +44,264 @@
 //! has the shifts (3/8) kappa - s/2 (planar) and kappa/2 (circular) of omega^2 per squared angle;
 //! they determine s and kappa. A pendulum is s = kappa = 1: -1/8 and +1/2.
 
-use nalgebra::{Matrix2, Vector2};
+use core::f64::consts::PI;
 
-use crate::closed_form::zeros_of_j1_slope;
-use crate::gauss::Gauss;
+use nalgebra::{DMatrix, Matrix2, Vector2};
+
+use crate::gauss::{Gauss, legendre, legendre_slopes};
+
+/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third order
+/// is not valid.
+pub const DETUNING: f64 = 0.01;
 
 /// A mode that the square of the first mode excites.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
-    /// Azimuthal number, 0 or 2.
-    pub azimuth: i32,
-    /// Zero of J'_azimuth, the wave number times R.
-    pub xi: f64,
-    /// c^2/(n n_1) with c = int J1(k r)^2 J r dr, n = int J^2 r dr, n_1 = int J1^2 r dr.
-    pub overlap: f64,
+    /// Name of the mode. Round sections: azimuthal number, and number from 1. Sectors: half waves over
+    /// the angle, and number from 1. Boxes: half waves along the motion and across it.
+    pub mode: [usize; 2],
+    /// Wave number kappa, 1/m.
+    pub kappa: f64,
+    /// Squared projections on chi over N and the first mode's N, of (X^2 + Y^2)/2, and of
+    /// (X^2 - Y^2)/2 and X Y together: those that excite the frequencies 0 and 2 omega. Planar motion.
+    pub planar: [f64; 2],
+    /// The same for circular motion.
+    pub circular: [f64; 2],
+    /// C chi/N at the wall, planar motion.
+    pub at_wall: f64,
 }
 
-/// The first mode and the modes that its square excites: pure numbers, equal at every depth.
+/// The first mode and the modes that its square excites: independent of the depth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
-    /// xi_1
-    pub xi: f64,
-    /// int J1^4 r dr/int J1^2 r dr
-    pub fourth: f64,
-    /// (2/((xi^2 - 1) J1(xi)))^2: squared amplitude a per squared slosh angle.
-    pub amplitude2: f64,
+    /// Wave number k of the first mode, 1/m.
+    pub k: f64,
+    /// int psi^4/int psi^2 of planar motion, and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2 of circular motion, if the
+    /// section has circular motion.
+    pub fourth: [Option<f64>; 2],
+    /// Amplitude a per slosh angle, m: int psi x/int psi^2, with x along the motion.
+    pub amplitude: f64,
     /// The excited modes.
     pub excited: Vec<Excited>,
 }
 
 impl Overlaps {
-    /// Computes the overlaps with `count` modes of each azimuthal number.
+    /// Computes the overlaps of a circular section of radius 1 with `count` modes of each azimuthal number.
     pub fn new(count: usize) -> Overlaps {
-        let xi = zeros_of_j1_slope(1)[0];
-        // The integrands have 2 count half waves: 4 points for each, plus a margin.
-        let rule = Gauss::new(8 * count + 40);
-        let integral = |f: &dyn Fn(f64) -> f64| -> f64 {
-            rule.nodes.iter().zip(&rule.weights).map(|(r, w)| w * r * f(*r)).sum()
-        };
-        let square = |r: f64| libm::j1(xi * r).powi(2);
-        let first = integral(&square);
+        Overlaps::round(0.0, 1.0, count)
+    }
+
+    /// Computes the overlaps of a circular (`inner` = 0) or annular section with `count` modes of each azimuthal
+    /// number, radii in m.
+    pub fn round(inner: f64, outer: f64, count: usize) -> Overlaps {
+        let [first, mean, double] = [1.0, 0.0, 2.0].map(|nu| Radial::new(inner, outer, nu, count));
+        Overlaps::of_waves(&first, &mean, &double)
+    }
+
+    /// Returns the overlaps of psi = u(r) cos(nu theta) with the modes of the orders 0 and 2 nu.
+    fn of_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
+        let psi = first.mode(0);
         let mut excited = Vec::new();
-        for azimuth in [0, 2] {
-            for zero in zeros_of_slope(azimuth, count) {
-                let other = |r: f64| libm::jn(azimuth, zero * r);
-                let c = integral(&|r| square(r) * other(r));
-                let n = integral(&|r| other(r).powi(2));
-                excited.push(Excited { azimuth, xi: zero, overlap: c * c / (n * first) });
+        for (waves, radial) in [(0, mean), (2, double)] {
+            for n in 0..radial.kappa.len() {
+                let chi = radial.mode(n);
+                let c = radial.integral(|i| psi[i] * psi[i] * chi[i]);
+                // with the integrals of cos^2 and sin^2 times 1, or cos and sin of 2 nu theta
+                let [planar, circular] = match waves {
+                    0 => [[c * c / 8.0; 2], [c * c / 2.0, 0.0]],
+                    _ => [[c * c / 16.0; 2], [0.0, c * c / 2.0]],
+                };
+                let at_wall = 0.5 * c * radial.at_wall[n];
+                excited.push(Excited {
+                    mode: [waves, n + 1],
+                    kappa: radial.kappa[n],
+                    planar,
+                    circular,
+                    at_wall,
+                });
             }
         }
-        let fourth = integral(&|r| square(r).powi(2)) / first;
-        let amplitude2 = (2.0 / ((xi * xi - 1.0) * libm::j1(xi))).powi(2);
-        Overlaps { xi, fourth, amplitude2, excited }
+        let fourth = first.integral(|i| psi[i].powi(4));
+        Overlaps {
+            k: first.kappa[0],
+            fourth: [Some(0.75 * fourth), Some(fourth)],
+            amplitude: first.integral(|i| psi[i] * first.r[i]),
+            excited,
+        }
     }
 
-    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at
-    /// h/R = `fill`.
-    pub fn shifts(&self, fill: f64) -> [f64; 2] {
-        let t_1 = self.xi * (self.xi * fill).tanh();
-        let (omega, k2) = (t_1.sqrt(), self.xi * self.xi);
-        // The potential's amplitude to first order, a = 1: eta_t = G_0 Phi.
-        let [planar_b, circular_b] = [-omega / t_1, omega / t_1];
-        // L_4 of both motions, over N of the first mode; first the terms of fourth order.
-        let mut planar = planar_b * planar_b / 16.0 * k2 * t_1 * 0.75 * self.fourth;
-        let mut circular = circular_b * circular_b / 8.0 * k2 * t_1 * self.fourth;
-        for Excited { azimuth, xi, overlap } in &self.excited {
-            let t = xi * (xi * fill).tanh();
-            // int chi (|grad psi|^2 - (G_0 psi)^2) and int psi (grad psi.grad chi - G_0 psi G_0 chi)
-            // over C
-            let elevated = k2 - xi * xi / 2.0 - t_1 * t_1;
-            let carried = xi * xi / 2.0 - t_1 * t;
-            // C^2/N over N of the first mode: half of cos^2 theta at azimuth 0, a quarter at 2.
-            let weight = overlap * if *azimuth == 0 { 0.5 } else { 0.25 };
-            let b = planar_b;
-            planar += weight
-                * (stationary(
-                    Matrix2::new(-0.5, -omega, -omega, -0.5 * t),
-                    Vector2::new(b * b * elevated / 8.0, -b * carried / 4.0),
-                ) + (b * b * elevated / 4.0).powi(2) / 2.0
-                    - b * b / 16.0 * t_1 * t_1 * t);
-            let b = circular_b;
-            circular += *overlap
-                * if *azimuth == 0 {
-                    (b * b * elevated / 4.0).powi(2)
-                } else {
-                    stationary(
-                        Matrix2::new(-1.0, 2.0 * omega, 2.0 * omega, -t),
-                        Vector2::new(b * b * elevated / 4.0, -b * carried / 2.0),
-                    ) - b * b / 8.0 * t_1 * t_1 * t
-                };
+    /// Computes the overlaps of a sector of `angle`, rad, between the radii `inner` and `outer`, m, with `count` modes of
+    /// each number of half waves over the angle. Motion along the bisector, or `across` it.
+    pub fn sector(inner: f64, outer: f64, angle: f64, across: bool, count: usize) -> Overlaps {
+        let half = Gauss::new(40);
+        // the mean over the angle
+        let mean = |f: &dyn Fn(f64) -> f64| -> f64 {
+            half.nodes.iter().zip(&half.weights).map(|(x, w)| w * f(angle * (x - 0.5))).sum()
+        };
+        let nu = PI / angle;
+        let radial = |half_waves: f64| Radial::new(inner, outer, half_waves * nu, count);
+        let axisymmetric = radial(0.0);
+        if !across {
+            let psi = axisymmetric.mode(0);
+            let excited = (0..axisymmetric.kappa.len()).map(|n| {
+                let c = axisymmetric.integral(|i| psi[i] * psi[i] * axisymmetric.mode(n)[i]);
+                let (planar, circular) = ([c * c / 4.0; 2], [0.0; 2]);
+                let at_wall = c * axisymmetric.at_wall[n];
+                Excited {
+                    mode: [0, n + 1],
+                    kappa: axisymmetric.kappa[n],
+                    planar,
+                    circular,
+                    at_wall,
+                }
+            });
+            return Overlaps {
+                k: axisymmetric.kappa[0],
+                fourth: [Some(axisymmetric.integral(|i| psi[i].powi(4))), None],
+                amplitude: mean(&f64::cos) * axisymmetric.integral(|i| psi[i] * axisymmetric.r[i]),
+                excited: excited.collect(),
+            };
+        }
+        let (first, double) = (radial(1.0), radial(2.0));
+        let overlaps = Overlaps::of_waves(&first, &axisymmetric, &double);
+        let along = 2.0 * mean(&|phi| (nu * phi).sin() * phi.sin());
+        Overlaps {
+            fourth: [overlaps.fourth[0], None],
+            amplitude: along * overlaps.amplitude,
+            ..overlaps
+        }
+    }
+
+    /// Returns the overlaps of a box for motion along `length`, m; with another length across it.
+    pub fn rectangle(length: f64) -> Overlaps {
+        let k = PI / length;
+        Overlaps {
+            k,
+            fourth: [Some(0.75), None],
+            amplitude: 4.0 / (length * k * k),
+            excited: vec![Excited {
+                mode: [2, 0],
+                kappa: 2.0 * k,
+                planar: [1.0 / 16.0; 2],
+                circular: [0.0; 2],
+                at_wall: 0.5,
+            }],
+        }
+    }
+
+    /// Returns the overlaps of a square box, for planar motion along its sides or (`diagonal`) along a diagonal.
+    pub fn square(length: f64, diagonal: bool) -> Overlaps {
+        let k = PI / length;
+        let double = [([2, 0], [0.5, 0.25]), ([0, 2], [0.0, 0.25])];
+        let mut excited: Vec<Excited> = double
+            .map(|(mode, [side, along])| Excited {
+                mode,
+                kappa: 2.0 * k,
+                planar: [if diagonal { along * along } else { side * side } / 4.0; 2],
+                circular: [1.0 / 16.0; 2],
+                at_wall: if diagonal { along } else { side },
+            })
+            .to_vec();
+        excited.push(Excited {
+            mode: [1, 1],
+            kappa: core::f64::consts::SQRT_2 * k,
+            planar: [if diagonal { 1.0 / 8.0 } else { 0.0 }; 2],
+            circular: [0.0, 0.5],
+            at_wall: if diagonal { 1.0 } else { 0.0 },
+        });
+        Overlaps {
+            fourth: [Some(if diagonal { 9.0 / 8.0 } else { 0.75 }), Some(1.25)],
+            excited,
+            ..Overlaps::rectangle(length)
+        }
+    }
+
+    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at a depth, m. The shift is 0
+    /// for a motion that the section does not have.
+    pub fn shifts(&self, depth: f64) -> [f64; 2] {
+        let [t_1, _, b] = self.wave(depth);
+        let k2 = self.k * self.k;
+        let mut l_4 = [0.5, 1.0].map(|part| part * b * b / 8.0 * k2 * t_1);
+        for (l_4, fourth) in l_4.iter_mut().zip(self.fourth) {
+            *l_4 *= fourth.unwrap_or(0.0);
+        }
+        for mode in &self.excited {
+            let Response { t, elevated, matrix, vector } = self.response(mode, depth);
+            let mean = 2.0 * (b * b * elevated / 4.0).powi(2);
+            let double = 4.0 * (stationary(matrix, vector) - b * b / 16.0 * t_1 * t_1 * t);
+            for (l_4, weight) in l_4.iter_mut().zip([mode.planar, mode.circular]) {
+                *l_4 += weight[0] * mean + weight[1] * double;
+            }
         }
         // a (omega^2/T - 1)/2 + 4 L_4 a^3 = 0, and twice that of the circular motion.
-        [-8.0 * planar * self.amplitude2, -4.0 * circular * self.amplitude2]
+        let amplitude2 = self.amplitude * self.amplitude;
+        [-8.0 * l_4[0] * amplitude2, -4.0 * l_4[1] * amplitude2]
     }
 
-    /// Returns s and kappa of the equivalent mass at h/R = `fill`.
-    pub fn equivalent(&self, fill: f64) -> [f64; 2] {
-        let [planar, circular] = self.shifts(fill);
+    /// Returns s and kappa of the equivalent mass at a depth, m. Without circular motion s is 1, and kappa
+    /// gives the planar shift.
+    pub fn equivalent(&self, depth: f64) -> [f64; 2] {
+        let [planar, circular] = self.shifts(depth);
+        if self.fourth[1].is_none() {
+            return [1.0, 8.0 / 3.0 * (planar + 0.5)];
+        }
         let kappa = 2.0 * circular;
         [0.75 * kappa - 2.0 * planar, kappa]
     }
 
-    /// Returns the depths h/R at which an excited mode has twice the frequency of the first, in
-    /// ascending order.
-    pub fn resonant_depths(&self) -> Vec<f64> {
-        self.resonances().iter().map(|(depth, ..)| *depth).collect()
+    /// Returns the second-order elevation at the wall per squared slosh angle, m, when planar motion has its largest
+    /// elevation there. It adds to the crest and subtracts from the trough.
+    pub fn second_wave(&self, depth: f64) -> f64 {
+        let [_, _, b] = self.wave(depth);
+        let of = |mode: &Excited| {
+            let Response { elevated, matrix, vector, .. } = self.response(mode, depth);
+            let mean = -b * b * elevated / 4.0;
+            mode.at_wall * (mean - (inverse(matrix) * vector)[0])
+        };
+        self.amplitude * self.amplitude * self.excited.iter().map(of).sum::<f64>()
     }
 
-    /// Returns the depths h/R at which an excited mode has twice the frequency of the first, with
-    /// the mode's azimuthal number and its own number, from 1. Near these depths the third order is
-    /// not valid.
-    pub fn resonances(&self) -> Vec<(f64, i32, usize)> {
+    /// Returns T, omega and the first-order amplitude b of the potential per elevation, with g = 1.
+    fn wave(&self, depth: f64) -> [f64; 3] {
+        let t_1 = self.k * (self.k * depth).tanh();
+        // eta_t = G_0 Phi
+        [t_1, t_1.sqrt(), -t_1.sqrt() / t_1]
+    }
+
+    fn response(&self, mode: &Excited, depth: f64) -> Response {
+        let [t_1, omega, b] = self.wave(depth);
+        let t = mode.kappa * (mode.kappa * depth).tanh();
+        // int chi (|grad psi|^2 - (G_0 psi)^2) and int psi (grad psi.grad chi - G_0 psi G_0 chi)
+        // over C
+        let elevated = self.k * self.k - mode.kappa * mode.kappa / 2.0 - t_1 * t_1;
+        let carried = mode.kappa * mode.kappa / 2.0 - t_1 * t;
+        Response {
+            t,
+            elevated,
+            matrix: Matrix2::new(-0.5, -omega, -omega, -0.5 * t),
+            vector: Vector2::new(b * b * elevated / 8.0, -b * carried / 4.0),
+        }
+    }
+
+    /// Returns the excited mode whose frequency is twice that of the first mode within [`DETUNING`] at a depth, m.
+    pub fn secondary_resonance(&self, depth: f64) -> Option<[usize; 2]> {
+        let [t_1, ..] = self.wave(depth);
+        let near = |mode: &&Excited| {
+            let t = mode.kappa * (mode.kappa * depth).tanh();
+            ((4.0 * t_1 / t).sqrt() - 1.0).abs() < DETUNING
+        };
+        self.excited.iter().find(near).map(|mode| mode.mode)
+    }
+
+    /// Returns the depths, m, at which an excited mode has twice the frequency of the first, in ascending order, with
+    /// the mode. Near these depths the third order is not valid.
+    pub fn resonances(&self) -> Vec<(f64, [usize; 2])> {
         let mut found = Vec::new();
-        for (place, mode) in self.excited.iter().enumerate() {
-            let before = self.excited[..place].iter().filter(|e| e.azimuth == mode.azimuth).count();
-            let detuning = |fill: f64| {
-                4.0 * self.xi * (self.xi * fill).tanh() - mode.xi * (mode.xi * fill).tanh()
+        for mode in &self.excited {
+            let detuning = |depth: f64| {
+                4.0 * self.k * (self.k * depth).tanh() - mode.kappa * (mode.kappa * depth).tanh()
             };
-            let grid: Vec<f64> = (1..400).map(|i| f64::from(i) * 0.01).collect();
+            let grid: Vec<f64> = (1..400).map(|i| f64::from(i) * 0.02 / self.k).collect();
             for pair in grid.windows(2) {
                 let [mut low, mut high] = [pair[0], pair[1]];
                 if detuning(low) * detuning(high) < 0.0 {
@@ -163,7 +310,7 @@ impl Overlaps {
                         let left = detuning(low) * detuning(middle) <= 0.0;
                         (low, high) = if left { (low, middle) } else { (middle, high) };
                     }
-                    found.push((low, mode.azimuth, before + 1));
+                    found.push((low, mode.mode));
                 }
             }
         }
@@ -172,52 +319,149 @@ impl Overlaps {
     }
 }
 
-/// Returns the stationary value of x.M x/2 + v.x.
-fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
-    let [a, b, c, d] = [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]];
-    let inverse = Matrix2::new(d, -b, -c, a) / (a * d - b * c);
-    -0.5 * v.dot(&(inverse * v))
+/// Equations of an excited mode per C: t, the source of the mean elevation, and matrix and vector of (p_2, f).
+struct Response {
+    t: f64,
+    elevated: f64,
+    matrix: Matrix2<f64>,
+    vector: Vector2<f64>,
 }
 
-/// Returns the first positive zeros of J'_m for m = 0 and 2, by bisection between those of an asymptotic grid.
-fn zeros_of_slope(m: i32, count: usize) -> Vec<f64> {
-    let slope = |x: f64| match m {
-        0 => -libm::j1(x),
-        _ => (libm::jn(m - 1, x) - libm::jn(m + 1, x)) / 2.0,
-    };
-    // Zeros are more than 3 apart and above 2.
-    let mut zeros = Vec::new();
-    let mut low: f64 = 2.0;
-    while zeros.len() < count {
-        let high = low + 0.5;
-        if slope(low) * slope(high) < 0.0 {
-            let (mut a, mut b) = (low, high);
-            while b - a > 4.0 * f64::EPSILON * b {
-                let middle = 0.5 * (a + b);
-                (a, b) = if slope(a) * slope(middle) <= 0.0 { (a, middle) } else { (middle, b) };
+fn inverse(m: Matrix2<f64>) -> Matrix2<f64> {
+    let [a, b, c, d] = [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]];
+    Matrix2::new(d, -b, -c, a) / (a * d - b * c)
+}
+
+/// Returns the stationary value of x.M x/2 + v.x.
+fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
+    -0.5 * v.dot(&(inverse(m) * v))
+}
+
+/// Radial parts u of the modes of order nu: (r u')'/r + (kappa^2 - nu^2/r^2) u = 0 with u' = 0 at the walls and int u^2 r
+/// dr = 1, by Galerkin's method. A constant is no mode.
+struct Radial {
+    /// Nodes of the quadrature, m, and weights with r dr.
+    r: Vec<f64>,
+    weights: Vec<f64>,
+    /// Wave numbers, 1/m, ascending.
+    kappa: Vec<f64>,
+    /// u at the nodes, one mode a column.
+    values: DMatrix<f64>,
+    /// u at the outer wall.
+    at_wall: Vec<f64>,
+}
+
+impl Radial {
+    fn new(inner: f64, outer: f64, nu: f64, count: usize) -> Radial {
+        let size = count + count / 2 + 16;
+        let rule = Gauss::new(8 * size);
+        // In a circle r = outer s^2 makes r^nu smooth. The point s = 1 is for the wall.
+        let place = |s: f64| match inner {
+            0.0 => (outer * s * s, 2.0 * outer * s),
+            _ => (inner + (outer - inner) * s, outer - inner),
+        };
+        let basis = |s: f64| match inner {
+            0.0 => in_circle(nu, s.powi(4), size, outer),
+            _ => in_ring(s, size, outer - inner),
+        };
+        let (mut r, mut weights) = (Vec::new(), Vec::new());
+        let mut values = DMatrix::zeros(rule.nodes.len(), size);
+        let [mut mass, mut stiffness] = [0, 1].map(|_| DMatrix::zeros(rule.nodes.len(), size));
+        let mut over_r = mass.clone();
+        for (i, (s, w)) in rule.nodes.iter().zip(&rule.weights).enumerate() {
+            let (radius, slope) = place(*s);
+            let weight = w * slope * radius;
+            for (j, (u, du)) in basis(*s).into_iter().enumerate() {
+                values[(i, j)] = u;
+                mass[(i, j)] = u * weight.sqrt();
+                stiffness[(i, j)] = du * weight.sqrt();
+                over_r[(i, j)] = nu / radius * u * weight.sqrt();
             }
-            zeros.push(0.5 * (a + b));
+            r.push(radius);
+            weights.push(weight);
         }
-        low = high;
+        let (mass, stiffness) =
+            (mass.tr_mul(&mass), stiffness.tr_mul(&stiffness) + over_r.tr_mul(&over_r));
+        // The bases are linearly independent, so that Cholesky's factor exists.
+        let factor = mass.cholesky().map_or_else(|| DMatrix::identity(size, size), |c| c.l());
+        let half = factor.solve_lower_triangular(&stiffness).unwrap_or_else(|| stiffness.clone());
+        let whole = factor.solve_lower_triangular(&half.transpose()).unwrap_or(half);
+        let eigen = (0.5 * (&whole + whole.transpose())).symmetric_eigen();
+        let mut order: Vec<usize> = (0..size).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        let constant = usize::from(nu == 0.0);
+        let order = &order[constant..constant + count];
+        let vectors = DMatrix::from_fn(size, count, |i, j| eigen.eigenvectors[(i, order[j])]);
+        let vectors = factor.tr_solve_lower_triangular(&vectors).unwrap_or(vectors);
+        let wall = DMatrix::from_iterator(1, size, basis(1.0).into_iter().map(|(u, _)| u));
+        Radial {
+            r,
+            weights,
+            kappa: order.iter().map(|i| eigen.eigenvalues[*i].max(0.0).sqrt()).collect(),
+            values: values * &vectors,
+            at_wall: (wall * &vectors).iter().copied().collect(),
+        }
     }
-    zeros
+
+    /// u of a mode at the nodes, in the sense of a positive value at the outer wall.
+    fn mode(&self, n: usize) -> Vec<f64> {
+        self.values.column(n).iter().copied().collect()
+    }
+
+    /// Returns int f r dr.
+    fn integral(&self, f: impl Fn(usize) -> f64) -> f64 {
+        self.weights.iter().enumerate().map(|(i, w)| w * f(i)).sum()
+    }
+}
+
+/// Returns the functions (r/R)^nu P_j^(0,nu)(2 x - 1), x = (r/R)^2, orthogonal in the circle, over R and with the factor
+/// of norm 1, and their derivatives by r (DLMF 18.9.2).
+pub(crate) fn in_circle(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64, f64)> {
+    let y = 2.0 * x - 1.0;
+    let (mut p, mut slope) = ((1.0, 1.0 + 0.5 * (nu + 2.0) * (y - 1.0)), (0.0, 0.5 * (nu + 2.0)));
+    let radius = x.sqrt();
+    let power = radius.powf(nu);
+    let mut all = Vec::with_capacity(size);
+    for j in 0..size {
+        let j = j as f64;
+        let norm = (2.0 * (2.0 * j + nu + 1.0)).sqrt() / outer;
+        let along = nu * power / radius * p.0 + power * 4.0 * radius * slope.0;
+        all.push((norm * power * p.0, norm * along / outer));
+        let n = j + 1.0;
+        let twice = 2.0 * n + nu;
+        let front = (twice + 1.0) / (2.0 * (n + 1.0) * (n + nu + 1.0) * twice);
+        let [linear, constant] = [front * (twice + 2.0) * twice, -front * nu * nu];
+        let before = n * (n + nu) * (twice + 2.0) / ((n + 1.0) * (n + nu + 1.0) * twice);
+        p = (p.1, (linear * y + constant) * p.1 - before * p.0);
+        // the derivatives by y; p.0 is the polynomial that the new one was made of
+        slope = (slope.1, linear * p.0 + (linear * y + constant) * slope.1 - before * slope.0);
+    }
+    all
+}
+
+/// Returns Legendre polynomials over the width of a ring and their derivatives by r, at the part `s` of the width.
+fn in_ring(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
+    let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
+    legendre(s, &mut values);
+    legendre_slopes(s, &mut slopes);
+    values.into_iter().zip(slopes.into_iter().map(|slope| slope / width)).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Abramowitz and Stegun, table 9.5, to more digits. The zero of J0' at 0 does not belong to a mode. Bisection ends
-    /// within four times the last digit. The slope's own rounding, 1e-16 over its slope of 0.2 to 0.4, adds about
-    /// 5e-16.
+    /// Abramowitz and Stegun, table 9.5, to more digits. The zero of J0' at 0 does not belong to a mode.
     #[test]
-    fn zeros_of_the_excited_modes_are_those_of_the_tables() {
-        for (m, known) in [
-            (0, [3.831_705_970_207_512, 7.015_586_669_815_619, 10.173_468_135_062_722]),
-            (2, [3.054_236_928_227_14, 6.706_133_194_158_459, 9.969_467_823_087_596]),
+    fn wave_numbers_of_the_circle_are_those_of_the_tables() {
+        for (nu, known) in [
+            (0.0, [3.831_705_970_207_512, 7.015_586_669_815_619, 10.173_468_135_062_722]),
+            (1.0, [1.841_183_781_340_659, 5.331_442_773_525_033, 8.536_316_366_346_285]),
+            (2.0, [3.054_236_928_227_14, 6.706_133_194_158_459, 9.969_467_823_087_596]),
         ] {
-            for (x, known) in zeros_of_slope(m, 3).iter().zip(known) {
-                assert!((x - known).abs() < 1e-14, "{m}: {x} {known}");
+            let found = Radial::new(0.0, 2.0, nu, 40);
+            for (x, known) in found.kappa.iter().zip(known) {
+                assert!((2.0 * x / known - 1.0).abs() < 1e-11, "{nu}: {x} {known}");
             }
         }
     }

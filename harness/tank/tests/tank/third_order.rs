@@ -43,14 +43,99 @@ fn planar_hardening_begins_at_0_5058_with_one_excited_mode_each_and_at_0_5031_wi
 /// 2 omega_1 = omega of modes (0,1), (2,2) and (0,2).
 #[test]
 fn secondary_resonances_stand_at_their_depths() {
-    let depths = Overlaps::new(5).resonant_depths();
-    assert_eq!(depths.len(), 3, "{depths:?}");
-    let modes: Vec<_> = Overlaps::new(5).resonances().iter().map(|r| (r.1, r.2)).collect();
-    assert_eq!(modes, [(0, 1), (2, 2), (0, 2)]);
-    for (found, known) in depths.iter().zip([0.152_267, 0.831_377, 1.009_701]) {
-        assert!((found - known).abs() < 1e-6, "{depths:?}");
+    let found = Overlaps::new(5).resonances();
+    let modes: Vec<_> = found.iter().map(|r| r.1).collect();
+    assert_eq!(modes, [[0, 1], [2, 2], [0, 2]]);
+    for ((depth, _), known) in found.iter().zip([0.152_267, 0.831_377, 1.009_701]) {
+        assert!((depth - known).abs() < 1e-6, "{found:?}");
     }
     // The third order has poles there.
     let all = Overlaps::new(5);
     assert!(all.equivalent(1.00975)[0].abs() > 50.0 && all.equivalent(1.2)[0].abs() < 2.0);
+    assert_eq!(all.secondary_resonance(1.00975), Some([0, 2]));
+    assert_eq!(all.secondary_resonance(1.2), None);
+}
+
+/// The closed form of the formulas has Bessel functions and eight modes of each azimuthal number, with overlaps to 15
+/// digits.
+#[test]
+fn upright_cylinders_have_the_coefficients_of_the_closed_form() {
+    let all = Overlaps::round(0.0, 0.5, 8);
+    for i in 0..20 {
+        let fill = 0.2 + 0.15 * f64::from(i);
+        let (s, kappa) = formulas::third_order::coefficients(fill);
+        let found = all.equivalent(0.5 * fill);
+        assert!((found[0] - s).abs() < 1e-9 * (1.0 + s.abs()), "{fill} {found:?} {s}");
+        assert!((found[1] - kappa).abs() < 1e-9 * (1.0 + kappa.abs()), "{fill} {found:?} {kappa}");
+    }
+}
+
+/// Tadjbakhsh and Keller, J. Fluid Mech. 8 (1960) 442: frequency to third order and elevation to second order.
+#[test]
+fn boxes_have_the_waves_of_tadjbakhsh_and_keller() {
+    let length = 0.7;
+    let k = std::f64::consts::PI / length;
+    let all = Overlaps::rectangle(length);
+    for fill in [0.05, 0.1, 0.2, 0.337, 0.5, 0.8, 1.2, 5.0] {
+        let t = (std::f64::consts::PI * fill).tanh();
+        let sigma = (9.0 * t.powi(-4) - 12.0 * t.powi(-2) - 3.0 - 2.0 * t * t)
+            / (2.0 * std::f64::consts::PI.powi(2));
+        let [planar, circular] = all.shifts(fill * length);
+        assert!((planar - sigma).abs() < 1e-12 * (1.0 + sigma.abs()), "{fill} {planar} {sigma}");
+        let [s, kappa] = all.equivalent(fill * length);
+        assert_eq!((s, circular), (1.0, 0.0));
+        assert!((0.375 * kappa - 0.5 - sigma).abs() < 1e-12 * (1.0 + sigma.abs()));
+        // at cos 2 k x = 1 and cos 2 w t = 1, with the wave 4/(a k^2) per angle
+        let second = k / 8.0 * (t + 1.0 / t + 3.0 / t.powi(3) - 1.0 / t) * all.amplitude.powi(2);
+        let found = all.second_wave(fill * length);
+        assert!((found / second - 1.0).abs() < 1e-12, "{fill} {found} {second}");
+    }
+}
+
+/// A ring without a hole is a circle. A thin ring of radius R is a channel: its planar wave is that of a box of the length
+/// pi R, its circular wave that of Stokes, omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8 T^4)].
+#[test]
+fn rings_lie_between_a_circle_and_a_channel() {
+    let (circle, ring) = (Overlaps::round(0.0, 1.0, 20), Overlaps::round(1e-3, 1.0, 20));
+    for depth in [0.4, 0.7, 1.5] {
+        for (a, b) in circle.equivalent(depth).iter().zip(ring.equivalent(depth)) {
+            assert!((a - b).abs() < 1e-4 * (1.0 + a.abs()), "{depth} {a} {b}");
+        }
+    }
+    let ring = Overlaps::round(0.999, 1.0, 4);
+    let channel = Overlaps::rectangle(std::f64::consts::PI);
+    for depth in [0.3_f64, 1.0, 3.0] {
+        // psi^2 r dr has the integral 1: a wave at the wall of 1/sqrt(0.001) per a
+        let per_wave = |overlaps: &Overlaps, wave: f64| {
+            overlaps.shifts(depth).map(|shift| shift / (overlaps.amplitude * wave).powi(2))
+        };
+        let found = per_wave(&ring, 1e-3_f64.sqrt().recip());
+        let t = depth.tanh();
+        let stokes = (9.0 * t.powi(4) - 10.0 * t * t + 9.0) / (8.0 * t.powi(4));
+        for (found, known) in found.into_iter().zip([per_wave(&channel, 1.0)[0], stokes]) {
+            assert!((found - known).abs() < 5e-3 * (1.0 + known.abs()), "{depth} {found} {known}");
+        }
+    }
+}
+
+/// A sector of 180 degrees has the modes cos theta of the circle for motion along its straight wall, and a thin one of
+/// 1 degree far from the axis is a box, both along the radius and across it.
+#[test]
+fn sectors_are_half_circles_and_boxes() {
+    let pi = std::f64::consts::PI;
+    let (circle, half) = (Overlaps::round(0.0, 0.8, 20), Overlaps::sector(0.0, 0.8, pi, true, 20));
+    for depth in [0.3, 0.7, 1.5] {
+        let (a, b) = (circle.shifts(depth)[0], half.shifts(depth)[0]);
+        assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{depth} {a} {b}");
+    }
+    // 1 m along the radius and across it
+    let angle = 1e-3;
+    for across in [false, true] {
+        let sector = Overlaps::sector(999.5, 1000.5, angle, across, 12);
+        let channel = Overlaps::rectangle(1.0);
+        for depth in [0.15, 0.4, 1.0] {
+            let (a, b) = (channel.shifts(depth)[0], sector.shifts(depth)[0]);
+            assert!((a - b).abs() < 5e-3 * (1.0 + a.abs()), "{across} {depth} {a} {b}");
+        }
+    }
 }
