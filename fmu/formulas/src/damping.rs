@@ -7,7 +7,8 @@
 //!
 //! The ratio of wall shear to volume is beta_n = int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV, 1/m. The true natural
 //! frequency omega_n includes capillarity, so that zeta stays finite if g vanishes. The factor f accounts for surface
-//! film and contact line: the value of a measured shape, or [`UNMEASURED`] for any other.
+//! film and contact line: the value of a measured shape, or [`UNMEASURED`] for any other. A wall that is such a shape in
+//! part has a mean of both.
 //!
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
 //! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any
@@ -15,7 +16,7 @@
 
 use core::f64::consts::TAU;
 
-use libm::{cosh, exp, pow, sinh, sqrt, tanh};
+use libm::{cosh, exp, log, pow, sinh, sqrt, tanh};
 
 use crate::cylinder::XI;
 
@@ -83,8 +84,30 @@ pub enum Shape {
 pub struct Correlation {
     /// Damping ratio.
     pub zeta: f64,
-    /// True within the range of the measurements.
-    pub in_range: bool,
+    /// Weight of the correlation against [`UNMEASURED`] laminar layers: 1 within the range of the measurements, 0 far
+    /// outside ([`BEYOND`]), smooth between.
+    pub weight: f64,
+}
+
+/// Factor by which a viscosity number may leave its measured range until the correlation has lost its weight.
+pub const BEYOND: f64 = 2.0;
+
+/// Half angle at which the cone's correlation has lost its weight, degrees. It is measured up to 45 degrees.
+const WIDEST: f64 = 50.0;
+
+/// Depth of an upright cylinder over its radius below which Stephens' formula holds alone in [`Shape::correlation`].
+const SHALLOW: f64 = 0.4;
+
+/// Returns 0 for t <= 0, 1 for t >= 1, and a cubic with a continuous slope between.
+pub fn smooth_step(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Returns the weight of a correlation that was measured for numbers from `low` to `high`.
+fn weight(number: f64, [low, high]: [f64; 2]) -> f64 {
+    let outside = f64::max(low / number, number / high);
+    1.0 - smooth_step(log(f64::max(outside, 1.0)) / log(BEYOND))
 }
 
 impl Shape {
@@ -92,97 +115,136 @@ impl Shape {
     /// stiffness.
     ///
     /// Cylinder: Mikishev and Dorozhkin from h/R = 0.5 on. Below, where that falls under the laminar layer, Stephens,
-    /// Leonard and Perry.
+    /// Leonard and Perry. The two differ by 7 % at 0.5; from 0.4 to 0.5 one passes into the other.
     pub fn correlation(&self, nu: f64, g: f64) -> Option<Correlation> {
-        let (zeta, in_range) = match *self {
-            Shape::Cylinder { radius, depth } => (cylinder(radius, depth, nu, g), true),
-            Shape::Sphere { radius, depth } => (
-                sphere(radius, depth, nu, g),
-                (0.1..=1.9).contains(&(depth / radius))
-                    && (1e-2..=1.0).contains(&sphere_number(radius, nu, g)),
-            ),
-            Shape::Cone { radius, half_angle } => {
-                (cone(radius, half_angle, nu, g), (0.0..=45.0).contains(&half_angle))
+        let (zeta, weight) = match *self {
+            Shape::Cylinder { radius, depth } => {
+                let deep = smooth_step((depth / radius - SHALLOW) / (0.5 - SHALLOW));
+                let zeta = if deep == 0.0 || deep == 1.0 {
+                    cylinder(radius, depth, nu, g)
+                } else {
+                    (1.0 - deep) * stephens(radius, depth, nu, g)
+                        + deep * mikishev_dorozhkin(radius, depth, nu, g)
+                };
+                (zeta, 1.0)
             }
+            Shape::Sphere { radius, depth } => {
+                (sphere(radius, depth, nu, g), weight(sphere_number(radius, nu, g), [1e-2, 1.0]))
+            }
+            Shape::Cone { radius, half_angle } => (
+                cone(radius, half_angle, nu, g),
+                1.0 - smooth_step((half_angle - 45.0) / (WIDEST - 45.0)),
+            ),
             Shape::Torus { tube_radius, depth } => (
                 torus(tube_radius, depth, nu, g),
-                (0.1..=0.9).contains(&(0.5 * depth / tube_radius))
-                    && (0.1..=10.0).contains(&torus_number(tube_radius, nu, g)),
+                weight(torus_number(tube_radius, nu, g), [0.1, 10.0]),
             ),
             Shape::Other => return None,
         };
-        Some(Correlation { zeta, in_range })
+        Some(Correlation { zeta, weight })
+    }
+
+    /// Returns the shape at the nearest depth that was measured: of a sphere 0.1 to 1.9 radii, of a torus 0.1 to 0.9
+    /// of its height.
+    #[must_use]
+    pub fn at_measured_depth(self) -> Shape {
+        match self {
+            Shape::Sphere { radius, depth } => {
+                Shape::Sphere { radius, depth: depth.clamp(0.1 * radius, 1.9 * radius) }
+            }
+            Shape::Torus { tube_radius, depth } => Shape::Torus {
+                tube_radius,
+                depth: depth.clamp(0.2 * tube_radius, 1.8 * tube_radius),
+            },
+            other => other,
+        }
     }
 }
 
-/// Basis of the damping estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Basis {
-    /// The shape's correlation, within the range of its measurements.
-    Correlation,
-    /// [`UNMEASURED`] laminar layers: there is no correlation for the shape.
-    Unmeasured,
-    /// [`UNMEASURED`] laminar layers: the correlation was not measured there.
-    OutOfRange,
-    /// [`UNMEASURED`] laminar layers: the correlation is below the laminar layer, the minimum of
-    /// any wall.
-    BelowLayer,
+/// A measured shape that the wetted wall of a tank has, wholly or in part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Share of the wetted wall that is of this shape, 1 if the whole wall is.
+    pub share: f64,
+    /// Damping ratio of the shape's first mode by its correlation, over that of the laminar layer at its wall.
+    pub factor: f64,
+    /// Weight of the correlation, see [`Correlation::weight`].
+    pub weight: f64,
 }
 
-/// A damping ratio and its expected interval.
+/// Share of the wall from which the interval holds a shape's correlation wholly, and share of other walls from which
+/// it is that of a mixture.
+const COUNTS: f64 = 0.05;
+
+/// Factor below which a correlation does not count, because no wall has less than its laminar layer.
+const BELOW: f64 = 0.8;
+
+impl Part {
+    /// Returns the shape's own factor: by its correlation, from the layer itself down to [`BELOW`] passing into
+    /// [`UNMEASURED`].
+    fn own(&self) -> f64 {
+        let trusted = self.weight * smooth_step((self.factor - BELOW) / (1.0 - BELOW));
+        UNMEASURED + trusted * (self.factor.max(1.0) - UNMEASURED)
+    }
+
+    /// Returns true if correlation and [`UNMEASURED`] laminar layers differ by more than the scatter of measured tanks.
+    pub fn disagrees(&self) -> bool {
+        let (low, high) = (self.factor.min(UNMEASURED), self.factor.max(UNMEASURED));
+        high > (1.0 + SCATTER) * low
+    }
+
+    /// Returns true within the range of the measurements if the correlation is not below the laminar layer.
+    fn is_in_range(&self) -> bool {
+        self.weight == 1.0 && self.factor >= 1.0
+    }
+
+    /// Returns true if the whole wall has this shape's correlation.
+    pub fn is_measured(&self) -> bool {
+        self.share == 1.0 && self.is_in_range()
+    }
+}
+
+/// A damping ratio and its expected interval, as multiples of the laminar layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// Damping ratio.
-    pub zeta: f64,
-    /// Expected interval of the damping ratio.
+    /// f.
+    pub factor: f64,
+    /// Expected interval of the first mode's f.
     pub interval: [f64; 2],
-    /// Damping ratio of the laminar layer alone.
-    pub laminar: f64,
-    /// Estimate from the correlation of the first mode, if there is one.
-    pub correlation: Option<f64>,
-    /// Basis of the estimate.
-    pub basis: Basis,
-    /// True if correlation and [`UNMEASURED`] laminar layers differ by more than the scatter of measured tanks.
-    pub disagree: bool,
+    /// Expected interval of the other modes' f.
+    pub interval_of_others: [f64; 2],
 }
 
-/// Estimates the damping ratio of `mode` of a tank whose first mode is `first`.
+/// Estimates f of a tank whose wetted wall has these shapes in part; the rest of the wall has [`UNMEASURED`].
 ///
-/// The first mode has its shape's correlation within the range of measurements, otherwise [`UNMEASURED`] laminar
-/// layers. Each other mode has the same multiple of its own layer as the first mode. If the correlation agrees with the
-/// layers, the interval is the scatter of measured tanks around it. For other modes and other shapes it runs from the
-/// layer alone to 1.3 of the larger of both.
-pub fn estimate(shape: Shape, nu: f64, first: Mode, mode: Mode) -> Estimate {
-    let layers = UNMEASURED * first.laminar(nu);
-    let correlation = shape.correlation(nu, first.omega * first.omega / first.lambda);
-    let basis = match correlation {
-        None => Basis::Unmeasured,
-        Some(Correlation { in_range: false, .. }) => Basis::OutOfRange,
-        Some(Correlation { zeta, .. }) if zeta < first.laminar(nu) => Basis::BelowLayer,
-        Some(_) => Basis::Correlation,
+/// f is the mean over the wall: each shape's factor on its share, moved towards [`UNMEASURED`] by the weight of its
+/// correlation and where that is below the laminar layer. All modes have the same f.
+///
+/// If the whole wall is one shape and its correlation agrees with [`UNMEASURED`] layers, the first mode's interval is
+/// the scatter of measured tanks. Otherwise it runs from the layer alone to 1.3 of the largest factor of all parts. It
+/// widens from one to the other while the shape's share falls to 95 %.
+pub fn estimate(parts: &[Part]) -> Estimate {
+    let mean = |sum: f64, part: &Part| sum + part.share * (part.own() - UNMEASURED);
+    let factor = match parts {
+        [part] if part.is_measured() => part.factor,
+        _ => parts.iter().fold(UNMEASURED, mean),
     };
-    let published = correlation.map(|correlation| correlation.zeta);
-    let taken = published.filter(|_| basis == Basis::Correlation).unwrap_or(layers);
-    let (low, high) =
-        published.map_or((layers, layers), |zeta| (zeta.min(layers), zeta.max(layers)));
-    let disagree = high > (1.0 + SCATTER) * low;
-    // The same multiple of its own layer; 0/0 without viscosity.
-    let share = if mode == first { 1.0 } else { mode.laminar(nu) / first.laminar(nu) };
-    let share = if share.is_finite() { share } else { 1.0 };
-    let is_measured = basis == Basis::Correlation && !disagree && mode == first;
-    let interval = if is_measured {
-        [(1.0 - SCATTER) * taken, (1.0 + SCATTER) * taken]
-    } else {
-        [first.laminar(nu) * share, (1.0 + SCATTER) * high * share]
+    let largest = parts.iter().fold(UNMEASURED, |largest, part| {
+        let counts = f64::min(part.share / COUNTS, 1.0);
+        largest.max(UNMEASURED + counts * (part.factor - UNMEASURED))
+    });
+    let wide = [1.0, (1.0 + SCATTER) * largest];
+    let scatter = [(1.0 - SCATTER) * factor, (1.0 + SCATTER) * factor];
+    let agrees = |part: &&Part| part.is_in_range() && !part.disagrees();
+    let interval = match parts.iter().find(|part| agrees(part) && part.share > 1.0 - COUNTS) {
+        Some(part) if part.share == 1.0 => scatter,
+        Some(part) => {
+            let t = (1.0 - part.share) / COUNTS;
+            [0, 1].map(|end| scatter[end] + t * (wide[end] - scatter[end]))
+        }
+        None => wide,
     };
-    Estimate {
-        zeta: taken * share,
-        interval,
-        laminar: first.laminar(nu) * share,
-        correlation: published,
-        basis,
-        disagree,
-    }
+    Estimate { factor, interval, interval_of_others: wide }
 }
 
 /// Returns Re = nu/sqrt(g R^3).
@@ -448,44 +510,73 @@ mod tests {
         );
     }
 
-    /// Depth, angle and viscosity number, each just inside and just outside the measured range.
+    /// Within its measurements a correlation has the weight 1, from twice as far on none, and half of it at the root of
+    /// two. The depth is limited, not weighed.
     #[test]
-    fn a_correlation_says_where_it_was_measured() {
+    fn a_correlation_loses_its_weight_outside_its_measurements() {
         let (r, g) = (2.0, 9.81);
-        let in_range =
-            |shape: Shape, nu: f64| shape.correlation(nu, g).map(|found| found.in_range).unwrap();
+        let weights = |shape: Shape, unit: f64, numbers: [f64; 6]| {
+            let weight = |number: f64| shape.correlation(number * unit, g).unwrap().weight;
+            for (found, expected) in numbers.map(weight).iter().zip([0.0, 0.5, 1.0, 1.0, 0.5, 0.0])
+            {
+                assert!((found - expected).abs() < 1e-12, "{shape:?} {found} {expected}");
+            }
+        };
+        let root = sqrt(2.0);
         let sphere = |x: f64| Shape::Sphere { radius: r, depth: x * r };
-        let nu = 0.1 / sphere_number(r, 1.0, g);
-        assert_eq!(
-            [0.09, 0.11, 1.89, 1.91].map(|x| in_range(sphere(x), nu)),
-            [false, true, true, false]
-        );
-        let numbers = [0.0099, 0.0101, 0.99, 1.01].map(|b| in_range(sphere(1.0), 10.0 * b * nu));
-        assert_eq!(numbers, [false, true, true, false]);
-        let cone = |half_angle: f64| Shape::Cone { radius: r, half_angle };
-        assert_eq!([44.9, 45.1].map(|b| in_range(cone(b), nu)), [true, false]);
+        let unit = 1.0 / sphere_number(r, 1.0, g);
+        let numbers = [0.0049, 0.01 / root, 0.0101, 0.99, root, 2.01];
+        weights(sphere(1.0), unit, numbers);
+        weights(sphere(1.99), unit, numbers);
         let torus = |y: f64| Shape::Torus { tube_radius: r, depth: 2.0 * y * r };
-        let nu = 1.0 / torus_number(r, 1.0, g);
+        let unit = 1.0 / torus_number(r, 1.0, g);
+        weights(torus(0.5), unit, [0.049, 0.1 / root, 0.101, 9.9, 10.0 * root, 20.1]);
+        let cone = |half_angle: f64| Shape::Cone { radius: r, half_angle };
+        let angles = [44.9, 45.0, 47.5, 50.0, 60.0];
+        let weight = |angle| cone(angle).correlation(1e-6, g).unwrap().weight;
+        assert_eq!(angles.map(weight), [1.0, 1.0, 0.5, 0.0, 0.0]);
         assert_eq!(
-            [0.09, 0.11, 0.89, 0.91].map(|y| in_range(torus(y), nu)),
-            [false, true, true, false]
+            Shape::Cylinder { radius: r, depth: 0.01 }.correlation(1.0, g).unwrap().weight,
+            1.0
         );
-        let numbers = [0.099, 0.101, 9.9, 10.1].map(|times| in_range(torus(0.5), times * nu));
-        assert_eq!(numbers, [false, true, true, false]);
-        assert!(in_range(Shape::Cylinder { radius: r, depth: 0.01 }, 1.0));
-        assert_eq!(Shape::Other.correlation(nu, g), None);
+        assert_eq!(Shape::Other.correlation(1e-6, g), None);
+        // without viscosity nothing was measured
+        assert_eq!(sphere(1.0).correlation(0.0, g), Some(Correlation { zeta: 0.0, weight: 0.0 }));
         // the value is the shape's formula
+        let nu = unit;
         let zeta = |shape: Shape| shape.correlation(nu, g).unwrap().zeta;
         assert_eq!(zeta(sphere(0.7)), super::sphere(r, 0.7 * r, nu, g));
         assert_eq!(zeta(cone(20.0)), super::cone(r, 20.0, nu, g));
         assert_eq!(zeta(torus(0.3)), super::torus(r, 0.6 * r, nu, g));
-        assert_eq!(zeta(Shape::Cylinder { radius: r, depth: r }), cylinder(r, r, nu, g));
+        for (x, deep) in [(0.3, 0.0), (0.45, 0.5), (0.5, 1.0), (1.0, 1.0)] {
+            let both = [stephens(r, x * r, nu, g), mikishev_dorozhkin(r, x * r, nu, g)];
+            let expected = (1.0 - deep) * both[0] + deep * both[1];
+            let found = zeta(Shape::Cylinder { radius: r, depth: x * r });
+            assert!((found / expected - 1.0).abs() < 1e-12, "{x} {found} {expected}");
+        }
     }
 
-    /// Returns a mode with the damping ratio `zeta` of its layer alone and the length of a half
-    /// full sphere of 1 m.
-    fn with_layer(zeta: f64, nu: f64, omega: f64) -> Mode {
-        Mode { beta: zeta / sqrt(nu / (8.0 * omega)), lambda: 1.56, omega }
+    #[test]
+    fn a_depth_outside_the_measurements_becomes_the_nearest_inside() {
+        let sphere = |x: f64| Shape::Sphere { radius: 2.0, depth: 2.0 * x };
+        let torus = |y: f64| Shape::Torus { tube_radius: 2.0, depth: 4.0 * y };
+        for (shape, nearest) in [
+            (sphere(0.05), sphere(0.1)),
+            (sphere(1.0), sphere(1.0)),
+            (sphere(1.95), sphere(1.9)),
+            (torus(0.01), torus(0.1)),
+            (torus(0.95), torus(0.9)),
+            (
+                Shape::Cone { radius: 1.0, half_angle: 80.0 },
+                Shape::Cone { radius: 1.0, half_angle: 80.0 },
+            ),
+        ] {
+            assert_eq!(shape.at_measured_depth(), nearest);
+        }
+    }
+
+    fn part(share: f64, factor: f64, weight: f64) -> Part {
+        Part { share, factor, weight }
     }
 
     fn is_near(found: [f64; 3], expected: [f64; 3]) {
@@ -494,89 +585,64 @@ mod tests {
         }
     }
 
-    fn numbers(estimate: Estimate) -> [f64; 3] {
-        [estimate.zeta, estimate.interval[0], estimate.interval[1]]
+    /// f of the first mode and its interval.
+    fn numbers(parts: &[Part]) -> [f64; 3] {
+        let Estimate { factor, interval: [low, high], interval_of_others } = estimate(parts);
+        // those of the other modes reach from the layer on
+        assert_eq!(interval_of_others[0], 1.0);
+        assert!(interval_of_others[1] >= high);
+        [factor, low, high]
     }
 
-    /// The first mode of a measured shape has the correlation and its scatter; the second has the same multiple of its
-    /// own layer.
+    /// Measured everywhere: the correlation, with the scatter if it agrees with 1.45 layers, otherwise from the layer to
+    /// 1.3 of the larger of both.
     #[test]
-    fn a_measured_shape_has_its_correlation_and_other_modes_as_many_layers() {
-        let (nu, shape) = (1e-6, Shape::Cylinder { radius: 1.0, depth: 1.0 });
-        let [first, second] = [0, 1].map(|n| Mode::of_cylinder(n, 1.0, 1.0, 9.81));
-        let correlation = cylinder(1.0, 1.0, nu, 9.81);
-        let found = estimate(shape, nu, first, first);
-        assert_eq!((found.basis, found.disagree), (Basis::Correlation, false));
-        is_near(numbers(found), [correlation, 0.7 * correlation, 1.3 * correlation]);
-        assert_eq!(found.laminar, first.laminar(nu));
-        let layers = second.laminar(nu) / first.laminar(nu);
-        let found = estimate(shape, nu, first, second);
-        // the larger of layers and correlation: 1.45 layers of the first mode, or 1.39
-        let high = correlation.max(1.45 * first.laminar(nu));
-        is_near(numbers(found), [correlation * layers, second.laminar(nu), 1.3 * high * layers]);
-        assert!((found.laminar / second.laminar(nu) - 1.0).abs() < 1e-14);
-        // without viscosity no mode has damping
-        assert_eq!(numbers(estimate(shape, 0.0, first, second)), [0.0; 3]);
+    fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
+        for (factor, low, high) in [
+            (1.0, 1.0, 1.3 * 1.45),
+            (1.11, 1.0, 1.3 * 1.45),
+            (1.12, 0.7 * 1.12, 1.3 * 1.12),
+            (1.88, 0.7 * 1.88, 1.3 * 1.88),
+            (1.89, 1.0, 1.3 * 1.89),
+            (22.0, 1.0, 1.3 * 22.0),
+        ] {
+            is_near(numbers(&[part(1.0, factor, 1.0)]), [factor, low, high]);
+            assert_eq!(part(1.0, factor, 1.0).disagrees(), low == 1.0);
+        }
+        let [low, high] = estimate(&[part(1.0, 1.5, 1.0)]).interval_of_others;
+        is_near([low, high, 1.0], [1.0, 1.95, 1.0]);
     }
 
-    /// The correlation uses the specific force with the same frequency, omega^2/lambda, which includes capillarity.
-    #[test]
-    fn a_correlation_holds_at_the_force_that_makes_the_frequency() {
-        let shape = Shape::Cylinder { radius: 1.0, depth: 1.0 };
-        let first = Mode { omega: 3.0, ..Mode::of_cylinder(0, 1.0, 1.0, 9.81) };
-        let correlation = cylinder(1.0, 1.0, 1e-6, 9.0 / first.lambda);
-        assert_eq!(estimate(shape, 1e-6, first, first).correlation, Some(correlation));
-    }
-
-    /// Without a correlation, outside its measurements, and if it is below the layer, the estimate is 1.45 layers, up
-    /// to 1.3 of the larger of both.
+    /// Without a measured shape 1.45 layers; outside its measurements, and if it is far below the layer, the same, but
+    /// the interval holds the correlation.
     #[test]
     fn what_was_not_measured_has_1_45_layers() {
-        let (nu, omega) = (1e-6, 4.0);
-        let mode = with_layer(1e-3, nu, omega);
-        let other = estimate(Shape::Other, nu, mode, mode);
-        assert_eq!((other.basis, other.correlation), (Basis::Unmeasured, None));
-        is_near(numbers(other), [1.45e-3, 1e-3, 1.3 * 1.45e-3]);
-        assert!(!other.disagree);
-        let g = omega * omega / mode.lambda;
-        // too little viscosity for the measured spheres
-        let shape = Shape::Sphere { radius: 1.0, depth: 1.0 };
-        let zeta = sphere(1.0, 1.0, nu, g);
-        for (layer, high, disagree) in [(zeta / 3.0, zeta, true), (zeta, 1.45 * zeta, true)] {
-            let mode = with_layer(layer, nu, omega);
-            let found = estimate(shape, nu, mode, mode);
-            assert_eq!((found.basis, found.disagree), (Basis::OutOfRange, disagree));
-            is_near(numbers(found), [1.45 * layer, layer, 1.3 * high]);
-        }
-        // measured, but below the minimum of one layer
-        let nu = 0.1 / sphere_number(1.0, 1.0, g);
-        let zeta = sphere(1.0, 1.0, nu, g);
-        for (share, basis) in [(1.01, Basis::BelowLayer), (0.99, Basis::Correlation)] {
-            let mode = with_layer(share * zeta, nu, omega);
-            let found = estimate(shape, nu, mode, mode);
-            assert_eq!(found.basis, basis);
-            let taken = if share > 1.0 { 1.45 * share * zeta } else { zeta };
-            is_near(numbers(found), [taken, share * zeta, 1.3 * 1.45 * share * zeta]);
-        }
+        is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);
+        is_near(numbers(&[part(1.0, 3.0, 0.0)]), [1.45, 1.0, 3.9]);
+        is_near(numbers(&[part(1.0, 0.8, 1.0)]), [1.45, 1.0, 1.3 * 1.45]);
+        // half-way from 1 to 0.8
+        is_near(numbers(&[part(1.0, 0.9, 1.0)]), [1.225, 1.0, 1.3 * 1.45]);
+        is_near(numbers(&[part(1.0, 3.45, 0.25)]), [1.95, 1.0, 1.3 * 3.45]);
     }
 
-    /// The test covers differences above 30 % in both directions.
+    /// A third of the wall has 4 layers, a half 1.15, the rest 1.45. The interval holds the largest of them.
     #[test]
-    fn two_estimates_disagree_by_more_than_the_scatter() {
-        let (nu, omega) = (1e-6, 4.0);
-        let g = omega * omega / 1.56;
-        let nu = nu * 0.1 / sphere_number(1.0, nu, g);
-        let shape = Shape::Sphere { radius: 1.0, depth: 1.0 };
-        let zeta = sphere(1.0, 1.0, nu, g);
-        for (ratio, disagree) in
-            [(1.29, false), (1.31, true), (1.0 / 1.29, false), (1.0 / 1.31, true)]
-        {
-            let mode = with_layer(zeta / (1.45 * ratio), nu, omega);
-            let found = estimate(shape, nu, mode, mode);
-            assert_eq!((found.basis, found.disagree), (Basis::Correlation, disagree), "{ratio}");
-            let low = if disagree { mode.laminar(nu) } else { 0.7 * zeta };
-            let high = if disagree { 1.3 * zeta.max(1.45 * mode.laminar(nu)) } else { 1.3 * zeta };
-            is_near(numbers(found), [zeta, low, high]);
+    fn a_wall_of_several_shapes_has_their_mean() {
+        let parts = [part(1.0 / 3.0, 4.0, 1.0), part(0.5, 1.15, 1.0)];
+        is_near(numbers(&parts), [4.0 / 3.0 + 0.5 * 1.15 + 1.45 / 6.0, 1.0, 5.2]);
+        // a share below 5 % moves the end of the interval in proportion
+        is_near(numbers(&[part(0.01, 4.0, 1.0)]), [1.4755, 1.0, 1.3 * (1.45 + 0.2 * 2.55)]);
+        // and nothing jumps where a shape becomes the whole wall, whether it agrees with 1.45 layers or not
+        for factor in [1.0, 1.3, 1.7, 4.0] {
+            let [nearly, wholly] =
+                [1.0 - 1e-9, 1.0].map(|share| numbers(&[part(share, factor, 1.0)]));
+            for (a, b) in nearly.into_iter().zip(wholly) {
+                assert!((a / b - 1.0).abs() < 1e-7, "{nearly:?} {wholly:?}");
+            }
         }
+        // half-way to the mixture: between 0.7 and 1, 1.3 of 1.3 and of 1.45
+        let factor = 1.45 - 0.975 * 0.15;
+        let found = numbers(&[part(0.975, 1.3, 1.0)]);
+        is_near(found, [factor, 0.5 * (0.7 * factor + 1.0), 0.5 * 1.3 * (factor + 1.45)]);
     }
 }

@@ -7,20 +7,24 @@
 
 use core::f64::consts::PI;
 
-use formulas::damping::{self as formula, Basis};
+use formulas::damping as formula;
 
 use crate::contour::Problems;
-use crate::modal::{Damping, ModalData, Mode, ModeDamping};
+use crate::modal::{Damping, DampingPart, ModalData, Mode, ModeDamping};
 use crate::shape::{self, Recognised};
 use crate::table::significant;
 use crate::tank::{Geometry, Shape, Tank};
+
+/// Advice on the ends of an interval.
+const ENDS: &str = "use the low end for stability margins, check both ends for settling times";
 
 /// Computes the damping of a tank solved as `data`, for a liquid of kinematic viscosity `nu`, m2/s, at the specific
 /// force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a box; empty for none.
 /// `sigma`, N/m, if known, is used for low Bond numbers.
 ///
 /// A contour that is a sphere, an upright cylinder, a cone or a torus, to 1e-6 of its size over the wetted part, has
-/// the damping of that shape.
+/// the damping of that shape. If only a part of the wall is such a shape, the factor over the laminar layer is a mean by
+/// area. So the ratio is continuous in the fill and in the shape of the tank.
 ///
 /// # Errors
 /// Without gravity and centring stiffness there is no natural frequency.
@@ -39,7 +43,7 @@ pub fn of_tank(
         core::mem::discriminant(given) == core::mem::discriminant(&found.shape)
     };
     let drawn = recognised.filter(|found| !is_given(found));
-    let canonical = drawn.and_then(|found| solve_shape(tank, &found, data));
+    let canonical = drawn.and_then(|found| solve_shape(found, data.modes.len()));
     let modes = canonical.as_ref().map_or(&data.modes, |canonical| &canonical.modes);
     let measured = recognised.map_or(formula::Shape::Other, |found| found.measured());
     let seen = |modes: &[Mode], springs: &[f64]| -> Vec<formula::Mode> {
@@ -60,19 +64,40 @@ pub fn of_tank(
             .to_string()
             .into());
     }
-    let mut warnings = Vec::new();
-    let estimate = formula::estimate(measured, nu, first, first);
     let effective = first.omega * first.omega / first.lambda;
-    warnings
-        .extend(outside(measured, nu, effective).into_iter().map(|why| format!("damping: {why}")));
+    let found = match (recognised, &data.wall) {
+        (Some(found), _) => Vec::from_iter(Nearest::whole(found, first, nu)),
+        (None, Some(wall)) => {
+            let parts = shape::parts(wall, data.fill).into_iter();
+            // Of a cone too wide for its correlation the factor has no meaning.
+            let counts = |part: &shape::Part| match part.found.measured() {
+                cone @ formula::Shape::Cone { .. } => {
+                    cone.correlation(nu, effective).is_some_and(|found| found.weight > 0.0)
+                }
+                _ => true,
+            };
+            let solve = |part: shape::Part| Nearest::solve(part.found, part.share, nu, effective);
+            parts.filter(counts).filter_map(solve).collect()
+        }
+        (None, None) => Vec::new(),
+    };
+    let parts: Vec<formula::Part> = found.iter().map(|nearest| nearest.part).collect();
+    let estimate = formula::estimate(&parts);
+    let correlation = measured.correlation(nu, effective).map(|correlation| correlation.zeta);
+    // The correlation itself, not its quotient by the layer times the layer.
+    let exact = correlation.filter(|_| found.iter().all(Nearest::is_measured));
+    let mut warnings: Vec<String> =
+        outside(measured, nu, effective).into_iter().map(|why| format!("damping: {why}")).collect();
     let layer = (2.0 * nu / first.omega).sqrt();
     if layer >= 0.1 / first.lambda {
         warnings.push(format!("damping: the layer of {layer:.3e} m is not thin against the wave"));
     }
     let mut all = |modes: &[formula::Mode]| -> Vec<ModeDamping> {
         let of_mode = |(n, mode): (usize, &formula::Mode)| {
-            let found = formula::estimate(measured, nu, modes[0], *mode);
-            let mut interval = found.interval;
+            let laminar = mode.laminar(nu);
+            let zeta = exact.filter(|_| n == 0).unwrap_or(estimate.factor * laminar);
+            let expected = if n == 0 { estimate.interval } else { estimate.interval_of_others };
+            let mut interval = expected.map(|factor| factor * laminar);
             if let (0, formula::Shape::Cylinder { radius, .. }, Some(sigma)) = (n, measured, sigma)
             {
                 let bond = data.rho * gravity * radius * radius / sigma;
@@ -86,56 +111,169 @@ pub fn of_tank(
                     ));
                 }
             }
-            ModeDamping { omega: mode.omega, zeta: found.zeta, interval, laminar: found.laminar }
+            ModeDamping { omega: mode.omega, zeta, interval, laminar }
         };
         modes.iter().enumerate().map(of_mode).collect()
     };
     let modes = all(&along_x);
     let modes_y =
         data.axes.as_ref().map_or(Vec::new(), |axes| all(&seen(&axes.y.modes, springs[1])));
-    let (layers, correlation) = (formula::UNMEASURED * estimate.laminar, estimate.correlation);
-    let other = correlation.map_or(String::new(), |zeta| {
-        let other = if estimate.basis == Basis::Correlation {
-            format!("{} laminar layers make {}", formula::UNMEASURED, significant(layers))
-        } else {
-            format!("its correlation makes {}", significant(zeta))
+    let (basis, parts) = match (&found[..], correlation) {
+        ([whole], Some(zeta)) => {
+            let layers = formula::UNMEASURED * first.laminar(nu);
+            (whole.basis(estimate.factor, zeta, layers), Vec::new())
+        }
+        _ => (mixture(&found, estimate.factor), found.iter().map(Nearest::shown).collect()),
+    };
+    let taken = format!("{basis}; {ENDS}");
+    Ok(Damping {
+        nu,
+        gravity,
+        shape: name_of(measured),
+        correlation,
+        parts,
+        taken,
+        modes,
+        modes_y,
+        warnings,
+    })
+}
+
+/// A measured shape that the wetted wall is, wholly or in part.
+struct Nearest {
+    /// The shape at the nearest depth that was measured.
+    shape: formula::Shape,
+    /// False if the depth was not measured.
+    at_depth: bool,
+    part: formula::Part,
+}
+
+impl Nearest {
+    /// Creates the shape of the whole wall of a tank whose first mode is `first`.
+    fn whole(found: Recognised, first: formula::Mode, nu: f64) -> Option<Nearest> {
+        let (shape, g) = (found.measured(), first.omega * first.omega / first.lambda);
+        if shape != shape.at_measured_depth() {
+            return Nearest::solve(found, 1.0, nu, g);
+        }
+        Nearest::new(shape, 1.0, nu, g, first.laminar(nu))
+    }
+
+    /// Creates the shape of a share of the wall, at the specific force `g`, by solving for the shape's own layer.
+    fn solve(found: Recognised, share: f64, nu: f64, g: f64) -> Option<Nearest> {
+        let shape = found.measured().at_measured_depth();
+        let fill = match shape {
+            formula::Shape::Sphere { depth, .. } | formula::Shape::Torus { depth, .. } => depth,
+            _ => found.fill,
         };
-        let disagree = if estimate.disagree {
+        let own = solve_shape(Recognised { fill, ..found }, 1)?;
+        let Mode { beta, lambda, .. } = *own.modes.first()?;
+        let layer = formula::laminar(beta, nu, (g * lambda).sqrt());
+        let nearest = Nearest::new(shape, share, nu, g, layer)?;
+        Some(Nearest { at_depth: shape == found.measured(), ..nearest })
+    }
+
+    fn new(shape: formula::Shape, share: f64, nu: f64, g: f64, layer: f64) -> Option<Nearest> {
+        let correlation = shape.correlation(nu, g)?;
+        // 0/0 without viscosity
+        let factor = if layer > 0.0 { correlation.zeta / layer } else { formula::UNMEASURED };
+        let part = formula::Part { share, factor, weight: correlation.weight };
+        Some(Nearest { shape, at_depth: true, part })
+    }
+
+    /// Returns true if the wall is this shape, within the range of its measurements.
+    fn is_measured(&self) -> bool {
+        self.at_depth && self.part.is_measured()
+    }
+
+    fn shown(&self) -> DampingPart {
+        let formula::Part { share, factor, .. } = self.part;
+        DampingPart { shape: name_of(self.shape), share, factor }
+    }
+
+    /// Returns the basis of the damping of a wall that is this shape, with the ratios by its correlation and by 1.45
+    /// layers.
+    fn basis(&self, factor: f64, correlation: f64, layers: f64) -> String {
+        let (name, unmeasured) = (name_of(self.shape), formula::UNMEASURED);
+        let formula::Part { weight, .. } = self.part;
+        let disagree = if self.part.disagrees() {
             ", more than measured tanks scatter: two estimates disagree"
         } else {
             ""
         };
-        format!("; {other}{disagree}")
-    });
-    let name = name_of(measured);
-    let taken = match estimate.basis {
-        Basis::Correlation => format!("{}, measured there{other}", source_of(measured)),
-        Basis::Unmeasured => format!(
-            "{} laminar layers, as in measured cylinders: no measurements of this shape",
-            formula::UNMEASURED
-        ),
-        Basis::OutOfRange => format!(
-            "{} laminar layers, as in measured cylinders: the correlation of the {name} was not measured there{other}",
-            formula::UNMEASURED
-        ),
-        Basis::BelowLayer => format!(
-            "{} laminar layers, as in measured cylinders: the correlation of the {name} is below the laminar layer \
-             there{other}",
-            formula::UNMEASURED
-        ),
-    };
-    Ok(Damping { nu, gravity, shape: name, correlation, taken, modes, modes_y, warnings })
+        let by_correlation =
+            format!("its correlation makes {}{disagree}", significant(correlation));
+        if weight == 0.0 {
+            return format!(
+                "{unmeasured} laminar layers, as in measured cylinders: the correlation of the {name} was not measured \
+                 there; {by_correlation}"
+            );
+        }
+        if weight < 1.0 {
+            return format!(
+                "{factor:.2} laminar layers, between {unmeasured} of measured cylinders and the correlation of the {name}, \
+                 which was not measured there; {by_correlation}"
+            );
+        }
+        if self.part.factor < 1.0 {
+            return format!(
+                "{factor:.2} laminar layers, as in measured cylinders where the correlation of the {name} is far below the \
+                 laminar layer; {by_correlation}"
+            );
+        }
+        if !self.at_depth {
+            return format!(
+                "{factor:.2} laminar layers, as the {name} has at the nearest depth that was measured; {unmeasured} make \
+                 {}{disagree}",
+                significant(layers)
+            );
+        }
+        format!(
+            "{}, measured there; {unmeasured} laminar layers make {}{disagree}",
+            source_of(self.shape),
+            significant(layers)
+        )
+    }
 }
 
-/// Solves for the shape's own modes at its fill, as many as `data` has.
-fn solve_shape(tank: &Tank, found: &Recognised, data: &ModalData) -> Option<ModalData> {
+/// Returns the basis of the damping of a wall that is no measured shape, or is one in part.
+fn mixture(found: &[Nearest], factor: f64) -> String {
+    let unmeasured = formula::UNMEASURED;
+    if found.is_empty() {
+        return format!(
+            "{unmeasured} laminar layers, as in measured cylinders: no measurements of this shape"
+        );
+    }
+    let of_shape = |nearest: &Nearest| {
+        let formula::Part { share, factor, weight } = nearest.part;
+        let range = if weight < 1.0 { ", beyond its measured range" } else { "" };
+        format!(
+            "{:.0} % of the wetted wall is a {}, whose correlation makes {factor:.2} layers{range}",
+            100.0 * share,
+            name_of(nearest.shape)
+        )
+    };
+    let shapes: Vec<String> = found.iter().map(of_shape).collect();
+    let disagree = if found.iter().any(|nearest| nearest.part.disagrees()) {
+        "; the estimates disagree by more than measured tanks scatter"
+    } else {
+        ""
+    };
+    format!(
+        "{factor:.2} laminar layers: {}; other walls have {unmeasured}, as measured cylinders{disagree}",
+        shapes.join("; ")
+    )
+}
+
+/// Solves for a shape's own modes at its fill.
+fn solve_shape(found: Recognised, modes: usize) -> Option<ModalData> {
     let whole = match found.shape {
         // The cone is open above the fill.
         Shape::Cone { half_angle, height } => Shape::Cone { half_angle, height: 1.5 * height },
         Shape::Cylinder { radius, height } => Shape::Cylinder { radius, height: 1.5 * height },
         shape => shape,
     };
-    Tank::of_shape(whole, tank.density).ok()?.solve(found.fill, data.modes.len()).ok()
+    // The density does not matter for damping.
+    Tank::of_shape(whole, 1.0).ok()?.solve(found.fill, modes).ok()
 }
 
 fn name_of(shape: formula::Shape) -> &'static str {

@@ -147,6 +147,9 @@ pub struct Damping {
     /// Damping of the first mode from the shape's correlation, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
+    /// Measured shapes of parts of the wetted wall, if the whole wall is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<DampingPart>,
     /// Basis of the first mode's damping, with the reason.
     pub taken: String,
     /// The modes, in the order of their frequency. Of a box, those along its first length.
@@ -156,6 +159,17 @@ pub struct Damping {
     pub modes_y: Vec<ModeDamping>,
     /// Formulas used outside their range, one sentence each.
     pub warnings: Vec<String>,
+}
+
+/// A measured shape of a part of the wetted wall.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DampingPart {
+    /// Name of the shape.
+    pub shape: &'static str,
+    /// Share of the area of the wetted wall.
+    pub share: f64,
+    /// Damping ratio by the shape's correlation over that of the laminar layer at its wall.
+    pub factor: f64,
 }
 
 /// Natural frequencies with surface tension.

@@ -1,10 +1,12 @@
-//! Recognises the shape of the wetted contour, so that the damping of a tank does not depend on how
-//! it is drawn.
+//! Recognises the shapes of the wetted contour, so that the damping of a tank does not depend on how it is drawn.
+//!
+//! [`recognise`] finds a wall that is one shape, [`parts`] the shapes of its lower parts. A capsule is a sphere up to the
+//! end of its lower dome.
 
-use formulas::damping;
+use formulas::damping::{self, smooth_step};
 
 use crate::contour::Wall;
-use crate::curve::{Point, norm, sub};
+use crate::curve::{Point, Segment, norm, sub};
 use crate::tank::Shape;
 
 /// Largest distance of the wetted wall from a shape, over its size.
@@ -42,42 +44,227 @@ impl Recognised {
 /// Recognises a wetted wall as a sphere, upright cylinder, cone or torus. `fill` is the height of
 /// the free surface above the lowest point, m.
 pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
-    let points: Vec<Point> = wall
-        .segments
-        .iter()
-        .flat_map(|part| (0..=PLACES).map(|i| part.at(i as f64 / PLACES as f64)))
-        .collect();
-    let (first, last) = (*points.first()?, *points.last()?);
-    let (bottom, radius) = (last[1] - fill, last[0]);
-    let size = fill.max(radius);
-    let fits =
-        |distance: &dyn Fn(Point) -> f64| points.iter().all(|p| distance(*p).abs() <= SAME * size);
-    let closed = first[0] <= SAME * size && (first[1] - bottom).abs() <= SAME * size;
-    if closed {
-        // The bottom or the wall, whichever is nearer.
-        if fits(&|p| f64::min((p[1] - bottom).abs(), (p[0] - radius).abs())) {
-            return Some(Recognised { shape: Shape::Cylinder { radius, height: fill }, fill });
-        }
-        let slope = radius / fill;
-        if fits(&|p| (p[0] - slope * (p[1] - bottom)) / slope.hypot(1.0)) {
-            let half_angle = slope.atan().to_degrees();
-            return Some(Recognised { shape: Shape::Cone { half_angle, height: fill }, fill });
-        }
-        // The circle about the axis through bottom and contact line.
-        let sphere = (radius * radius + fill * fill) / (2.0 * fill);
-        if fits(&|p| norm([p[0], p[1] - bottom - sphere]) - sphere) {
-            return Some(Recognised { shape: Shape::Sphere { radius: sphere }, fill });
-        }
-        return None;
-    }
-    // The circle through both contact lines, which are level, and the lowest point.
-    let tube = {
-        let half = 0.5 * (last[0] - first[0]);
-        (half * half + fill * fill) / (2.0 * fill)
-    };
-    let center = [0.5 * (first[0] + last[0]), bottom + tube];
-    (center[0] > tube && fits(&|p| norm(sub(p, center)) - tube)).then_some(Recognised {
-        shape: Shape::Torus { ring_radius: center[0], tube_radius: tube },
-        fill,
+    let points = sampled(wall, PLACES);
+    let cut = Cut::whole(&points, fill)?;
+    KINDS.into_iter().find_map(|kind| {
+        let shape = kind.through(cut)?;
+        let fits = |p: &Point| distance(&shape, *p, cut.bottom) <= SAME * cut.size();
+        points.iter().all(fits).then_some(Recognised { shape, fill })
     })
+}
+
+/// A measured shape of a part of the wetted wall, up from the lowest point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Part {
+    /// The shape, with the depth of liquid up to which the wall is of this shape.
+    pub found: Recognised,
+    /// Share of the area of the wetted wall.
+    pub share: f64,
+}
+
+/// Returns the measured shapes of which a wetted wall is in part. `fill` is the height of the free surface above the
+/// lowest point, m.
+///
+/// The wall up to some height is compared with the sphere, cylinder, cone or torus through its lowest point and the
+/// contact line that it would have there. It counts as this shape within 1e-6 of its size, and not at all from [`FAR`]
+/// on. A smooth step between makes the result continuous in the fill and in the shape of the tank.
+pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
+    let places = (SAMPLES / wall.segments.len()).clamp(2, PLACES);
+    let points = sampled(wall, places);
+    let mut found: Vec<Part> =
+        KINDS.into_iter().filter_map(|kind| kind.part(&points, fill)).collect();
+    // Shallow walls are several shapes in part. The odds of each share are those of this shape alone, so that a share
+    // of 1 leaves nothing to the others.
+    let beyond = |skip: usize| -> f64 {
+        found
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| *i != skip)
+            .map(|(_, part)| 1.0 - part.share)
+            .product()
+    };
+    let weights: Vec<f64> =
+        found.iter().enumerate().map(|(i, part)| part.share * beyond(i)).collect();
+    let sum = weights.iter().sum::<f64>() + beyond(found.len());
+    for (part, weight) in found.iter_mut().zip(weights) {
+        part.share = weight / sum;
+    }
+    found
+}
+
+/// Distance of the wall from a shape, over its size, from which the wall does not count as this shape.
+const FAR: f64 = 0.01;
+
+/// Share of the wall below which a shape does not count.
+const LEAST: f64 = 0.02;
+
+/// Number of samples of the whole wall for [`parts`].
+const SAMPLES: usize = 256;
+
+/// Returns `places` + 1 points on each segment.
+fn sampled(wall: &Wall, places: usize) -> Vec<Point> {
+    let on = |part: &Segment| -> Vec<Point> {
+        (0..=places).map(|i| part.at(i as f64 / places as f64)).collect()
+    };
+    wall.segments.iter().flat_map(on).collect()
+}
+
+/// The lower part of a wall, below a level.
+#[derive(Clone, Copy)]
+struct Cut {
+    /// Radius of the inner contact line, m; `None` if the wall begins on the axis.
+    inner: Option<f64>,
+    /// Radius of the outer contact line, m.
+    outer: f64,
+    /// Height of the lowest point, m, from the contour's own zero.
+    bottom: f64,
+    /// Depth at the level, m.
+    depth: f64,
+}
+
+impl Cut {
+    fn whole(points: &[Point], fill: f64) -> Option<Cut> {
+        let (first, last) = (*points.first()?, *points.last()?);
+        let on_axis = first[0] <= SAME * fill.max(last[0]);
+        let inner = (!on_axis).then_some(first[0]);
+        Some(Cut { inner, outer: last[0], bottom: last[1] - fill, depth: fill })
+    }
+
+    fn size(&self) -> f64 {
+        self.depth.max(self.outer)
+    }
+}
+
+/// Kinds of measured shapes, in the order in which [`recognise`] tries them.
+const KINDS: [Kind; 4] = [Kind::Cylinder, Kind::Cone, Kind::Sphere, Kind::Torus];
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Cylinder,
+    Cone,
+    Sphere,
+    Torus,
+}
+
+impl Kind {
+    /// Returns the shape through the lowest point and the contact lines.
+    fn through(self, cut: Cut) -> Option<Shape> {
+        let Cut { outer, depth, .. } = cut;
+        match (self, cut.inner) {
+            (Kind::Cylinder, None) => Some(Shape::Cylinder { radius: outer, height: depth }),
+            (Kind::Cone, None) => {
+                Some(Shape::Cone { half_angle: (outer / depth).atan().to_degrees(), height: depth })
+            }
+            (Kind::Sphere, None) => {
+                Some(Shape::Sphere { radius: (outer * outer + depth * depth) / (2.0 * depth) })
+            }
+            // The circle through both contact lines, which are level, and the lowest point.
+            (Kind::Torus, Some(inner)) => {
+                let half = 0.5 * (outer - inner);
+                let tube_radius = (half * half + depth * depth) / (2.0 * depth);
+                let ring_radius = 0.5 * (inner + outer);
+                (ring_radius > tube_radius).then_some(Shape::Torus { ring_radius, tube_radius })
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the part of the wall that is of this kind, without regard to other kinds; `None` below [`LEAST`].
+    fn part(self, points: &[Point], fill: f64) -> Option<Part> {
+        let whole = Cut::whole(points, fill)?;
+        let lowest =
+            (0..points.len()).rev().min_by(|a, b| points[*a][1].total_cmp(&points[*b][1]))?;
+        let bands: Vec<f64> =
+            points.windows(2).map(|p| (p[0][0] + p[1][0]) * norm(sub(p[1], p[0]))).collect();
+        let area: f64 = bands.iter().sum();
+        // Levels from the free surface down to the lowest point: weight of the wall below, its share, shape and depth.
+        let (mut weight, mut sums) = (0.0_f64, [0.0; 4]);
+        let mut above: Option<[f64; 4]> = None;
+        for level in (lowest + 1..points.len()).rev() {
+            let [outer, z] = points[level];
+            let start = points[..lowest].iter().rposition(|p| p[1] > z).map_or(0, |i| i + 1);
+            let inner = whole.inner.map(|first| match start {
+                0 => first,
+                _ => crossing(points[start - 1], points[start], z),
+            });
+            let cut = Cut { inner, outer, bottom: whole.bottom, depth: z - whole.bottom };
+            if cut.depth <= SAME * whole.size() {
+                break;
+            }
+            let Some(shape) = self.through(cut) else { continue };
+            let (limit, mut farthest) = (FAR * cut.size(), 0.0_f64);
+            for p in &points[start..=level] {
+                farthest = farthest.max(distance(&shape, *p, cut.bottom));
+                if farthest >= limit {
+                    break;
+                }
+            }
+            let here = 1.0 - smooth_step((farthest / cut.size() - SAME) / (FAR - SAME));
+            let share = bands[start..level].iter().sum::<f64>() / area;
+            let share = if level + 1 == points.len() { 1.0 } else { share };
+            let [size, ring] = dimensions(&shape);
+            let values = [share, share * size, share * ring, share * cut.depth];
+            // A lower part counts at least as much as the wall that it is a part of.
+            if here > weight {
+                let from = above.unwrap_or(values);
+                for ((sum, a), b) in sums.iter_mut().zip(from).zip(values) {
+                    *sum += (here - weight) * 0.5 * (a + b);
+                }
+                weight = here;
+            }
+            if weight == 1.0 {
+                break;
+            }
+            above = Some(values);
+        }
+        let [share, size, ring, depth] = sums;
+        if share <= LEAST {
+            return None;
+        }
+        let shape = self.with(size / share, ring / share, depth / share);
+        let found = Recognised { shape, fill: depth / share };
+        Some(Part { found, share: (share - LEAST) / (1.0 - LEAST) })
+    }
+
+    fn with(self, size: f64, ring: f64, depth: f64) -> Shape {
+        match self {
+            Kind::Cylinder => Shape::Cylinder { radius: size, height: depth },
+            Kind::Cone => Shape::Cone { half_angle: size, height: depth },
+            Kind::Sphere => Shape::Sphere { radius: size },
+            Kind::Torus => Shape::Torus { ring_radius: ring, tube_radius: size },
+        }
+    }
+}
+
+/// Returns the dimensions of a shape other than its height: radius or half angle, and the radius of a ring.
+fn dimensions(shape: &Shape) -> [f64; 2] {
+    match *shape {
+        Shape::Cylinder { radius, .. } | Shape::Sphere { radius } => [radius, 0.0],
+        Shape::Cone { half_angle, .. } => [half_angle, 0.0],
+        Shape::Torus { ring_radius, tube_radius } => [tube_radius, ring_radius],
+        _ => [0.0; 2],
+    }
+}
+
+/// Returns the radius at which the line between two points has the height z.
+fn crossing(a: Point, b: Point, z: f64) -> f64 {
+    a[0] + (z - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+}
+
+/// Returns the distance of a point from a measured shape whose lowest point is at the height `bottom`.
+fn distance(shape: &Shape, [r, z]: Point, bottom: f64) -> f64 {
+    let z = z - bottom;
+    match *shape {
+        // The bottom or the wall, whichever is nearer.
+        Shape::Cylinder { radius, .. } => f64::min(z.abs(), (r - radius).abs()),
+        Shape::Cone { half_angle, .. } => {
+            let (sin, cos) = half_angle.to_radians().sin_cos();
+            (r * cos - z * sin).abs()
+        }
+        Shape::Sphere { radius } => (norm([r, z - radius]) - radius).abs(),
+        Shape::Torus { ring_radius, tube_radius } => {
+            (norm([r - ring_radius, z - tube_radius]) - tube_radius).abs()
+        }
+        _ => f64::INFINITY,
+    }
 }

@@ -1,6 +1,7 @@
 //! Tests of the tank's modal parameters, in one binary.
 
 mod common;
+mod continuity;
 mod dimensions;
 mod files;
 mod formulas;

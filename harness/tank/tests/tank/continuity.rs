@@ -1,0 +1,212 @@
+//! Damping over the fill and over the shape of a tank: no steps, and one rule on both sides of each transition.
+
+use crate::common::tank;
+use hubslosh_tank::modal::Damping;
+use hubslosh_tank::parameters::{Liquid, damping_of};
+use hubslosh_tank::{Tank, damping};
+
+/// Kinematic viscosity and specific force within the range of the sphere's correlation for the tanks below.
+const SLOW: [f64; 2] = [1e-6, 0.3];
+
+fn at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
+    let data = tank.solve(fill, 1).unwrap();
+    let liquid = Liquid { gravity, nu: Some(nu), sigma: None, contact_angle: 90.0 };
+    damping_of(tank, &data, nu, liquid).unwrap()
+}
+
+fn of(shape: &str) -> Tank {
+    tank(&format!("density = 1000.0\n{shape}"))
+}
+
+/// Name, tank, liquid. A cone, a sphere and a torus have one correlation at every fill, a box has none, a cylinder two.
+/// Capsule, cylinder with a dome, cone with a cylinder and dish leave their shapes at a tangent or a corner.
+const TANKS: [(&str, &str, [f64; 2]); 9] = [
+    ("sphere", "shape = { sphere = { radius = 0.3 } }", SLOW),
+    (
+        "capsule",
+        "shape = { domed_cylinder = { radius = 0.3, height = 0.4, bottom = 0.3, top = 0.3 } }",
+        SLOW,
+    ),
+    ("cone", "shape = { cone = { half_angle = 30, height = 1.0 } }", SLOW),
+    ("torus", "shape = { torus = { ring_radius = 0.3, tube_radius = 0.0635 } }", [3.3e-6, 9.81]),
+    ("box", "box = [0.8, 0.5]", SLOW),
+    ("cylinder", "shape = { cylinder = { radius = 0.3, height = 0.9 } }", SLOW),
+    (
+        "cylinder with a dome",
+        "shape = { domed_cylinder = { radius = 0.3, height = 0.4, bottom = 0, top = 0.3 } }",
+        SLOW,
+    ),
+    (
+        "cone with a cylinder",
+        "profile = [{ line = [0, 0, 0.3, 0.5] }, { line = [0.3, 0.5, 0.3, 1] }]",
+        SLOW,
+    ),
+    (
+        "dish",
+        "shape = { torispherical = { radius = 0.3, height = 0.3, crown_radius = 0.6, knuckle_radius = 0.06 } }",
+        SLOW,
+    ),
+];
+
+/// Returns the largest relative changes between neighbours of `count` + 1 fills, 0.1 % of the tank's height apart. They
+/// are those of the damping ratio, and of ratio and interval over the laminar layer, which has a slope of its own.
+fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64; 4] {
+    let depth = tank.depth().unwrap_or(1.0);
+    let numbers = |i: usize| {
+        let mode = at(tank, from + 1e-3 * depth * i as f64, liquid).modes[0];
+        let [zeta, low, high] = [mode.zeta, mode.interval[0], mode.interval[1]];
+        [zeta, zeta / mode.laminar, low / mode.laminar, high / mode.laminar]
+    };
+    let mut worst = [0.0_f64; 4];
+    let mut last = numbers(0);
+    for i in 1..=count {
+        let next = numbers(i);
+        worst = std::array::from_fn(|k| worst[k].max((next[k] / last[k] - 1.0).abs()));
+        last = next;
+    }
+    worst
+}
+
+#[test]
+#[ignore = "minutes: .ci/run --nightly"]
+fn damping_has_no_step_at_500_fills() {
+    for (name, shape, liquid) in TANKS {
+        let tank = of(shape);
+        let from = 0.25 * tank.depth().unwrap_or(1.0);
+        let [zeta, ..] = largest_steps(&tank, liquid, from, 500);
+        assert!(zeta < 0.01, "{name}: {zeta}");
+    }
+}
+
+/// Covers each place where a wall leaves a shape: tangents, shoulder, corner, knuckle. Covers the ends of the ranges of
+/// sphere, cylinder and torus, and the torus where its correlation falls below the laminar layer.
+#[test]
+fn damping_has_no_step_where_a_wall_leaves_a_shape() {
+    for (name, levels) in [
+        ("sphere", &[0.03][..]),
+        ("capsule", &[0.3, 0.7]),
+        ("torus", &[0.1 * 0.127, 0.68 * 0.127, 0.73 * 0.127, 0.9 * 0.127]),
+        ("cylinder", &[0.12, 0.135, 0.15]),
+        ("cylinder with a dome", &[0.4]),
+        ("cone with a cylinder", &[0.5]),
+        ("dish", &[0.0667]),
+    ] {
+        let (_, shape, liquid) = TANKS.into_iter().find(|tank| tank.0 == name).unwrap();
+        let tank = of(shape);
+        for level in levels {
+            let from = level - 4.5e-3 * tank.depth().unwrap();
+            let [_, factor, low, high] = largest_steps(&tank, liquid, from, 8);
+            assert!(
+                factor < 0.01 && low < 0.01 && high < 0.01,
+                "{name} at {level}: {factor} {low} {high}"
+            );
+        }
+    }
+}
+
+/// At the tangent of a capsule, and in its cylinder.
+#[test]
+fn a_capsule_keeps_the_factor_of_its_dome_on_the_dome_s_share() {
+    let (_, shape, liquid) = TANKS[1];
+    let tank = of(shape);
+    let ratio = |fill: f64| {
+        let mode = at(&tank, fill, liquid).modes[0];
+        mode.zeta / mode.laminar
+    };
+    // 3.16 layers at the tangent, and no fall to 1.45 there
+    assert!((ratio(0.3001) / ratio(0.3) - 1.0).abs() < 2e-3);
+    let full = at(&tank, 0.7, liquid);
+    let [part] = &full.parts[..] else { panic!("{full:?}") };
+    // the dome of 0.3 m of a wetted height of 0.7 m, and the lowest part of the cylinder
+    assert!(part.shape == "sphere" && (3.0 / 7.0..0.52).contains(&part.share), "{part:?}");
+    let mean = 1.45 + part.share * (part.factor - 1.45);
+    assert!((full.modes[0].zeta / full.modes[0].laminar / mean - 1.0).abs() < 1e-12);
+    assert_eq!((full.shape, full.correlation), ("other", None));
+    for words in ["of the wetted wall is a sphere", "disagree", "low end for stability"] {
+        assert!(full.taken.contains(words), "{words}: {}", full.taken);
+    }
+}
+
+/// Between the shape's correlation and 1.45 layers, and an interval that holds both.
+#[test]
+fn a_mixture_lies_between_its_correlations_and_its_interval_holds_them() {
+    let walls = [
+        ("capsule", [0.32, 0.5, 0.9]),
+        ("dish", [0.07, 0.2, 0.4]),
+        ("cone with a cylinder", [0.51, 0.6, 0.9]),
+    ];
+    for (name, fills) in walls {
+        let (_, shape, liquid) = TANKS.into_iter().find(|tank| tank.0 == name).unwrap();
+        for fill in fills {
+            let found = at(&of(shape), fill, liquid);
+            let mode = found.modes[0];
+            let [part] = &found.parts[..] else { panic!("{name} {fill}: {found:?}") };
+            let both = [1.45, part.factor].map(|factor| factor * mode.laminar);
+            let [low, high] = mode.interval;
+            assert!(both.into_iter().all(|zeta| low < zeta && zeta < high), "{name} {fill}");
+            assert!(
+                both[0].min(both[1]) < mode.zeta && mode.zeta < both[0].max(both[1]),
+                "{name} {fill}"
+            );
+        }
+    }
+}
+
+/// Spheroids and capsules that pass through the sphere: near it the ratio changes with the shape as a smooth function
+/// does, far from it little of the sphere is left. At 0.8 of the height the sphere has ten layers.
+#[test]
+fn near_a_sphere_every_shape_has_its_damping() {
+    let spheroid = |e: f64| {
+        let height = 0.3 * (1.0 + e);
+        let tank =
+            of(&format!("shape = {{ spheroid = {{ radius = 0.3, half_height = {height:?} }} }}"));
+        at(&tank, 1.6 * height, SLOW).modes[0].zeta
+    };
+    let capsule = |e: f64| {
+        let height = 0.6 * e;
+        let text = format!(
+            "shape = {{ domed_cylinder = {{ radius = 0.3, height = {height:?}, bottom = 0.3, top = 0.3 }} }}"
+        );
+        at(&of(&text), 0.48 * (1.0 + e), SLOW).modes[0].zeta
+    };
+    let sphere = at(&of("shape = { sphere = { radius = 0.3 } }"), 0.48, SLOW).modes[0].zeta;
+    for e in [1e-7, 5e-6, 1e-3] {
+        for zeta in [spheroid(e), spheroid(-e), capsule(e)] {
+            assert!((zeta / sphere - 1.0).abs() < 1e-5 + 10.0 * e, "{e:e}: {zeta} {sphere}");
+        }
+    }
+    // 0.5 % of the axis apart, through the whole transition
+    let all: Vec<f64> = (-6..=6).map(|i| spheroid(5e-3 * f64::from(i))).collect();
+    for pair in all.windows(2) {
+        assert!((pair[1] / pair[0]).ln().abs() < 0.5, "{all:?}");
+    }
+    assert!(all[0] < 0.4 * sphere && all[12] < 0.4 * sphere && all[6] == sphere);
+}
+
+/// One correlation at every fill of these tanks: its published formula to the last digit but one.
+#[test]
+fn a_wall_that_is_one_shape_has_its_published_correlation() {
+    let close = |found: f64, expected: f64| {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}")
+    };
+    let [nu, g] = SLOW;
+    for x in [0.11, 0.5, 1.0, 1.3, 1.89] {
+        let sphere = of("shape = { sphere = { radius = 0.3 } }");
+        close(at(&sphere, 0.3 * x, SLOW).modes[0].zeta, damping::sphere(0.3, 0.3 * x, nu, g).zeta);
+    }
+    for x in [0.1, 0.39, 0.5, 0.8, 2.0] {
+        let cylinder = of("shape = { cylinder = { radius = 0.3, height = 0.9 } }");
+        let formula = if x < 0.5 { damping::stephens } else { damping::mikishev_dorozhkin };
+        close(at(&cylinder, 0.3 * x, SLOW).modes[0].zeta, formula(0.3, 0.3 * x, nu, g).zeta);
+    }
+    for angle in [20.0, 44.0] {
+        let cone = of(&format!("shape = {{ cone = {{ half_angle = {angle:?}, height = 1.0 }} }}"));
+        let radius = 0.5 * f64::to_radians(angle).tan();
+        close(at(&cone, 0.5, SLOW).modes[0].zeta, damping::cone(radius, angle, nu, g).zeta);
+    }
+    let (_, shape, [nu, g]) = TANKS[3];
+    let torus = at(&of(shape), 0.86 * 0.127, [nu, g]);
+    close(torus.modes[0].zeta, damping::torus(0.0635, 0.86 * 0.127, nu, g).zeta);
+    let wave = at(&of("box = [0.8, 0.5]"), 0.4, SLOW).modes[0];
+    close(wave.zeta, 1.45 * damping::keulegan(0.8, 0.5, 0.4, SLOW[0], SLOW[1]).zeta);
+}
