@@ -3,6 +3,7 @@
 import atexit
 import difflib
 import math
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,6 +15,9 @@ __all__ = ["Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "did_you_mean",
 
 Value = float | int | bool | str
 """A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name."""
+
+_INDICES = re.compile(r"\[\d+(,\d+)*\]")
+"""End of the name of a vector's or matrix's element."""
 
 INTEGERS = range(-(2**31), 2**31)
 """Numbers that fmi2Integer has."""
@@ -107,6 +111,20 @@ class Fmu:
     def names(self, *causalities: str) -> list[str]:
         """Return the names of the variables with these causalities ("output", "local", …)."""
         return [v.name for v in self.variables.values() if v.causality in causalities]
+
+    def components(self, names: Iterable[str]) -> list[str]:
+        """Return names in which that of a vector, ``"omega"``, stands for all its components.
+
+        A matrix gives its elements row after row. Other names stay as they are.
+        """
+        found: list[str] = []
+        for name in names:
+            if name in self.variables:
+                found.append(name)
+                continue
+            elements = [of for of in self.variables if of.startswith(f"{name}[")]
+            found += [of for of in elements if _INDICES.fullmatch(of, len(name))] or [name]
+        return found
 
     def variable(self, name: str) -> Variable:
         """Return a variable by its name."""

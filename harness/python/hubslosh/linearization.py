@@ -217,7 +217,8 @@ def linearize(
     model, parameters: as for `simulate`; start values among the parameters (``init.omega``) and
     values of inputs (``g_axial``) are the point of linearisation. The FMU must offer Model Exchange
     and directional derivatives.
-    inputs, outputs: Real variables by name; by default all inputs and all outputs of that type.
+    inputs, outputs: Real variables by name, a vector by its name (``"omega"``); by default all
+    inputs and all outputs of that type.
     all_states: keep states that no output depends on, directly or through other states. Without
     them nothing is approximated: modes that are not used, or the work done, leave no trace.
 
@@ -279,7 +280,7 @@ def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[
     if names is None:
         return [name for name in fmu.names(causality) if fmu.kind(name) == "Real"]
     problems: list[str] = []
-    names = names_of(names, f"{causality}s", problems)
+    names = fmu.components(names_of(names, f"{causality}s", problems))
     for name in names:
         try:
             variable, kind = fmu.variable(name), fmu.kind(name)

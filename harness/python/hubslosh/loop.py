@@ -44,7 +44,8 @@ class Loop:
     rule, which moves a frequency f to atan(π f T)/(π T).
     period: of the controller's cycle, s.
     model, parameters: as for `simulate`.
-    measured, command: variables and inputs of the FMU by name, one or several.
+    measured, command: variables and inputs of the FMU by name, one or several; ``"omega"`` of
+    Spacecraft is all three components.
     delay: from measurement to command, s; any. latency: the same in whole cycles. The command of a
     cycle acts that much later and is held until the next one acts: a continuous design sees half a
     cycle more.
@@ -69,7 +70,7 @@ class Loop:
         except FmuError as error:
             found.append(str(error))
         fmu = Fmu.open(self.model)
-        for name in (commands := names_of(self.command, "command", found)):
+        for name in (commands := fmu.components(names_of(self.command, "command", found))):
             if name not in fmu.names("input"):
                 allowed = fmu.names("input")
                 hint = did_you_mean(name, allowed)
@@ -79,7 +80,7 @@ class Loop:
                 )
             elif fmu.kind(name) != "Real":
                 found.append(f"the command {name} is of type {fmu.kind(name)}, not Real")
-        measured = names_of(self.measured, "measured", found)
+        measured = fmu.components(names_of(self.measured, "measured", found))
         check_outputs(fmu, measured, found)
         for name in measured:
             if name in fmu.variables and fmu.kind(name) not in ("Real", "String"):
@@ -102,7 +103,9 @@ class Loop:
     @property
     def names(self) -> tuple[list[str], list[str]]:
         """Names of what is measured, and of the commands."""
-        return names_of(self.measured, "", []), names_of(self.command, "", [])
+        fmu = Fmu.open(self.model)
+        measured, command = names_of(self.measured, "", []), names_of(self.command, "", [])
+        return fmu.components(measured), fmu.components(command)
 
     def linear(self) -> LinearModel | None:
         """Return the controller as a sampled linear model; None if it is a function."""

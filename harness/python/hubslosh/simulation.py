@@ -77,8 +77,9 @@ def simulate(
     stop, start: s; by default those of the inputs, otherwise the FMU's suggestion.
     step: between the rows of the result, s; by default the rows of the inputs, otherwise the FMU's
     suggestion. The FMU steps to every row of the inputs whatever the step.
-    outputs: variables to record; by default all outputs, and of the six-axis FMUs the slosh angles
-    of the tanks in use (and of tanks that drain ``liquid``), by which `view` draws the run.
+    outputs: variables to record, a vector by its name (``"omega"``); by default all outputs, and of
+    the six-axis FMUs the slosh angles of the tanks in use (and of tanks that drain ``liquid``), by
+    which `view` draws the run.
     tolerance: relative, for the FMU's solver; by default its own choice.
     hold: inputs are held from row to row.
 
@@ -172,7 +173,7 @@ def outputs_of(
 ) -> list[str]:
     """Return the variables to record; those of ``None`` are all outputs and what `view` needs."""
     if outputs is not None:
-        return names_of(outputs, "outputs", problems)
+        return fmu.components(names_of(outputs, "outputs", problems))
 
     def number(name: str) -> int:
         if name not in fmu.variables:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hubslosh import FmuError, closed_loop, drive, linearize
+from hubslosh import FmuError, Loop, closed_loop, drive, linearize
 
 VISCOUS = {"friction.model": "viscous"}
 PERIOD = 0.1  # s
@@ -113,3 +113,21 @@ def test_all_that_is_wrong_is_told_at_once(fmu: Path) -> None:
         model.sampled(0.1, -1)
     with pytest.raises(FmuError, match="sampled already"):
         model.sampled(0.1).sampled(0.1)
+
+
+def test_a_vector_s_name_is_all_its_components(fmu: Path) -> None:
+    """Of loops, linear models and records; a scalar of that name stays one."""
+    craft = fmu.with_name("Spacecraft.fmu")
+    start = {"force[3]": 100.0, "init.omega[1]": 0.01}
+    whole = Loop(np.eye(3), 0.1, craft, start, "omega", "torque")
+    each = ["omega[1]", "omega[2]", "omega[3]"]
+    parts = Loop(np.eye(3), 0.1, craft, start, each, ["torque[1]", "torque[2]", "torque[3]"])
+    assert whole.names == parts.names and whole.problems() == []
+    run = whole.simulate(1.0, outputs=["omega", "tank[1].p"])
+    rods = [f"tank[1].p[{n},{i}]" for n in (1, 2, 3) for i in (1, 2, 3)]
+    assert list(run)[4:] == [*each, *rods]
+    assert run[each].equals(parts.simulate(1.0, outputs=each)[each])
+    assert linearize(craft, start, "torque", "omega").outputs == tuple(each)
+    assert linearize(fmu, VISCOUS, "tau_cmd", "omega").outputs == ("omega",)
+    with pytest.raises(FmuError, match="did you mean omega"):
+        linearize(craft, start, "torque", "omga")
