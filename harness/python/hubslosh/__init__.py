@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import attitude, plot
+    from .craft import Craft, MassProperties, MountedTank
     from .files import to_csv, to_mat, to_parquet
     from .fitting import TransferFunction, fit
     from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 # numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
 # one of its names (PEP 562). The same as above, for Python itself; a test compares.
 _MODULES = {
+    "craft": ("Craft", "MassProperties", "MountedTank"),
     "files": ("to_csv", "to_mat", "to_parquet"),
     "fitting": ("TransferFunction", "fit"),
     "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value"),
@@ -69,6 +71,7 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 __all__ = [
     "COLUMNS",
     "TORQUE",
+    "Craft",
     "Estimated",
     "Fmu",
     "FmuError",
@@ -79,6 +82,8 @@ __all__ = [
     "LiquidModes",
     "Loop",
     "Margins",
+    "MassProperties",
+    "MountedTank",
     "Plant",
     "Quantity",
     "Run",

@@ -152,7 +152,9 @@ class Tank:
         with _folder(self._source) as (folder, file):
             out = folder / "parameters.toml"
             flags = ["--model", model, "--parameters", str(out), "--out", str(folder / "r.json")]
-            _call(self._program, [str(file), *self._flags, *self._liquid, *flags])
+            said = _call(self._program, [str(file), *self._flags, *self._liquid, *flags])
+            for warning in said:
+                warnings.warn(warning, FmuWarning, stacklevel=3)
             return read_parameters(out)
 
 
@@ -178,6 +180,35 @@ def tank(
 
     Needs the program ``hubslosh``; see `campaign`. Its page on tanks has every shape.
     """
+    found, said = solve(
+        source, fill, fill_mass=fill_mass, modes=modes, gravity=gravity, nu=nu, sigma=sigma,
+        contact_angle=contact_angle, program=program,
+    )  # fmt: skip
+    for warning in said:
+        warnings.warn(warning, FmuWarning, stacklevel=2)
+    return found
+
+
+def solve(
+    source: str | Path | Mapping[str, Any],
+    fill: float | str | None = None,
+    *,
+    fill_mass: float | None = None,
+    modes: int = 3,
+    gravity: float = 9.80665,
+    nu: float | None = None,
+    sigma: float | None = None,
+    contact_angle: float | None = None,
+    program: str | Path | None = None,
+    spacecraft: bool = False,
+) -> tuple[Tank, list[str]]:
+    """Return the result of `tank` and the program's warnings.
+
+    spacecraft: the same call computes the parameters of Spacecraft. A full tank has no modes, and
+    of its parameters only those of rigid liquid.
+    """
+    from .tables import read_parameters
+
     if (fill is None) == (fill_mass is None):
         raise FmuError('give the fill: a height in m, "60%" of the volume, or fill_mass in kg')
     if isinstance(fill, str) and not fill.strip().endswith("%"):
@@ -189,28 +220,75 @@ def tank(
     for name, value in numbers.items():
         if value is not None and (isinstance(value, bool) or not _is_number(value)):
             raise FmuError(f"{name} must be a number, not {value!r}")
-    given: dict[str, Any] | Path
+    given = _given(source)
+    amount = ["--fill", str(fill)] if fill is not None else ["--fill-mass", str(fill_mass)]
+    flags = [*amount, "--modes", str(modes), "--gravity", repr(float(gravity))]
+    liquid = _liquid_flags(nu, sigma, contact_angle)
+    found = find_program(program)
+    with _folder(given) as (folder, file):
+        out, picture = folder / "result.json", folder / "picture.svg"
+        written = ["--out", str(out), "--picture", str(picture)]
+        parameters = folder / "parameters.toml"
+        full = isinstance(fill, str) and fill.strip() == "100%"
+        if spacecraft and not full:
+            written += ["--model", "Spacecraft", "--parameters", str(parameters)]
+        said = _call(found, [str(file), *flags, *liquid, *written])
+        result = json.loads(out.read_text(encoding="utf-8"))
+        drawing = picture.read_text(encoding="utf-8")
+        solved = Tank(result, drawing, float(gravity), given, flags, liquid, found)
+        if parameters.exists():
+            solved.__dict__["_of_spacecraft"] = read_parameters(parameters)
+        elif not result["modes"]:
+            solved.__dict__["_of_spacecraft"] = {"tank[1].I_z": 0.0}
+    return solved, said
+
+
+def fill_table(
+    source: str | Path | Mapping[str, Any],
+    between: Sequence[float | str],
+    *,
+    modes: int = 3,
+    gravity: float = 9.80665,
+    nu: float | None = None,
+    sigma: float | None = None,
+    contact_angle: float | None = None,
+    program: str | Path | None = None,
+) -> "tuple[dict[str, Value], list[str]]":
+    """Return the fill table of tank 1 of Spacecraft, which lets it drain, and warnings.
+
+    between: lowest and highest fill of the table, as for `tank`. The program places up to 12 points
+    between them, in some 5 s of CPU time. The other arguments are those of `tank`.
+    """
+    from .tables import read_parameters
+
+    ends = ",".join(str(end) for end in between)
+    flags = ["--sweep", ends, "--modes", str(modes), "--gravity", repr(float(gravity))]
+    flags += _liquid_flags(nu, sigma, contact_angle)
+    with _folder(_given(source)) as (folder, file):
+        out = folder / "parameters.toml"
+        flags += ["--model", "Spacecraft", "--parameters", str(out)]
+        flags += ["--out", str(folder / "sweep.csv")]
+        said = _call(find_program(program), [str(file), *flags])
+        return read_parameters(out), said
+
+
+def _given(source: Any) -> "dict[str, Any] | Path":
+    """Return a tank's file, or what would stand in one."""
     if isinstance(source, Mapping):
         given = dict(source)
         for key in ("points", "svg"):  # files beside the tank file, which is elsewhere
             if isinstance(given.get(key), str):
                 given[key] = str(Path(given[key]).absolute())
-    elif isinstance(source, str | Path):
-        given = Path(source)
-    else:
-        raise FmuError(f"a tank is a file or a dict of what stands in one, not {source!r}")
-    amount = ["--fill", str(fill)] if fill is not None else ["--fill-mass", str(fill_mass)]
-    flags = [*amount, "--modes", str(modes), "--gravity", repr(float(gravity))]
+        return given
+    if isinstance(source, str | Path):
+        return Path(source)
+    raise FmuError(f"a tank is a file or a dict of what stands in one, not {source!r}")
+
+
+def _liquid_flags(nu: float | None, sigma: float | None, contact_angle: float | None) -> list[str]:
     options = {"--nu": nu, "--sigma": sigma, "--contact-angle": contact_angle}
-    told = {name: repr(float(value)) for name, value in options.items() if value is not None}
-    liquid = [text for pair in told.items() for text in pair]
-    found = find_program(program)
-    with _folder(given) as (folder, file):
-        out, picture = folder / "result.json", folder / "picture.svg"
-        _call(found, [str(file), *flags, *liquid, "--out", str(out), "--picture", str(picture)])
-        result = json.loads(out.read_text(encoding="utf-8"))
-        drawing = picture.read_text(encoding="utf-8")
-    return Tank(result, drawing, float(gravity), given, flags, liquid, found)
+    given = {name: repr(float(value)) for name, value in options.items() if value is not None}
+    return [text for pair in given.items() for text in pair]
 
 
 def _is_number(value: Any) -> bool:
@@ -257,8 +335,8 @@ def _toml(value: Any) -> str:
     raise FmuError(f"{value!r} cannot stand in a tank file")
 
 
-def _call(program: Path, arguments: list[str]) -> None:
-    """Run ``hubslosh tank``; its warnings are warnings here."""
+def _call(program: Path, arguments: list[str]) -> list[str]:
+    """Run ``hubslosh tank`` and return its warnings."""
     try:
         done = subprocess.run([program, "tank", *arguments], capture_output=True, check=False)
     except OSError as error:
@@ -269,9 +347,8 @@ def _call(program: Path, arguments: list[str]) -> None:
         if Path(arguments[0]).name == _TEMPORARY:  # of a dict; where it was says nothing
             text = text.replace(f"{arguments[0]}: ", "").replace(arguments[0], "the tank")
         raise FmuError(f"hubslosh tank: {text}")
-    for line in said.splitlines():
-        if line.startswith("warning: "):
-            warnings.warn(line.removeprefix("warning: "), FmuWarning, stacklevel=4)
+    lines = (line for line in said.splitlines() if line.startswith("warning: "))
+    return [line.removeprefix("warning: ") for line in lines]
 
 
 def _from_z(axis: Sequence[float]) -> list[float]:

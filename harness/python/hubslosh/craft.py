@@ -1,0 +1,552 @@
+"""A spacecraft with its tanks at any fill: mass properties, parameters of the FMU, loops."""
+
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import temporary
+from .arguments import vector
+from .fmu import Fmu, FmuError, FmuWarning, Quantity
+from .linearization import LinearModel, linearize
+from .loop import Loop
+from .simulation import outputs_of
+from .tanks import Tank, _from_z, _given, _toml, fill_table, solve
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .viewing import View
+
+Vector = NDArray[np.float64]
+
+Fill = Any
+"""Fill of all tanks, or of each: by name or in their order. Of a tank: height, m; ``"60%"`` of its
+volume; ``(120, "kg")``; 0 if it is empty."""
+
+MOST_TANKS = 4
+"""Number of tanks that Spacecraft has."""
+
+
+@dataclass(frozen=True, eq=False)
+class MountedTank:
+    """A tank of a `Craft`: its drawing, its place, its liquid."""
+
+    source: str | Path | Mapping[str, Any]
+    """Drawing: a tank file, or a dict with its content, as for `tank`."""
+    position: Sequence[float]
+    """Position of the tank's zero (of a ``shape`` its lowest point) from O, body axes, m."""
+    axis: Sequence[float] = (0.0, 0.0, 1.0)
+    """Upwards along the tank's axis, body axes; or the tank's attitude as a quaternion, scalar
+    first, tank to body axes."""
+    modes: int = 2
+    """Number of slosh modes, 1 to 3."""
+    nu: float | None = None
+    """Kinematic viscosity for damping ratios, m²/s."""
+    sigma: float | None = None
+    """Surface tension for centring stiffnesses, N/m."""
+    contact_angle: float | None = None
+    """Contact angle between surface and wall, deg."""
+
+    @property
+    def q(self) -> Vector:
+        """Attitude as a unit quaternion, tank to body axes."""
+        if len(self.axis) != 4:
+            return np.array(_from_z(vector(self.axis, 3, "axis")))
+        q = vector(self.axis, 4, "axis")
+        return q / np.linalg.norm(q)
+
+    @property
+    def rotation(self) -> Vector:
+        """Matrix from tank to body axes."""
+        w, x, y, z = self.q
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    def problems(self) -> list[str]:
+        """Return everything that is wrong with it, but for its drawing."""
+        found = []
+        for name, lengths in (("position", (3,)), ("axis", (3, 4))):
+            try:
+                numbers = np.asarray(getattr(self, name), float)
+            except (TypeError, ValueError):
+                numbers = np.empty(0)
+            right = numbers.shape in [(length,) for length in lengths]
+            if not right or not np.isfinite(numbers).all() or (name == "axis" and not any(numbers)):
+                count = " or ".join(str(length) for length in lengths)
+                found.append(f"{name} must be {count} finite numbers, not {getattr(self, name)!r}")
+        if self.modes not in (1, 2, 3):
+            found.append(f"modes must be 1, 2 or 3, not {self.modes!r}")
+        return found
+
+    def __repr__(self) -> str:
+        """Return the tank in a line."""
+        return f"MountedTank({self.describe()})"
+
+    def describe(self) -> str:
+        """Return the tank in a few words."""
+        given = self.source
+        if isinstance(given, Mapping):
+            drawn = next(iter(given.get("shape", ())), None)
+            shape = drawn or next((key for key in _DRAWINGS if key in given), "tank")
+            what = f"{shape}, {given.get('density', '?')} kg/m³"
+        else:
+            what = str(given)
+        return f"{what}, at {_row(self.position)} m, axis {_row(self.axis)}, modes={self.modes}"
+
+
+_DRAWINGS = ("profile", "box", "points", "svg")
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Mass, centre of mass and inertia of a `Craft` at a fill."""
+
+    mass: float
+    """Mass, kg."""
+    center_of_mass: Vector
+    """Centre of mass from O, body axes, m."""
+    inertia: Vector
+    """Inertia about the centre of mass, body axes, kg·m²; products of inertia are minus the
+    integral of x y dm."""
+
+    def __str__(self) -> str:
+        """Return it in five lines."""
+        rows = "\n".join(f"  {_row(row, 7)}" for row in self.inertia)
+        return (
+            f"mass {self.mass:.7g} kg, centre of mass {_row(self.center_of_mass, 6)} m\n"
+            f"inertia about it, kg·m²:\n{rows}"
+        )
+
+
+Liquid = Literal["effective", "rigid"]
+"""Model of the liquid's inertia: under a lid without friction, or solid."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Craft:
+    """A spacecraft with tanks: one object for all fills.
+
+    Body axes have the origin O. Nothing is computed before it is asked for; `tank` computes each
+    fill once. Needs the program ``hubslosh``; see `campaign`.
+    """
+
+    mass: float
+    """Dry mass, kg."""
+    inertia: ArrayLike
+    """Inertia of the dry craft about its centre of mass, body axes, kg·m²: a symmetric matrix
+    (products of inertia are minus the integral of x y dm), or its diagonal."""
+    center_of_mass: Sequence[float] = (0.0, 0.0, 0.0)
+    """Centre of mass of the dry craft from O, m."""
+    tanks: Mapping[str, MountedTank] = field(default_factory=dict)
+    """Up to four tanks by name. Their order gives the FMU's numbers."""
+    thrust: float | Sequence[float] = 0.0
+    """Force at O, body axes, N; a number is along z."""
+    wheels: Sequence[float] = (0.0, 0.0, 0.0)
+    """Angular momentum of the wheels relative to the body, N·m·s."""
+    gravity: float | None = None
+    """Specific force along the tanks' axes for frequencies and damping, m/s²; by default thrust
+    over mass at the fill."""
+    model: str | Path = "Spacecraft"
+    program: str | Path | None = None
+    _known: dict[Any, Any] = field(default_factory=dict, init=False)
+    _said: list[str] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        """Refuse what is wrong, all of it at once."""
+        problems = []
+        for name, value in {"mass": self.mass, "gravity": self.gravity}.items():
+            number = isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0
+            if not number and not (name == "gravity" and value is None):
+                problems.append(f"{name} must be a positive number, not {value!r}")
+        for name in ("center_of_mass", "wheels"):
+            try:
+                vector(getattr(self, name), 3, name)
+            except FmuError as error:
+                problems.append(str(error))
+        for check in (self._inertia, self._force):
+            try:
+                check()
+            except FmuError as error:
+                problems.append(str(error))
+        if not isinstance(self.tanks, Mapping) or len(self.tanks) > MOST_TANKS:
+            problems.append(f"tanks must be up to {MOST_TANKS} MountedTank by name")
+        else:
+            for name, tank in self.tanks.items():
+                if not isinstance(tank, MountedTank):
+                    problems.append(f"tank {name} must be a MountedTank, not {tank!r}")
+                    continue
+                problems += [f"tank {name}: {problem}" for problem in tank.problems()]
+        if problems:
+            raise FmuError("; ".join(problems))
+
+    def _inertia(self) -> Vector:
+        try:
+            J = np.asarray(self.inertia, float)
+        except (TypeError, ValueError):
+            J = np.empty(0)
+        J = np.diag(J) if J.shape == (3,) else J
+        if J.shape != (3, 3) or not np.isfinite(J).all() or not (J == J.T).all():
+            raise FmuError("inertia must be a symmetric matrix of 3 × 3, or its diagonal")
+        moments = np.linalg.eigvalsh(J)
+        if moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+            raise FmuError(
+                f"inertia has the principal moments {_row(moments)} kg·m², which no body has "
+                "(allowed: above 0, each at most the sum of the others; products of inertia are "
+                "minus the integral of x y dm)"
+            )
+        return J
+
+    def _force(self) -> Vector:
+        if isinstance(self.thrust, int | float | np.number):
+            return vector([0.0, 0.0, self.thrust], 3, "thrust")
+        return vector(self.thrust, 3, "thrust")
+
+    def fills(self, fill: Fill) -> dict[str, Any]:
+        """Return the fill of each tank by name."""
+        return self._by_tank(fill, "fill")
+
+    def _by_tank(self, given: Any, what: str) -> dict[str, Any]:
+        names = list(self.tanks)
+        if isinstance(given, Mapping):
+            if set(given) != set(names):
+                raise FmuError(f"{what} must have {', '.join(names)}, not {', '.join(given)}")
+            return {name: given[name] for name in names}
+        single = isinstance(given, str | int | float | np.number) or _is_mass(given)
+        if single:
+            return dict.fromkeys(names, given)
+        try:
+            values = list(given)
+        except TypeError:
+            values = []
+        if len(values) != len(names):
+            raise FmuError(
+                f"{what} must be a value, or one for each of {', '.join(names)}, not {given!r}"
+            )
+        return dict(zip(names, values, strict=True))
+
+    def _solve(self, name: str, fill: Any, gravity: float) -> Tank | None:
+        """Return a tank at a fill; None if it is empty."""
+        if _is_empty(fill):
+            return None
+        key = (name, fill, gravity)
+        if key not in self._known:
+            of = self.tanks[name]
+            amount = {"fill_mass": float(fill[0])} if _is_mass(fill) else {"fill": fill}
+            try:
+                self._known[key], said = solve(
+                    of.source, **amount, modes=of.modes, gravity=gravity, nu=of.nu, sigma=of.sigma,
+                    contact_angle=of.contact_angle, program=self.program, spacecraft=True,
+                )  # fmt: skip
+                self._said.extend(f"tank {name}: {text}" for text in said)
+            except FmuError as error:
+                raise FmuError(f"tank {name}: {error}") from None
+        found: Tank = self._known[key]
+        return found
+
+    def _capacity(self, name: str) -> Tank:
+        """Return the full tank, for its mass."""
+        full = self._solve(name, "100%", 1.0)
+        assert full is not None
+        return full
+
+    def _mass_of(self, name: str, fill: Any) -> float:
+        """Return the mass of liquid in a tank, kg."""
+        if _is_empty(fill):
+            return 0.0
+        if _is_mass(fill):
+            return float(fill[0])
+        if isinstance(fill, str) and fill.strip().endswith("%"):
+            return float(fill.strip()[:-1]) / 100 * self._capacity(name).mass
+        found = self._solve(name, fill, 1.0)
+        assert found is not None
+        return found.mass
+
+    def tank_at(self, fill: Fill) -> dict[str, Tank]:
+        """Return the tanks that are not empty at a fill, by name, as `tank` gives them."""
+        fills = self.fills(fill)
+        with ThreadPoolExecutor(MOST_TANKS) as pool:
+            if self.gravity is None:
+                masses = pool.map(self._mass_of, fills, fills.values())
+                acceleration = self._force() / (self.mass + sum(masses))
+
+            def solved(name: str) -> Tank | None:
+                if self.gravity is not None or _is_empty(fills[name]):
+                    return self._solve(name, fills[name], self.gravity or 1.0)
+                along = float(self.tanks[name].rotation[:, 2] @ acceleration)
+                if not along > 0:
+                    raise FmuError(
+                        f"tank {name}: the thrust gives {along:.3g} m/s² along its axis, which "
+                        "does not hold liquid at its bottom; give gravity=, m/s²"
+                    )
+                return self._solve(name, fills[name], along)
+
+            tanks = dict(zip(fills, pool.map(solved, fills), strict=True))
+        said, self._said[:] = self._said[:], []
+        for text in dict.fromkeys(said):
+            warnings.warn(text, FmuWarning, stacklevel=3)
+        return {name: tank for name, tank in tanks.items() if tank is not None}
+
+    def mass_properties(self, fill: Fill, liquid: Liquid = "effective") -> MassProperties:
+        """Return mass, centre of mass and inertia at a fill, every surface at rest.
+
+        liquid: "effective", with the inertia that it has under a lid, without friction (about the
+        axis of a body of revolution: 0), as the FMU has it; "rigid", as if it were solid.
+        """
+        if liquid not in ("effective", "rigid"):
+            raise FmuError(f'liquid must be "effective" or "rigid", not {liquid!r}')
+        parts = [(float(self.mass), vector(self.center_of_mass, 3, ""), self._inertia())]
+        for name, found in self.tank_at(fill).items():
+            of = self.tanks[name]
+            R = of.rotation
+            center = vector(of.position, 3, "") + R[:, 2] * float(found.all["z_cg"])
+            parts.append((found.mass, center, R @ np.diag(_own_inertia(found, liquid)) @ R.T))
+        mass = sum(m for m, _, _ in parts)
+        center = sum((m * r for m, r, _ in parts), np.zeros(3)) / mass
+        inertia = np.zeros((3, 3))
+        for m, r, J in parts:
+            d = r - center
+            inertia += J + m * ((d @ d) * np.eye(3) - np.outer(d, d))
+        return MassProperties(mass, center, (inertia + inertia.T) / 2)
+
+    def parameters(
+        self,
+        fill: Fill,
+        *,
+        rigid: bool = False,
+        detach: bool = False,
+        mass_flow: Any = None,
+        between: Sequence[float | str] = ("2%", "98%"),
+    ) -> dict[str, Quantity]:
+        """Return the parameters of Spacecraft at a fill.
+
+        rigid: liquid without slosh, with its effective inertia. detach: liquid may leave the
+        bottom, by `travel`. mass_flow: tanks drain, see `drain`.
+        """
+        if detach and (rigid or mass_flow is not None):
+            raise FmuError("detach is for sloshing liquid in tanks that do not drain")
+        if rigid and mass_flow is not None:
+            raise FmuError("a tank that drains has sloshing liquid: rigid is for constant fills")
+        r, J, F = vector(self.center_of_mass, 3, ""), self._inertia(), self._force()
+        found: dict[str, Quantity] = {"craft.mass": float(self.mass), "tanks": len(self.tanks)}
+        found |= {f"craft.r[{i + 1}]": float(x) for i, x in enumerate(r)}
+        pairs = [(i, j) for i in range(3) for j in range(i, 3)]
+        found |= {f"craft.J{'xyz'[i]}{'xyz'[j]}": float(J[i, j]) for i, j in pairs}
+        found |= {f"force[{i + 1}]": float(x) for i, x in enumerate(F)}
+        found |= {f"h_wheels[{i + 1}]": float(x) for i, x in enumerate(self.wheels)}
+        tanks = self.tank_at(fill)
+        for number, (name, of) in enumerate(self.tanks.items(), 1):
+            prefix = f"tank[{number}]"
+            if name in tanks:
+                whole = rigid or not tanks[name].all["modes"]  # a full tank has no surface
+                found |= tanks[name].parameters(
+                    "Spacecraft", number, position=of.position, rigid=whole
+                )
+            else:
+                empty = dict.fromkeys((f"{prefix}.{key}" for key in ("m_0", "H_0", "I_0")), 0.0)
+                found |= empty | {f"{prefix}.modes": 0}
+            found |= {f"{prefix}.q[{i + 1}]": float(x) for i, x in enumerate(of.q)}
+        if detach:
+            numbers = {name: number for number, name in enumerate(self.tanks, 1)}
+            for name, travel in self.travel(fill).items():
+                if tanks[name].all["modes"]:
+                    found[f"tank[{numbers[name]}].ball.travel"] = travel
+        if mass_flow is not None:
+            tables = self._draining(mass_flow, tanks, between)
+            # the FMU warns of values that the table replaces
+            replaced = {_without_point(name) for name in tables if ".fill." in name}
+            found = {n: value for n, value in found.items() if n not in replaced} | tables
+        return found
+
+    def _draining(
+        self, mass_flow: Any, tanks: dict[str, Tank], between: Sequence[float | str]
+    ) -> dict[str, Quantity]:
+        """Return mass flows and fill tables."""
+        found: dict[str, Quantity] = {}
+        flows = self._by_tank(mass_flow, "mass_flow")
+        for number, (name, flow) in enumerate(flows.items(), 1):
+            if flow == 0:
+                continue
+            if name not in tanks:
+                raise FmuError(f"tank {name} is empty: it cannot drain")
+            of, tank = self.tanks[name], tanks[name]
+            key = (name, "table", tuple(between), tank.gravity)
+            if key not in self._known:
+                self._known[key], said = fill_table(
+                    of.source, between, modes=of.modes, gravity=tank.gravity, nu=of.nu,
+                    sigma=of.sigma, contact_angle=of.contact_angle, program=self.program,
+                )  # fmt: skip
+                # what it says about damping does not hold: see below
+                self._said.extend(f"tank {name}: {text}" for text in said if "damping" not in text)
+            table: dict[str, Quantity] = {
+                f"tank[{number}]{key.removeprefix('tank[1]')}": value
+                for key, value in self._known[key].items()
+            }
+            # where the program's table has one damping ratio for all fills, that of this fill holds
+            if not any(".fill.zeta" in key for key in table):
+                own = tank.parameters("Spacecraft", number)
+                table |= {key: value for key, value in own.items() if ".zeta[" in key}
+            found |= table | {f"tank[{number}].liquid_0": tank.mass}
+            found[f"mass_flow[{number}]"] = float(flow)
+        return found
+
+    def drain(
+        self, mass_flow: Any, fill: Fill, between: Sequence[float | str] = ("2%", "98%")
+    ) -> dict[str, Quantity]:
+        """Return the parameters of Spacecraft with tanks that drain from a fill on.
+
+        mass_flow: out of each tank, kg/s; one value, or one for each tank as in `fills`. The tank
+        of a flow that is not 0 gets a fill table with the ends ``between``, which takes some 5 s of
+        CPU time and is kept. The FMU stops where liquid leaves the table.
+        """
+        return self.parameters(fill, mass_flow=mass_flow, between=between)
+
+    def travel(self, fill: Fill) -> dict[str, float]:
+        """Return the way of detached liquid in each tank that is not empty, m.
+
+        That is the distance between the liquid's centres at the bottom and at the top of a closed
+        tank, ``ball.travel`` of the FMU: see the page on thrust that reverses.
+        """
+        ways = {}
+        for name, tank in self.tank_at(fill).items():
+            full = self._capacity(name)
+            gas, center = full.mass - tank.mass, float(full.all["z_cg"])
+            if gas > 1e-6 * full.mass:
+                below = self._solve(name, (gas, "kg"), tank.gravity)
+                assert below is not None
+                center = (full.mass * center - gas * float(below.all["z_cg"])) / tank.mass
+            ways[name] = center - float(tank.all["z_cg"])
+        return ways
+
+    def linearize(
+        self,
+        fill: Fill,
+        inputs: Sequence[str] | str = "torque",
+        outputs: Sequence[str] | str = ("q", "omega"),
+        *,
+        parameters: Mapping[str, Quantity] | None = None,
+        rigid: bool = False,
+    ) -> LinearModel:
+        """Return the linear model at a fill, at rest under thrust; see `hubslosh.linearize`.
+
+        parameters: further ones of the FMU, which go before those of the craft.
+        """
+        every = self.parameters(fill, rigid=rigid) | dict(parameters or {})
+        return linearize(self.model, every, inputs, outputs)
+
+    def loop(
+        self,
+        controller: Any,
+        period: float,
+        fill: Fill,
+        *,
+        measured: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
+        command: Sequence[str] | str = "torque",
+        latency: int = 0,
+        delay: float = 0.0,
+        parameters: Mapping[str, Quantity] | None = None,
+        rigid: bool = False,
+        mass_flow: Any = None,
+        between: Sequence[float | str] = ("2%", "98%"),
+    ) -> Loop:
+        """Return the loop of a sampled controller around the craft at a fill; see `Loop`.
+
+        Small angles: ``q[2]``, ``q[3]``, ``q[4]`` are half the angles about the body axes.
+        parameters: further ones of the FMU, which go before those of the craft. mass_flow, between:
+        tanks drain while it is simulated, see `drain`.
+        """
+        every = self.parameters(fill, rigid=rigid, mass_flow=mass_flow, between=between)
+        every |= dict(parameters or {})
+        return Loop(controller, period, self.model, every, measured, command, latency, delay)
+
+    def columns(self, fill: Fill) -> list[str]:
+        """Return the columns by which `view` draws craft and liquid, for ``outputs``."""
+        fmu = Fmu.open(self.model)
+        names = outputs_of(fmu, None, self.parameters(fill), [])
+        drawn = ("q[", "tank[")
+        return [name for name in names if name.startswith(drawn)]
+
+    def view(self, run: "pd.DataFrame", out: str | Path | None = None, **options: Any) -> "View":
+        """Show a run in 3-D with the tanks as they are drawn; options as for `hubslosh.view`."""
+        from .viewing import view
+
+        with temporary.folder() as folder:
+            files: dict[int, Path] = {}
+            for number, (name, of) in enumerate(self.tanks.items(), 1):
+                given = _given(of.source)
+                if isinstance(given, Path):
+                    files[number] = given
+                    continue
+                files[number] = Path(folder) / f"tank{number}.toml"
+                text = "".join(f"{_toml(k)} = {_toml(v)}\n" for k, v in given.items())
+                if "name" not in given:
+                    text = f"name = {_toml(name)}\n{text}"
+                files[number].write_text(text, encoding="utf-8")
+            return view(run, out, tanks=files, **options)
+
+    def __repr__(self) -> str:
+        """Return the craft in a line."""
+        return f"Craft({self.mass:g} kg dry, tanks: {', '.join(self.tanks) or 'none'})"
+
+    def __str__(self) -> str:
+        """Return the craft in at most ten lines."""
+        J, F, h = self._inertia(), self._force(), vector(self.wheels, 3, "wheels")
+        products = f"Jxy, Jxz, Jyz {_row((J[0, 1], J[0, 2], J[1, 2]))}"
+        lines = [
+            f"Craft of {self.mass:g} kg dry, centre of mass {_row(self.center_of_mass)} m",
+            f"inertia Jxx, Jyy, Jzz {_row(np.diag(J))}, {products} kg·m²",
+            f"thrust {_row(F)} N" + (f", wheels {_row(h)} N·m·s" if h.any() else ""),
+        ]
+        lines += [
+            f"tank {number} {name}: {tank.describe()}"
+            for number, (name, tank) in enumerate(self.tanks.items(), 1)
+        ]
+        return "\n".join(lines)
+
+
+def _without_point(name: str) -> str:
+    """Return the parameter that a value of a fill table replaces; m_0 is the rest of the liquid."""
+    prefix, key = name.split(".fill.")
+    if key.startswith("liquid["):
+        return f"{prefix}.m_0"
+    key = re.sub(r",\d+\]$", "]", key)
+    return f"{prefix}.{key if key[:2] not in ('H_', 'I_') else key.partition('[')[0]}"
+
+
+def _row(numbers: Any, digits: int = 6) -> str:
+    return f"({', '.join(f'{float(x):.{digits}g}' for x in np.asarray(numbers, float))})"
+
+
+def _is_mass(fill: Any) -> bool:
+    return isinstance(fill, tuple) and len(fill) == 2 and fill[1] == "kg"
+
+
+def _is_empty(fill: Any) -> bool:
+    if _is_mass(fill):
+        return bool(fill[0] == 0)
+    if isinstance(fill, str):
+        try:
+            return float(fill.strip().removesuffix("%")) == 0
+        except ValueError:
+            return False
+    return bool(fill == 0)
+
+
+def _own_inertia(tank: Tank, liquid: Liquid) -> Vector:
+    """Return the moments of inertia of a liquid about its centre, tank axes."""
+    kind = "eff" if liquid == "effective" else "frozen"
+    axes = tank.all.get("axes")  # of a box: motion along y turns about x
+    across = [float((axes[of] if axes else tank.all)[f"I_{kind}_cg"]) for of in "yx"]
+    about = tank.all["I_frozen_axis"] if kind == "frozen" else tank.all.get("I_eff_axis", 0.0)
+    return np.array([*across, float(about)])

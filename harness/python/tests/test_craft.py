@@ -1,0 +1,171 @@
+"""A craft's mass properties, parameters and loops against sums by hand and against the FMU."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import option
+
+import hubslosh
+from hubslosh import Craft, FmuError, MountedTank, attitude
+
+SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
+CYLINDER = {"density": 875.0, "shape": {"cylinder": {"radius": 0.4, "height": 1.1}}}
+J = [[1150.0, -14.0, 22.0], [-14.0, 980.0, 9.0], [22.0, 9.0, 870.0]]
+TURNED = (np.sin(0.1), 0.0, np.cos(0.1))
+
+
+@pytest.fixture
+def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
+    """Return a craft with a sphere, and a cylinder whose axis leans."""
+    tanks = {
+        "ox": MountedTank(SPHERE, (0.1, 0.5, -0.3)),
+        "fuel": MountedTank(CYLINDER, (-0.2, -0.6, 0.1), TURNED, modes=1),
+    }
+    return Craft(
+        1400.0, J, (0.01, -0.02, 1.05), tanks, 400.0, (1.0, 2.0, 3.0),
+        model=fmu.with_name("Spacecraft.fmu"), program=option(request, "--hubslosh"),
+    )  # fmt: skip
+
+
+def shifted(mass: float, arm: np.ndarray) -> np.ndarray:
+    """Return the inertia of a point."""
+    x, y, z = arm
+    return mass * np.array(
+        [[y * y + z * z, -x * y, -x * z], [-x * y, x * x + z * z, -y * z],
+         [-x * z, -y * z, x * x + y * y]]
+    )  # fmt: skip
+
+
+def test_rigid_mass_properties_are_sums_by_hand(craft: Craft) -> None:
+    """Half a sphere and half a cylinder by their formulas, turned and shifted by hand."""
+    found = craft.mass_properties("50%", "rigid")
+    R, r, h = 0.5, 0.4, 0.55
+    ox = 1440 * 2 / 3 * np.pi * R**3
+    fuel = 875 * np.pi * r**2 * h
+    # half a ball: centre 3 R/8 below the sphere's; 2/5 m R² about each axis through that centre
+    across = ox * R**2 * (2 / 5 - 9 / 64)
+    of_ox = np.diag([across, across, 2 / 5 * ox * R**2])
+    c, s = TURNED[2], TURNED[0]
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    side = fuel * (3 * r**2 + h**2) / 12
+    of_fuel = turn @ np.diag([side, side, fuel * r**2 / 2]) @ turn.T
+    places = [
+        np.array([0.01, -0.02, 1.05]),
+        np.array([0.1, 0.5, -0.3 + 5 / 8 * R]),
+        np.array([-0.2, -0.6, 0.1]) + h / 2 * np.array(TURNED),
+    ]
+    masses = [1400.0, ox, fuel]
+    center = sum(m * p for m, p in zip(masses, places, strict=True)) / sum(masses)
+    inertia = np.array(J) + of_ox + of_fuel
+    inertia += sum(shifted(m, p - center) for m, p in zip(masses, places, strict=True))
+    assert found.mass == pytest.approx(sum(masses), rel=1e-12)
+    assert found.center_of_mass == pytest.approx(center, abs=1e-12)
+    # the program integrates the contour's inertia
+    assert found.inertia == pytest.approx(inertia, abs=1e-9 * inertia.max())
+
+
+@pytest.mark.parametrize("fill", ["3%", {"ox": (120.0, "kg"), "fuel": 0.7}, ("100%", 0)])
+def test_effective_mass_properties_are_the_fmu_s_own(craft: Craft, fill) -> None:
+    """Sloshing and rigid liquid alike, at rest."""
+    mine = craft.mass_properties(fill)
+    for rigid in (False, True):
+        start = craft.parameters(fill, rigid=rigid)
+        with hubslosh.Plant(craft.model, start) as plant:
+            names = ["mass", *(f"center_of_mass[{i}]" for i in (1, 2, 3))]
+            names += [f"inertia[{i},{k}]" for i in (1, 2, 3) for k in (1, 2, 3)]
+            values = np.array([plant.get([name])[0] for name in names])
+        assert values[0] == pytest.approx(mine.mass, rel=1e-12)
+        assert values[1:4] == pytest.approx(mine.center_of_mass, abs=1e-12)
+        assert values[4:].reshape(3, 3) == pytest.approx(mine.inertia, rel=1e-9, abs=1e-7)
+
+
+def test_loop_and_linear_model_are_those_of_parameters_by_hand(craft: Craft) -> None:
+    """Margins and matrices equal those of the same numbers, put together from `tank`."""
+    fill, gains = "60%", np.hstack([20 * np.eye(3), 300 * np.eye(3)])
+    mass = craft.mass_properties(fill).mass
+    hand = {"craft.mass": 1400.0, "tanks": 2, "force[3]": 400.0}
+    hand |= {"craft.Jxx": 1150.0, "craft.Jxy": -14.0, "craft.Jxz": 22.0, "craft.Jyy": 980.0}
+    hand |= {"craft.Jyz": 9.0, "craft.Jzz": 870.0}
+    hand |= {f"craft.r[{i}]": x for i, x in zip((1, 2, 3), (0.01, -0.02, 1.05), strict=True)}
+    hand |= {f"h_wheels[{i}]": float(i) for i in (1, 2, 3)}
+    for number, (of, along) in enumerate(zip(craft.tanks.values(), (1, TURNED[2]), strict=True), 1):
+        own = hubslosh.tank(
+            of.source, fill, modes=of.modes, gravity=400 / mass * along, program=craft.program
+        )
+        hand |= own.parameters("Spacecraft", number, position=of.position, axis=of.axis)
+    torques = ["torque[1]", "torque[2]", "torque[3]"]
+    measured = ["q[2]", "q[3]", "q[4]", "omega[1]", "omega[2]", "omega[3]"]
+    loop = craft.loop(gains, 0.1, fill, delay=0.15)
+    assert loop.names == (measured, torques)
+    other = hubslosh.Loop(gains, 0.1, craft.model, hand, measured, torques, delay=0.15)
+    mine, theirs = hubslosh.margins(loop), hubslosh.margins(other)
+    assert mine.delay_margin == pytest.approx(theirs.delay_margin, rel=1e-9)
+    columns = ["frequency", "gain_margin", "phase_margin"]
+    assert mine.crossings[columns].to_numpy() == pytest.approx(
+        theirs.crossings[columns].to_numpy(), rel=1e-9, nan_ok=True
+    )
+    model = craft.linearize(fill)
+    assert model.outputs == ("q[1]", "q[2]", "q[3]", "q[4]", "omega[1]", "omega[2]", "omega[3]")
+    assert model.inputs == tuple(torques)
+
+
+def test_draining_tanks_lose_the_mass_that_flows(craft: Craft) -> None:
+    """The table of the sphere goes into the FMU; damping is that of the fill at the start."""
+    on_axis = replace(craft.tanks["ox"], position=(0, 0, -0.3), modes=1, nu=3e-6)
+    craft = replace(craft, center_of_mass=(0, 0, 1.05), tanks={"ox": on_axis})
+    start = craft.drain(2.0, "50%", between=("20%", "70%"))
+    assert start["tank[1].zeta[1]"] == craft.tank_at("50%")["ox"].modes["zeta"][0]
+    run = hubslosh.simulate(craft.model, start, stop=10, outputs=["mass", "center_of_mass"])
+    lost = run["mass"].iloc[0] - run["mass"].iloc[-1]
+    assert lost == pytest.approx(20, rel=1e-9)
+    now = craft.mass_properties((craft.tank_at("50%")["ox"].mass - 20, "kg"))
+    assert run["center_of_mass[3]"].iloc[-1] == pytest.approx(now.center_of_mass[2], abs=2e-4)
+    # a loop around it
+    gains = np.hstack([20 * np.eye(3), 300 * np.eye(3)])
+    loop = craft.loop(gains, 0.5, "50%", mass_flow={"ox": 2.0}, between=("20%", "70%"))
+    end = loop.simulate(10, outputs="mass")["mass"].iloc[-1]
+    assert end == pytest.approx(run["mass"].iloc[-1], rel=1e-9)
+
+
+def test_detached_liquid_travels_as_in_closed_forms(craft: Craft) -> None:
+    """In a sphere twice the distance of the centres; in a cylinder the gas's height."""
+    ways = craft.travel({"ox": "50%", "fuel": "25%"})
+    assert ways["ox"] == pytest.approx(2 * 3 / 8 * 0.5, rel=1e-8)
+    assert ways["fuel"] == pytest.approx(0.75 * 1.1, rel=1e-8)
+    values = craft.parameters({"ox": "50%", "fuel": "25%"}, detach=True)
+    assert values["tank[2].ball.travel"] == ways["fuel"]
+    assert craft.travel("100%")["ox"] == pytest.approx(0, abs=1e-12)
+
+
+def test_the_viewer_draws_a_loop_with_the_craft_s_columns(craft: Craft, tmp_path: Path) -> None:
+    """With the tanks' own contours."""
+    loop = craft.loop(np.hstack([20 * np.eye(3), 300 * np.eye(3)]), 0.1, "60%")
+    reference = attitude.slew(0.02, 1.0, axis=(0, 0, 1))
+    run = loop.simulate(2, reference=reference, outputs=craft.columns("60%"))
+    page = craft.view(run, tmp_path / "craft.html", program=craft.program)
+    assert page.path.stat().st_size > 100_000
+    assert "tank[2].angle_y[1]" in run and "tank[1].angle_x[2]" in run
+
+
+def test_a_craft_names_everything_that_is_wrong_with_it(craft: Craft) -> None:
+    """At once where it can; a fill where it is asked for."""
+    bad = MountedTank(SPHERE, (0, 0), axis=(0, 0, 0), modes=4)
+    with pytest.raises(FmuError) as error:
+        Craft(-1, [[1, 0, 0], [0, 1, 0], [0, 0, 3]], tanks={"a": bad, "b": SPHERE}, thrust="x")
+    for text in ("mass must be", "principal moments", "thrust must be", "tank a: position", "axis",
+                 "modes must be 1, 2 or 3", "tank b must be a MountedTank"):  # fmt: skip
+        assert text in str(error.value)
+    for fill, text in {
+        ("50%",): "one for each of ox, fuel",
+        "120%": "tank ox: hubslosh tank",
+    }.items():
+        with pytest.raises(FmuError, match=text):
+            craft.parameters(fill)
+    with pytest.raises(FmuError, match="fill must have ox, fuel, not ox"):
+        craft.fills({"ox": "50%"})
+    with pytest.raises(FmuError, match=r"m/s² along its axis.*give gravity="):
+        replace(craft, thrust=0.0).parameters("50%")
+    assert replace(craft, thrust=0.0, gravity=0.1).parameters("50%")["tank[1].g_ref"] == 0.1
+    assert len(str(craft).splitlines()) <= 10
