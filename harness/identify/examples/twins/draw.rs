@@ -11,10 +11,11 @@ use identify::design::Multisine;
 use identify::methods::identification::Identification;
 use identify::methods::output_error;
 use identify::options::Options;
-use identify::recording::{Recording, prepare};
+use identify::recording::{Recording, Source, prepare, read};
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
 
+use crate::habits::Written;
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 
 /// Relative spread of truths around the nominal bench.
@@ -43,12 +44,12 @@ pub struct Twin {
     /// s.
     duration: f64,
     /// s.
-    delay: f64,
+    pub delay: f64,
     gyro_scale: f64,
     /// rad/s.
     gyro_bias: f64,
     /// rad.
-    encoder: Option<f64>,
+    pub encoder: Option<f64>,
     /// Rows a second.
     rate: f64,
     /// Torque and clock of the recording over the true ones.
@@ -56,6 +57,16 @@ pub struct Twin {
     clock: f64,
     /// Drift of the gyro at each row, rad/s.
     drift: Vec<f64>,
+}
+
+/// What a recording has of a twin.
+pub struct Measured {
+    /// N·m, at the instants of the commands.
+    pub torque: Vec<f64>,
+    /// rad/s.
+    pub rate: Vec<f64>,
+    /// rad.
+    pub angle: Option<Vec<f64>>,
 }
 
 impl Twin {
@@ -130,6 +141,16 @@ impl Twin {
             now = keep * now + drift * (1.0 - keep * keep).sqrt() * random.normal();
         }
         twin
+    }
+
+    /// Returns the twin with another sampling rate, rows per second.
+    pub fn with_rate(mut self, rate: f64) -> Twin {
+        let rows = (self.duration * rate).round() as usize;
+        let last = self.drift.len() - 1;
+        let drift = |k: usize| self.drift[((k as f64 * self.rate / rate).round() as usize).min(last)];
+        let drift = (0..=rows).map(drift).collect();
+        (self.drift, self.rate) = (drift, rate);
+        self
     }
 
     /// Returns the intersample behaviour that the fit receives; `None` for half of the twins, where the fit has to find it.
@@ -212,31 +233,53 @@ impl Twin {
 
     /// Records it.
     pub fn record(&self) -> Recording {
-        let step = 1.0 / self.rate;
-        let time: Vec<f64> = (0..self.drift.len()).map(|k| k as f64 * step).collect();
+        let rows = self.rows();
+        let Measured { torque, rate, angle } = self.measure(&rows, &rows, self.delay);
+        Recording { angle, ..Recording::of("twin", self.stamps(&rows), torque, rate) }
+    }
+
+    /// Instants of the rows, s.
+    pub fn rows(&self) -> Vec<f64> {
+        (0..self.drift.len()).map(|k| k as f64 / self.rate).collect()
+    }
+
+    /// Times of instants as the recording's clock has them, s.
+    pub fn stamps(&self, instants: &[f64]) -> Vec<f64> {
+        instants.iter().map(|t| self.clock * t).collect()
+    }
+
+    /// What is measured at these instants (s) if the torque is commanded at those of `commands`; the encoder is
+    /// `encoder_delay` (s) late.
+    pub fn measure(&self, commands: &[f64], instants: &[f64], encoder_delay: f64) -> Measured {
         let torque = self.torque();
-        let tau: Vec<f64> = time.iter().map(|t| torque(*t)).collect();
+        let tau: Vec<f64> = commands.iter().map(|t| torque(*t)).collect();
         let drive = match self.between {
-            Intersample::FirstOrderHold => Drive::Lines(&time, &tau),
-            Intersample::ZeroOrderHold => Drive::Held(&time, &tau),
-            Intersample::BandLimited => Drive::Smooth(&time, &*torque),
+            Intersample::FirstOrderHold => Drive::Lines(commands, &tau),
+            Intersample::ZeroOrderHold => Drive::Held(commands, &tau),
+            Intersample::BandLimited => Drive::Smooth(commands, &*torque),
         };
-        let at: Vec<f64> = time.iter().map(|t| (t - self.delay).max(0.0)).collect();
-        let motion = self.bench.motion(&drive, &at);
+        let late = |delay: f64| -> Vec<f64> {
+            instants.iter().map(|t| (t - delay).max(0.0)).collect()
+        };
+        let motion = self.bench.motion(&drive, &late(self.delay));
         let mut random = Random::new(self.seed, 8);
         let (white, _, _, least) = GYRO;
-        let rate = motion.rate.iter().zip(&self.drift).map(|(rate, drift)| {
-            let noise = drift + white * self.rate.sqrt() * random.normal();
+        let drift = |t: f64| self.drift[((t * self.rate).round() as usize).min(self.drift.len() - 1)];
+        let rate = motion.rate.iter().zip(instants).map(|(rate, t)| {
+            let noise = drift(*t) + white * self.rate.sqrt() * random.normal();
             ((self.gyro_scale * (rate + noise) + self.gyro_bias) / least).round() * least
         });
         let rate: Vec<f64> = rate.collect();
         let angle = self.encoder.map(|std| {
-            motion.angle.iter().map(|angle| angle + TAU * 0.1 + std * random.normal()).collect()
+            let angles = match encoder_delay == self.delay {
+                true => motion.angle.clone(),
+                false => self.bench.motion(&drive, &late(encoder_delay)).angle,
+            };
+            angles.iter().map(|angle| angle + TAU * 0.1 + std * random.normal()).collect()
         });
         // as the recording has it
-        let time = time.iter().map(|t| self.clock * t).collect();
-        let tau = tau.iter().map(|tau| self.torque_scale * tau).collect();
-        Recording { angle, ..Recording::of("twin", time, tau, rate) }
+        let torque = tau.iter().map(|tau| self.torque_scale * tau).collect();
+        Measured { torque, rate, angle }
     }
 
     /// Identifies its recording as a user would, with these slosh models; `hear` receives each message.
@@ -249,6 +292,21 @@ impl Twin {
         let options = Options { intersample: self.told(), models, ..Options::default() };
         let coarsest = options.nominal(fmu)?.coarsest();
         let parts = prepare(self.record(), coarsest, &mut |line| hear(&line))?;
+        output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
+    }
+
+    /// The same of a file in which its recording was written.
+    pub fn identify_file(
+        &self,
+        fmu: &Fmu,
+        models: Vec<String>,
+        written: &Written,
+        hear: &dyn Fn(&str),
+    ) -> Result<Identification> {
+        let options = Options { intersample: self.told(), models, ..Options::default() };
+        let coarsest = options.nominal(fmu)?.coarsest();
+        let source = Source { columns: written.columns.parse()?, slow: signals::recording::Between::Held, trim: written.trim };
+        let parts = read(&written.path, &source, coarsest, &mut |line| hear(&line))?;
         output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
     }
 }

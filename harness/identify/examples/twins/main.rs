@@ -8,17 +8,20 @@
 //!   duration=200        of each recording, s; twice that for a slow sweep
 //!   models=linear,…     as for hubslosh identify --model; else linear and spherical for every third, for the others what it is
 //!   say=false           true: the verdict of every twin
+//!   habits=all          through a file written as loggers write it: all, or some of [`habits::HABITS`]; twin k has the k-th
 //! ```
 
 #[allow(dead_code, reason = "its test looks at more of it")]
 mod bench;
 mod draw;
+mod habits;
 
 use std::collections::BTreeMap;
 
 use analysis::innovations::Tests;
 use anyhow::{Context, Result, bail};
 use draw::Twin;
+use habits::HABITS;
 use host::fmu::Fmu;
 use identify::methods::identification::Identification;
 
@@ -120,9 +123,16 @@ impl Tally {
     }
 }
 
+/// The habit of a name.
+fn known(name: &str) -> Result<&'static str> {
+    let found = HABITS.into_iter().find(|habit| *habit == name);
+    found.with_context(|| format!("{name} is not a habit (allowed: {})", HABITS.join(", ")))
+}
+
 fn main() -> Result<()> {
     let (mut seeds, mut duration, mut say) = (1..=200, 200.0, false);
     let mut models: Option<Vec<String>> = None;
+    let mut some: Vec<&'static str> = Vec::new();
     for argument in std::env::args().skip(1) {
         let (key, value) =
             argument.split_once('=').with_context(|| format!("{argument}: KEY=VALUE"))?;
@@ -134,6 +144,8 @@ fn main() -> Result<()> {
             "duration" => duration = value.parse()?,
             "models" => models = Some(value.split(',').map(String::from).collect()),
             "say" => say = value == "true",
+            "habits" if value == "all" => some = HABITS.to_vec(),
+            "habits" => some = value.split(',').map(|habit| known(habit)).collect::<Result<_>>()?,
             _ => bail!("{key} is not asked for; see the head of examples/twins/main.rs"),
         }
     }
@@ -141,14 +153,28 @@ fn main() -> Result<()> {
     let (mut tally, mut twins) = (Tally::default(), 0);
     for seed in seeds {
         twins += 1;
-        let twin = Twin::draw(seed, duration);
+        let habit = (!some.is_empty()).then(|| some[(seed as usize - 1) % some.len()]);
+        let plain = Twin::draw(seed, duration);
+        let twin = match habit {
+            Some(habit) => habits::of(plain, habit),
+            None => plain,
+        };
         let models = models.clone().unwrap_or_else(|| twin.models());
         let hear = |line: &str| {
             if say {
                 println!("  {line}");
             }
         };
-        match twin.identify(&fmu, models, &hear) {
+        let found = match habit {
+            Some(habit) => {
+                println!("{seed}: {habit}");
+                let directory = tempfile::tempdir()?;
+                let written = habits::write(&twin, habit, directory.path())?;
+                twin.identify_file(&fmu, models, &written, &hear)
+            }
+            None => twin.identify(&fmu, models, &hear),
+        };
+        match found {
             Ok(found) => {
                 tally.add(&twin, &found);
                 if say || found.fits != Some(true) || !found.converged {

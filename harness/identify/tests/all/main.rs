@@ -11,6 +11,8 @@ mod draw;
 #[path = "../../examples/fmu_twin/mod.rs"]
 #[allow(dead_code, reason = "the examples use the rest of it")]
 mod fmu_twin;
+#[path = "../../examples/twins/habits.rs"]
+mod habits;
 mod methods;
 mod other_bench;
 mod out_of_range;
