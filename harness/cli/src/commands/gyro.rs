@@ -38,6 +38,9 @@ pub struct GyroArgs {
         requires = "recording"
     )]
     columns: Columns,
+    /// Rows a second, for a recording without times.
+    #[arg(long, value_name = "HZ", requires = "recording")]
+    rate: Option<f64>,
     /// Length of the recording's chunks, s: the thesis's 15 min.
     #[arg(long, value_name = "SECONDS", default_value_t = 900.0, requires = "recording")]
     chunk: f64,
@@ -102,7 +105,8 @@ impl GyroArgs {
     fn look_at(&self, path: &Path) -> Result<()> {
         let signals =
             [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
-        let wanted = Wanted { signals: &signals, columns: &self.columns };
+        let columns = self.columns.clone().with_rate(self.rate)?;
+        let wanted = Wanted { signals: &signals, columns: &columns };
         let mut say = |line: String| terminal::note(line);
         let table = recording::read(path, &wanted, &mut say)?;
         let (step, table) = recording::even(table, &mut say)?;

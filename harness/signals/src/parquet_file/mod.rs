@@ -12,6 +12,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use files::{budget, bug, input};
+use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{DataType, Int96};
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -116,6 +117,13 @@ pub fn read(
             for (k, &position) in positions.iter().enumerate() {
                 let (start, length) = group.metadata().column(position).byte_range();
                 let column = || format!("column {}", names[position]);
+                let codec = group.metadata().column(position).compression();
+                ensure!(
+                    !matches!(codec, Compression::BROTLI(_) | Compression::LZO),
+                    "column {} is compressed with {codec} (allowed: none, Snappy, gzip, LZ4, Zstandard); in Python \
+                     pandas.read_parquet('FILE').to_parquet('FILE', compression='zstd') converts the file",
+                    names[position]
+                );
                 pages::check(&file, start, length, size).with_context(column)?;
                 let (kind, level) = &kinds[k];
                 let reader = group.get_column_reader(position)?;

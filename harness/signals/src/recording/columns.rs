@@ -19,8 +19,12 @@ pub struct Column {
 }
 
 /// Signals by name, each with its column.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Columns(BTreeMap<String, Column>);
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Columns {
+    of: BTreeMap<String, Column>,
+    /// Rows a second, of files without times.
+    rate: Option<f64>,
+}
 
 /// The signals that recordings may have, with what they measure.
 pub const SIGNALS: [(&str, Quantity); 10] = [
@@ -86,7 +90,7 @@ fn named(item: &str) -> Result<(String, Column)> {
 
 impl fmt::Display for Columns {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        for (k, (signal, column)) in self.0.iter().enumerate() {
+        for (k, (signal, column)) in self.of.iter().enumerate() {
             write!(f, "{}{signal}={}", if k == 0 { "" } else { "," }, column.name)?;
             if let Some(unit) = &column.unit {
                 write!(f, ":{unit}")?;
@@ -120,23 +124,42 @@ impl Columns {
             }
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
-        Ok(Columns(columns))
+        Ok(Columns { of: columns, rate: None })
+    }
+
+    /// The same for files without times, whose rows come this many times a second.
+    ///
+    /// # Errors
+    /// If that is not a positive number.
+    pub fn with_rate(self, rate: Option<f64>) -> Result<Self> {
+        if let Some(rate) = rate {
+            ensure!(
+                rate > 0.0 && rate.is_finite(),
+                "--rate {rate}: it must be a positive number of rows a second"
+            );
+        }
+        Ok(Columns { rate, ..self })
+    }
+
+    /// Rows a second, if the files have no times.
+    pub fn rate(&self) -> Option<f64> {
+        self.rate
     }
 
     /// The column of a signal; the one of its own name unless another is given.
     pub fn of(&self, signal: &str) -> Column {
         let own = || Column { name: signal.into(), unit: None };
-        self.0.get(signal).cloned().unwrap_or_else(own)
+        self.of.get(signal).cloned().unwrap_or_else(own)
     }
 
     /// Returns true if the user named the signal's column.
     pub fn names(&self, signal: &str) -> bool {
-        self.0.contains_key(signal)
+        self.of.contains_key(signal)
     }
 
     /// The signals whose columns were given.
     pub fn signals(&self) -> impl Iterator<Item = &str> {
-        self.0.keys().map(String::as_str)
+        self.of.keys().map(String::as_str)
     }
 }
 

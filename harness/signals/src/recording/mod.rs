@@ -3,11 +3,14 @@
 //! (`gyro_z [deg/s]`) give the signal and the unit of each column.
 //!
 //! The rows of a recording are those with a value of one signal, its rows' signal. Where another one has none,
-//! because it is slower or was lost, it is completed: held, or joined by lines. Nothing is resampled.
+//! because it is slower or was lost, it is completed: held, or joined by lines. Nothing is resampled. Times that are
+//! printed to few digits are put back onto their even grid ([`stamps`]).
 
 mod columns;
 mod even;
 mod matlab;
+mod number;
+mod stamps;
 mod text;
 mod unit;
 
@@ -188,7 +191,19 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     // time first, then the signals that are there
     // a table of times alone has no signal
     let rows_signal = wanted.signals.first().map_or("time", |signal| signal.name);
-    let time = Signal { name: "time", required: true, between: Between::Line, unit: None };
+    let time_signal = Signal { name: "time", required: true, between: Between::Line, unit: None };
+    let counted = wanted.columns.rate();
+    if let Some(rate) = counted {
+        let own = header.names.iter().find(|name| *name == "time");
+        let own = own
+            .cloned()
+            .or_else(|| wanted.columns.names("time").then(|| wanted.columns.of("time").name));
+        ensure!(
+            own.is_none(),
+            "--rate {rate} is for files without times, and column {} is this one's (allowed: --rate or times)",
+            own.unwrap_or_default()
+        );
+    }
     let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());
     let mut stated = None; // seconds in the unit of the time, if one is stated
     let (mut problems, mut used) = (Vec::new(), Vec::new());
@@ -197,12 +212,15 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     problems.extend(wanted.columns.signals().filter(|name| !of_use(name)).map(|name| {
         format!("--columns {name} is of no use here (allowed: time, {})", names.join(", "))
     }));
-    for signal in [&time].into_iter().chain(wanted.signals) {
+    let mut timeless = false;
+    let own_time = counted.is_none().then_some(&time_signal);
+    for signal in own_time.into_iter().chain(wanted.signals) {
         let column = wanted.columns.of(signal.name);
         let place = match header.place(&column.name) {
             Ok(place) => place,
             Err(_) if !signal.required && !wanted.columns.names(signal.name) => continue,
             Err(error) => {
+                timeless |= signal.name == "time";
                 problems.push(error.to_string());
                 continue;
             }
@@ -219,7 +237,7 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
                 continue;
             }
         };
-        if signals.is_empty() && unit.is_some() {
+        if signal.name == "time" && unit.is_some() {
             stated = Some(factor);
         }
         used.push(match &unit {
@@ -233,24 +251,28 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     }
     ensure!(
         problems.is_empty(),
-        "{} (columns in it: {}; --columns SIGNAL=COLUMN:UNIT,... says which is which)",
+        "{} (columns in it: {}; --columns SIGNAL=COLUMN:UNIT,... says which is which{})",
         problems.join("; "),
-        header.names.join(", ")
+        header.names.join(", "),
+        if timeless { "; --rate HZ takes equally spaced rows without times" } else { "" }
     );
+    ensure!(!places.is_empty(), "it has no signal that is wanted");
     let time = header.names[places[0]].as_str();
+    let timed = counted.is_none();
     let remedy = format!("--columns time={time}:ms, or :s, :us, :ns, :min, :h, states it");
     let found = match &file {
         File::Text(layout) => {
             layout.notes.iter().cloned().for_each(&mut *done);
-            layout.read(path, &places, done)?
+            layout.read(path, &places, timed, done)?
         }
         File::Parquet(_) => {
             let time = parquet_file::Time { place: 0, stated, remedy: &remedy };
-            let found = parquet_file::read(path, |_| Ok(places.clone()), Some(time))?;
+            let found = parquet_file::read(path, |_| Ok(places.clone()), timed.then_some(time))?;
             Found { columns: found.columns, origin: found.origin, seconds: found.seconds }
         }
         File::Matlab(header) => {
-            matlab::read(path, header, &places, stated.is_none().then_some(&remedy))?
+            let unstated = (timed && stated.is_none()).then_some(&remedy);
+            matlab::read(path, header, &places, unstated)?
         }
     };
     done(format!("columns used: {}", used.join(", ")));
@@ -272,6 +294,20 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     }
     if let Some(origin) = origin {
         done(format!("its times are dates: time counts from {origin}"));
+    }
+    if let Some(rate) = counted {
+        let rows = columns[0].len();
+        columns.insert(0, (0..rows).map(|k| k as f64 / rate).collect());
+        signals.insert(0, time_signal);
+        done(format!("it has no times: its rows are taken as {rate} a second (--rate)"));
+    }
+    if let Some(grid) = stamps::regular(&columns[0]) {
+        done(format!(
+            "its times are printed to {}: rows {:.6} ms apart have these times, and are taken so",
+            stamps::words(grid.quantum),
+            1e3 * grid.step
+        ));
+        columns[0] = grid.time;
     }
     let names = signals.iter().map(|signal| signal.name.to_string()).collect();
     let columns = complete(&signals, columns, rows_signal, done)?;

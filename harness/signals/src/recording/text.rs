@@ -1,14 +1,16 @@
-//! Numbers in columns of text: any separator (semicolon, tab, comma, blanks), decimal points or commas, lines
-//! of comment, a row of units, dates as time. What a file has is seen from its first lines.
+//! Numbers in columns of text: any separator (semicolon, tab, comma, blanks, or that of Excel's `sep=`), decimal points
+//! or commas, separators of thousands, lines of comment, a row of units, dates or clock times as time. The first lines
+//! of a file show its layout. Columns of text are skipped.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use chrono::{DateTime, NaiveDateTime};
+use chrono::{DateTime, NaiveDateTime, NaiveTime, Timelike as _};
 use files::{budget, input};
 
+use super::number::Style;
 use super::{Found, Header};
 
 /// Lines from which separator and header are seen.
@@ -26,6 +28,9 @@ enum Separator {
     Char(char),
     Blanks,
 }
+
+/// Nanoseconds of a day.
+const DAY: i64 = 86_400_000_000_000;
 
 /// In the order in which they are preferred.
 const SEPARATORS: [Separator; 4] =
@@ -63,68 +68,156 @@ impl Separator {
         match self {
             Separator::Char(';') => "semicolons",
             Separator::Char('\t') => "tabs",
-            Separator::Char(_) => "commas",
+            Separator::Char(',') => "commas",
+            Separator::Char(_) => "the sign of its line sep=",
             Separator::Blanks => "blanks",
         }
     }
 }
 
 /// Value of a field.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Value {
     Number(f64),
     /// Nanoseconds since 1970.
     Date(i64),
+    /// Nanoseconds since midnight.
+    Clock(i64),
     Missing,
+    /// A number that can be read in two ways; the reason.
+    Ambiguous(String),
     Other,
 }
 
-/// A number with a decimal point, or with a decimal comma if `comma`.
-fn number(field: &str, comma: bool) -> Option<f64> {
-    let value = match field.split_once(',') {
-        None => field.parse().ok()?,
-        Some((whole, rest)) => {
-            let digits = rest.starts_with(|c: char| c.is_ascii_digit());
-            if !comma || !digits || rest.contains([',', '.']) || whole.contains('.') {
-                return None;
-            }
-            format!("{whole}.{rest}").parse().ok()?
-        }
-    };
-    f64::is_finite(value).then_some(value)
+impl Value {
+    /// Returns true for a number or a time.
+    fn is_there(&self) -> bool {
+        !matches!(self, Value::Missing | Value::Other)
+    }
 }
 
-/// Nanoseconds since 1970 of a date and time by ISO 8601, in UTC unless it says otherwise.
+/// Forms of dates, all with a time of day and any number of decimals of the second.
+const DATES: [&str; 4] = [
+    "%Y-%m-%dT%H:%M:%S%.f",
+    "%Y-%m-%d %H:%M:%S%.f",
+    "%Y/%m/%d %H:%M:%S%.f",
+    "%d.%m.%Y %H:%M:%S%.f",
+];
+
+/// Nanoseconds since 1970 of a date and time by ISO 8601, with slashes or as 31.1.2026, in UTC unless it says otherwise.
 fn date(field: &str) -> Option<i64> {
-    if field.len() < 16 || field.as_bytes()[4] != b'-' {
+    if field.len() < 14 || !field.contains(':') {
         return None;
     }
+    // decimal commas, as Python's logging writes them
+    let field = &field.replace(',', ".");
     let zoned = || DateTime::parse_from_rfc3339(field).ok()?.timestamp_nanos_opt();
     let plain =
         |form| NaiveDateTime::parse_from_str(field, form).ok()?.and_utc().timestamp_nanos_opt();
-    zoned().or_else(|| plain("%Y-%m-%dT%H:%M:%S%.f")).or_else(|| plain("%Y-%m-%d %H:%M:%S%.f"))
+    zoned().or_else(|| DATES.iter().find_map(|form| plain(form)))
+}
+
+/// Nanoseconds since midnight of a time of day, 23:59:59.98.
+fn clock(field: &str) -> Option<i64> {
+    if field.len() < 7 || field.bytes().filter(|byte| *byte == b':').count() != 2 {
+        return None;
+    }
+    let time = NaiveTime::parse_from_str(&field.replace(',', "."), "%H:%M:%S%.f").ok()?;
+    Some(i64::from(time.num_seconds_from_midnight()) * 1_000_000_000 + i64::from(time.nanosecond()))
 }
 
 /// Returns true for a field that marks a missing value.
 fn missing(field: &str) -> bool {
-    let words = ["", "nan", "na", "n/a", "null", "none", "-"];
+    let words = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"];
     field.len() < 5 && words.iter().any(|word| field.eq_ignore_ascii_case(word))
 }
 
-fn value((field, quoted): (&str, bool), separator: Separator) -> Value {
-    let comma = quoted || separator != Separator::Char(',');
-    match number(field, comma) {
-        Some(number) => Value::Number(number),
-        None if missing(field) => Value::Missing,
-        None => date(field).map_or(Value::Other, Value::Date),
+/// Value of a field; `style` is how its column writes numbers so far.
+fn value((field, quoted): (&str, bool), separator: Separator, style: &mut Style) -> Value {
+    let comma = match separator {
+        Separator::Char(',') if !quoted => super::number::Comma::Separates,
+        Separator::Char(',') => super::number::Comma::Either,
+        _ => super::number::Comma::Decimal,
+    };
+    match style.number(field, comma) {
+        Ok(Some(number)) => Value::Number(number),
+        Ok(None) if missing(field) => Value::Missing,
+        Ok(None) => match (date(field), clock(field)) {
+            (Some(date), _) => Value::Date(date),
+            (None, Some(clock)) => Value::Clock(clock),
+            (None, None) => Value::Other,
+        },
+        Err(reason) => Value::Ambiguous(reason),
     }
 }
 
-/// Returns true if a line holds only values, and at least one that is not missing.
-fn is_data(fields: &[(&str, bool)], separator: Separator) -> bool {
-    let mut values = fields.iter().map(|field| value(*field, separator));
-    let some = values.clone().any(|v| matches!(v, Value::Number(_) | Value::Date(_)));
-    some && values.all(|v| v != Value::Other)
+/// Values of the fields of a line in the sample.
+fn values(line: &str, separator: Separator) -> Vec<Value> {
+    let mut fields = Vec::new();
+    separator.split(line, &mut fields);
+    fields.into_iter().map(|field| value(field, separator, &mut Style::default())).collect()
+}
+
+/// The separator of a line `sep=;`, with which Excel begins a file.
+fn excels(line: &str) -> Option<Separator> {
+    let line = line.trim_matches(['"', ' ']);
+    let (name, sign) = line.split_at_checked(4)?;
+    let mut signs = sign.chars();
+    let sign =
+        signs.next().filter(|_| name.eq_ignore_ascii_case("sep=") && signs.next().is_none())?;
+    Some(Separator::Char(sign))
+}
+
+/// A way to divide the lines of a sample into columns.
+struct Division {
+    separator: Separator,
+    width: usize,
+    /// The columns of text.
+    texts: Vec<usize>,
+    /// Lines whose columns hold values, but for those of text.
+    rows: usize,
+}
+
+impl Division {
+    /// Divides a sample; rows have at least `least` fields.
+    fn of(sample: &[(usize, String)], separator: Separator, least: usize) -> Division {
+        let lines: Vec<Vec<Value>> =
+            sample.iter().map(|(_, line)| values(line, separator)).collect();
+        // lines with a value somewhere are rows, or a row of units with a 1
+        let rows = || lines.iter().filter(|l| l.len() >= least && l.iter().any(Value::is_there));
+        let mut widths = std::collections::BTreeMap::new();
+        rows().for_each(|line| *widths.entry(line.len()).or_insert(0_usize) += 1);
+        let width = widths.iter().max_by_key(|(_, count)| **count).map_or(0, |(width, _)| *width);
+        let count = widths.get(&width).copied().unwrap_or(0);
+        let others = |k: &usize| {
+            rows().filter(|line| line.len() == width && line[*k] == Value::Other).count()
+        };
+        let texts = (0..width).filter(|k| 2 * others(k) > count).collect();
+        let mut found = Division { separator, width, texts, rows: 0 };
+        found.rows = lines.iter().filter(|line| found.is_sound(line)).count();
+        found
+    }
+
+    fn numbers<'v>(&self, line: &'v [Value]) -> impl Iterator<Item = &'v Value> {
+        let texts = self.texts.clone();
+        line.iter().enumerate().filter(move |(k, _)| !texts.contains(k)).map(|(_, value)| value)
+    }
+
+    /// Returns true if all columns but those of text hold values, and at least one that is not missing.
+    fn is_sound(&self, line: &[Value]) -> bool {
+        line.len() == self.width
+            && self.numbers(line).all(|value| *value != Value::Other)
+            && self.numbers(line).any(Value::is_there)
+    }
+
+    /// Returns true for a row, even if a few of its values are none; a row of units may have a 1.
+    fn is_row(&self, line: &str) -> bool {
+        let line = values(line, self.separator);
+        let count = |wanted: fn(&Value) -> bool| self.numbers(&line).filter(|v| wanted(v)).count();
+        let first = self.numbers(&line).next().is_some_and(Value::is_there);
+        let mostly = first && count(|v| *v == Value::Other) < count(Value::is_there);
+        self.is_sound(&line) || line.len() == self.width && mostly
+    }
 }
 
 /// The lines of a file, without comments and empty ones.
@@ -219,33 +312,26 @@ impl Layout {
             }
             sample.push((lines.number, text.clone()));
         }
-        ensure!(!sample.is_empty(), "it is empty");
-        // the separator by which most lines are values, at least two in each
-        let mut fields = Vec::new();
-        let mut best = (0, SEPARATORS[2], 0);
-        // a table of times alone has one column
-        for (least, separators) in [(2, &SEPARATORS[..]), (1, &SEPARATORS[2..3])] {
-            for &separator in separators {
-                let mut widths: Vec<usize> = Vec::new();
-                for (_, line) in &sample {
-                    separator.split(line, &mut fields);
-                    if fields.len() >= least && is_data(&fields, separator) {
-                        widths.push(fields.len());
-                    }
-                }
-                let count = |width: usize| widths.iter().filter(|w| **w == width).count();
-                let width = widths.iter().copied().max_by_key(|width| count(*width)).unwrap_or(0);
-                if count(width) > best.0 {
-                    best = (count(width), separator, width);
-                }
-            }
-            if best.0 > 0 {
-                break;
-            }
+        let told = sample.first().and_then(|(_, line)| excels(line));
+        if told.is_some() {
+            sample.remove(0);
         }
-        let (found, separator, width) = best;
-        if found == 0 {
-            let (line, text) = &sample[sample.len() - 1];
+        ensure!(!sample.is_empty(), "it is empty");
+        // the separator by which most lines are values, at least two in each; columns of text count only where no
+        // separator does without; a table of times alone has one column
+        let of = |separator: &Separator, least| Division::of(&sample, *separator, least);
+        let tried = told.as_ref().map_or(&SEPARATORS[..], std::slice::from_ref);
+        let best = |divisions: Vec<Division>| {
+            let found = divisions.into_iter().filter(|d| d.rows > 0 && d.texts.len() < d.width);
+            found.reduce(|best, other| {
+                let key = |d: &Division| (d.texts.is_empty(), d.rows);
+                if key(&other) > key(&best) { other } else { best }
+            })
+        };
+        let division = best(tried.iter().map(|separator| of(separator, 2)).collect())
+            .or_else(|| best(vec![of(&SEPARATORS[2], 1)]));
+        let Some(division) = division else {
+            let (line, text) = sample.get(1).unwrap_or(&sample[0]);
             bail!(
                 "line {line}, \"{}\", is no row of numbers (allowed: numbers with decimal point or comma, separated by \
                  semicolons, tabs, commas or blanks; decimal commas need another separator, or quotes; lines of \
@@ -253,12 +339,9 @@ impl Layout {
                 text.chars().take(60).collect::<String>(),
                 COMMENTS.join(" or ")
             );
-        }
-        let is_row = |line: &str| {
-            let mut fields = Vec::new();
-            separator.split(line, &mut fields);
-            fields.len() == width && is_data(&fields, separator)
         };
+        let (separator, width) = (division.separator, division.width);
+        let is_row = |line: &str| division.is_row(line);
         let at = sample.iter().position(|(_, line)| is_row(line)).unwrap_or(0);
         let first = sample[at].0;
         // the header: the first line above with as many fields, or one less where rows end in a separator
@@ -302,23 +385,29 @@ impl Layout {
         }
         let mut header = Header::of(names, units);
         header.widen(width);
+        if !division.texts.is_empty() {
+            let names: Vec<&str> =
+                division.texts.iter().map(|k| header.names[*k].as_str()).collect();
+            notes.push(format!("columns of text are skipped: {}", names.join(", ")));
+        }
         Ok(Layout { separator, header, first, notes })
     }
 
-    /// Reads the columns at these places, that of the time first, in which dates are allowed; NaN where a value is
-    /// missing.
+    /// Reads the columns at these places, that of the time first if the file has `times`: dates and clock times are
+    /// allowed there. NaN where a value is missing.
     pub fn read(
         &self,
         path: &Path,
         places: &[usize],
+        times: bool,
         done: &mut dyn FnMut(String),
     ) -> Result<Found> {
         let mut lines = Lines::open(path)?;
         let size = path.metadata()?.len();
         let mut columns = vec![Vec::new(); places.len()];
+        let mut styles = vec![Style::default(); places.len()];
         let mut text = String::new();
-        let time = places[0];
-        let (mut origin, mut faults, mut count) = (None, Vec::new(), 0_usize);
+        let (mut stamps, mut faults, mut count) = (None, Vec::new(), 0_usize);
         let mut fault = |words: String| {
             count += 1;
             if count <= NAMED {
@@ -345,24 +434,26 @@ impl Layout {
                 ));
                 continue;
             }
-            budget::reading(columns[0].len() + 1, places.len(), size)?;
-            for (column, &place) in columns.iter_mut().zip(places) {
-                let parsed = match value(fields[place], self.separator) {
-                    Value::Number(number) if place != time || origin.is_none() => number,
-                    Value::Missing => f64::NAN,
-                    Value::Date(at) if place == time && (origin.is_some() || column.is_empty()) => {
-                        (i128::from(at) - i128::from(*origin.get_or_insert(at))) as f64 * 1e-9
-                    }
-                    _ => {
-                        fault(format!(
-                            "line {line}, column {}: \"{}\" is not a number",
-                            self.header.names[place],
-                            fields[place].0.chars().take(40).collect::<String>()
-                        ));
-                        f64::NAN
-                    }
+            budget::reading(columns.first().map_or(0, Vec::len) + 1, places.len(), size)?;
+            for (k, &place) in places.iter().enumerate() {
+                let is_time = times && k == 0;
+                let begins = columns[k].is_empty();
+                let parsed = match value(fields[place], self.separator, &mut styles[k]) {
+                    Value::Number(number) if !is_time || stamps.is_none() => Ok(number),
+                    Value::Missing => Ok(f64::NAN),
+                    Value::Date(at) if is_time => Stamps::date(&mut stamps, begins, at),
+                    Value::Clock(at) if is_time => Stamps::clock(&mut stamps, begins, at),
+                    Value::Ambiguous(reason) => Err(reason),
+                    _ => Err("is not a number".into()),
                 };
-                column.push(parsed);
+                columns[k].push(parsed.unwrap_or_else(|reason| {
+                    fault(format!(
+                        "line {line}, column {}: \"{}\" {reason}",
+                        self.header.names[place],
+                        fields[place].0.chars().take(40).collect::<String>()
+                    ));
+                    f64::NAN
+                }));
             }
         }
         if count > 0 {
@@ -372,12 +463,58 @@ impl Layout {
             };
             bail!(
                 "{}{more} (allowed: finite numbers with decimal point or comma; nothing, NaN or NA where a value is \
-                 missing; in the column of the time dates as 2026-01-31T12:00:00.020)",
+                 missing; in the column of the time dates as 2026-01-31T12:00:00.020 or 31.01.2026 12:00:00.020 and clock \
+                 times as 12:00:00.020)",
                 faults.join("; ")
             );
         }
-        let origin = origin.map(|at| DateTime::from_timestamp_nanos(at).to_rfc3339());
+        let origin = stamps.as_ref().map(Stamps::origin);
         let seconds = origin.is_some();
         Ok(Found { columns, origin, seconds })
+    }
+}
+
+/// Times that are dates or clock times.
+enum Stamps {
+    /// Since the first one, ns since 1970.
+    Dates(i64),
+    /// Since the first one, ns since midnight; the last one, with the days that have passed.
+    Clock(i64, i64),
+}
+
+impl Stamps {
+    /// Seconds from the first date to another one.
+    fn date(stamps: &mut Option<Stamps>, begins: bool, at: i64) -> Result<f64, String> {
+        let first = match stamps {
+            None if begins => at,
+            Some(Stamps::Dates(first)) => *first,
+            _ => return Err("is a date, where the lines above have none".into()),
+        };
+        *stamps = Some(Stamps::Dates(first));
+        Ok((i128::from(at) - i128::from(first)) as f64 * 1e-9)
+    }
+
+    /// Seconds from the first clock time to another one, midnights counted.
+    fn clock(stamps: &mut Option<Stamps>, begins: bool, at: i64) -> Result<f64, String> {
+        let (first, last) = match stamps {
+            None if begins => (at, at),
+            Some(Stamps::Clock(first, last)) => (*first, *last),
+            _ => return Err("is a clock time, where the lines above have none".into()),
+        };
+        // half a day back is a midnight
+        let days = (last - at + DAY / 2).div_euclid(DAY).max(0);
+        let at = at + days * DAY;
+        *stamps = Some(Stamps::Clock(first, at));
+        Ok((at - first) as f64 * 1e-9)
+    }
+
+    /// The first one, in words.
+    fn origin(&self) -> String {
+        match self {
+            Stamps::Dates(at) => DateTime::from_timestamp_nanos(*at).to_rfc3339(),
+            Stamps::Clock(at, _) => {
+                DateTime::from_timestamp_nanos(*at).format("%H:%M:%S%.f").to_string()
+            }
+        }
     }
 }

@@ -415,3 +415,224 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
     let ending = read_text("xls", b"", "").unwrap_err();
     assert!(ending.contains("the name must end in .csv, .txt,"), "{ending}");
 }
+
+/// Each of these was refused, or read wrongly, before.
+#[test]
+fn files_of_loggers_and_spreadsheets_are_read_as_they_are_written() {
+    let renamed = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";
+    let cases: [(&str, &str); 8] = [
+        // rosbag exports, flight logs: a column of text, one of Booleans
+        (
+            "t,state,armed,T_cmd,gyro z\n0,idle,false,100,0\n20,\"sweep, up\",true,250,1\n40,sweep,true,-300,-1.5\n",
+            renamed,
+        ),
+        // events in some rows only, the first among them
+        ("t,event,T_cmd,gyro z\n0,start,100,0\n20,,250,1\n40,,-300,-1.5\n", renamed),
+        // Excel abroad, with a typographic minus
+        (
+            "\u{feff}sep=;\nt;T_cmd;gyro z\n0,0;100;0\n20,0;250;1\n40,0;\u{2212}300;\u{2212}1,5\n",
+            renamed,
+        ),
+        // a separator that only this line tells
+        ("sep=|\nt|T_cmd|gyro z\n0|100|0\n20|250|1\n40|-300|-1.5\n", renamed),
+        // thousands: µN·m in English, German and French
+        (
+            "t,T_cmd,gyro z\n0,\"100,000.0\",0\n20,\"250,000\",1\n40,\"-300,000.0\",-1.5\n",
+            "time=t:ms,tau_cmd=T_cmd:uNm,omega=gyro z:deg/s",
+        ),
+        (
+            "t;T_cmd;gyro z\n0;100.000,0;0\n20;250.000;1\n40;-300.000,0;-1,5\n",
+            "time=t:ms,tau_cmd=T_cmd:uNm,omega=gyro z:deg/s",
+        ),
+        (
+            "t;T_cmd;gyro z\n0;100\u{a0}000;0\n20;250 000;1\n40;-300\u{202f}000,0;-1,5\n",
+            "time=t:ms,tau_cmd=T_cmd:uNm,omega=gyro z:deg/s",
+        ),
+        // decimals in all columns, a 1 in the row of units
+        (
+            "t;T_cmd;ok;gyro z\nms;mNm;1;deg/s\n0;100;1;0\n20;250;1;1\n40;-300;1;-1,5\n",
+            "time=t,tau_cmd=T_cmd,omega=gyro z",
+        ),
+    ];
+    for (text, of) in cases {
+        let (table, _) =
+            read_text("csv", text.as_bytes(), of).unwrap_or_else(|e| panic!("{text}\n{e}"));
+        assert_close(column(&table, "time"), &TIME, text);
+        assert_close(column(&table, "tau_cmd"), &TORQUE, text);
+        assert_close(column(&table, "omega"), &RATE, text);
+    }
+    let said = read_text("csv", cases[0].0.as_bytes(), renamed).unwrap().1;
+    assert!(said.contains("columns of text are skipped: state, armed"), "{said}");
+}
+
+#[test]
+fn clock_times_and_dates_of_all_kinds_are_seconds() {
+    let rows = |stamps: [&str; 3]| stamps.map(|stamp| format!("{stamp};0,1;2\n")).concat();
+    let cases = [
+        // over midnight
+        ["23:59:59.990", "00:00:00.010", "0:00:00.03"],
+        ["23:59:59,990", "24:00:00,010", "24:00:00,030"],
+        [
+            "2026-01-31 23:59:59.990+00:00",
+            "2026-02-01 00:00:00.010+00:00",
+            "2026-02-01 00:00:00.030+00:00",
+        ],
+        ["2026-01-31 23:59:59,990", "2026-02-01 00:00:00,010", "2026-02-01 00:00:00,030"],
+        ["31.01.2026 23:59:59,990", "01.02.2026 00:00:00,010", "1.2.2026 00:00:00,030"],
+        ["2026/01/31 23:59:59.99", "2026/02/01 00:00:00.01", "2026/02/01 00:00:00.03"],
+    ];
+    for (k, stamps) in cases.into_iter().enumerate() {
+        let text = format!("time;tau_cmd;omega\n{}", rows(stamps));
+        let found = read_text("csv", text.as_bytes(), "");
+        if k == 1 {
+            // nobody's day has an hour 24
+            let error = found.unwrap_err();
+            assert!(
+                error.contains("line 3, column time: \"24:00:00,010\" is not a number"),
+                "{error}"
+            );
+            continue;
+        }
+        let (table, said) = found.unwrap();
+        assert_close(column(&table, "time"), &TIME, stamps[0]);
+        assert!(said.contains("time counts from "), "{said}");
+    }
+}
+
+#[test]
+fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
+    let cases = [
+        (
+            "time,tau_cmd,omega\n0,0,0\n\"1,234\",0,0\n",
+            "line 3, column time: \"1,234\" may be 1234 or 1.234 (allowed: numbers without separators of thousands",
+        ),
+        (
+            "time;tau_cmd;omega\n0,5;0;0\n1.234;0;0\n",
+            "line 3, column time: \"1.234\" may be 1234 or 1.234",
+        ),
+        (
+            "time;tau_cmd;omega\n0.5;0;0\n0,75;0;0\n",
+            "line 3, column time: \"0,75\" is read with a decimal comma, the lines above with a decimal point",
+        ),
+        // the first bad line, not the last of the sample
+        (
+            "time,tau_cmd,omega\n0,0,true\n1,0,true\n2,0,false\n",
+            "line 2, column omega: \"true\" is not a number; line 3",
+        ),
+        ("a,b\nidle,x\nbusy,y\n", "line 2, \"idle,x\", is no row of numbers"),
+    ];
+    for (text, words) in cases {
+        let error = read_text("csv", text.as_bytes(), "").unwrap_err();
+        assert!(error.contains(words), "{words}:\n{error}");
+    }
+}
+
+#[test]
+fn a_file_without_times_is_read_at_a_stated_rate_alone() {
+    let text = "tau_cmd,omega\n0.1,0\n0.25,1\n-0.3,2\n";
+    let error = read_text("csv", text.as_bytes(), "").unwrap_err();
+    assert!(error.contains("; --rate HZ takes equally spaced rows without times)"), "{error}");
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.csv");
+    std::fs::write(&path, text).unwrap();
+    let at_50_hz = Columns::default().with_rate(Some(50.0)).unwrap();
+    let (table, said) = read_file(&path, &at_50_hz).unwrap();
+    assert_close(column(&table, "time"), &TIME, text);
+    assert_close(column(&table, "tau_cmd"), &TORQUE, text);
+    assert!(said.contains("its rows are taken as 50 a second (--rate)"), "{said}");
+    assert!(Columns::default().with_rate(Some(0.0)).is_err());
+    std::fs::write(&path, "time,tau_cmd,omega\n0,0,0\n1,0,0\n").unwrap();
+    let error = read_file(&path, &at_50_hz).unwrap_err();
+    assert!(
+        error.contains("--rate 50 is for files without times, and column time is this one's"),
+        "{error}"
+    );
+    // a matrix of a .mat file, and Parquet
+    let rate = Some(50.0);
+    let of = columns("tau_cmd=T_cmd:mNm,omega=gyro(3):deg/s").with_rate(rate).unwrap();
+    let (table, _) = read_file(&stored("plain.mat"), &of).unwrap();
+    assert!((column(&table, "time")[1] - 0.02).abs() < 1e-12);
+    let (table, _) =
+        read_file(&stored("dur_ns.parquet"), &columns("tau_cmd=omega").with_rate(rate).unwrap())
+            .map_err(|error| assert!(error.contains("column time is this one's"), "{error}"))
+            .unwrap_or_default();
+    assert_eq!(table.rows(), 0);
+}
+
+#[test]
+fn times_printed_to_milliseconds_are_put_back_onto_their_grid() {
+    let rows: String = (0..400).map(|k| format!("{:.3},0,{k}\n", f64::from(k) / 33.0)).collect();
+    let (table, said) =
+        read_text("csv", format!("time,tau_cmd,omega\n{rows}").as_bytes(), "").unwrap();
+    let time = column(&table, "time");
+    let worst = (0..400).map(|k| (time[k] - time[0] - k as f64 / 33.0).abs()).fold(0.0, f64::max);
+    assert!(worst < 2e-5, "{worst:e}");
+    assert!(said.contains("its times are printed to 1 ms: rows 30.303"), "{said}");
+}
+
+/// Writes a Parquet file of time, torque in mN·m and rate with a codec.
+fn write_parquet(path: &Path, names: [&str; 3], codec: parquet::basic::Compression) {
+    use parquet::{basic, data_type, file, schema::types::Type};
+    let field = |name: &str| {
+        let of = Type::primitive_type_builder(name, basic::Type::DOUBLE);
+        std::sync::Arc::new(of.with_repetition(basic::Repetition::REQUIRED).build().unwrap())
+    };
+    let schema = Type::group_type_builder("schema").with_fields(names.map(field).to_vec()).build();
+    let properties = file::properties::WriterProperties::builder().set_compression(codec).build();
+    let mut writer = file::writer::SerializedFileWriter::new(
+        std::fs::File::create(path).unwrap(),
+        std::sync::Arc::new(schema.unwrap()),
+        std::sync::Arc::new(properties),
+    )
+    .unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    for values in [TIME, TORQUE.map(|t| 1e3 * t), RATE] {
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<data_type::DoubleType>().write_batch(&values, None, None).unwrap();
+        column.close().unwrap();
+    }
+    group.close().unwrap();
+    writer.close().unwrap();
+}
+
+#[test]
+fn parquet_files_of_common_codecs_with_units_in_their_names_are_read() {
+    use parquet::basic::Compression;
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.parquet");
+    let codecs = [
+        Compression::UNCOMPRESSED,
+        Compression::SNAPPY,
+        Compression::GZIP(Default::default()),
+        Compression::LZ4,
+        Compression::LZ4_RAW,
+        Compression::ZSTD(Default::default()),
+    ];
+    for codec in codecs {
+        write_parquet(&path, ["time (s)", "tau cmd [mN.m]", "omega"], codec);
+        // a column is named with its unit or without
+        for of in ["time=time (s),tau_cmd=tau cmd [mN.m]", "tau_cmd=tau cmd"] {
+            let (table, _) = read_file(&path, &columns(of)).unwrap();
+            assert_close(column(&table, "time"), &TIME, of);
+            assert_close(column(&table, "tau_cmd"), &TORQUE, of);
+        }
+    }
+    // the codec of a column without its pages' codec: Brotli is named, with what to do
+    write_parquet(&path, ["time", "tau_cmd", "omega"], Compression::GZIP(Default::default()));
+    let mut bytes = std::fs::read(&path).unwrap();
+    // field 4 of a column's metadata, an i32: 2 is gzip (zigzag 4), 4 Brotli (zigzag 8)
+    let end = bytes.len();
+    let places: Vec<usize> =
+        (end / 3..end - 1).filter(|k| bytes[*k..*k + 2] == [0x15, 0x04]).collect();
+    let error = places.into_iter().find_map(|place| {
+        bytes[place + 1] = 0x08;
+        std::fs::write(&path, &bytes).unwrap();
+        bytes[place + 1] = 0x04;
+        read_file(&path, &Columns::default()).err().filter(|error| error.contains("BROTLI"))
+    });
+    let error = error.unwrap();
+    assert!(
+        error.contains("is compressed with BROTLI") && error.contains("compression='zstd'"),
+        "{error}"
+    );
+}

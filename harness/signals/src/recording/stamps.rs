@@ -1,0 +1,152 @@
+//! Times that a logger printed to a few digits, put back onto the even grid that they come from.
+//!
+//! A logger at 33 Hz that prints milliseconds writes 0.030, 0.061, 0.091. Each stamp is off by up to half a millisecond, and a
+//! torque that is moved by so much is wrong by more than a gyro's noise. If one even grid, rows left out or not, gives every
+//! stamp within its rounding, that grid is what the logger had.
+
+/// An even grid under printed times.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// The unit of the last digit, s.
+    pub quantum: f64,
+    /// Time between rows, s.
+    pub step: f64,
+    /// The times, s.
+    pub time: Vec<f64>,
+}
+
+/// Most decimals of a printed time, s.
+const DECIMALS: i32 = 6;
+/// Part of the quantum by which a time may be off a whole number of them: times since 1970 have 52 binary digits.
+const OFF: f64 = 1e-2;
+/// Part of the quantum by which the spread of the stamps about the grid may exceed it.
+const BEYOND: f64 = 0.02;
+/// Fewest rows.
+const FEWEST: usize = 20;
+
+/// Returns the grid under times, s; `None` where they are on an even grid anyway or on none that explains them.
+pub fn regular(time: &[f64]) -> Option<Grid> {
+    if time.len() < FEWEST || !time.iter().all(|t| t.is_finite()) {
+        return None;
+    }
+    let quantum = quantum(time)?;
+    let units: Vec<f64> = time.iter().map(|t| ((t - time[0]) / quantum).round()).collect();
+    let steps: Vec<f64> = units.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if steps.iter().any(|step| *step < 0.0) {
+        return None;
+    }
+    let mut sorted = steps.clone();
+    let middle = (steps.len() - 1) / 2;
+    let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // nothing was rounded
+    if steps.iter().all(|step| usual > 0.0 && (step / usual).fract() == 0.0) {
+        return None;
+    }
+    let indices = (0..time.len()).map(|k| k as f64).collect();
+    let counted = || {
+        let near: Vec<f64> = steps.iter().copied().filter(|step| *step < 1.5 * usual).collect();
+        let mean = near.iter().sum::<f64>() / near.len() as f64;
+        let each = steps.iter().map(|step| (step / mean).round());
+        let counts = std::iter::once(0.0).chain(each.scan(0.0, |sum, step| {
+            *sum += step;
+            Some(*sum)
+        }));
+        counts.collect()
+    };
+    let (counts, from, step) = fitted(&units, indices).or_else(|| fitted(&units, counted()))?;
+    let at = |k: &f64| time[0] + quantum * (from + step * k);
+    Some(Grid { quantum, step: quantum * step, time: counts.iter().map(at).collect() })
+}
+
+/// A quantum in words.
+pub fn words(quantum: f64) -> String {
+    match quantum {
+        q if q >= 1.0 => format!("{q} s"),
+        q if q >= 0.999e-3 => format!("{:.0} ms", 1e3 * q),
+        q => format!("{:.0} us", 1e6 * q),
+    }
+}
+
+/// The largest power of ten, s, of which all times are multiples.
+fn quantum(time: &[f64]) -> Option<f64> {
+    (0..=DECIMALS).map(|k| 10_f64.powi(-k)).find(|quantum| {
+        let off = |t: &f64| {
+            let units = (t - time[0]) / quantum;
+            (units - units.round()).abs() < OFF
+        };
+        time.iter().all(off)
+    })
+}
+
+/// The row numbers, offset and step of the grid that explains all stamps (in quanta), from first row numbers.
+fn fitted(units: &[f64], mut counts: Vec<f64>) -> Option<(Vec<f64>, f64, f64)> {
+    let n = units.len() as f64;
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    for _ in 0..4 {
+        let (k, u) = (mean(&counts), mean(units));
+        let pairs = || counts.iter().zip(units).map(|(count, unit)| (count - k, unit - u));
+        let step =
+            pairs().map(|(a, b)| a * b).sum::<f64>() / pairs().map(|(a, _)| a * a).sum::<f64>();
+        if !(step > 0.0 && step.is_finite()) {
+            return None;
+        }
+        let from = u - step * k;
+        let off = counts.iter().zip(units).map(|(count, unit)| unit - from - step * count);
+        let (low, high) =
+            off.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let grows = counts.windows(2).all(|pair| pair[1] > pair[0]);
+        if grows && high - low <= 1.0 + BEYOND {
+            return Some((counts, from, step));
+        }
+        // rows of less than a quantum cannot be counted by their stamps
+        if step < 1.0 {
+            return None;
+        }
+        counts = units.iter().map(|unit| ((unit - from) / step).round()).collect();
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn printed(step: f64, rows: std::ops::Range<usize>, quantum: f64) -> Vec<f64> {
+        rows.map(|k| (k as f64 * step / quantum).round() * quantum).collect()
+    }
+
+    #[test]
+    fn rounded_times_are_put_back_onto_their_grid() {
+        // the last one has rows closer than its digits
+        for (step, quantum) in [(1.0 / 33.0, 1e-3), (1.0 / 60.0, 1e-2), (1.0 / 120.0, 1e-2)] {
+            let grid = regular(&printed(step, 0..5000, quantum)).unwrap();
+            assert_eq!(grid.quantum, quantum);
+            let off = |(k, t): (usize, &f64)| (t - grid.time[0] - k as f64 * step).abs();
+            let worst = grid.time.iter().enumerate().map(off).fold(0.0, f64::max);
+            assert!(worst < 1e-2 * quantum, "{step} {worst:e}");
+        }
+        // two stretches of rows are missing
+        let mut gaps = printed(1.0 / 33.0, 0..5000, 1e-3);
+        gaps.drain(4000..4077);
+        gaps.drain(1000..1007);
+        let grid = regular(&gaps).unwrap();
+        assert!((grid.time[4900] - grid.time[0] - 4984.0 / 33.0).abs() < 2e-5);
+    }
+
+    #[test]
+    fn times_that_no_grid_explains_stay_as_they_are() {
+        let even = printed(0.02, 0..5000, 1e-3);
+        assert_eq!(regular(&even), None);
+        let mut lost = even.clone();
+        lost.drain(100..110);
+        assert_eq!(regular(&lost), None);
+        // real jitter of 3 ms, printed in ms
+        let mut state = 1_u64;
+        let jitter = even.iter().map(|t| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            t + 1e-3 * ((state >> 33) % 4) as f64
+        });
+        assert_eq!(regular(&jitter.collect::<Vec<_>>()), None);
+        assert_eq!(regular(&printed(std::f64::consts::PI / 100.0, 0..5000, 1e-12)), None);
+    }
+}
