@@ -56,6 +56,8 @@ pub mod tank {
     pub const DAMPING_LAW_KIND: &str = "tank.damping_law_kind";
     pub const G_FLOOR: &str = "tank.g_floor";
     pub const ZETA_AMPLITUDE: crate::Array<1> = crate::Array("tank.zeta_amplitude");
+    pub const NONLINEAR_INERTIA: crate::Array<1> = crate::Array("tank.nonlinear_inertia");
+    pub const NONLINEAR_STIFFNESS: crate::Array<1> = crate::Array("tank.nonlinear_stiffness");
     pub const WAVE: crate::Array<1> = crate::Array("tank.wave");
     pub const LIQUID_0: &str = "tank.liquid_0";
     pub const OUTLET: &str = "tank.outlet";

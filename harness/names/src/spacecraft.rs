@@ -81,6 +81,8 @@ pub mod tank {
     pub const DAMPING_LAW_KIND: crate::Array<1> = crate::Array("tank[].damping_law_kind");
     pub const G_FLOOR: crate::Array<1> = crate::Array("tank[].g_floor");
     pub const ZETA_AMPLITUDE: crate::Array<2> = crate::Array("tank[].zeta_amplitude");
+    pub const NONLINEAR_INERTIA: crate::Array<2> = crate::Array("tank[].nonlinear_inertia");
+    pub const NONLINEAR_STIFFNESS: crate::Array<2> = crate::Array("tank[].nonlinear_stiffness");
     pub const WAVE: crate::Array<2> = crate::Array("tank[].wave");
     pub const LIQUID_0: crate::Array<1> = crate::Array("tank[].liquid_0");
     pub const OUTLET: crate::Array<1> = crate::Array("tank[].outlet");
