@@ -325,8 +325,8 @@ fn the_fmu_with_arrays_has_the_states_derivatives_and_indicators_of_that_with_sc
                 run.instance.set_time(time).unwrap();
                 run.set(|key| input(case.model, &names, key, time));
                 run.instance.set_continuous_states(&x).unwrap();
-                let (event, _) = run.instance.completed_integrator_step().unwrap();
-                if event {
+                let step = run.instance.completed_integrator_step().unwrap();
+                if step.enter_event_mode {
                     run.instance.enter_event_mode().unwrap();
                     run.instance.update_discrete_states().unwrap();
                     run.instance.enter_continuous_time_mode().unwrap();

@@ -2,6 +2,7 @@
 //! hosts call: the one is the transpose of the other, and both are what differences of the FMU's own values say.
 
 use fastrand::Rng;
+use host::causality::{Causality, Variability};
 use host::description::{ModelDescription, Type, Value, Variable};
 use host::fmi3::{Fmu, Instance, Interface};
 use pack::{Fmi, model, packed_version_for_tests};
@@ -29,7 +30,7 @@ struct Sides {
 }
 
 fn is_real(v: &Variable) -> bool {
-    v.kind() == Type::Real && v.variability == "continuous"
+    v.kind() == Type::Real && v.variability == Variability::Continuous
 }
 
 fn is_computed(v: &Variable) -> bool {
@@ -45,7 +46,7 @@ impl Sides {
             description.variable(name).unwrap().reference
         };
         let inputs: Vec<u32> =
-            real().filter(|v| v.causality == "input").map(|v| v.reference).collect();
+            real().filter(|v| v.causality == Causality::Input).map(|v| v.reference).collect();
         let unknowns: Vec<&Variable> =
             real().filter(|v| is_computed(v) && !v.name.starts_with("event_indicator")).collect();
         Sides {

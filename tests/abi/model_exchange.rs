@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use host::causality::Causality;
 use host::description::{Type, Value};
 use host::fmi2::{EventInfo, Fmu, Instance, MODEL_EXCHANGE, Status};
 use pack::packed_for_tests;
@@ -124,9 +125,9 @@ impl<'fmu> Host<'fmu> {
             self.x = x;
             self.instance.set_time(self.time).unwrap();
             self.instance.set_continuous_states(&x).unwrap();
-            let (step_event, terminate) = self.instance.completed_integrator_step().unwrap();
-            assert!(!terminate);
-            if crossed || is_due || step_event {
+            let step = self.instance.completed_integrator_step().unwrap();
+            assert!(!step.terminate);
+            if crossed || is_due || step.enter_event_mode {
                 let kind = if crossed {
                     0
                 } else if is_due {
@@ -145,7 +146,7 @@ impl<'fmu> Host<'fmu> {
 /// Every real output and some locals.
 fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     let variables = &instance.fmu().description().variables;
-    let outputs = variables.iter().filter(|v| v.causality == "output").map(|v| v.name.as_str());
+    let outputs = variables.iter().filter(|v| v.causality == Causality::Output).map(|v| v.name.as_str());
     let locals = ["energy", "momentum", "work", "heat", "stuck_time", "wheel_speed"];
     let names: Vec<&str> = outputs.chain(locals).collect();
     names.into_iter().map(|name| (name.to_string(), instance.real(name).unwrap())).collect()
@@ -304,7 +305,7 @@ fn euler_meets_co_simulation_to_first_order() {
             host.instance.set_time(host.time).unwrap();
             host.instance.set_continuous_states(&host.x.clone()).unwrap();
             // The FMU says when a change is overdue.
-            if host.instance.completed_integrator_step().unwrap().0 {
+            if host.instance.completed_integrator_step().unwrap().enter_event_mode {
                 events += 1;
                 host.instance.enter_event_mode().unwrap();
                 host.event_iteration();
@@ -423,7 +424,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
 
     let (mut reals, mut integers, mut booleans) = (vec![], vec![], vec![]);
     let variables = &fmu.description().variables;
-    for v in variables.iter().filter(|v| v.causality == "parameter") {
+    for v in variables.iter().filter(|v| v.causality == Causality::Parameter) {
         let set = settings.iter().find(|(name, _)| *name == v.name).map(|(_, value)| *value);
         let text = set.or(v.attributes().start.as_deref()).unwrap();
         match fmu.description().value(v, text).unwrap() {
