@@ -30,7 +30,11 @@ impl Module {
 
     fn write(&self, indent: &str, text: &mut String) {
         for constant in &self.constants {
-            let _ = writeln!(text, "{indent}pub const {constant};");
+            let line = format!("{indent}pub const {constant};");
+            // as rustfmt breaks lines over 100 columns
+            let broken = format!(" =\n{indent}    ");
+            let line = if line.len() > 100 { line.replacen(" = ", &broken, 1) } else { line };
+            let _ = writeln!(text, "{line}");
         }
         for (name, module) in &self.modules {
             let _ = writeln!(text, "\n{indent}pub mod {name} {{");

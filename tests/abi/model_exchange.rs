@@ -146,7 +146,8 @@ impl<'fmu> Host<'fmu> {
 /// Every real output and some locals.
 fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     let variables = &instance.fmu().description().variables;
-    let outputs = variables.iter().filter(|v| v.causality == Causality::Output).map(|v| v.name.as_str());
+    let outputs =
+        variables.iter().filter(|v| v.causality == Causality::Output).map(|v| v.name.as_str());
     let locals = ["energy", "momentum", "work", "heat", "stuck_time", "wheel_speed"];
     let names: Vec<&str> = outputs.chain(locals).collect();
     names.into_iter().map(|name| (name.to_string(), instance.real(name).unwrap())).collect()

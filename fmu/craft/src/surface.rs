@@ -67,7 +67,7 @@ pub(crate) struct Surface {
 impl Surface {
     /// Returns the surface of a mode, `None` for a pendulum.
     pub fn new(s: f64, kappa: f64) -> Option<Surface> {
-        (s != 1.0 || kappa != 1.0).then(|| Surface { inertia: s - 1.0, stiffness: kappa - 1.0 })
+        (s != 1.0 || kappa != 1.0).then_some(Surface { inertia: s - 1.0, stiffness: kappa - 1.0 })
     }
 
     /// Returns the inertia along the meridian, relative to a pendulum's, from eta = p.e and u.

@@ -72,8 +72,10 @@ pub mod slosh {
         pub const K: crate::Array<1> = crate::Array("slosh.table.k");
         pub const ZETA: crate::Array<1> = crate::Array("slosh.table.zeta");
         pub const WAVE: crate::Array<1> = crate::Array("slosh.table.wave");
-        pub const NONLINEAR_INERTIA: crate::Array<1> = crate::Array("slosh.table.nonlinear_inertia");
-        pub const NONLINEAR_STIFFNESS: crate::Array<1> = crate::Array("slosh.table.nonlinear_stiffness");
+        pub const NONLINEAR_INERTIA: crate::Array<1> =
+            crate::Array("slosh.table.nonlinear_inertia");
+        pub const NONLINEAR_STIFFNESS: crate::Array<1> =
+            crate::Array("slosh.table.nonlinear_stiffness");
         pub const DIRECTION: crate::Array<1> = crate::Array("slosh.table.direction");
     }
 }

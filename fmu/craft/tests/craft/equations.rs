@@ -95,7 +95,7 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
         (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         p.pivot = random.pivot();
     }
-    if seed >= 60 && seed < 85 {
+    if (60..85).contains(&seed) {
         random.make_all_planar(&mut p);
     }
     if seed >= 80 {

@@ -15,8 +15,8 @@ use identify::recording::{Recording, Source, prepare, read};
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
 
-use crate::habits::Written;
 use crate::bench::{Bearing, Bench, Drive, Liquid};
+use crate::habits::Written;
 
 /// Relative spread of truths around the nominal bench.
 const SPREAD: f64 = 0.3;
@@ -147,7 +147,8 @@ impl Twin {
     pub fn with_rate(mut self, rate: f64) -> Twin {
         let rows = (self.duration * rate).round() as usize;
         let last = self.drift.len() - 1;
-        let drift = |k: usize| self.drift[((k as f64 * self.rate / rate).round() as usize).min(last)];
+        let drift =
+            |k: usize| self.drift[((k as f64 * self.rate / rate).round() as usize).min(last)];
         let drift = (0..=rows).map(drift).collect();
         (self.drift, self.rate) = (drift, rate);
         self
@@ -258,13 +259,13 @@ impl Twin {
             Intersample::ZeroOrderHold => Drive::Held(commands, &tau),
             Intersample::BandLimited => Drive::Smooth(commands, &*torque),
         };
-        let late = |delay: f64| -> Vec<f64> {
-            instants.iter().map(|t| (t - delay).max(0.0)).collect()
-        };
+        let late =
+            |delay: f64| -> Vec<f64> { instants.iter().map(|t| (t - delay).max(0.0)).collect() };
         let motion = self.bench.motion(&drive, &late(self.delay));
         let mut random = Random::new(self.seed, 8);
         let (white, _, _, least) = GYRO;
-        let drift = |t: f64| self.drift[((t * self.rate).round() as usize).min(self.drift.len() - 1)];
+        let drift =
+            |t: f64| self.drift[((t * self.rate).round() as usize).min(self.drift.len() - 1)];
         let rate = motion.rate.iter().zip(instants).map(|(rate, t)| {
             let noise = drift(*t) + white * self.rate.sqrt() * random.normal();
             ((self.gyro_scale * (rate + noise) + self.gyro_bias) / least).round() * least
@@ -305,7 +306,11 @@ impl Twin {
     ) -> Result<Identification> {
         let options = Options { intersample: self.told(), models, ..Options::default() };
         let coarsest = options.nominal(fmu)?.coarsest();
-        let source = Source { columns: written.columns.parse()?, slow: signals::recording::Between::Held, trim: written.trim };
+        let source = Source {
+            columns: written.columns.parse()?,
+            slow: signals::recording::Between::Held,
+            trim: written.trim,
+        };
         let parts = read(&written.path, &source, coarsest, &mut |line| hear(&line))?;
         output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
     }

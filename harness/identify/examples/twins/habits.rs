@@ -80,9 +80,11 @@ pub fn write(twin: &Twin, habit: &str, directory: &Path) -> Result<Written> {
     let mut random = Random::new(twin.seed, 11);
     let last = rows[rows.len() - 1].time;
     match habit {
-        "slow-gyro" => rows.iter_mut().enumerate().filter(|(k, _)| k % 5 != 2).for_each(|(_, row)| {
-            (row.rate, row.angle) = (None, None);
-        }),
+        "slow-gyro" => {
+            rows.iter_mut().enumerate().filter(|(k, _)| k % 5 != 2).for_each(|(_, row)| {
+                (row.rate, row.angle) = (None, None);
+            })
+        }
         "gap" => rows.retain(|row| !(0.0..0.2).contains(&(row.time - 0.45 * last))),
         "gaps" => rows.retain(|row| {
             [0.2, 0.45, 0.8].iter().all(|at| !(0.0..1.0).contains(&(row.time - at * last)))
@@ -96,7 +98,8 @@ pub fn write(twin: &Twin, habit: &str, directory: &Path) -> Result<Written> {
         }
         "clipped" => {
             let peak = rows.iter().filter_map(|row| row.rate).fold(0.0, |p: f64, w| p.max(w.abs()));
-            rows.iter_mut().for_each(|row| row.rate = row.rate.map(|w| w.clamp(-0.7 * peak, 0.7 * peak)));
+            rows.iter_mut()
+                .for_each(|row| row.rate = row.rate.map(|w| w.clamp(-0.7 * peak, 0.7 * peak)));
         }
         "frozen" => {
             for from in [0.3, 0.5, 0.7] {
@@ -108,7 +111,8 @@ pub fn write(twin: &Twin, habit: &str, directory: &Path) -> Result<Written> {
         }
         _ => {}
     }
-    let mut written = Written { path: directory.join(format!("{habit}.csv")), ..Written::default() };
+    let mut written =
+        Written { path: directory.join(format!("{habit}.csv")), ..Written::default() };
     match habit {
         "late-start" => written.trim = Some((0.15 * last, last)),
         "no-time" => written.rate = Some(1.0 / (rows[1].time - rows[0].time)),
@@ -131,7 +135,9 @@ pub fn write(twin: &Twin, habit: &str, directory: &Path) -> Result<Written> {
             "time=t (ms),tau_cmd=T_cmd [mN.m],omega=gyro z".clone_into(&mut written.columns);
             return Ok(written);
         }
-        habit if !HABITS.contains(&habit) => bail!("{habit} is not a habit (allowed: {})", HABITS.join(", ")),
+        habit if !HABITS.contains(&habit) => {
+            bail!("{habit} is not a habit (allowed: {})", HABITS.join(", "))
+        }
         _ => {}
     }
     std::fs::write(&written.path, text(&rows, habit, twin.encoder.is_some())?)?;
@@ -205,9 +211,12 @@ fn text(rows: &[Row], habit: &str, encoder: bool) -> Result<String> {
                 let micros = ((time + 86_300.0) * 1e6).round() as u64;
                 let (day, micros) = (micros / 86_400_000_000, micros % 86_400_000_000);
                 let seconds = micros / 1_000_000;
-                let clock = format!("{:02}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60);
+                let clock =
+                    format!("{:02}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60);
                 match habit {
-                    "dates" => format!("2026-03-{:02} {clock}.{:06}+00:00", 14 + day, micros % 1_000_000),
+                    "dates" => {
+                        format!("2026-03-{:02} {clock}.{:06}+00:00", 14 + day, micros % 1_000_000)
+                    }
                     _ => format!("{clock}.{:06}", micros % 1_000_000),
                 }
             }
