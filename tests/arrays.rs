@@ -94,7 +94,7 @@ impl Opened {
         let folder = tempfile::tempdir().unwrap();
         archive.unpack(folder.path()).unwrap();
         let root = Element::parse(archive.description().unwrap().as_bytes()).unwrap();
-        let fmu = Fmu::load_for(None, folder.path(), path).unwrap();
+        let fmu = Fmu::load_for(None, folder.path(), path, &root).unwrap();
         Opened { fmu, variables: Variable::all(&root), _folder: folder }
     }
 

@@ -132,7 +132,11 @@ impl Description {
     /// # Errors
     /// If it is not well-formed, with the line.
     pub fn read(bytes: &[u8]) -> Result<Description, String> {
-        let root = Element::parse(bytes)?;
+        Ok(Description::new(Element::parse(bytes)?))
+    }
+
+    /// Returns the description with this root element.
+    pub fn new(root: Element) -> Description {
         let types: BTreeMap<&str, &Element> = root
             .list("TypeDefinitions")
             .filter_map(|t| Some((t.get("name")?, t.children.first()?)))
@@ -144,7 +148,7 @@ impl Description {
             let structure = root.child("ModelStructure");
             structure.into_iter().flat_map(|s| s.list(list)).map(unknown).collect()
         };
-        Ok(Description {
+        Description {
             model_exchange: root.child("ModelExchange").cloned(),
             co_simulation: root.child("CoSimulation").cloned(),
             outputs: unknowns("Outputs"),
@@ -152,7 +156,12 @@ impl Description {
             initial_unknowns: unknowns("InitialUnknowns"),
             variables,
             root,
-        })
+        }
+    }
+
+    /// Returns true for a description of FMI 3.
+    pub fn is_fmi3(&self) -> bool {
+        self.root.get("fmiVersion").is_some_and(|version| version.starts_with("3."))
     }
 
     /// The version of FMI, 1.0 or 3.0, that it is of in place of 2.0.

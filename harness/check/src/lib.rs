@@ -48,7 +48,6 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use host::fmi2::PLATFORM;
-use host::xml::Element;
 use rayon::prelude::*;
 
 use self::rules::fmi3;
@@ -131,9 +130,8 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
 
     // An FMU of FMI 3 keeps rules of its own. One of FMI 1 keeps others: one rule tells it.
-    let third = archive.file("modelDescription.xml").and_then(|xml| Element::parse(xml).ok());
-    let third = third.filter(|root| root.get("fmiVersion").is_some_and(|v| v.starts_with("3.")));
-    let third = third.map(v3::Description::new);
+    let third = description.as_ref().ok().filter(|d| d.is_fmi3());
+    let third = third.map(|d| v3::Description::new(d.root.clone()));
     let libraries = v3::Binaries::new(&archive, third.as_ref());
     let is_foreign = description.as_ref().is_ok_and(|d| d.other_version().is_some());
     let is_wanted = |rule: &&'static Rule| match is_foreign && third.is_none() {

@@ -171,11 +171,9 @@ const LOADING: &str = "loading the binary";
 
 /// The other side: looks at the rule and answers with what it finds; it is ended after `limit`.
 pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Result<()> {
-    let is_fmi3 = std::fs::read(directory.join("modelDescription.xml")).is_ok_and(|xml| {
-        let version =
-            Element::parse(&xml).ok().and_then(|root| root.get("fmiVersion").map(String::from));
-        version.is_some_and(|version| version.starts_with("3."))
-    });
+    let xml = std::fs::read(directory.join("modelDescription.xml"))?;
+    let root = Element::parse(&xml).map_err(anyhow::Error::msg)?;
+    let is_fmi3 = root.get("fmiVersion").is_some_and(|version| version.starts_with("3."));
     let rules = if is_fmi3 { super::rules::fmi3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
     trace::doing(LOADING, Crash::Error);
@@ -196,7 +194,7 @@ pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Resul
         false => findings.skip(format!("it cannot be loaded: {error:#}")),
     };
     match rule.check {
-        Check::Calls(check) => match FmuUnderTest::open(directory, path, deadline) {
+        Check::Calls(check) => match FmuUnderTest::open(directory, path, root, deadline) {
             Err(error) => lost(error, &mut findings),
             Ok(mut fmu) => {
                 fmu.before = before;
@@ -206,7 +204,7 @@ pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Resul
                 fmu.doing("unloading the binary");
             }
         },
-        Check::Calls3(check) => match v3::Subject::open(directory, path, deadline) {
+        Check::Calls3(check) => match v3::Subject::open(directory, path, root, deadline) {
             Err(error) => lost(error, &mut findings),
             Ok(subject) => {
                 if let Err(error) = check(&subject, &mut findings) {

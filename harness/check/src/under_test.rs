@@ -132,11 +132,15 @@ pub struct Experiment {
 }
 
 impl FmuUnderTest {
-    /// Loads the FMU that is unpacked in `directory`.
+    /// Loads the FMU that is unpacked in `directory` and has this model description.
     /// Makes no instances after `deadline`.
-    pub fn open(directory: &Path, path: &Path, deadline: Instant) -> Result<FmuUnderTest> {
-        let xml = std::fs::read(directory.join("modelDescription.xml"))?;
-        let description = Description::read(&xml).map_err(anyhow::Error::msg)?;
+    pub fn open(
+        directory: &Path,
+        path: &Path,
+        root: Element,
+        deadline: Instant,
+    ) -> Result<FmuUnderTest> {
+        let description = Description::new(root);
         let identifier = |interface: &Option<Element>| {
             interface.as_ref().and_then(|i| i.get("modelIdentifier")).map(str::to_string)
         };
@@ -150,7 +154,7 @@ impl FmuUnderTest {
             let Some(identifier) = identifier else { continue };
             let at = match loaded.iter().position(|known| *known == identifier) {
                 Some(at) => at,
-                None => match Fmu::load_for(interface.kind(), directory, path) {
+                None => match Fmu::load_for(interface.kind(), directory, path, &description.root) {
                     Ok(binary) => {
                         binaries.push(binary);
                         loaded.push(identifier);
@@ -191,7 +195,8 @@ impl FmuUnderTest {
     /// Copies the unpacked FMU to `directory` and loads the copy: a library of its own.
     pub fn copy(&self, directory: &Path) -> Result<FmuUnderTest> {
         copy_files(&self.directory, directory)?;
-        FmuUnderTest::open(directory, &self.path, self.deadline)
+        let root = self.description.root.clone();
+        FmuUnderTest::open(directory, &self.path, root, self.deadline)
     }
 
     /// Announces the next call: a crash or a hang is then reported at this place.

@@ -727,6 +727,11 @@ impl ModelDescription {
     pub(crate) fn from_xml_with(text: &str, set: &BTreeMap<u32, Value>) -> Result<Self> {
         let root = Element::parse(text.as_bytes())
             .map_err(|why| anyhow!("modelDescription.xml, line and column {why}"))?;
+        ModelDescription::from_element(&root, set)
+    }
+
+    /// The same from the parsed file.
+    pub(crate) fn from_element(root: &Element, set: &BTreeMap<u32, Value>) -> Result<Self> {
         // what other versions have is not missing here
         let version = root.get("fmiVersion").unwrap_or("2.0");
         let is_fmi3 = version.starts_with("3.");
@@ -747,9 +752,9 @@ impl ModelDescription {
         }
         let optional = |name: &str| root.get(name).unwrap_or_default().to_string();
         let mut description = ModelDescription {
-            fmi_version: reader.text(&root, "fmiVersion"),
-            model_name: reader.text(&root, "modelName"),
-            guid: reader.text(&root, if is_fmi3 { "instantiationToken" } else { "guid" }),
+            fmi_version: reader.text(root, "fmiVersion"),
+            model_name: reader.text(root, "modelName"),
+            guid: reader.text(root, if is_fmi3 { "instantiationToken" } else { "guid" }),
             version: optional("version"),
             description: optional("description"),
             generation_tool: optional("generationTool"),
@@ -767,7 +772,7 @@ impl ModelDescription {
                 },
             },
             variables: Vec::new(),
-            derivatives: derivatives(&root, is_fmi3),
+            derivatives: derivatives(root, is_fmi3),
             sizes: (
                 root.child("ModelStructure").map_or(0, |s| s.list("Derivatives").count()),
                 root.number("numberOfEventIndicators").unwrap_or(0.0) as usize,
@@ -776,7 +781,7 @@ impl ModelDescription {
             elements: BTreeMap::new(),
         };
         if is_fmi3 {
-            reader.variables3(&root, set, &mut description);
+            reader.variables3(root, set, &mut description);
         } else {
             let variables = root.list("ModelVariables").map(|e| reader.variable(e));
             description.variables = variables.collect();

@@ -12,13 +12,14 @@ use std::sync::Once;
 use anyhow::Result;
 use libloading::Library;
 
-pub use crate::c_abi::version::FmuState;
+use crate::c_abi::version::FmuState;
 use crate::c_abi::version::{
     self, Call, Common, Component, Exchange, Getter, Interface, Refs, Setter, Updated, Version,
 };
 use crate::c_abi::{self, Environment, Function, c_string, copied, functions, pointer};
 pub use crate::c_abi::{CallError, Called, HostState, Message, Status};
 use crate::description::{CType, Value};
+pub use crate::xml::Element;
 
 pub mod guarded;
 
@@ -305,14 +306,14 @@ macro_rules! answers {
 }
 
 impl Fmu {
-    /// [`Fmu::load`] with the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`]:
-    /// the two may name different ones.
-    pub fn load_for(kind: i32, directory: &Path, path: &Path) -> Result<Self> {
+    /// Loads the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`], from an unpacked FMU whose model
+    /// description is `root`. The two interfaces may name different binaries.
+    pub fn load_for(kind: i32, directory: &Path, path: &Path, root: &Element) -> Result<Self> {
         let interface = match kind {
             CO_SIMULATION => Interface::CoSimulation,
             _ => Interface::ModelExchange,
         };
-        Fmu::load_binary(Some(interface), directory, path)
+        Fmu::load_parsed(Some(interface), directory, path, root)
     }
 
     /// Returns true if the binary has all functions of Model Exchange.

@@ -22,6 +22,7 @@ use crate::c_abi::{
 };
 use crate::causality::Causality;
 use crate::description::{CType, Value};
+use crate::xml::Element;
 
 /// An FMU 3.0 whose binary is loaded.
 pub type Fmu = version::Fmu<Fmi3>;
@@ -500,9 +501,15 @@ impl Version for Fmi3 {
 }
 
 impl Fmu {
-    /// [`Fmu::load`] for one interface: the two may name different binaries.
-    pub fn load_for(interface: Option<Interface>, directory: &Path, path: &Path) -> Result<Self> {
-        Fmu::load_binary(interface, directory, path)
+    /// Loads the binary of one interface from an unpacked FMU whose model description is `root`. The two interfaces may
+    /// name different binaries.
+    pub fn load_for(
+        interface: Option<Interface>,
+        directory: &Path,
+        path: &Path,
+        root: &Element,
+    ) -> Result<Self> {
+        Fmu::load_parsed(interface, directory, path, root)
     }
 
     /// Names of the 75 functions that every FMU must export (section 2.5).

@@ -73,17 +73,24 @@ impl Use {
 }
 
 impl Subject {
-    /// Loads the FMU that is unpacked in `directory`, for each interface that rules call. Makes
-    /// no instances after `deadline`.
-    pub fn open(directory: &Path, path: &Path, deadline: Instant) -> Result<Subject> {
-        let xml = std::fs::read(directory.join("modelDescription.xml"))?;
-        let description = Description::new(Element::parse(&xml).map_err(anyhow::Error::msg)?);
+    /// Loads the FMU that is unpacked in `directory` and has this model description, for each interface that rules call.
+    /// Makes no instances after `deadline`.
+    pub fn open(
+        directory: &Path,
+        path: &Path,
+        root: Element,
+        deadline: Instant,
+    ) -> Result<Subject> {
+        let description = Description::new(root);
         let mut binaries = Vec::new();
         for (name, interface) in
             [("CoSimulation", Interface::CoSimulation), ("ModelExchange", Interface::ModelExchange)]
         {
             if description.interface(name).is_some() {
-                binaries.push((interface, Fmu::load_for(Some(interface), directory, path)?));
+                binaries.push((
+                    interface,
+                    Fmu::load_for(Some(interface), directory, path, &description.root)?,
+                ));
             }
         }
         if binaries.is_empty() {

@@ -19,6 +19,7 @@ use super::{
 use crate::archive::Archive;
 use crate::description::{CType, ModelDescription, Type, Value, Variable};
 use crate::guard::Calls;
+use crate::xml::Element;
 
 pub(crate) type Component = *mut c_void;
 pub(crate) type State = *mut c_void;
@@ -265,6 +266,18 @@ impl<V: Version> Fmu<V> {
             .with_context(|| format!("modelDescription.xml in {name} cannot be read"))?;
         let description =
             ModelDescription::from_xml(&text).with_context(|| format!("{name} cannot be used"))?;
+        Fmu::load_described(description, interface, directory, path)
+    }
+
+    /// The same with a model description that is parsed already: parsing takes most of the time of a large one.
+    pub(crate) fn load_parsed(
+        interface: Option<Interface>,
+        directory: &Path,
+        path: &Path,
+        root: &Element,
+    ) -> Result<Self> {
+        let description = ModelDescription::from_element(root, &BTreeMap::new())
+            .with_context(|| format!("{} cannot be used", path.display()))?;
         Fmu::load_described(description, interface, directory, path)
     }
 
