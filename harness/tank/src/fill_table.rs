@@ -7,7 +7,9 @@
 use core::f64::consts::PI;
 
 use names::sloshtank::tank::MOST_MODES as MODES;
+use names::sloshtank::tank::fill;
 pub use names::sloshtank::tank::fill::MOST_POINTS as POINTS;
+use names::sloshtank::tank::{H_0, HINGE, I_0, I_Z, LENGTH, LIQUID_0, M_0, MASS, OUTLET};
 
 use crate::contour::Problems;
 use crate::interpolation::Monotone;
@@ -167,15 +169,14 @@ pub fn parameters(
     target: Target,
     liquid: Liquid,
 ) -> Result<ParameterSet, Problems> {
-    let prefix = match target {
-        Target::HubSlosh => {
-            return Err("HubSlosh's tank does not drain: a table over the fill is for SloshTank or Spacecraft."
+    if target == Target::HubSlosh {
+        return Err(
+            "HubSlosh's tank does not drain: a table over the fill is for SloshTank or Spacecraft."
                 .to_string()
-                .into());
-        }
-        Target::SloshTank => "tank".to_string(),
-        Target::Spacecraft { tank } => format!("tank[{tank}]"),
-    };
+                .into(),
+        );
+    }
+    let prefix = target.name("tank");
     let rows = &sweep.rows;
     if !(2..=POINTS).contains(&rows.len()) {
         return Err(
@@ -234,28 +235,29 @@ pub fn parameters(
         }
     }
     // parameters that the table replaces
-    let replaced = ["m_0", "H_0", "I_0", "I_z", "mass[", "length[", "hinge["]
-        .map(|what| format!("{prefix}.{what}"));
-    set.values.retain(|(name, _)| !replaced.iter().any(|start| name.starts_with(start)));
-    let mut real = |what: String, value: f64| {
-        set.values.push((format!("{prefix}.{what}"), Value::Real(value)));
+    let of_modes = (1..=modes).flat_map(|n| [MASS, LENGTH, HINGE].map(|array| array.at([n])));
+    let replaced = [M_0, H_0, I_0, I_Z].map(String::from).into_iter().chain(of_modes);
+    let replaced: Vec<String> = replaced.map(|name| target.name(&name)).collect();
+    set.values.retain(|(name, _)| !replaced.contains(name));
+    let mut real = |name: &str, value: f64| {
+        set.values.push((target.name(name), Value::Real(value)));
     };
-    real("liquid_0".to_string(), last.m_liq);
-    real("outlet".to_string(), last.z_lowest);
+    real(LIQUID_0, last.m_liq);
+    real(OUTLET, last.z_lowest);
     for (i, row) in rows.iter().enumerate() {
         let (at, rest) = (i + 1, row.rest(modes));
-        real(format!("fill.liquid[{at}]"), row.m_liq);
-        real(format!("fill.H_0[{at}]"), rest.height);
+        real(&fill::LIQUID.at([at]), row.m_liq);
+        real(&fill::H_0.at([at]), rest.height);
         // with the largest number of modes it may be below 0 by rounding
-        real(format!("fill.I_0[{at}]"), rest.inertia.max(0.0));
-        real(format!("fill.I_z[{at}]"), row.i_eff_axis.unwrap_or(0.0));
+        real(&fill::I_0.at([at]), rest.inertia.max(0.0));
+        real(&fill::I_Z.at([at]), row.i_eff_axis.unwrap_or(0.0));
         for n in 0..modes {
             let mode = &row.modes[n];
-            real(format!("fill.mass[{},{at}]", n + 1), mode.m);
-            real(format!("fill.length[{},{at}]", n + 1), mode.l);
-            real(format!("fill.hinge[{},{at}]", n + 1), bob(row, n) + mode.l);
+            real(&fill::MASS.at([n + 1, at]), mode.m);
+            real(&fill::LENGTH.at([n + 1, at]), mode.l);
+            real(&fill::HINGE.at([n + 1, at]), bob(row, n) + mode.l);
         }
     }
-    set.values.push((format!("{prefix}.fill.points"), Value::Integer(rows.len() as i64)));
+    set.values.push((target.name(fill::POINTS), Value::Integer(rows.len() as i64)));
     Ok(set)
 }

@@ -5,7 +5,8 @@
 
 use core::fmt::Write as _;
 
-use names::{hubslosh, sloshtank, spacecraft};
+use names::hubslosh::{self, DampingLaw, SloshSource, slosh};
+use names::{sloshtank, spacecraft};
 
 use crate::contour::Problems;
 use crate::low_gravity::{self, Capillary, Fluid};
@@ -27,6 +28,18 @@ pub enum Target {
         /// Number of the tank.
         tank: usize,
     },
+}
+
+impl Target {
+    /// Returns the target's name of a variable of SloshTank's tank, `tank.mass[1]`.
+    pub(crate) fn name(self, of_sloshtank: &str) -> String {
+        match self {
+            Target::Spacecraft { tank } => {
+                of_sloshtank.replacen("tank", &format!("tank[{tank}]"), 1)
+            }
+            _ => of_sloshtank.to_string(),
+        }
+    }
 }
 
 /// Properties of the liquid other than its density.
@@ -241,7 +254,7 @@ impl ParameterSet {
             format!("heights (hinge, H_0): {}", data.origin()),
         ];
         let most = match target {
-            Target::HubSlosh => hubslosh::slosh::MOST_MODES,
+            Target::HubSlosh => slosh::MOST_MODES,
             Target::SloshTank => sloshtank::tank::MOST_MODES,
             Target::Spacecraft { .. } => spacecraft::tank::MOST_MODES,
         };
@@ -341,62 +354,61 @@ impl ParameterSet {
             ));
             for n in first_across..=2 * count {
                 let radial = Value::Real(std::f64::consts::FRAC_PI_2);
-                values.push((format!("slosh.table.direction[{n}]"), radial));
+                values.push((slosh::table::DIRECTION.at([n]), radial));
             }
         }
         let mut real = |name: String, value: f64| values.push((name, Value::Real(value)));
         match target {
             Target::HubSlosh => {
-                real("slosh.table.m_liq".into(), data.m_liq);
+                real(slosh::table::M_LIQ.into(), data.m_liq);
                 // specific force of the damping ratios; at 0 there are none
                 if liquid.gravity > 0.0 {
-                    real("slosh.table.g_ref".into(), liquid.gravity);
+                    real(slosh::table::G_REF.into(), liquid.gravity);
                 }
-                real("fluid.rho".into(), data.rho);
+                real(hubslosh::fluid::RHO.into(), data.rho);
                 // For a box, the width of the free surface along its first length.
                 real(
-                    "tank.d".into(),
+                    hubslosh::tank::D.into(),
                     2.0 * data.r_surface.unwrap_or(data.length_x.unwrap_or(0.0) / 2.0),
                 );
-                real("tank.I_own".into(), data.i_eff_axis.unwrap_or(0.0));
+                real(hubslosh::tank::I_OWN.into(), data.i_eff_axis.unwrap_or(0.0));
                 of_modes("slosh.table", &mut values);
-                values.push(("slosh.source".into(), Value::Item("table")));
+                let source = Value::Item(SloshSource::Table.name());
+                values.push((slosh::SOURCE.into(), source));
                 // The damping ratios come from the laminar layer.
-                values.push(("slosh.damping_law".into(), Value::Item("laminar")));
-                values.push(("slosh.modes".into(), Value::Integer(modes.len() as i64)));
+                let law = Value::Item(DampingLaw::Laminar.name());
+                values.push((slosh::DAMPING_LAW.into(), law));
+                values.push((slosh::MODES.into(), Value::Integer(modes.len() as i64)));
             }
             Target::SloshTank | Target::Spacecraft { .. } => {
-                let prefix = match target {
-                    Target::Spacecraft { tank: number @ 1..=spacecraft::MOST_TANKS } => {
-                        format!("tank[{number}]")
-                    }
-                    Target::Spacecraft { tank: number } => {
-                        return Err(format!(
-                            "The tank's number is {number}; Spacecraft has 1 to {}.",
-                            spacecraft::MOST_TANKS
-                        )
-                        .into());
-                    }
-                    _ => "tank".to_string(),
-                };
+                use sloshtank::tank::{DI_Y, DIRECTION, G_REF, H_0, I_0, I_Z, M_0, MODES};
+                if let Target::Spacecraft { tank: number } = target
+                    && !(1..=spacecraft::MOST_TANKS).contains(&number)
+                {
+                    return Err(format!(
+                        "The tank's number is {number}; Spacecraft has 1 to {}.",
+                        spacecraft::MOST_TANKS
+                    )
+                    .into());
+                }
                 let rest = match both {
                     // Each bob is rigid liquid for motion along the other axis. Rotation about x moves it along y.
                     Some(axes) => modal::rest(data.m_liq, data.z_cg, axes.y.i_eff_cg, &modes),
                     None => data.rest(modes.len()),
                 };
-                real(format!("{prefix}.m_0"), rest.m_0);
-                real(format!("{prefix}.H_0"), rest.height);
+                real(target.name(M_0), rest.m_0);
+                real(target.name(H_0), rest.height);
                 // With the largest number of modes it may be below 0 by rounding.
                 let least = if both.is_some() { f64::NEG_INFINITY } else { 0.0 };
-                real(format!("{prefix}.I_0"), rest.inertia.max(least));
-                real(format!("{prefix}.I_z"), data.i_eff_axis.unwrap_or(0.0));
+                real(target.name(I_0), rest.inertia.max(least));
+                real(target.name(I_Z), data.i_eff_axis.unwrap_or(0.0));
                 if liquid.gravity > 0.0 {
-                    real(format!("{prefix}.g_ref"), liquid.gravity);
+                    real(target.name(G_REF), liquid.gravity);
                 }
                 if let Some(axes) = both {
-                    real(format!("{prefix}.dI_y"), axes.x.i_eff_cg - axes.y.i_eff_cg);
+                    real(target.name(DI_Y), axes.x.i_eff_cg - axes.y.i_eff_cg);
                     for (n, &(axis, _)) in chosen.iter().enumerate() {
-                        real(format!("{prefix}.direction[{},{}]", n + 1, axis + 1), 1.0);
+                        real(target.name(&DIRECTION.at([n + 1, axis + 1])), 1.0);
                     }
                     notes.push(format!(
                         "planar modes along both lengths: m_0 = {:.6} kg is the liquid less the masses of all, each of which is \
@@ -404,9 +416,9 @@ impl ParameterSet {
                         rest.m_0
                     ));
                 }
-                of_modes(&prefix, &mut values);
-                values.push((format!("{prefix}.modes"), Value::Integer(modes.len() as i64)));
-                if prefix != "tank" {
+                of_modes(&target.name("tank"), &mut values);
+                values.push((target.name(MODES), Value::Integer(modes.len() as i64)));
+                if target != Target::SloshTank {
                     notes.push("set tanks to the number of tanks".to_string());
                 }
             }
