@@ -84,7 +84,7 @@ sys.exit(not run.step(50))
     done = subprocess.run(
         [sys.executable, "-c", program, fmu.resolve()], capture_output=True, text=True, check=False
     )
-    # libcosim itself leaves enumerations out and says so; that is no finding.
+    # libcosim itself leaves enumerations out and says so; that is not a finding.
     skipped = "FMI 2.0 Enumeration variable type not supported"
     lines = (done.stdout + done.stderr).splitlines()
     said = [line for line in lines if line.strip() and skipped not in line]

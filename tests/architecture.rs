@@ -394,7 +394,7 @@ fn modules(
 
 /// Modules in a circle or above one.
 fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
-    // What uses nothing that is left is no part of a circle.
+    // What uses nothing that is left is not part of a circle.
     while let Some(leaf) =
         left.iter().find(|(_, used)| used.is_empty()).map(|(name, _)| name.clone())
     {

@@ -536,7 +536,7 @@ fn derivatives_and_dependencies_of_arrays_are_those_of_their_elements_by_rows() 
                     expected.push((key.clone(), name[&d.independent].clone()));
                 }
             }
-            // What is beyond the size is no variable here.
+            // What is beyond the size is not a variable here.
             expected.retain(|(_, known)| columns.contains(known));
             assert_eq!(mapped, expected, "{}", v.name);
         }

@@ -16,7 +16,7 @@ TEXTS = Path(__file__).resolve().parent / "ssp"
 def pack(fmu: Path, archive: Path) -> None:
     """Write the system's description, its parameters and the FMU into one archive."""
     if not zipfile.is_zipfile(fmu):
-        sys.exit(f"error: {fmu} is no FMU; cargo run --release -- pack makes one")
+        sys.exit(f"error: {fmu} is not an FMU; cargo run --release -- pack makes one")
     members = {path.relative_to(TEXTS).as_posix(): path for path in TEXTS.rglob("*.ss?")}
     members["resources/HubSlosh.fmu"] = fmu
     archive.parent.mkdir(parents=True, exist_ok=True)

@@ -291,7 +291,7 @@ def analyse(path: Path) -> tuple[Features, Features]:
     some = squares[1] > 0
     values["off_axis_median"] = float(np.median(squares[0][some] / squares[1][some]))
     values["off_axis_energy"] = float(squares[0].sum() / squares[1].sum())
-    # the tank's arm is no stored signal: the plan's or the FMU's start value
+    # the tank's arm is not a stored signal: the plan's or the FMU's start value
     settings = dict(pair.split("=", 1) for pair in notes["settings"].split())
     arm = float(settings.get("tank.r", 0.225))
     values["leakage"] = float(np.sqrt(np.mean(np.abs(arm * force) ** 2)))

@@ -741,7 +741,7 @@ def verdict(rows: list[Row]) -> str:
 
 
 def computed() -> list[tuple[float, float, float]]:
-    """Return depth, frequency by CFD and ours: what others computed is no measurement."""
+    """Return depth, frequency by CFD and ours: what others computed is not a measurement."""
     data = table("box_cfd.csv")
     return [
         (h, w, frequency(tank("density = 1000\nbox = [1, 1]\n", h, 1)) / math.sqrt(G))

@@ -147,7 +147,7 @@ def test_what_is_wrong_is_said_before_a_worker_starts(monkeypatch, capsys, fmu, 
 
 
 def test_differences_of_cells_are_relative_and_a_text_differs_or_not() -> None:
-    """Empty against a number is no small difference."""
+    """Empty against a number is not a small difference."""
     assert difference("1.5", "1.50") == 0.0
     assert difference("2.0", "2.000000002") == pytest.approx(1e-9)
     assert difference("", "0.1") == difference("a", "b") == float("inf")

@@ -234,7 +234,7 @@ fn no_calls_break<M: runtime::Model>(inputs: u32) {
         host.arg(if under_valgrind() { "1000" } else { "10" });
         match std::env::var_os("HUBSLOSH_CORPUS") {
             Some(corpus) => {
-                for input in std::fs::read_dir(corpus).expect("HUBSLOSH_CORPUS is no folder") {
+                for input in std::fs::read_dir(corpus).expect("HUBSLOSH_CORPUS is not a folder") {
                     host.arg(input.unwrap().path());
                 }
             }

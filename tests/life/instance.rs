@@ -1107,7 +1107,7 @@ fn kinds_that_contradict_the_enumerations_are_all_reported() {
     for text in ["slosh.kind = 4", "slosh.model = 3", "friction.kind = 2", "friction.model = 1"] {
         assert!(fault.text.contains(text), "{text} is not in: {}", fault.text);
     }
-    // The same number twice is no contradiction, nor is the start value, which many hosts set.
+    // The same number twice is not a contradiction, nor is the start value, which many hosts set.
     for (model, kind) in [(4, 4), (2, 4)] {
         stepping(&[("slosh.model", number(model)), ("slosh.kind", number(kind))]);
     }

@@ -80,7 +80,7 @@ fn an_input_follows_others_exactly_where_the_model_sets_its_slope<M: Model>() {
     let mut inputs = M::Inputs::default();
     let slope = |inputs: &mut M::Inputs, scalar: &Scalar<M>| match scalar.access {
         Access::Input(ramp) => std::mem::replace(ramp(inputs, scalar.element)[1], given),
-        _ => panic!("{} is no input", scalar.name()),
+        _ => panic!("{} is not an input", scalar.name()),
     };
     for scalar in M::table().inputs() {
         slope(&mut inputs, scalar);

@@ -121,7 +121,7 @@ impl Binaries {
             let [_, folder, file] = parts[..] else { continue };
             let Some((ending, kind)) = platform(folder) else {
                 let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-                // that of a standard folder in other capitals is no name of a vendor
+                // that of a standard folder in other capitals is not a name of a vendor
                 let is_vendors = platform(&folder.to_lowercase()).is_none();
                 let is_named = identifiers.iter().any(|name| name == stem);
                 all.of_vendors += usize::from(is_vendors && is_named);

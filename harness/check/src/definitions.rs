@@ -28,7 +28,7 @@ pub fn fmi_version(d: &Description, findings: &mut Findings) {
         return findings.add(
             "fmiVersion",
             format!(
-                "\"{other}\": it is no FMU 2.0, and no other rule is looked at (allowed: \"2.0\")"
+                "\"{other}\": this is not FMI 2.0, and no other rule is checked (allowed: \"2.0\")"
             ),
         );
     }

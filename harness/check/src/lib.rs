@@ -105,7 +105,7 @@ const OPENING: [&str; 10] = [
 ///
 /// # Errors
 /// If the file cannot be read, a rule asked for is unknown, or there is no place to unpack. Whatever
-/// is wrong with the FMU is no error but a finding.
+/// is wrong with the FMU is not an error but a finding.
 pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) -> Result<Report> {
     let known = |name: &str| RULES.iter().chain(fmi3::RULES).any(|rule| is_selected(rule, name));
     let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
@@ -168,7 +168,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
             (Check::Binaries(check), _) => check(&binaries, &mut findings),
             (Check::Description3(check), _) => match &third {
                 Some(description) => check(description, &mut findings),
-                None => findings.skip("it is no FMU 3.0"),
+                None => findings.skip("it is not an FMU 3.0"),
             },
             (Check::Binaries3(check), _) => check(&libraries, &mut findings),
             (Check::Calls(_) | Check::Calls3(_), _) => {

@@ -48,7 +48,7 @@ pub enum Interface {
 /// Most rules cannot be checked: one rule gives the reason, the others are skipped.
 #[derive(Debug)]
 pub struct Unusable {
-    /// The rule that tells; empty if it is no fault.
+    /// The rule that tells; empty if it is not a fault.
     pub rule: &'static str,
     /// Reason.
     pub why: String,

@@ -27,7 +27,7 @@ pub fn structured_names(d: &Description, findings: &mut Findings) {
     }
     d.each(findings, |v| {
         (!is_structured(&v.name))
-            .then(|| "the name is no path like a.b[1].c, der(a.b) or a.'b c'".to_string())
+            .then(|| "the name is not a path like a.b[1].c, der(a.b) or a.'b c'".to_string())
     });
 }
 
@@ -248,7 +248,7 @@ pub fn range(d: &Description, findings: &mut Findings) {
             let items = v.typed.get("declaredType").map(items).unwrap_or_default();
             let list: Vec<_> = items.iter().map(f64::to_string).collect();
             return (!items.is_empty() && !items.contains(&start))
-                .then(|| format!("start={start} is no item (allowed: {})", list.join(", ")));
+                .then(|| format!("start={start} is not an item (allowed: {})", list.join(", ")));
         }
         None
     });
@@ -303,7 +303,7 @@ pub fn independent(d: &Description, findings: &mut Findings) {
         findings.add(all[1].place(), format!("{} independent variables (allowed: one)", all.len()));
     }
     for v in all.iter().filter(|v| v.kind != Type::Real) {
-        findings.add(v.place(), "the independent variable is no Real");
+        findings.add(v.place(), "the independent variable is not a Real");
     }
 }
 
@@ -331,8 +331,9 @@ pub fn states(d: &Description, findings: &mut Findings) {
     });
     let states = d.states();
     d.each(findings, |v| {
-        (v.typed.flag("reinit") && !states.contains(&v.index))
-            .then(|| "reinit, but Derivatives lists no derivative of it, so it is no state".into())
+        (v.typed.flag("reinit") && !states.contains(&v.index)).then(|| {
+            "reinit, but Derivatives lists no derivative of it, so it is not a state".into()
+        })
     });
 }
 

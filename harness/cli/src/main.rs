@@ -12,7 +12,7 @@ macro_rules! print {
     ($($arguments:tt)*) => { crate::terminal::say(format!($($arguments)*)) };
 }
 
-/// A line on stdout about what was done, which is no result: not with `--quiet`.
+/// A line on stdout about what was done, which is not a result: not with `--quiet`.
 macro_rules! done {
     ($($arguments:tt)*) => {
         if !crate::terminal::is_quiet() {

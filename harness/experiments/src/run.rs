@@ -103,9 +103,9 @@ pub fn histories(
     }
     if !wrong.is_empty() && !ignore {
         problems.push(format!(
-            "{} {} no input (--ignore-columns passes over such columns)",
+            "{} {} (--ignore-columns skips such columns)",
             wrong.join(", "),
-            if wrong.len() == 1 { "is" } else { "are" }
+            if wrong.len() == 1 { "is not an input" } else { "are not inputs" }
         ));
     }
     if let Some(chosen) = chosen.filter(|chosen| !inputs.contains(chosen)) {
@@ -378,7 +378,7 @@ impl Recorder {
                     real_places.push(place);
                 }
                 Type::String | Type::Binary | Type::Clock => {
-                    bail!("{name} is no number; only numbers can be recorded")
+                    bail!("{name} is not a number; only numbers can be recorded")
                 }
                 Type::Integer | Type::Boolean | Type::Enumeration => {
                     others.push(variable.clone());

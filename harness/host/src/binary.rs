@@ -403,7 +403,7 @@ pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
         let (Some(macho::MH_MAGIC_64), Some(cpu), Some(subtype)) =
             (number(0), number(4), number(8))
         else {
-            bail!("a part of the universal binary is no Mach-O file");
+            bail!("a part of the universal binary is not a Mach-O file");
         };
         body.resize(body.len().next_multiple_of(page), 0);
         head.extend([cpu, subtype, body.len() as u32, part.len() as u32, ALIGNMENT]);

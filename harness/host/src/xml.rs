@@ -105,7 +105,7 @@ impl Element {
         self.attributes.iter().find(|(name, _)| name == attribute).map(|(_, value)| value.as_str())
     }
 
-    /// The value of an attribute that is a number; none if it is not written or is no number.
+    /// The value of an attribute that is a number; none if it is not written or is not a number.
     pub fn number(&self, attribute: &str) -> Option<f64> {
         self.get(attribute).and_then(double)
     }

@@ -106,7 +106,7 @@ pub fn matters(recordings: &[Recording]) -> bool {
     recordings.iter().any(varies)
 }
 
-/// Sum of squares over the first behaviour's beyond which another one is no rival, wherever its minimum is.
+/// Difference from the first behaviour's sum of squares above which another behaviour is out, wherever its minimum is.
 const NO_RIVAL: f64 = 1.5;
 
 /// The same beyond which another one is given up, if a step has been taken.
@@ -118,7 +118,7 @@ const FORESEEN: f64 = 1.0;
 /// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row.
 /// The sensitivities are nearly the same, so each behaviour costs a few simulations. If they lead near its minimum but not to it,
 /// the behaviour gets sensitivities of its own: a wrong behaviour may have moved a poorly determined unknown far along its
-/// valley, and a sum of squares on the way is no evidence. The exception is a point less than a standard deviation from a minimum
+/// valley, and a sum of squares on the way proves nothing. The exception is a point less than a standard deviation from a minimum
 /// that already decides against the behaviour. If they were sought `before` with nearly the same noise and from nearly the same
 /// minimum, the search continues from the earlier results, and a behaviour that was far off stays rejected.
 pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Others>) -> Others {

@@ -222,7 +222,7 @@ fn unknowns(
         ensure!(
             variable.causality == Causality::Parameter
                 && variable.kind() == host::description::Type::Real,
-            "{name} cannot be estimated: it is no parameter with a real value"
+            "{name} cannot be estimated: it is not a parameter with a real value"
         );
         if !all.iter().any(|(n, _, used)| n == name && !used) {
             let known = options.known.iter().find(|k| k.0 == *name).map(|k| k.1);

@@ -67,7 +67,7 @@ const DECREMENT: f64 = 0.01;
 pub const MINIMUM: f64 = 0.1;
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 pub const ROUNDS: usize = 6;
-/// A change of one variable there by more than this of one here is no valley's bend.
+/// A change of one variable there by more than this of one here is not a valley's bend.
 const SHARPEST: f64 = 1e3;
 
 /// A measured signal of the hub.

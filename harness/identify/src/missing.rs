@@ -28,7 +28,7 @@ use crate::simulate::{Motion, TORQUE_BESIDES};
 /// Root mean square of the torque by which the answer is differenced, over that of the command: small against the nonlinearity,
 /// large against the integrator's tolerance.
 const STEP: f64 = 1e-4;
-/// Command below which it is no measure, N·m: a free decay has none.
+/// Smallest commanded torque that serves as a scale, N·m; a free decay has none.
 const QUIET: f64 = 1e-3;
 /// Part of a sensitivity that the unknowns must leave for it to be seen: theirs are differences, good to a thousandth.
 const SEEN: f64 = 1e-2;

@@ -63,7 +63,7 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
         ensure!(
             matches!(variable.causality, Causality::Parameter | Causality::Input)
                 && name != TAU_CMD,
-            "{name} cannot be set: it is no parameter"
+            "{name} cannot be set: it is not a parameter"
         );
         instance.set(name, value)?;
     }

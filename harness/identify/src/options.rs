@@ -31,7 +31,7 @@ pub struct Options {
     pub tolerances: Tolerances,
     /// Intersample behaviour of the torque; `None` chooses the best fit.
     pub intersample: Option<Intersample>,
-    /// The rate's time stamps may be early: a delay below zero is no doubt.
+    /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
     pub acausal: bool,
     /// Recordings that are simulated, not fitted.
     pub validation: Vec<Recording>,

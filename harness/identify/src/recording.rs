@@ -133,14 +133,14 @@ impl Recording {
     }
 
     /// The part of `seconds` in which the hub moves most, after `run_in` more in which the model forgets how it began; those rows are not
-    /// fitted. `None` where that is no small part, where the beginning counts (it is not at rest), or an encoder's angle does.
+    /// fitted. `None` where that is not a small part, where the beginning counts (it is not at rest), or an encoder's angle does.
     pub fn loudest(&self, seconds: f64, run_in: f64) -> Option<Recording> {
         if self.duration() < 2.0 * (seconds + run_in) || !self.from_rest || self.angle.is_some() {
             return None;
         }
         let rows = |time: f64| (time / self.step()) as usize;
         let (run_in, length) = (rows(run_in), rows(seconds));
-        // about the mean: a gyro's bias is no motion
+        // about the mean: a gyro's bias is not motion
         let moving = about_mean(&self.rate);
         let power =
             |from: usize| moving[from..from + length].iter().map(|rate| rate * rate).sum::<f64>();
@@ -473,7 +473,7 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
 /// explain. (If both pass zero by chance in the middle of a motion, the answer is wrong, and the residual tests show it.)
 fn starts_at_rest(part: &Recording) -> bool {
     let rate = (part.rate[0] + part.rate[1]) / 2.0;
-    // a gyro's bias is no motion: up to 3 % of the signal, or 5 times the noise
+    // a gyro's bias is not motion: up to 3 % of the signal, or 5 times the noise
     let slow = rate.abs() < 5.0 * part.rate_noise() + 0.03 * deviation(&part.rate);
     slow && part.torque[0].abs() < 0.1 * deviation(&part.torque)
 }

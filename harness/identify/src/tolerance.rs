@@ -50,7 +50,7 @@ impl Tolerances {
                 None => value.trim().parse(),
             };
             let number = number
-                .with_context(|| format!("{name}: {value} is no number; 1% or 0.01 is one"))?;
+                .with_context(|| format!("{name}: {value} is not a number; 1% or 0.01 is one"))?;
             ensure!((0.0..0.5).contains(&number), "{name}: must be from 0 to 50 %, not {value}");
             match name.trim() {
                 "torque" => self.torque = number,

@@ -201,7 +201,7 @@ fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
             [format!("manylinux_{major}_{minor}_{machine}")].into_iter().chain(older).collect()
         }
         Kind::Windows => vec!["win_amd64".into()],
-        // from 11 on the second number is no release of its own
+        // from 11 on the second number is not a release of its own
         Kind::MacOs => vec![format!("macosx_{}_0_{architecture}", needed(MACOS).0)],
     })
 }

@@ -39,7 +39,7 @@ def check_numbers(**values: Any) -> None:
 
 
 def check_table(table: Any, what: str) -> None:
-    """Raise FmuError if an argument is no pandas.DataFrame."""
+    """Raise FmuError if an argument is not a pandas.DataFrame."""
     import pandas as pd
 
     if not isinstance(table, pd.DataFrame):

@@ -182,7 +182,7 @@ class Fmu:
         if isinstance(unit, DefinedUnit) and variable.base is not None:
             exponents, factor, offset = variable.base
             if dict(zip(DefinedUnit.EXPONENTS, exponents, strict=True)) != unit.exponents:
-                raise ValueError(f"the unit {unit} of the file is no unit of its kind, {base}")
+                raise ValueError(f"the unit {unit} of the file is not a unit of its kind, {base}")
             return factor / unit.factor, (offset - unit.offset) / unit.factor
         if unit == base:
             return 1.0, 0.0

@@ -26,7 +26,7 @@ def _is_number(value: Any) -> bool:
 
 
 def check_seconds(**values: Any) -> None:
-    """Refuse what is no positive number of seconds, by name."""
+    """Refuse what is not a positive number of seconds, by name."""
     if problems := wrong_seconds(**values):
         raise FmuError("; ".join(problems))
 
@@ -291,7 +291,7 @@ def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[
             problems.append(f"{name} is of type {kind}, not Real")
         elif causality == "input" and variable.causality != "input":
             allowed = ", ".join(fmu.names("input"))
-            problems.append(f"{name} is no input of {fmu.name} (inputs: {allowed})")
+            problems.append(f"{name} is not an input of {fmu.name} (inputs: {allowed})")
     if problems:
         raise FmuError("; ".join(problems))
     return list(names)

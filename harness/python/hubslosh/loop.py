@@ -75,7 +75,7 @@ class Loop:
                 allowed = fmu.names("input")
                 hint = did_you_mean(name, allowed)
                 found.append(
-                    f"the command {name} is no input of {fmu.name} (inputs: {', '.join(allowed)})"
+                    f"the command {name} is not an input of {fmu.name} (inputs: {', '.join(allowed)})"
                     f"{hint}"
                 )
             elif fmu.kind(name) != "Real":

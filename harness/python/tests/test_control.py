@@ -175,7 +175,7 @@ def test_a_delay_of_any_length_is_exact_in_model_and_simulation(fmu: Path, delay
 
 
 def test_the_simulated_loop_becomes_unstable_at_the_delay_margin(fmu: Path) -> None:
-    """A tenth less decays, a tenth more grows; the margin is no whole number of cycles."""
+    """A tenth less decays, a tenth more grows; the margin is not a whole number of cycles."""
     start = VISCOUS | {"init.slosh_angle": 0.001}
     found = margins(Loop(GAINS, PERIOD, fmu, VISCOUS, delay=0.04))
     assert found.stable and 0.5 * PERIOD < found.delay_margin < 0.8 * PERIOD

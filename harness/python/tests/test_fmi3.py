@@ -123,7 +123,7 @@ def test_what_an_fmu_3_refuses_is_said_in_its_own_words(fmu: Path) -> None:
 
 @pytest.mark.parametrize("model", INPUTS)
 def test_a_linear_model_has_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
-    """All matrices and names, at a start that is no rest, with parameters and inputs of every type.
+    """All matrices and names, at a start in motion, with parameters and inputs of every type.
 
     The FMU evaluates the same derivatives for the same seeds, whatever the function is called.
     """

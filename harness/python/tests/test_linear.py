@@ -56,7 +56,7 @@ def test_a_hub_that_is_held_is_warned_of(fmu: Path) -> None:
 
 def test_wrong_names_are_told(fmu: Path) -> None:
     """All of them."""
-    with pytest.raises(FmuError, match=r"no variable tau; .*omega is no input of HubSlosh"):
+    with pytest.raises(FmuError, match=r"no variable tau; .*omega is not an input of HubSlosh"):
         linearize(fmu, VISCOUS, inputs=["tau", "omega"])
     with pytest.raises(FmuError, match="stuck is of type Boolean"):
         linearize(fmu, VISCOUS, outputs=["stuck"])

@@ -64,7 +64,7 @@ def test_one_call_gives_the_bits_of_single_calls(fmu: Path, model: str, hold: bo
 def test_steps_between_rows_and_rows_between_steps_change_nothing(fmu: Path) -> None:
     """The torque is the same lines, whatever the step; 1e-9 is ten times the solver's tolerance.
 
-    50 ms is no multiple of the rows' 20 ms, 7 ms divides nothing.
+    50 ms is not a multiple of the rows' 20 ms, 7 ms divides nothing.
     """
     rows = simulate(fmu, inputs=TABLE, tolerance=1e-10, outputs=["theta", "omega"])
     for step in (0.05, 0.007):

@@ -129,7 +129,7 @@ def test_jumps_in_the_input_are_met(fmu: Path) -> None:
 
 
 def test_wrong_start_values_stop_the_simulation(fmu: Path) -> None:
-    """tank.h = 0 is no tank."""
+    """tank.h = 0 is not a tank."""
     with pytest.raises(Exception, match="fmi2ExitInitializationMode"):
         simulate(fmu, start_values={"tank.h": 0})
 

@@ -156,7 +156,7 @@ fn residuals(
 fn check(name: &str, relative: [f64; 3], excess: &mut Vec<String>) {
     let [momentum, angular, energy] = relative;
     println!("{name:20} P {momentum:.1e}  H {angular:.1e}  E {energy:.1e}");
-    // NaN is no balance either.
+    // NaN is not a balance either.
     if !(momentum < 1e-12 && angular < 1e-12 && energy < 1e-10) {
         excess.push(format!("{name}: P {momentum:e}, H {angular:e}, E {energy:e}"));
     }

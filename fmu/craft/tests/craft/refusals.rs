@@ -84,7 +84,7 @@ fn numbers_are_taken_to_the_ends_of_their_ranges_and_refused_beyond() {
             assert_eq!([low, high].map(|end| said(&p, number, end)), [None, None], "{name}");
             let below = if low == 0.0 { -1e-300 } else { low - low.abs() * 1e-9 };
             for value in [below, high * (1.0 + 1e-9), f64::NAN, f64::INFINITY] {
-                // A diameter of 0 or less is no cylinder.
+                // A diameter of 0 or less is not a cylinder.
                 if name == "tank[1].diameter" && (0.0..high).contains(&value) {
                     continue;
                 }

@@ -211,7 +211,7 @@ fn a_step_stops_where_the_wheel_s_torque_changes() {
     assert!((at - 0.13).abs() < 1e-12, "{at}");
 }
 
-/// Samples at 0.02, 0.04, ... after the start; the one at the end is no reason to stop before.
+/// Samples at 0.02, 0.04, ... after the start; the one at the end is not a reason to stop before.
 #[test]
 fn a_step_stops_at_each_sample_of_the_gyro() {
     let mut p = bench(SloshModel::Spherical, FrictionModel::Viscous);
@@ -323,7 +323,7 @@ fn words_that_are_no_stopped_step_are_refused() {
     }
     let mut none = words;
     none[..first].fill(u64::MAX);
-    assert!(StoppedStep::from_words(&none).is_none(), "its start is no state");
+    assert!(StoppedStep::from_words(&none).is_none(), "its start is not a state");
 }
 
 /// On an error the plant is where it was, and so is the step that has stopped.

@@ -300,7 +300,7 @@ pub unsafe fn fmi3SetInt64<M: Model>(
     values: *const fmi3Int64,
     nValues: usize,
 ) -> fmi3Status {
-    // 0 is no item of any enumeration.
+    // 0 is not an item of any enumeration.
     let from_c = |n| Value::Integer(i32::try_from(n).unwrap_or(0));
     let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
     unsafe { set::<M, _>(instance, &SET_INT64, references, values, from_c) }

@@ -111,7 +111,7 @@ pub fn extra(archive: &Archive, findings: &mut Findings) {
     {
         findings.add(
             format!("extra/{folder}"),
-            "it is no folder in the reverse domain notation of its maker (allowed: like org.example.data)",
+            "it is not a folder in the reverse domain notation of its maker (allowed: like org.example.data)",
         );
     }
 }

@@ -34,7 +34,7 @@ pub fn structured_names(d: &Description, findings: &mut Findings) {
     }
     d.each(findings, |v| {
         (!crate::variables::is_structured(&v.name))
-            .then(|| "the name is no path like a.b[1].c, der(a.b) or a.'b c'".to_string())
+            .then(|| "the name is not a path like a.b[1].c, der(a.b) or a.'b c'".to_string())
     });
 }
 
@@ -161,7 +161,7 @@ pub fn range(d: &Description, findings: &mut Findings) {
             let items = v.element.get("declaredType").map(items).unwrap_or_default();
             let list: Vec<_> = items.iter().map(f64::to_string).collect();
             let odd = starts.iter().find(|x| !items.is_empty() && !items.contains(x))?;
-            return Some(format!("start={odd} is no item (allowed: {})", list.join(", ")));
+            return Some(format!("start={odd} is not an item (allowed: {})", list.join(", ")));
         }
         None
     });
@@ -177,7 +177,7 @@ pub fn independent(d: &Description, findings: &mut Findings) {
     }
     for v in all {
         if !v.is_float() {
-            findings.add(v.place(), "the independent variable is no Float64 or Float32");
+            findings.add(v.place(), "the independent variable is not a Float64 or Float32");
         }
         for attribute in ["initial", "start", "min", "max"] {
             if v.written.get(attribute).is_some() {
@@ -310,7 +310,7 @@ pub fn derivatives_of(d: &Description, findings: &mut Findings) {
     let states: BTreeSet<u32> = d.states().into_iter().collect();
     d.each(findings, |v| {
         if v.written.flag("reinit") && !states.contains(&v.reference) {
-            return Some("reinit, but it is no continuous state".to_string());
+            return Some("reinit, but it is not a continuous state".to_string());
         }
         let text = v.written.get("derivative")?;
         let Some(of) = v.derivative_of().and_then(|r| d.at(r)) else {

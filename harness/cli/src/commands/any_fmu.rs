@@ -41,7 +41,7 @@ pub struct AnyFmuArgs {
     /// Outputs that were recorded.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     outputs: Vec<String>,
-    /// A sensor among the outputs that is no variable of the FMU, as `hubslosh run --sensor` has it; its scale, bias and delay are
+    /// A sensor among the outputs that is not a variable of the FMU, as `hubslosh run --sensor` has it; its scale, bias and delay are
     /// taken as known, its noise is estimated. One for each flag.
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…", requires = "free")]
     sensors: Vec<Sensor>,

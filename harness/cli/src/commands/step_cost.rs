@@ -74,7 +74,7 @@ fn seconds(text: &str) -> Result<f64> {
     let time = number.trim().parse::<f64>().ok().map(|number| number * unit);
     time.filter(|time| *time > 0.0 && time.is_finite()).with_context(|| {
         format!(
-            "\"{text}\" is no time above 0 (allowed: such as 1ms, 250us, 0.01s, or a number of s)"
+            "\"{text}\" is not a time above 0 (allowed: such as 1ms, 250us, 0.01s, or a number of s)"
         )
     })
 }

@@ -290,7 +290,7 @@ fn a_torque_file_without_the_columns_names_those_missing_and_those_there() {
         &[
             "in.csv",
             "none of its columns is an input",
-            "torque is no input",
+            "torque is not an input",
             "the FMU's inputs: tau_cmd, tau_ext, g_axial",
             "columns in the file: time, torque",
         ],
@@ -419,7 +419,7 @@ fn every_column_that_is_an_input_drives_and_others_are_refused_by_name() {
     refuses(
         directory,
         || run("time,tau_cmd,oil,omega\n0,0,0,0\n1,0,0,0\n", &[]),
-        &["oil, omega are no input", "--ignore-columns"],
+        &["oil, omega are not inputs", "--ignore-columns"],
     );
     let passed = run("time,tau_cmd,oil\n0,0,0\n1,0,0\n", &["--ignore-columns"]);
     assert!(passed.status.success());
@@ -553,7 +553,7 @@ fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
         Some("error: there were 2 warnings, which --strict makes an error")
     );
     let rows = hubslosh(directory, &["--quiet", "torque", "--profiles"]);
-    assert!(text(&rows.stdout).contains("exp-sweep"), "what is asked for is no notice");
+    assert!(text(&rows.stdout).contains("exp-sweep"), "what is asked for is not a notice");
 }
 
 #[test]

@@ -74,8 +74,8 @@ fn a_deadline_that_is_too_short_is_refused_in_words() {
 #[test]
 fn what_step_cost_cannot_do_is_said() {
     for (arguments, code, words) in [
-        (&["--deadline", "soon"][..], 2, "\"soon\" is no time above 0"),
-        (&["--deadline", "0ms"], 2, "is no time above 0"),
+        (&["--deadline", "soon"][..], 2, "\"soon\" is not a time above 0"),
+        (&["--deadline", "0ms"], 2, "is not a time above 0"),
         (&["--deadline", "2s"], 1, "allowed: 1e-9 s to 1 s"),
         (&["--deadline", "1ms", "--margin", "0.5"], 1, "allowed: 1 to 100"),
         (&["--profile", "sweep"], 1, "sweep"),

@@ -334,7 +334,7 @@ fn ends_its_own_process(when: &str) {
             "--force",
         ];
         let output = sandbox.hubslosh(&["variables", "--fmu", &fmu]);
-        assert!(output.status.success(), "{what}: a description is no binary");
+        assert!(output.status.success(), "{what}: a description is not a binary");
         if *name == LOUD {
             // a gigabyte through a pipe may take longer than the limit of the others
             let patient: Vec<&str> =

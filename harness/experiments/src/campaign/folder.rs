@@ -266,7 +266,7 @@ impl Folder {
             Ok(())
         };
         temporary::uninterrupted(publish)?;
-        #[cfg(unix)] // the names, too; elsewhere a directory is no file
+        #[cfg(unix)] // the names, too; elsewhere a directory is not a file
         let _ = File::open(&self.path).and_then(|directory| directory.sync_all());
         manifest.sums = sums;
         Ok(())

@@ -304,7 +304,7 @@ pub const KINDS: &[Kind] = &[
     },
 ];
 
-/// The profile that is no formula: how it is written, and what it is.
+/// The profile that is not a formula: how it is written, and what it is.
 pub const FILE: (&str, &str) = (
     "file:path=FILE,hold=false",
     "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, joined by lines, or held with hold=true; a relative path starts where the command is started",

@@ -193,7 +193,7 @@ impl Written {
         &self.name
     }
 
-    /// Takes a key that is no number away.
+    /// Takes a key that is not a number away.
     pub(crate) fn take(&mut self, key: &str) -> Option<String> {
         let place = self.pairs.iter().position(|(k, _)| k == key)?;
         Some(self.pairs.remove(place).1)
@@ -339,7 +339,7 @@ impl Torque {
             torques.push(tau[k]);
             let Some(next) = time.get(k + 1) else { break };
             let end = tau[k] + slope * (next - time[k]);
-            // rounding of the slope is no jump
+            // rounding of the slope is not a jump
             if (end - tau[k + 1]).abs() > 1e-12 * (tau[k].abs() + tau[k + 1].abs()) {
                 times.push(*next);
                 torques.push(end);

@@ -374,7 +374,7 @@ impl Sensor {
             let rows = seconds / step;
             ensure!(
                 (rows - rows.round()).abs() < 1e-6 * rows.max(1.0),
-                "sensor {}: {what} {seconds} s is no multiple of the step, {step} s",
+                "sensor {}: {what} {seconds} s is not a multiple of the step, {step} s",
                 self.name
             );
             Ok(rows.round() as usize)

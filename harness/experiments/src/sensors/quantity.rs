@@ -101,7 +101,7 @@ impl Quantity {
         unit: Option<&str>,
     ) -> Result<Self> {
         let variable = description.variable(name)?;
-        ensure!(variable.kind() == Type::Real, "{name} is no Real");
+        ensure!(variable.kind() == Type::Real, "{name} is not a Real");
         let own = description.unit(variable);
         ensure!(
             unit.is_none_or(|unit| unit == own),

@@ -147,7 +147,7 @@ impl Twin {
         let rows = ((stop - start) * self.rate).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
-        // the FMU hears the recorded torque late: its knots are shifted, before them is no torque
+        // the FMU hears the recorded torque late: its knots are shifted, there is no torque before the first
         let held = self.intersample == Intersample::ZeroOrderHold;
         let heard = if self.intersample == Intersample::BandLimited {
             torque.clone()

@@ -486,7 +486,7 @@ fn say(
             [_, false] => "; to the right it has no end but the bound".into(),
         };
         words.push(format!(
-            "{name}: the likelihood is no parabola; its 95 % interval is {:.5e} to {:.5e}{unit}{open}",
+            "{name}: the likelihood is not a parabola; its 95 % interval is {:.5e} to {:.5e}{unit}{open}",
             interval.ends[0], interval.ends[1]
         ));
     }

@@ -182,7 +182,7 @@ pub struct Question {
     pub held: Vec<String>,
     /// Outputs that were recorded: of the FMU, or columns of `sensors`.
     pub outputs: Vec<String>,
-    /// Sensors that read what is no output of the FMU: a wave gauge, a camera.
+    /// Sensors that read what is not an output of the FMU: a wave gauge, a camera.
     pub sensors: Vec<Sensor>,
     /// Sensors with a bias.
     pub biases: Vec<Bias>,

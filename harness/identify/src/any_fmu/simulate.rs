@@ -26,7 +26,7 @@ impl Model {
     /// Opens an FMU for a solver.
     ///
     /// # Errors
-    /// If it is no FMU, or has not what the solver needs.
+    /// If it is not an FMU, or has not what the solver needs.
     pub fn open(path: &Path, solver: Solver) -> Result<Self> {
         Ok(match solver {
             Solver::Own => Model::Own(Fmu::open(path)?),

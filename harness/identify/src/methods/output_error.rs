@@ -463,7 +463,7 @@ fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>
     if dry.iter().flatten().next().is_none() {
         return Ok(None);
     }
-    // what is vaguely known is no knowledge
+    // vague priors do not count
     let rows: usize = found.answer.residual.iter().map(Vec::len).sum();
     let priors = problem.unknowns.iter().filter(|unknown| unknown.prior.is_some());
     let mut jacobian = found.jacobian.clone();

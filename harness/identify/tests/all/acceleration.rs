@@ -137,7 +137,7 @@ fn a_bias_of_five_degrees_a_second_leads_to_no_false_minimum() {
     assert_eq!(wrong(4, 0, 0.087), [""; 0]);
 }
 
-/// A start far off does not lead astray, and a start of what is no unknown is refused.
+/// A start far off does not lead astray, and a start of what is not a unknown is refused.
 #[test]
 fn a_start_is_taken_besides_those_of_the_data() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -1,4 +1,4 @@
-//! Twins that are identified through a sensor that is no output of the FMU's, and through its force.
+//! Twins that are identified through a sensor that is not an output of the FMU's, and through its force.
 
 use experiments::profile::Torque;
 use experiments::run::{Run, TORQUE};

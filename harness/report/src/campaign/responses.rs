@@ -77,7 +77,7 @@ fn bode(
     ]
 }
 
-/// The area within two standard deviations of a response; nothing where it is no wider than a line.
+/// The area within two standard deviations of a response; nothing where it is as narrow as a line.
 fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Value> {
     /// Half-widths that are seen, dB, and the widest that is drawn, in standard deviations of ln |H|.
     const SEEN: f64 = 0.2;

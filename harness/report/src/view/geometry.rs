@@ -256,7 +256,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             let m_liq = number(fluid::RHO) * std::f64::consts::PI * radius * radius * h;
             let modes: Vec<_> = (0..count).map(|n| pendulum(n, 2.0 * radius, h, m_liq)).collect();
             let note =
-                "The tank is drawn by tank.d and tank.h; how high its wall is, is no parameter."
+                "The tank is drawn by tank.d and tank.h; how high its wall is, is not a parameter."
                     .into();
             (modes, h, 0.0, m_liq, note)
         }
@@ -374,7 +374,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
             (0..count).map(|n| Pendulum::of((n, &pendulum(n, diameter, depth, m_liq)))).collect();
         (level, bottom) = (depth, 0.0);
         note = format!(
-            "{prefix} is drawn by its diameter and depth; how high its wall is, is no parameter."
+            "{prefix} is drawn by its diameter and depth; how high its wall is, is not a parameter."
         );
     } else {
         m_liq = number("m_0") + modes.iter().map(|m| m.mass).sum::<f64>();
