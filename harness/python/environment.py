@@ -2,10 +2,10 @@
 
 As a program: ``python3 environment.py DIRECTORY REQUIREMENTS`` prints the interpreter's path.
 
-``requirements*.in`` say what the project's scripts ask for. ``requirements*.txt`` follow from them:
-all packages with version and SHA-256, those for other systems and Pythons too, so that an index
-cannot hand out anything else. After a change of the former run the command that stands in the
-first lines of the latter (PyPI's uv), from the project's root.
+``requirements*.in`` list the packages that the project's scripts need. ``requirements*.txt`` follow
+from them: all packages with version and SHA-256, for other systems and Pythons too. An index
+therefore cannot deliver anything else. After a change of the former run the command that stands in
+the first lines of the latter (PyPI's uv), from the project's root.
 """
 
 import contextlib

@@ -9,10 +9,11 @@ sweeps of 1.25 to 3.5 Hz in 2700 s, both fills of the bench, by
 * `slosh.zeta_amplitude`: 0 to 0.016 1/rad,
 * what a real bench has that starts rotary slosh (`SEEDS`).
 
-Of each: the largest hub acceleration at 0.25 N·m and at 0.0125 N·m (central differences of the
-rate at 50 Hz; the second also of the rate as the specified gyro reads it), and the first amplitude
-of the ladder at which the liquid swirls. Rubaga's thesis has 2.21 and 0.222 rad/s², and swirl from
-0.075 to 0.1 N·m. Prints the tables of book/damping.md. Some 500 runs: half an hour of CPU time.
+For each model it prints the largest hub acceleration at 0.25 N·m and at 0.0125 N·m, by central
+differences of the rate at 50 Hz; the second also for the rate that the specified gyro reads. It
+also prints the first amplitude of the ladder at which the liquid swirls. Rubaga's thesis has 2.21
+and 0.222 rad/s², and swirl from 0.075 to 0.1 N·m. Prints the tables of book/damping.md. Some 500
+runs: half an hour of CPU time.
 """
 
 import argparse

@@ -10,11 +10,10 @@ virtual environment in the target directory and needs the network. It takes some
 
 Every slosh model with every friction law of 0.1.0, 300 s, wheel and gyro on; the 22 sine sweeps
 of Rubaga's thesis, 2700 s each, linear and spherical. Of every output and every single local that
-both builds have the largest difference is taken over the signal's maximum. It is to be 1e-13 at
-most, or no more than SENSITIVE times what the older build itself makes of one of its parameters
-changed in the last bit: a motion that multiplies a last bit by so much has no more digits.
-Ends with 1 where neither holds. ``omega_imu`` is left out: 0.1.0 took samples a step late from some
-50 s on.
+both builds have the largest difference is taken over the signal's maximum. The difference must be
+at most 1e-13, or SENSITIVE times the older build's change when the last bit of a parameter changes:
+a motion that amplifies a last bit so much has no more valid digits. Ends with 1 where neither
+holds. ``omega_imu`` is left out: 0.1.0 took samples a step late from some 50 s on.
 """
 
 import argparse

@@ -2,11 +2,11 @@
 
     python flight_twin.py [--gyro good|mems] [--twins 1] [--program hubslosh] [--fmu Spacecraft]
 
-A second simulator, independent of Spacecraft.fmu, flies a rigid craft with two tanks under thrust:
-Newton's law of craft and bobs with the rods' pulls as unknowns, one dense system, Runge and Kutta's
-rule. Wheels turn it by 0.3° to and fro and hold it, thrusters pulse sideways. Three gyros with
-scales, alignment and biases and an accelerometer are recorded at 10 Hz, in two flights. The search
-starts at what `hubslosh tank` says of the tanks' drawing; the truth is up to 10 % off.
+A second simulator, independent of Spacecraft.fmu, flies a rigid craft with two tanks under thrust.
+It solves Newton's law of craft and bobs, with the rods' tensions as unknowns, as one dense system
+by Runge–Kutta. Wheels turn it by 0.3° to and fro and hold it, thrusters pulse sideways. Three gyros
+with scales, alignment and biases and an accelerometer are recorded at 10 Hz, in two flights. The
+search starts at what `hubslosh tank` says of the tanks' drawing; the truth is up to 10 % off.
 
 Prints estimates and true values; for several twins the number of intervals that contain the truth.
 """

@@ -3,11 +3,10 @@
     python3 harness/studies/six_axes.py [--short] dist/HubSlosh.fmu dist/Spacecraft.fmu
 
 needs Linux, a C compiler, Python 3.11 or newer and valgrind. FMUs packed from older source will
-do, too: what they have no name for is left out. The FMU is driven as a host does, from its file
-(six_axes.c): a torque and its slope are set, fmi2DoStep makes a step of 20 ms, 1000 times after
-100; callgrind counts what happens in fmi2DoStep alone, the same on any machine. With --short two
-rows are counted and compared with the page: 10 % apart at most, since compilers differ by some per
-cent.
+do, too: what they have no name for is left out. A host in C (six_axes.c) loads the FMU's file. It
+sets a torque and its slope and calls fmi2DoStep with 20 ms, 1000 times after 100. callgrind counts
+the instructions in fmi2DoStep alone, the same on any machine. With --short two rows are counted and
+compared with the page: 10 % apart at most, since compilers differ by some per cent.
 
 | case | what |
 | --- | --- |

@@ -625,9 +625,8 @@ impl Lump {
         axial
     }
 
-    /// Returns the coefficients below n of three quantities that must be positive for the pendulums to take over the
-    /// liquid, each with the magnitude of its rounding terms: the remaining swing, thrust along the tank, depth below
-    /// the surface's centre.
+    /// Returns the coefficients below n of three quantities, each with the magnitude of its rounding terms: the remaining swing,
+    /// thrust along the tank, depth below the surface's centre. All must be positive before the pendulums take over the liquid.
     fn settling(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> [(Series, f64); 3] {
         let mut thrust = self.axial(n, a, w, w_d);
         thrust[0] -= self.floor;

@@ -102,8 +102,8 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenv
 use crate::sizes::MODES;
 use crate::state::{BallState, Line, Ramp, Ranges, has_direction};
 
-/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy, the mass of liquid, and
-/// the detached liquid's position (m) and rate (m/s) relative to the tank's origin, tank axes.
+/// Number of continuous states of a tank: p and p' of each mode, the dissipated energy and the mass of liquid. Then follow
+/// position (m) and rate (m/s) of the detached liquid from the tank's origin, tank axes.
 pub const TANK_STATES: usize = 6 * MODES + 8;
 
 /// Number of a tank's inputs: a, omega, omega_dot, mass_flow.
@@ -122,11 +122,11 @@ const BALL: usize = LIQUID + 1;
 pub enum Coupling {
     /// Wrench at a = w' = 0 and the current added mass, for hosts that solve with both.
     Split = 1,
-    /// Constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at the given a, w';
-    /// for hosts that add a constant matrix to the matrix that they solve with.
+    /// Constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at the given a, w'. For hosts
+    /// that add a constant to the matrix that they solve with.
     Lumped = 2,
-    /// The same matrix and wrench as `Lumped`, for hosts that are plain rigid bodies with M in their mass, centre of mass and inertia. bias also
-    /// contains their centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
+    /// The same matrix and wrench as `Lumped`, for hosts that are plain rigid bodies with M in their mass, centre of mass and
+    /// inertia. bias also contains the centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
     RigidBody = 3,
 }
 
@@ -1245,8 +1245,8 @@ impl SloshTank {
         }
     }
 
-    /// Returns x: p and p' of each mode, tank axes; then the dissipated energy, J, the mass of liquid, kg, and
-    /// position, m, and rate, m/s, of the detached liquid, tank axes.
+    /// Returns x: p and p' of each mode, the dissipated energy, J, and the mass of liquid, kg. Then follow position, m, and rate,
+    /// m/s, of the detached liquid. Vectors are in tank axes.
     pub fn continuous_states(&self) -> [f64; TANK_STATES] {
         self.motion.state.x
     }

@@ -173,8 +173,8 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.tank == tank)
     }
 
-    /// Returns true if every tank without a model of detached liquid is in its range after a step, judged by the
-    /// liquid's directions at the end and the accelerations during the step.
+    /// Returns true if every tank without a model of detached liquid is in its range after a step. The liquid's directions at the
+    /// end and the accelerations during the step decide.
     pub fn is_in_range(&self) -> bool {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
@@ -303,15 +303,14 @@ impl Spacecraft {
         !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)
     }
 
-    /// Writes functions of states and inputs that cross zero at events, two for each tank: at the end of the liquid's
-    /// current state, and at the end of its sliding on the wall. They are 1 where there is no such event.
+    /// Writes event indicators, two for each tank: one crosses zero at the end of the liquid's current state, one at the end of
+    /// its sliding on the wall. They are 1 where there is no such event.
     pub fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         self.motion.indicators(inputs, indicators);
     }
 
-    /// Returns true if a host that integrates itself has passed an event of a liquid, whatever the indicators of its
-    /// last steps were: the liquid is outside its wall and moves outwards, or must leave its bottom or the wall, or may
-    /// settle.
+    /// Returns true if a host that integrates itself has passed an event of a liquid, whatever the indicators of its last steps
+    /// were. The liquid is then outside its wall and moves outwards, must leave bottom or wall, or may settle.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let mut now = [1.0; 2 * TANKS];
         self.event_indicators(inputs, &mut now);

@@ -1,8 +1,8 @@
 //! Frequencies of an upright cylinder's slosh modes under gravity that is tilted from its axis.
 //!
-//! Gravity has the component g along the axis and g s across it, with s the tangent of the tilt. At rest the surface is
-//! the plane z = s x, with x in the direction of gravity's component across the axis, and the depth in the middle is
-//! that of the upright tank. With Lambda = omega^2/g
+//! Gravity has the component g along the axis and g s across it, with s the tangent of the tilt. At rest the surface is the plane
+//! z = s x, with x in the direction of gravity's component across the axis. The depth in the middle is that of the upright tank.
+//! With Lambda = omega^2/g
 //!
 //! ```text
 //! Laplace(phi) = 0,   dphi/dn = 0 on the wetted wall,   dphi/dz - s dphi/dx = Lambda phi at z = s x

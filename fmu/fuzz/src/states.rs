@@ -19,9 +19,8 @@ use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_
 /// Bytes of the checksum, at the end.
 const CHECKSUM: usize = 16;
 
-/// The bytes are: which version of FMI and which state to start from; then patches, each a place (two bytes), a length
-/// (one byte) and that many bytes of new content. What is left over, or an odd first byte, is
-/// taken as a saved state by itself.
+/// The bytes are the version of FMI and the state to start from. Patches follow, each a place (two bytes), a length (one byte)
+/// and that many bytes of new content. What is left over, or an odd first byte, is taken as a saved state by itself.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((which, patches)) = data.split_first() else { return };
     if *which == u8::MAX {

@@ -9,9 +9,9 @@
 //! omega^2 = f g/l,   f = f_along n^2 + f_across (1 - n^2)
 //! ```
 //!
-//! where l is the upright tank's pendulum length, and the sloshing mass is m f. A mode's m/omega^2 is its share of the
-//! surface's static moment, rho pi R^4/4 g/omega^2 for all modes together, which does not depend on the tilt. A
-//! pendulum of mass m' and length l' that swings about an equilibrium at u l' from the hinge has
+//! where l is the upright tank's pendulum length, and the sloshing mass is m f. A mode's m/omega^2 is its share of the surface's
+//! static moment, rho pi R^4/4 for all modes together. The tilt does not change that moment. A pendulum of mass m' and length l'
+//! that swings about an equilibrium at u l' from the hinge has
 //!
 //! ```text
 //! omega^2 = (g/l') F,   sloshing mass m' M
@@ -26,10 +26,10 @@
 //! e), and F is its ratio to e.(K^-1 e), for the two equations of small motions, with e the tangent. Hence l' = l F/f
 //! and m' = m f/M.
 //!
-//! f belongs to the tangential direction. In the radial direction, models with one pendulum for both directions have
-//! the F with n^2 and 1 - n^2 exchanged, the liquid has the f with both exchanged. A spherical pendulum has the same
-//! frequency in both directions. `liquid` separates them by itself, similar to the real liquid (deep: c = -0.36 along
-//! the slope and 0.37 across it, compared with -0.42 and 0.23).
+//! f belongs to the tangential direction. In the radial direction n^2 and 1 - n^2 are exchanged: in F for models with one
+//! pendulum for both directions, in f for the liquid. A spherical pendulum has the same frequency in both directions. `liquid`
+//! separates them by itself, similar to the real liquid (deep: c = -0.36 along the slope and 0.37 across it, compared with -0.42
+//! and 0.23).
 
 use alloc::format;
 use alloc::string::String;

@@ -1,6 +1,5 @@
-//! Common parts of the C interfaces of all versions of FMI: the status of a call, the
-//! host's logger, the host's texts and arrays, handles of instances and of saved states. Panics
-//! end here: one poisons the instance.
+//! Common parts of the C interfaces of all versions of FMI: status of a call, the host's logger, texts and arrays, handles of
+//! instances and saved states. Panics end here: one poisons the instance.
 //!
 //! Pointers may be NULL wherever the standard does not forbid it, and mostly where it does.
 
@@ -190,9 +189,8 @@ pub fn null(call: &Call, name: &str) -> Fault {
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
 /// The first word of a live component or saved state of this model, this version of FMI and this loaded copy of the
-/// library, at this address. Handles of other FMUs, of the same FMU by the other version's functions, and of a second copy
-/// of the library have other marks: the variable table stands at another address, the version has another digit. No
-/// address has the upper 16 bits of a mark.
+/// library, at this address. Other FMUs, the other version's functions and a second copy of the library have other marks: the
+/// address of the variable table and the digit of the version differ. No address has the upper 16 bits of a mark.
 fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     let table = ptr::from_ref(M::table()).addr() as u64;
     // Below the table's alignment, so that the two do not mix.
@@ -349,8 +347,8 @@ pub unsafe fn saved_state<'a, M: Model, V: Version>(
     Ok(unsafe { &mut (*handle.cast::<SavedState<M, V>>()).instance })
 }
 
-/// Frees a saved state and clears the handle; NULL is fine. fmusim (0.0.39) gives the state itself in
-/// place of the handle's address: known by its mark, which no address equals, it is freed too.
+/// Frees a saved state and clears the handle; NULL is allowed. fmusim (0.0.39) passes the state itself in place of the handle's
+/// address. Its mark, which no address equals, identifies it, and it is freed too.
 pub unsafe fn free_state<M: Model, V: Version>(
     call: &Call,
     name: &str,

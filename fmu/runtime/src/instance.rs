@@ -1,9 +1,7 @@
 //! Effects of the host's calls on one instance, the same for every version of FMI's C interface.
 //!
-//! A call that is refused changes nothing. The one exception is a step that the
-//! model could not compute: the model stands where it was, but the instance goes
-//! to the state "step failed", where it can be read, reset, or given a saved
-//! state.
+//! A call that is refused changes nothing. The one exception is a step that the model could not compute. The model keeps its
+//! state, but the instance goes to "step failed", where it can be read, reset, or given a saved state.
 //!
 //! In Model Exchange the host integrates: it sets time and states. Where the host handles events
 //! ([`Events::ByHost`]), what is discrete changes in [`Instance::new_discrete_states`] alone.
@@ -690,9 +688,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         done
     }
 
-    /// The value references of what a variable depends on: before the motion begins what its initial value does; then
-    /// those of the inputs and states it is declared to depend on that it does depend on as things stand: in stick or
-    /// slip, by the models chosen. Derivatives that vanish at the very point count if they do not close by.
+    /// Returns the value references that a variable depends on. Before the motion begins these are the dependencies of its
+    /// initial value. Then they are the declared inputs and states that act at present: in stick or slip, with the chosen models.
+    /// Derivatives that vanish at the very point count if they do not close by.
     pub(crate) fn dependencies(
         &mut self,
         call: &Call,

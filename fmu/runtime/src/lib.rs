@@ -1,11 +1,10 @@
 //! Common base of the project's FMUs. It knows FMI and no physics; a model knows its physics
 //! and no FMI. They meet in one trait, [`Model`].
 //!
-//! [`variable`] and [`table`] say what a model's variables are, [`call`] when a call is allowed,
-//! [`instance`] what the calls do, [`snapshot`] how a state is saved, [`log`] what is logged to the
-//! host. What differs between the versions of FMI is the trait [`version::Version`]; each is one file
-//! ([`v2`], [`v3`]), with its C interface on top of what they share ([`c_abi`]): these hold the only unsafe
-//! code.
+//! [`variable`] and [`table`] define a model's variables, [`call`] the states that allow a call, [`instance`] the effect of
+//! calls. [`snapshot`] saves states, and [`log`] writes to the host's log. The trait [`version::Version`] holds the differences
+//! between versions of FMI. Each version is one file ([`v2`], [`v3`]) with its C interface, on top of the common [`c_abi`]. These
+//! files hold the only unsafe code.
 //!
 //! An FMU is a crate with a table, an implementation of [`Model`] and two lines:
 //! `runtime::export_fmi2!(TheModel);` and `runtime::export_fmi3!(TheModel);`.

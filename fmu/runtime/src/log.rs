@@ -1,11 +1,9 @@
 //! Selection of messages for the host's logger.
 //!
 //! Calls that fail, what to be warned of when the motion begins or a size changes, and, for those
-//! who ask, the model's events. A host that asks for
-//! nothing gets no chatter: `loggingOn` of a new instance switches nothing, because
-//! failures are reported either way (a status without a reason helps nobody) and
-//! events only on an explicit wish. Setting the debug logging is one and is obeyed: off means
-//! silence, and no category named means all.
+//! who ask, the model's events. A host gets only the messages that it requests. `loggingOn` of a new instance has no effect:
+//! failures are always logged, because a status without a reason helps nobody, and events only if a category is switched on.
+//! Setting the debug logging is one and is obeyed: off means silence, and no category named means all.
 
 use crate::call::Severity;
 use crate::model::Model;

@@ -144,9 +144,8 @@ pub enum Access<M: Model> {
 /// A scalar variable, or an array of them.
 #[derive(Debug)]
 pub struct Variable<M: Model> {
-    /// Its name. An array's element has its indices, counted from 1, in the name's empty brackets;
-    /// those that find none follow in brackets of their own: `tank[].p` of the shape 4, 3, 3 is
-    /// `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
+    /// Its name. An array's element has its indices, counted from 1, in the name's empty brackets. Further indices follow in
+    /// brackets of their own: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
     pub name: &'static str,
     /// Description with sign and frame.
     pub description: &'static str,
@@ -167,8 +166,8 @@ pub struct Variable<M: Model> {
     pub follows_inputs: bool,
     /// True if this parameter can be set during the simulation.
     pub tunable: bool,
-    /// The inputs and continuous states it depends on without delay: a name as it is, the
-    /// name of an array for all elements, or with "[]" after it for the same element.
+    /// Inputs and continuous states that it depends on without delay. The name of an array stands for all elements, with "[]" for
+    /// the element of the same index.
     pub depends_on: &'static [&'static str],
     /// The parameters and inputs that its initial value depends on besides; a
     /// name that ends with a dot stands for all parameters that begin like that.

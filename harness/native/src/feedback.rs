@@ -22,8 +22,8 @@ struct Linear {
     reference: Vec<f64>,
     /// f, a row per cycle.
     feedforward: Vec<f64>,
-    /// Places of a quaternion in y, scalar first: of its vector part the error is that of q⁻¹ ⊗ r, half of what is left to
-    /// turn about each body axis, the short way round.
+    /// Indices of a quaternion in y, scalar first. The error of its vector part is that of q⁻¹ ⊗ r, half the remaining rotation
+    /// about each body axis, the short way.
     quaternion: Option<[usize; 4]>,
     /// Room for e and the next x.
     error: Vec<f64>,

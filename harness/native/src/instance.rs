@@ -23,8 +23,8 @@ pub struct Held {
     _fmu: Arc<fmu::Fmu>,
 }
 
-// SAFETY: it stands in a mutex, so that one thread at a time calls the instance, which is all that FMI asks for; what the
-// host keeps for a thread it sets anew in each call.
+// SAFETY: a mutex protects it, so one thread at a time calls the instance, as FMI requires. The host sets its thread-local state
+// again in each call.
 unsafe impl Send for Held {}
 
 impl Held {

@@ -1,5 +1,5 @@
-//! The compiled half of the Python package `hubslosh`: reads FMUs ([`fmu`]), drives their instances through single calls
-//! ([`instance`]) and whole runs ([`run`]), with a controller in the loop if there is one ([`feedback`]).
+//! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and drives their instances by single calls
+//! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]).
 //!
 //! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
 //! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.

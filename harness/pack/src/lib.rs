@@ -1,5 +1,5 @@
-//! Builds the binaries of an FMU and packs them, with all that should travel with them, into a
-//! `.fmu` (FMI 2.0, section 2.3; FMI 3.0, section 2.5).
+//! Builds the binaries of an FMU and packs them, with documentation and licences, into a `.fmu` (FMI 2.0, section 2.3; FMI 3.0,
+//! section 2.5).
 
 pub mod archive;
 pub mod components;

@@ -87,9 +87,8 @@ pub(crate) fn cargo() -> Command {
 /// Arguments of `cargo rustc` for the FMU's binary. `cargo build` would make the rlib in the same
 /// call, and then leave out the link-time optimisation without a word: 70 % more code.
 ///
-/// The compiler may do two numbers at once where that saves much, as with vectors. Where it saves
-/// little it costs: a pair is loaded just after its halves were stored one by one, and the
-/// processor waits; the linear model's step takes a fifth longer.
+/// The compiler may do two numbers at once where that saves much, as with vectors. Where it saves little, it costs time: a pair
+/// is loaded just after its halves were stored one by one, and the processor waits. The linear model's step takes a fifth longer.
 ///
 /// What follows goes to the compiler.
 pub(crate) fn arguments(command: &mut Command, package: &str) {

@@ -1,5 +1,5 @@
-//! A release to take away: the FMU for all platforms in both versions of FMI, its SBOM and the report of its check; the
-//! wheels' SBOM, and the wheel for Linux. [`MANIFEST`] lists the SHA-256 of all of them.
+//! Makes the files of a release. Each FMU is for all platforms, in both versions of FMI, with its SBOM and the report of its
+//! check. The wheels' SBOM and the wheel for Linux follow. [`MANIFEST`] lists the SHA-256 of all files.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -35,9 +35,9 @@ pub fn path(model: &Model, fmi: Fmi, folder: &Path) -> PathBuf {
     fmi.path(folder, &format!("{}-{}", model.name, env!("CARGO_PKG_VERSION")))
 }
 
-/// Builds for all platforms, checks, and writes the release's files to `folder`, for each version of FMI: the FMU, its SBOM
-/// (`.cdx.json`), and the report of the check (`.check.txt`), which `check` returns; lists them in [`MANIFEST`] and removes
-/// those of older versions. Returns what was written. If `check` refuses the FMU of one version, neither is released.
+/// Builds an FMU for all platforms, checks it, and writes its files to `folder`. For each version of FMI these are the FMU, its
+/// SBOM (`.cdx.json`), and the report (`.check.txt`) that `check` returns. Lists them in [`MANIFEST`] and removes those of older
+/// versions. Returns what was written. If `check` refuses the FMU of one version, neither is released.
 pub fn write(
     model: &Model,
     folder: &Path,
@@ -68,9 +68,9 @@ fn is_of(file: &str, name: &str, version: &str) -> bool {
         .is_some_and(|rest| rest.starts_with(['-', '.']))
 }
 
-/// Writes files of the present version of `name` to `folder`, lists them and `elsewhere`, names and SHA-256 of files that
-/// the folder does not keep, in [`MANIFEST`] in place of what it has of this version, and removes the files of `name` that
-/// are listed there and are no longer kept. Returns what was written.
+/// Writes files of the present version of `name` to `folder`. Updates this version's entries of [`MANIFEST`]: these files and
+/// `elsewhere`, names and SHA-256 of files that the folder does not keep. Removes listed files of `name` that are no longer kept.
+/// Returns what was written.
 ///
 /// # Errors
 /// If a file cannot be read or written. Files are removed last.
@@ -131,9 +131,9 @@ fn of_version(
     Ok([("fmu", bytes), ("cdx.json", sbom), ("check.txt", report.into_bytes())])
 }
 
-/// Builds the wheels of all platforms to `made`, and lists them in [`MANIFEST`] of `folder`, to which it writes their SBOM and
-/// the wheel for Linux on x86-64 if it is not larger than [`LARGEST_WHEEL`]; an older version's wheel is removed. Returns
-/// what was written there.
+/// Builds the wheels of all platforms to `made` and lists them in [`MANIFEST`] of `folder`. Writes their SBOM there, and the
+/// wheel for Linux on x86-64 unless it is larger than [`LARGEST_WHEEL`]. Removes an older version's wheel. Returns what was
+/// written there.
 pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut wheels = wheel::write_for(&PLATFORMS.each_ref(), made)?;
     wheels.sort();

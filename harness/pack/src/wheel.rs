@@ -1,5 +1,5 @@
-//! The Python package `hubslosh` as wheels, one for each platform, with the FMUs of both versions of FMI and the command
-//! `hubslosh` inside (packaging.python.org, "Binary distribution format"): same files, same bytes.
+//! Builds the wheels of the Python package `hubslosh`, one for each platform, with the FMUs of both versions of FMI and the
+//! command `hubslosh` (packaging.python.org, "Binary distribution format"). The same files give the same bytes.
 //!
 //! Its Python runs anywhere, its binaries do not: the tag says which Linux, Windows or macOS they
 //! need, and is read from the binaries themselves. Its compiled half uses the stable ABI of Python alone: one wheel for

@@ -1,8 +1,7 @@
 //! The layout in which an entry of the table is one variable: which scalars stand behind a value reference.
 //!
-//! An instance knows scalars alone. What a host says of arrays is put in their terms here, before anything is done
-//! with it: an array is the row of its elements, by rows, as long as its structural parameters say at present. An
-//! element that is beyond keeps its start value.
+//! An instance knows scalars alone. This module first translates a host's arrays to scalars: an array is the list of its
+//! elements, row by row, with the present sizes of its structural parameters. An element that is beyond keeps its start value.
 
 use super::references::{scalar_reference, time_reference, type_of};
 use crate::call::CType;

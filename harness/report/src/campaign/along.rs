@@ -196,7 +196,7 @@ pub(super) fn bearing_and_liquid(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Stiction, slosh amplitude, energy balance",
-        html! { "Beyond the dashed line, a quarter of the tank's radius, linear slosh theory no longer holds: runs of a linear model there are numerically correct but do not represent a real tank. The energy residual checks the FMU's balance at every sample." },
+        html! { "Beyond the dashed line, a quarter of the tank's radius, linear slosh theory no longer holds. Runs of a linear model there are numerically correct but do not represent a real tank. The energy residual checks the FMU's balance at every sample." },
         [
             Quantity {
                 decades: true,

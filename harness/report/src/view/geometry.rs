@@ -237,8 +237,8 @@ fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
     if frequency > 0.0 && stiffness > 0.0 { 1.0 / stiffness } else { given }
 }
 
-const DRAWN: &str = "an upright cylinder with the radius that its wave at the wall has, the depth that its first mode's share of the \
-    liquid has, and the liquid's centre of mass, with a cylinder's surface (--tank draws the tank itself)";
+const DRAWN: &str = "an upright cylinder that matches the wave at the wall, the first mode's share of the liquid and the \
+    liquid's centre of mass, with a cylinder's surface (--tank draws the tank itself)";
 
 /// The tank of the bench, its origin in the middle of the bottom.
 pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank {
