@@ -75,8 +75,8 @@ class Loop:
                 allowed = fmu.names("input")
                 hint = did_you_mean(name, allowed)
                 found.append(
-                    f"the command {name} is not an input of {fmu.name} (inputs: {', '.join(allowed)})"
-                    f"{hint}"
+                    f"the command {name} is not an input of {fmu.name} "
+                    f"(inputs: {', '.join(allowed)}){hint}"
                 )
             elif fmu.kind(name) != "Real":
                 found.append(f"the command {name} is of type {fmu.kind(name)}, not Real")

@@ -68,7 +68,7 @@ def test_a_tank_is_drawn_by_its_file(fmu: Path, tmp_path: Path, request) -> None
 
 
 def test_a_run_is_a_pandas_table_also_after_a_loop_a_copy_and_a_pickle(fmu: Path, request) -> None:
-    """``run.view()`` is there wherever the table is; what is not a run is refused by its columns."""
+    """``run.view()`` works on parts and copies of the table, and refuses other tables."""
     run = hubslosh.closed_loop([[0.5, 0.6]], 0.1, 2.0, fmu)
     for table in (run, run.iloc[5:], run.copy(), pickle.loads(pickle.dumps(run))):
         assert isinstance(table, hubslosh.Run) and isinstance(table, pd.DataFrame)
