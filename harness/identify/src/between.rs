@@ -239,8 +239,8 @@ pub fn evidence(
             })
             .collect();
         return format!(
-            "Cannot tell what the torque does between rows: {}. The values are those of the first; their standard deviations hold \
-             that it may be another. --torque sets it.",
+            "Cannot tell what the torque does between rows: {}. The values are those of the first; their standard deviations \
+             include the others. --torque sets it.",
             each.join(", ")
         );
     }

@@ -368,8 +368,8 @@ pub fn prepare(
     let torque = parts.iter().map(|part| peak(&part.torque)).fold(0.0, f64::max);
     ensure!(
         !parts.iter().all(is_stuck),
-        "{name}: the hub does not turn: omega is noise of {:.1e} rad/s and nothing of tau_cmd (up to {torque:.2e} N·m) is in it. \
-         The bearing sticks under so little torque, or omega is of another axis",
+        "{name}: the hub does not turn: omega is noise of {:.1e} rad/s and does not follow tau_cmd (up to {torque:.2e} N·m). The \
+         bearing sticks under so little torque, or omega is of another axis",
         noise_level(&parts[0].rate)
     );
     Ok(parts)

@@ -170,10 +170,8 @@ impl When {
     fn words(self) -> &'static str {
         match self {
             When::Always => "it is the first",
-            When::Unexplained => "noise does not explain what the starts before led to",
-            When::Moved => {
-                "the attempt before found another minimum, and noise does not explain it"
-            }
+            When::Unexplained => "the results of earlier starts do not fit",
+            When::Moved => "the last attempt found another minimum, which does not fit",
             When::Poor => "the fit so far is poor",
             When::Near => "the search has not ended, and the residual is nearly noise",
             When::Unfinished => "the search has not ended, and the fit is not poor",
@@ -226,7 +224,7 @@ impl<'a> Search<'a, '_> {
         let rows: usize = part.iter().map(|r| r.of_fresh(&r.time).len()).sum();
         let excess = there.cost / rows as f64;
         self.say(format!(
-            "{}: the loudest part has a mean square of {excess:.1} of noise",
+            "{}: the mean square of the loudest part is {excess:.1} times that of noise",
             self.model
         ));
         if excess < NEARLY_NOISE {
@@ -343,7 +341,7 @@ impl<'a> Search<'a, '_> {
             let adds = match tried.x {
                 Some(_) => format!("adds {more:.1} to the sum of squares"),
                 None => format!(
-                    "adds at least {more:.1} to the sum of squares by the loudest part alone"
+                    "adds at least {more:.1} to the sum of squares, by the loudest part alone"
                 ),
             };
             self.say(format!(

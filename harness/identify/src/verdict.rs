@@ -72,29 +72,28 @@ pub fn words(
         reasons.extend(findings.missing.iter().map(Missing::words));
         reasons.extend(findings.doubts.iter().cloned());
         lines.push(format!(
-            "{DOES_NOT_FIT}: the residual of no model tried is the gyro's noise alone ({}). Values and intervals are \
-             those of the nearest model and are not to be trusted: something acts on the bench that the model does not \
-             have.",
+            "{DOES_NOT_FIT}: no model leaves only the gyro's noise as residual ({}). Values and intervals are those of the \
+             nearest model and cannot be trusted: something acts on the bench that the models lack.",
             reasons.join("; ")
         ));
     }
     if !fit.converged {
         lines.push(format!(
-            "{NO_MINIMUM} (it is {:.2} standard deviations away): values and standard \
-             deviations are not to be trusted. More torque, a longer recording or --start may help.",
+            "{NO_MINIMUM} (it is {:.2} standard deviations away): values and standard deviations cannot be trusted. More torque, \
+             a longer recording or --start may help.",
             fit.newton_decrement
         ));
     }
     if fit.converged && fit.newton_decrement > TOLD {
         lines.push(format!(
-            "The search ended {:.2} standard deviations from the minimum; the stated ones hold that.",
+            "The search ended {:.2} standard deviations from the minimum; the stated standard deviations include this.",
             fit.newton_decrement
         ));
     }
     if fit.model == SloshModel::Frozen.name() && parameters.contains_key(hub::I) {
         lines.push(
-            "hub.I is the whole inertia less that of the liquid as the tank is set (tank.d, tank.h, tank.r, fluid.rho), which no \
-             recording without slosh shows: its interval holds for that liquid."
+            "hub.I is the total inertia minus that of the liquid in the tank as set (tank.d, tank.h, tank.r, fluid.rho). A \
+             recording without slosh does not show the liquid: the interval holds for this one."
                 .into(),
         );
     }
@@ -131,8 +130,8 @@ fn slosh(question: &Question, fits: bool) -> Option<String> {
             .map(|(model, p)| format!("{} (probability {p:.2})", model.model))
             .collect();
         return Some(format!(
-            "Cannot tell which slosh model it is: {}. The parameters below are those of the first; their \
-             standard deviations hold that it may be another.",
+            "Cannot tell which slosh model it is: {}. The parameters below are those of the first; their standard deviations \
+             include the others.",
             each.join(", ")
         ));
     }
@@ -159,7 +158,7 @@ fn friction(laws: &[ModelFit]) -> Vec<String> {
             }
             // what the other has more counts ln N a parameter; without that they are alike
             _ if first.deviance - other.deviance > -DECIDES => format!(
-                "Cannot tell the friction's law: {} explains the data as well as {}, which has fewer unknowns and is kept.",
+                "Cannot tell the friction's law: {} explains the data as well as {}, which has fewer unknowns and is used.",
                 other.friction, first.friction
             ),
             g => format!(

@@ -238,7 +238,7 @@ impl AnyFmuArgs {
             tell(&found);
         }
         if found.fits != Some(true) || !found.converged {
-            terminal::warn("the result is not to be trusted; its verdict says why");
+            terminal::warn("the result cannot be trusted; its verdict says why");
         }
         if let Some(path) = out.report {
             let page = any_fmu::page(&found);

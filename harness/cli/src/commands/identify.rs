@@ -125,7 +125,7 @@ pub struct IdentifyArgs {
         hide_default_value = true
     )]
     columns: String,
-    /// The tank is empty: no liquid is assumed, the whole inertia is the hub's.
+    /// Fits an empty tank: no slosh model, all inertia belongs to the hub.
     #[arg(conflicts_with = "free", long)]
     empty: bool,
     /// Uses the rows between two times alone.
@@ -439,7 +439,7 @@ impl IdentifyArgs {
             self.tell::<M>(&found);
         }
         if found.fits == Some(false) || !found.converged {
-            terminal::warn("the result is not to be trusted; its verdict says why");
+            terminal::warn("the result cannot be trusted; its verdict says why");
         }
         if let (Some(path), Some(page)) = (&self.report, M::page(&found)) {
             atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;

@@ -46,7 +46,7 @@ fn what_was_identified_is_fed_back_to_a_run() {
     let asked = ["identify", "data.csv", "--model", "frozen", "--perfect", "--out", "result.json"];
     let said = hubslosh(folder, &asked).unwrap();
     // the liquid's part of the inertia is what the tank says
-    assert!(said.contains("its interval holds for that liquid"), "{said}");
+    assert!(said.contains("the interval holds for this one"), "{said}");
     let asked = ["run", "--parameters", "result.json", "--input", "data.csv", "--ignore-columns"];
     hubslosh(folder, &[&asked[..], &["--columns", "omega", "--out", "twin.csv"]].concat()).unwrap();
     let column = |name: &str| {

@@ -25,7 +25,7 @@ pub fn deviances(
     let result: Value = serde_json::from_str(result).context("the result cannot be read")?;
     let setup = Setup::new(question, model.description())?;
     let unknowns = question.unknowns(model.description(), records)?;
-    let other = "the result is of another question: its unknowns or outputs are others";
+    let other = "the result belongs to another question: its unknowns or outputs differ";
     let estimate = |name: &str| {
         let of = |kind: &str| result[kind][name]["value"].as_f64();
         of("parameters").or_else(|| of("measurement")).context(other)

@@ -450,7 +450,7 @@ fn say(
             |set: &Inseparable| set.direction.len() > 1 && set.direction.contains_key(name);
         if std.is_finite() {
             words.push(format!(
-                "{name} is not determined: any value from {:.4e} to {:.4e}{unit} fits as well",
+                "{name} is not determined: any value from {:.4e} to {:.4e}{unit} fits equally well",
                 interval.ends[0], interval.ends[1]
             ));
         } else if !details.cannot_tell_apart.iter().any(is_of_a_set) {
@@ -463,8 +463,7 @@ fn say(
     {
         details.not_determined.push(name.clone());
         words.push(format!(
-            "{name} is not determined by the recordings: {:.4e} ± {std:.1e}{unit} is what was known beforehand ({mean:.4e} ± \
-             {beforehand:.1e})",
+            "{name} is not determined by the recordings: {:.4e} ± {std:.1e}{unit} is the prior ({mean:.4e} ± {beforehand:.1e})",
             e.value
         ));
         return;
@@ -474,7 +473,7 @@ fn say(
         let (which, other) = if upper { ("upper", 0) } else { ("lower", 1) };
         details.at_bound.push(name.clone());
         words.push(format!(
-            "{name} is at its {which} bound, {}{unit}: the recordings want to go further; its 95 % interval reaches from there to \
+            "{name} is at its {which} bound, {}{unit}: the minimum lies beyond it; its 95 % interval reaches from there to \
              {:.4e}{unit}",
             e.value, interval.ends[other]
         ));
@@ -482,8 +481,8 @@ fn say(
         details.not_quadratic.push(name.clone());
         let open = match interval.ended {
             [true, true] => String::new(),
-            [false, _] => "; to the left it has no end but the bound".into(),
-            [_, false] => "; to the right it has no end but the bound".into(),
+            [false, _] => "; its lower end is the bound".into(),
+            [_, false] => "; its upper end is the bound".into(),
         };
         words.push(format!(
             "{name}: the likelihood is not a parabola; its 95 % interval is {:.5e} to {:.5e}{unit}{open}",
@@ -506,7 +505,7 @@ fn fit_in_words(outputs: &[Output]) -> String {
     }
     let count = outputs.iter().filter(is_bad).count();
     format!(
-        "{DOES_NOT_FIT}: the residual of {count} of {} outputs is not noise; {} of {}: {}. No interval is to be trusted.",
+        "{DOES_NOT_FIT}: the residual of {count} of {} outputs is not noise; {} of {}: {}. No interval can be trusted.",
         outputs.len(),
         o.name,
         o.recording,

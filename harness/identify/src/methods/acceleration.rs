@@ -384,8 +384,8 @@ impl Problem {
             bounds[place] = (least.max(low), most.min(high));
             ensure!(
                 bounds[place].0 < bounds[place].1,
-                "by the sizes of torque and rate {name} is {least:.2e} to {most:.2e} (allowed by the FMU: {low} to {high}): are \
-                 their units right?"
+                "torque and rate imply {name} of {least:.2e} to {most:.2e} (allowed by the FMU: {low} to {high}): check their \
+                 units"
             );
         }
         for (name, low, high) in &options.bounds {
@@ -1007,7 +1007,7 @@ fn words(found: &Found) -> Vec<String> {
     if ratio < MISFIT {
         words.extend((!at_bound.is_empty()).then(|| {
             format!(
-                "{DOES_NOT_FIT}: {} ended at a bound; no number here is to be trusted.",
+                "{DOES_NOT_FIT}: {} ended at a bound; no number here can be trusted.",
                 at_bound.join(", ")
             )
         }));
@@ -1018,8 +1018,8 @@ fn words(found: &Found) -> Vec<String> {
     } else {
         words.push(format!(
             "{DOES_NOT_FIT}: the residual is {:.2e} rad/s², {ratio:.2} times what the gyro's noise makes. Something acts \
-             that inertia and friction do not explain (a liquid that moves, a delay); no number here is to be \
-             trusted. With a liquid: hubslosh identify without --method.",
+             that inertia and friction do not explain (a liquid that moves, a delay); no number here can be trusted. With a \
+             liquid: hubslosh identify without --method.",
             fit.rmse
         ));
     }
@@ -1043,7 +1043,7 @@ fn words(found: &Found) -> Vec<String> {
         for j in 0..i {
             if matrix[i][j].abs() > 0.95 {
                 words.push(format!(
-                    "{} and {} have the correlation {:.3}: they are known together, not each.",
+                    "{} and {} have the correlation {:.3}: only their combination is determined.",
                     names[j], names[i], matrix[i][j]
                 ));
             }

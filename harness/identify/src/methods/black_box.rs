@@ -141,7 +141,7 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
     let poles = models.iter().map(|m| m.model.poles(step, wide)).collect();
     let line = |m: &Judged| {
         format!(
-            "{}, order {}: simulates what was held back to {:.1} % (one step ahead it predicts {:.1} %).",
+            "{}, order {}: its simulation fits the held-back rows to {:.1} % (prediction one step ahead: {:.1} %).",
             m.model.kind, m.model.order, m.held_out_pct, m.one_step_pct
         )
     };

@@ -317,16 +317,15 @@ fn words(fit: &Fit, fits: bool, converged: bool) -> Vec<String> {
     }
     words.push(if fits {
         format!(
-            "Three poles and two zeros fit the record: the residual is {:.2} times the gyro's noise, and the poles \
-             are where the zeros, the inertia and the friction say ({:+.1} standard deviations).",
+            "Three poles and two zeros fit the record: the residual is {:.2} times the gyro's noise, and the poles agree with \
+             zeros, inertia and friction ({:+.1} standard deviations).",
             fit.over_noise, fit.structure
         )
     } else {
         format!(
             "{DOES_NOT_FIT}: the residual of three poles and two zeros is {:.2} times the gyro's noise, and the poles are \
-             {:+.1} standard deviations from where zeros, inertia and friction say. Dry friction and large slosh are \
-             not linear; the intervals hold for what looks like noise alone. Use the time domain \
-             (hubslosh identify without --method).",
+             {:+.1} standard deviations from those of zeros, inertia and friction. Dry friction and large slosh are not linear; \
+             the intervals hold for what looks like noise alone. Use the time domain (hubslosh identify without --method).",
             fit.over_noise, fit.structure
         )
     });

@@ -225,8 +225,8 @@ fn words(levels: &Levels, (odd, even): (f64, f64)) -> Vec<String> {
     }
     if levels.odd > levels.noise {
         words.push(
-            "What limits the response is distortion, not noise: more periods do not help, another draw of the phases \
-             (--seed) does, or a model with the nonlinearity in it."
+            "Distortion limits the response, not noise: more periods do not help. Use another draw of the phases (--seed), or a \
+             model with the nonlinearity."
                 .into(),
         );
     }

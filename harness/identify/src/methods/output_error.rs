@@ -157,7 +157,7 @@ fn identify_whole(
     let (mut fitted, mut failed): (Vec<Fitted>, _) = (Vec::new(), None);
     for model in ORDER.into_iter().filter(|model| options.models.iter().any(|m| m == model)) {
         if model != SloshModel::Frozen.name() && response.is_none() && options.starts.is_empty() {
-            tell(News::Step(format!("{model}: not tried, the data show no slosh to start from")));
+            tell(News::Step(format!("{model}: not tried because the data show no slosh")));
             continue;
         }
         let from = fitted.iter().min_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
@@ -550,8 +550,8 @@ fn shares(
         .collect();
     (!large.is_empty()).then(|| {
         format!(
-            "The intervals hold tolerances of what the recording cannot show ({}). Their share of the variance: {}. --tolerance \
-             sets them.",
+            "The intervals include tolerances of quantities that the recording does not show ({}). Their share of the variance: \
+             {}. --tolerance sets them.",
             known.join(", "),
             large.join(", ")
         )
@@ -609,8 +609,8 @@ fn acausal(problem: &Problem, found: &Polished, options: &Options) -> Option<Str
     let step = problem.recordings[0].step();
     (!options.acausal && between::is_acausal((delay, std), step)).then(|| {
         format!(
-            "the rate comes {:.2} ± {:.2} ms before the torque: the time stamps, or the torque between rows, are not what they \
-             are taken for (--torque; --acausal allows it)",
+            "the rate comes {:.2} ± {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \
+             --acausal allows it)",
             -1e3 * delay,
             1e3 * std
         )

@@ -313,7 +313,7 @@ fn budget(found: &Identification) -> Markup {
     let head = std::iter::once("estimate").chain(effects.iter().map(|e| e.source.as_str()));
     html! {
         h2 { "Error budget" }
-        p { "What an error of something that is not estimated would do to each estimate, in % of it; in its own unit where it is zero within its standard deviation. Tolerances (\"wrong by\") are part of the intervals." }
+        p { "Effect of errors in quantities that are not estimated, in % of each estimate, or in its unit if it is zero within its standard deviation. Tolerances (\"wrong by\") are part of the intervals." }
         (table(head, found.parameters.iter().map(row)))
     }
 }

@@ -98,8 +98,8 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
         caption: html! {
             "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other. "
             @if models.len() > 1 { "Lines: " (lines.join(", ")) ". " }
-            "Thin and dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from what of the rate no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
-            (list_of("Not to be trusted, and not drawn", &untrusted))
+            "Thin and dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from the part of the rate that no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
+            (list_of("Invalid, and not drawn", &untrusted))
         },
         height: 460,
         panels: vec![Panel::new(&axis.label, "frequency / Hz")],
