@@ -1,11 +1,11 @@
 """Compare pages of ``hubslosh view`` with the tables that they show, in a browser.
 
 Makes five runs: a sweep with rotary slosh, four modes of the liquid, a slew in six axes with two
-tanks, a tank that drains, a sphere. Of each, at three instants, the bobs that are drawn are read
-back and compared with where the table's numbers put them; so is the wave at the wall, with the
-FMU's wave_height, too. The surface has to move the liquid's centre of mass as far as the pendulums
-do. Contrast and the rest of WCAG 2 AA are axe-core's to judge. A unit of the FMU that looks like
-markup is shown as text. Leaves fifteen screenshots and a film.
+tanks, a tank that drains, a sphere. At three instants of each page, the drawn bobs are read back
+and compared with the positions from the table. So is the wave at the wall, also with the FMU's
+wave_height. The surface has to move the liquid's centre of mass as far as the pendulums do.
+Contrast and the rest of WCAG 2 AA are axe-core's to judge. A unit of the FMU that looks like markup
+is shown as text. Leaves fifteen screenshots and a film.
 
 Needs Playwright (``requirements-browser.txt``), Debian's Chromium and ffmpeg; ``.ci/browser`` gets
 them.

@@ -6,8 +6,8 @@ use std::process::Command;
 use crate::common::{python, run};
 use pack::{Fmi, MODELS, packed_model_for_tests, packed_version_for_tests};
 
-/// The motion is bit-identical to FMI 2.0 however FMPy handles events; through CVODE it is the same within what its
-/// tolerance, 1e-9, makes of 20 s of stick and slip.
+/// The motion is bit-identical to FMI 2.0 however FMPy handles events. Through CVODE it is equal within the error of a tolerance
+/// of 1e-9 over 20 s of stick and slip.
 const FMPY: &str = r#"
 import sys
 import numpy as np

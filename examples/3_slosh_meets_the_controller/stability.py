@@ -2,8 +2,8 @@
 
     python examples/3_slosh_meets_the_controller/stability.py
 
-What is predicted comes from the FMU's directional derivatives (`linearize`) and, for limit cycles,
-from one harmonic of the planar pendulum's equations; what is simulated from the FMU in closed loop.
+Predictions come from the FMU's directional derivatives (`linearize`) and, for limit cycles, from
+one harmonic of the planar pendulum's equations. Simulations run the FMU in closed loop.
 """
 
 import argparse

@@ -1,6 +1,5 @@
-//! modelDescription.xml of FMI 3.0 from the same table: scalars with the names of FMI 2.0, and behind them
-//! the independent variable and the event indicators, which FMI 2.0 has no variables for. With arrays an entry of the
-//! table is one variable.
+//! Writes modelDescription.xml of FMI 3.0 from the same table: scalars with the names of FMI 2.0. Then follow the independent
+//! variable and the event indicators, which are not variables in FMI 2.0. With arrays an entry of the table is one variable.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;

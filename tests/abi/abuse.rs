@@ -143,8 +143,8 @@ fn number(said: &str, word: &str) -> f64 {
     before.rsplit(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("no {word} in: {said}"))
 }
 
-/// Thousands at once step in turns with the bits each has alone; hundreds of times the library is loaded
-/// and is gone after unloading; a state goes there and back; Model Exchange goes through its events; steps take no memory.
+/// Thousands of instances step in turns and give the bits that each gives alone. The library is loaded hundreds of times and is
+/// gone after unloading. States go there and back, Model Exchange passes its events, steps take no memory.
 fn a_whole_life(fmi: Fmi, share: Share) {
     let fmu = Unpacked::new(HUBSLOSH, fmi);
     let [instances, loads] = match std::env::var("HUBSLOSH_VALGRIND").as_deref() {
@@ -265,8 +265,8 @@ fn no_calls_break_the_packed_binary_of_sloshtank() {
     no_calls_break::<SloshTank::Model>(2000);
 }
 
-/// A host that traps division by zero, invalid operations and overflow, as those do that look for the
-/// first NaN: none of them comes from any slosh model, friction law or gyro, in either interface.
+/// The host traps division by zero, invalid operations and overflow, as hosts do that search for the first NaN. No slosh model,
+/// friction law or gyro causes one, in either interface.
 #[cfg(target_os = "linux")]
 fn no_model_traps(fmi: Fmi, share: Share) {
     if under_valgrind() {
@@ -594,7 +594,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// What the suite divides between the versions, each of them tries here: minutes, by hand.
+/// Each version tries here what the suite divides between the versions: minutes, by hand.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
@@ -691,14 +691,14 @@ fn the_stack_that_an_fmu_needs_is_no_more_than_the_book_says() {
     }
 }
 
-/// Of `rounding.c`, 20 ms each.
+/// Number of steps of `rounding.c`, 20 ms each.
 const STEPS: usize = 250;
 
 /// Further settings of a host, by name, before a motion.
 type Settings<'a> = &'a [(&'a str, &'a str)];
 
-/// What a host's floating-point environment does to 5 s of a motion: the bits of all Reals, ten times. The motion is
-/// the same in both versions of FMI, to the last bit, whether the FMU handles events or, in 3.0, the host.
+/// Returns the bits of all Reals, ten times in 5 s of a motion, under a host's floating-point environment. The motion is the same
+/// in both versions of FMI, to the last bit, whether the FMU handles events or, in 3.0, the host.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Settings) {
     if under_valgrind() {

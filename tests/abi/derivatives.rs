@@ -1,5 +1,5 @@
-//! Directional and adjoint derivatives of the packed FMUs 3.0 at random operating points, through the functions that
-//! hosts call: the one is the transpose of the other, and both are what differences of the FMU's own values say.
+//! Directional and adjoint derivatives of the packed FMUs 3.0 at random operating points, through the functions that hosts call.
+//! One is the transpose of the other, and both equal differences of the FMU's values.
 
 use fastrand::Rng;
 use host::causality::{Causality, Variability};
@@ -7,8 +7,8 @@ use host::description::{ModelDescription, Type, Value, Variable};
 use host::fmi3::{Fmu, Instance, Interface};
 use pack::{Fmi, model, packed_version_for_tests};
 
-/// Rounding, relative to the sum of the sizes of the products that a number is the sum of: there are up to 100 of
-/// them, and each number of the Jacobian is rounded on the way to it.
+/// Rounding error of a sum, relative to the sum of its products' magnitudes: there are up to 100 products, and each number of the
+/// Jacobian is itself rounded.
 const ROUNDING: f64 = 1e-13;
 /// Central differences of order 4 over 1e-3 of a known's size leave out (1e-3)^4 of the fifth derivative, and lose
 /// 1e-16/1e-3 to rounding, more where large terms cancel in a value.
@@ -246,9 +246,9 @@ fn setting(name: impl Into<String>, value: impl ToString) -> (String, String) {
     (name.into(), value.to_string())
 }
 
-/// Checks the point of Model Exchange that `settings` lead to, states moved by random numbers in the ranges of `scatter`,
-/// and the point that Co-Simulation reaches in 0.3 s from the start, where a host can move the inputs alone; not those
-/// whose jumps are impulses, which move states with them.
+/// Checks the point of Model Exchange that `settings` lead to, states moved by random numbers in the ranges of `scatter`, and the
+/// point that Co-Simulation reaches in 0.3 s from the start, where a host can move the inputs alone; not those whose jumps are
+/// impulses, which move states with them.
 fn check(
     fmu: &Fmu,
     rng: &mut Rng,

@@ -388,8 +388,8 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     refused!(instance.enter_event_mode(), "\"instantiated\"");
 }
 
-/// What OpenModelica up to 1.27 makes of Booleans: its array of bytes is read as one of fmi2Boolean, which has four
-/// bytes each; what is behind it is taken to be 0 (fmi2SetBoolean_OMC in its FMI2Common.c).
+/// Returns Booleans as OpenModelica up to 1.27 passes them. Its array of bytes is read as an array of fmi2Boolean, four bytes
+/// each, with zeros behind it (fmi2SetBoolean_OMC in its FMI2Common.c).
 fn misread(booleans: &[i32]) -> Vec<i32> {
     let mut bytes: Vec<u8> = booleans.iter().map(|b| *b as u8).collect();
     bytes.resize(4 * booleans.len(), 0);

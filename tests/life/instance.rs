@@ -561,9 +561,8 @@ fn bytes_that_are_no_state_are_refused() {
     assert!(from_bytes(b"HubSlosh").is_err());
 }
 
-/// A sample falls due at the end of each of these steps; from 52 s on it once came a step late, when
-/// the steps added up had drifted from the host's clock by 1e-11 s. The rate moves by 1e-3 rad/s
-/// a step; 1e-6 of it is what the allowed part of a period makes.
+/// A sample falls due at the end of each of these steps. From 52 s on it once came a step late: the sum of the steps had drifted
+/// from the host's clock by 1e-11 s. The rate moves by 1e-3 rad/s a step; 1e-6 of it is what the allowed part of a period makes.
 #[test]
 fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies() {
     let h = 0.01;
@@ -1073,7 +1072,7 @@ fn kinds_choose_what_the_enumerations_choose() {
     }
 }
 
-/// What OpenModelica up to 1.27 sets as Booleans is noise.
+/// OpenModelica up to 1.27 sets Booleans to noise.
 #[test]
 fn kinds_decide_whatever_the_booleans_say() {
     for name in ["slosh.zeta_from_correlation", "slosh.capillarity", "wheel.enabled", "imu.enabled"]

@@ -37,9 +37,9 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The cylinder of the bench by its dimensions, by the closed form of `hubslosh tank`, and by its
-/// contour through the boundary integral equation: masses and lengths agree to 1e-11, and the motion
-/// over 10 s to the integrator's tolerance times what rotary motion makes of a small change.
+/// The cylinder of the bench by its dimensions, by the closed form of `hubslosh tank`, and by its contour through the boundary
+/// integral equation: masses and lengths agree to 1e-11, and the motion over 10 s to the integrator's tolerance times what rotary
+/// motion makes of a small change.
 #[test]
 fn table_of_the_old_cylinder_gives_the_old_motion() {
     for model in

@@ -38,14 +38,14 @@ enum Exchange {
     Constant,
 }
 
-/// How it goes on from there within a step, and who moves first.
+/// Continuation of the exchanged values within a step, and the order of the two FMUs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     GaussSeidelHeld,
     GaussSeidelLinear,
     JacobiHeld,
     JacobiLinear,
-    /// As `GaussSeidelLinear`; then both steps again, with what the tank has given at the end.
+    /// `GaussSeidelLinear`, then both steps again with the tank's values at the end.
     Repeated,
 }
 use Order::*;
@@ -439,8 +439,8 @@ fn coupling_converges_with_its_order() {
     }
 }
 
-/// A box under way in both of its planes, m_0 below 0. Lumped its modes count twice, so that what is a step late is more: held
-/// values take more damping away than of modes all around: at lambda 8 and 20 ms the pair diverges. Extrapolated ones do not.
+/// A box under way in both of its planes, m_0 below 0. With lumped coupling its modes count twice, so a larger part is a step
+/// late. Held values then take away more damping: at lambda 8 and 20 ms the pair diverges. Extrapolated ones do not.
 #[test]
 fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     let lambda = ratio(a_box());

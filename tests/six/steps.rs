@@ -14,8 +14,8 @@ use super::draining::tank;
 use super::random::Random;
 use super::records::{STEP, at_end, motion_at_end};
 
-/// Right after a step outputs are limits from the left: the torque of wheels that have been turning
-/// up is in them, and the rate of a host that has turned.
+/// Right after a step outputs are limits from the left: they include the torque of wheels that have accelerated, and the rate of
+/// a host that has turned.
 #[test]
 fn outputs_after_a_step_are_those_at_its_end() {
     for seed in 0..10 {

@@ -1,5 +1,4 @@
-//! What is committed and follows from something else is what it follows from; the icon is what
-//! importers want.
+//! Committed files that are generated equal their generators' output; the icon is what importers want.
 
 use std::path::Path;
 

@@ -1,9 +1,8 @@
 //! `hubslosh check`: does an FMU keep the rules of FMI 2.0 or 3.0, and those that hosts add?
 //!
 //! Every rule is an entry of a table, [`RULES`] for FMI 2.0, [`rules::fmi3::RULES`] for 3.0, with the function that looks. Rules of the
-//! archive, the description and the binaries look at the file. Rules of calls load the binary for
-//! this platform and call it as hosts do, each in a process of its own: an FMU that crashes or hangs
-//! is a finding, not the end of the check.
+//! archive, the description and the binaries look at the file. Rules of calls load the binary for this platform and call it as
+//! hosts do. Each runs in a process of its own: a crash or a hang is a finding, not the end of the check.
 
 pub mod archive;
 pub mod arrays;

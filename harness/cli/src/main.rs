@@ -44,8 +44,8 @@ use terminal::Terminal;
 
 /// Packs FMUs, checks them, simulates campaigns and reports.
 ///
-/// Without a subcommand: packs dist/HubSlosh.fmu, simulates the 22 sine sweeps of Rubaga's thesis
-/// with a linear and a spherical liquid and leaves dist/campaign/report.html and features.csv.
+/// Without a subcommand: packs dist/HubSlosh.fmu and simulates the 22 sine sweeps of Rubaga's thesis with a linear and a
+/// spherical liquid. Writes dist/campaign/report.html and features.csv.
 #[derive(Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Cli {

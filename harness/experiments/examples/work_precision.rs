@@ -1,5 +1,5 @@
-//! One point of the work-precision diagram, for one method at one tolerance: CPU time for 20 ms
-//! of motion, and error over the thesis's sweep (0.1 N m, 10 cm, dry friction).
+//! Computes one point of the work-precision diagram, for one method at one tolerance: CPU time for 20 ms of motion, and error
+//! over the thesis's sweep. (The sweep has 0.1 N m, 10 cm and dry friction.)
 //!
 //! `work_precision METHOD TOLERANCE SECONDS RUNS [REFERENCE]` prints
 //! `ns per 20 ms,largest error of omega in rad/s`. The motion is solved RUNS times. For each

@@ -1,5 +1,5 @@
-//! Similarity of a bench and a flight tank as text: Bond numbers, the tank with equal Bond numbers,
-//! Froude's factors (`formulas::similarity`; Rubaga's thesis 2.5, 2.6, 7.2, with its numbers corrected).
+//! Prints the similarity of a bench and a flight tank: Bond numbers, the tank with equal Bond numbers, Froude's factors. Sources:
+//! `formulas::similarity`; Rubaga's thesis 2.5, 2.6 and 7.2, with corrected numbers.
 //!
 //! An angular acceleration has two different numbers. The thesis's 45.87 is Bo_i of its bench, but
 //! its equivalent tank follows from Bo_r.
@@ -92,8 +92,8 @@ pub fn bond(
     Ok(Found { text, json })
 }
 
-/// Bond, Weber and Froude numbers of a liquid that moves at a velocity (m/s), which of the forces rules, and how long gravity
-/// and surface tension take over the radius (2.28, 2.29).
+/// Prints Bond, Weber and Froude numbers of a liquid that moves at a velocity (m/s), and the dominant force. Also prints the
+/// times that gravity and surface tension take over the radius (2.28, 2.29).
 pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result<Found> {
     positive(&[
         ("density", liquid.density),

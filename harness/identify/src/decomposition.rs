@@ -96,9 +96,9 @@ impl Curvature {
         (&self.vectors * c).component_mul(&self.scale)
     }
 
-    /// Directions that the matrix does not resolve. `errors` are the relative errors of the Jacobian's columns, all of them
-    /// independent: along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i². Each direction is a unit vector
-    /// in the matrix's own scales.
+    /// Returns the directions that the matrix does not resolve. `errors` are the independent relative errors of the Jacobian's
+    /// columns. Along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i². Each direction is a unit vector in
+    /// the matrix's own scales.
     pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
         let flat = self.flat();
         let is_flat = |value: f64, v: &DVector<f64>| {

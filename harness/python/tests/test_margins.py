@@ -113,7 +113,7 @@ def test_each_of_two_loops_is_broken_with_the_other_closed() -> None:
 
 
 def test_the_modulus_margin_is_the_least_distance_to_minus_one() -> None:
-    """Of 1/(s (s + 1)) as on a fine grid: a minimum is flat, 1e-5 in w is 1e-10 in it."""
+    """For 1/(s (s + 1)) as on a fine grid: a minimum is flat, 1e-5 in w is 1e-10 in it."""
     w = np.linspace(0.5, 3, 250_001)
     least = np.abs(1 + 1 / (1j * w * (1j * w + 1))).min()
     assert margins(1 / (S * (S + 1))).modulus_margin == pytest.approx(least, rel=1e-8)

@@ -39,7 +39,7 @@ def link() -> zipfile.ZipInfo:
     ],
 )
 def test_an_archive_beyond_the_budgets_is_refused(tmp_path, files, why) -> None:
-    """By the host's rules, of which every kind has one here."""
+    """Every kind of the host's rules has a case here."""
     with pytest.raises(FmuError, match=re.escape(why)):
         Fmu(packed(tmp_path, files))
 

@@ -68,7 +68,7 @@ static TABLE: Table<Controller> = Table::new(
 );
 
 impl Controller {
-    /// Where tau tends to.
+    /// Torque that tau tends to.
     fn wanted(&self, theta: f64, omega: f64) -> f64 {
         -self.p.k_p * theta - self.p.k_d * omega
     }

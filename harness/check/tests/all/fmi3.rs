@@ -1,5 +1,5 @@
-//! Rules on FMUs 3.0: a model without a fault (model3.c, model3.xml) keeps every rule, and copies of it that are wrong in one
-//! way break the rule that is meant.
+//! Rules on FMUs 3.0. A model without a fault (model3.c, model3.xml) keeps every rule. Copies of it with one fault each break the
+//! intended rule.
 
 use std::collections::BTreeSet;
 

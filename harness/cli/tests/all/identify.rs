@@ -220,7 +220,8 @@ fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
     let folder = folder.path();
     let asked = ["design", "--snr", "20", "--band", "1.25,20"];
     // A linear bench: 7500 samples have the noise to 0.8 %, 0.07 dB; four of that. Dry friction takes a quarter of the torque at
-    // the lower end and more than half at the resonance; as viscous friction of the same first harmonic it is good to a twentieth.
+    // the lower end and more than half at the resonance. Viscous friction with the same first harmonic is right within a
+    // twentieth.
     let linear = ["friction.c=0", "friction.d=0"];
     for (set, most) in [(&linear[..], 0.3), (&[], 0.5)] {
         let set: Vec<&str> = set.iter().flat_map(|one| ["--set", one]).collect();

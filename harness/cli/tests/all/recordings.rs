@@ -1,5 +1,5 @@
-//! Recordings through the program: a twin shows what the run shows that it was made from, in whatever form it is written;
-//! a gyro at rest; a free decay; an empty tank.
+//! Recordings through the program. A twin in any file format gives the result of the run that it was made from. Further cases are
+//! a gyro at rest, a free decay and an empty tank.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;

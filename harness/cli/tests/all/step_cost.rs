@@ -17,8 +17,8 @@ fn step_cost(fmi: Fmi, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// The FMU makes as many internal steps as were chosen, and no more; where it refuses, a shorter step goes on (FMI 3.0), or
-/// one from the saved state (FMI 2.0).
+/// The FMU makes at most the chosen number of internal steps. If it refuses a step, a shorter step (FMI 3.0) or one from the
+/// saved state (FMI 2.0) continues.
 #[test]
 fn the_number_of_internal_steps_chosen_for_a_deadline_is_obeyed() {
     for fmi in Fmi::ALL {

@@ -146,8 +146,8 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     assert_eq!(page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap().len(), 1);
 }
 
-/// Liquid that stands higher on one side has its centre of mass there: rho int eta r cos^2 dA = m l per angle, for every mode and
-/// every tank, exact in linear theory. A cylinder's surface in this sphere misses by a tenth of the size.
+/// Liquid that stands higher on one side has its centre of mass there: rho int eta r cos^2 dA = m l per angle. This holds for
+/// every mode and every tank, exactly in linear theory. A cylinder's surface in this sphere misses by a tenth of the size.
 #[test]
 fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum_does() {
     let directory = tempfile::tempdir().unwrap();

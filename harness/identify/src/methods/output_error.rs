@@ -454,8 +454,8 @@ struct OneWay {
     place: usize,
 }
 
-/// If the hub turns one way alone, its friction is c (1 ± asymmetry) and d (1 ± asymmetry), and nothing tells the asymmetry from c
-/// and d but what is vaguely known of these. The asymmetry is then no unknown: the minimum is sought with an asymmetry of 0.
+/// If the hub turns one way alone, only c (1 ± asymmetry) and d (1 ± asymmetry) act, and only vague priors separate the asymmetry
+/// from c and d. The asymmetry is then not an unknown: the search fixes it at 0.
 fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>> {
     const NAME: &str = hubslosh::friction::ASYMMETRY;
     let Some(place) = problem.index(NAME) else { return Ok(None) };

@@ -1,6 +1,6 @@
-//! Reads Parquet files: numbers of every type, and times in seconds by their logical type (TIMESTAMP, TIME, DATE,
-//! INTERVAL, INT96) or by the type in Arrow's own schema (durations of pandas and Polars). Nothing is
-//! taken for a number that is none, and no unit is guessed.
+//! Reads Parquet files: numbers of every type, and times in seconds. Times go by their logical type (TIMESTAMP, TIME, DATE,
+//! INTERVAL, INT96) or by the type in Arrow's schema (durations of pandas and Polars). Nothing is taken for a number that is
+//! none, and no unit is guessed.
 
 mod arrow;
 mod kind;

@@ -226,7 +226,7 @@ struct Lines {
     bytes: Vec<u8>,
     /// Number of the last line, from 1.
     number: usize,
-    /// That line has an end.
+    /// True if that line has an end.
     ended: bool,
     /// The last comment, without its sign.
     comment: Option<String>,
