@@ -15,9 +15,11 @@
 
 pub mod closed_form;
 pub mod contour;
+mod contour_waves;
 pub mod curve;
 pub mod damping;
 pub mod fill_table;
+pub mod finite_amplitude;
 mod gauss;
 pub mod interpolation;
 pub mod low_gravity;

@@ -17,6 +17,7 @@
 use serde::Serialize;
 
 use crate::contour::{Problems, Volume, Wall};
+use crate::finite_amplitude::FiniteAmplitude;
 use crate::potential_flow::{Discretisation, Solution};
 
 /// Share of the liquid's mass below which a mode has no height.
@@ -283,6 +284,9 @@ pub struct ModalData {
     /// Damping, if the liquid's viscosity is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damping: Option<Damping>,
+    /// Amplitude dependence of the first mode, see [`crate::finite_amplitude`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub finite_amplitude: Option<FiniteAmplitude>,
     /// The wetted wall.
     #[serde(skip)]
     pub wall: Option<Wall>,
@@ -404,6 +408,7 @@ impl ModalData {
             error_beta: 0.0,
             capillarity: None,
             damping: None,
+            finite_amplitude: None,
             wall: None,
         }
     }

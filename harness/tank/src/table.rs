@@ -2,6 +2,7 @@
 
 use core::fmt::Write as _;
 
+use crate::finite_amplitude::FiniteAmplitude;
 use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest};
 
 /// Formats a length in m to 1e-9 m without trailing zeros; fills from a volume have 17 digits.
@@ -63,6 +64,10 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
             "\nat 0 m/s² only capillarity brings the liquid back, which is not in this table without --sigma: f is 0"
         );
     }
+    if let Some(found) = &data.finite_amplitude {
+        let waves = [data.modes.first(), data.axes.as_ref().and_then(|axes| axes.y.modes.first())];
+        amplitude_section(&mut text, found, waves.map(|mode| mode.map_or(0.0, |mode| mode.wave)));
+    }
     if let Some(damping) = &data.damping {
         damping_section(&mut text, damping);
     }
@@ -83,6 +88,38 @@ fn capillarity_section(text: &mut String, capillarity: &Capillarity) {
         significant(*sigma)
     );
     for warning in warnings {
+        let _ = writeln!(text, "  warning: {warning}");
+    }
+}
+
+fn amplitude_section(text: &mut String, found: &FiniteAmplitude, waves: [f64; 2]) {
+    let _ = writeln!(text, "\nfinite amplitude of mode 1 at the slosh angle A, rad");
+    let axes = if found.mode_y.is_some() { ["x", "y"] } else { ["", ""] };
+    for ((mode, axis), wave) in [&found.mode, &found.mode_y].into_iter().zip(axes).zip(waves) {
+        let Some(known) = mode else { continue };
+        let along = if axis.is_empty() { String::new() } else { format!("motion along {axis}: ") };
+        let circular =
+            known.circular.map_or(String::new(), |shift| format!(", circular {shift:+.4} A^2"));
+        let _ = writeln!(
+            text,
+            "  {along}s = {:.4}, kappa = {:.4}, error {:.0e}, up to {:.0} degrees",
+            known.nonlinear_inertia,
+            known.nonlinear_stiffness,
+            known.error,
+            known.angle_limit.to_degrees()
+        );
+        let _ = writeln!(
+            text,
+            "  omega^2 shifts by the part {:+.4} A^2 in planar motion{circular} (pendulum: -0.125 A^2, +0.5 A^2)",
+            known.planar
+        );
+        let _ = writeln!(
+            text,
+            "  wave at the wall, m: crest {wave:.6} A {:+.6} A^2, trough {wave:.6} A {:+.6} A^2",
+            known.wave_second, -known.wave_second
+        );
+    }
+    for warning in &found.warnings {
         let _ = writeln!(text, "  warning: {warning}");
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use files::output::atomically;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, capillarity_of, damping_of};
-use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
+use hubslosh_tank::{Fill, Problems, Tank, fill_table, finite_amplitude, picture, sweep, table};
 
 use crate::terminal;
 
@@ -137,6 +137,9 @@ impl TankArgs {
                 // The table has them, and --parameters warns of its own.
                 let is_read = self.parameters.is_some() || !(self.json || self.out.is_some());
                 found.filter(|_| !is_read).for_each(terminal::warn);
+                if !data.modes.is_empty() {
+                    data.finite_amplitude = Some(finite_amplitude::of_tank(&tank, &data));
+                }
                 if let Some(nu) = self.nu.filter(|_| !data.modes.is_empty()) {
                     let liquid = self.liquid();
                     data.damping = Some(damping_of(&tank, &data, nu, liquid).with_context(read)?);

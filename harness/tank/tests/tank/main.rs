@@ -4,6 +4,7 @@ mod common;
 mod continuity;
 mod dimensions;
 mod files;
+mod finite_amplitude;
 mod formulas;
 mod physics;
 mod pictures;

@@ -92,8 +92,8 @@ fn boxes_have_the_waves_of_tadjbakhsh_and_keller() {
     }
 }
 
-/// A ring without a hole is a circle. A thin ring of radius R is a channel: its planar wave is that of a box of the length
-/// pi R, its circular wave that of Stokes, omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8 T^4)].
+/// A ring without a hole is a circle. A thin ring of radius R is a channel. Its planar wave is that of a box of the length
+/// pi R. Its circular wave is that of Stokes: omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8 T^4)].
 #[test]
 fn rings_lie_between_a_circle_and_a_channel() {
     let (circle, ring) = (Overlaps::round(0.0, 1.0, 20), Overlaps::round(1e-3, 1.0, 20));
@@ -118,8 +118,8 @@ fn rings_lie_between_a_circle_and_a_channel() {
     }
 }
 
-/// A sector of 180 degrees has the modes cos theta of the circle for motion along its straight wall, and a thin one of
-/// 1 degree far from the axis is a box, both along the radius and across it.
+/// A sector of 180 degrees has the modes cos theta of the circle for motion along its straight wall. A narrow one far from
+/// the axis is a box, along the radius and across it.
 #[test]
 fn sectors_are_half_circles_and_boxes() {
     let pi = std::f64::consts::PI;

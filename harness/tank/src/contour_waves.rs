@@ -1,0 +1,732 @@
+//! Amplitude dependence of the first mode of a body of revolution of any contour: potential flow to
+//! third order, by a variational method.
+//!
+//! The surface is z = z_F + zeta(rho, theta, t) at r = r(rho, z). Lines of constant rho begin at the radius rho
+//! of the surface at rest and run inside the tank. The outermost one is the wall, r(R, z) = R(z). With
+//! the volume element w rho drho dtheta dz, w = r r_rho/rho, harmonic functions u_j, phi = sum c_j(t) u_j
+//! and Q(t) the liquid, Luke's variational principle (J. Fluid Mech. 27 (1967) 395) reads
+//!
+//! ```text
+//! L = sum c_j d/dt int_Q u_j dV - (1/2) int_Q |grad phi|^2 dV - g int_Q (z - z_F) dV
+//! int_Q F dV = int_Q0 F dV + int [F w zeta + (F w)_z zeta^2/2 + (F w)_zz zeta^3/6 + ...] rho drho dtheta
+//! ```
+//!
+//! with derivatives along the lines at the surface at rest: only slope and curvature of the wall at the
+//! contact line enter. Each zeta is allowed, because the lines do not leave the tank. Miles (1976) and
+//! Lukovsky use this principle for vertical walls and for cones. To first order zeta = a f E,
+//! phi = -omega a U S, with
+//!
+//! ```text
+//! planar     E = cos theta cos wt,    S = cos theta sin wt
+//! circular   E = cos(wt - theta),     S = sin(wt - theta)
+//! ```
+//!
+//! To second order zeta gets p P + r Z and phi gets d F. P is constant in time, Z and F have the frequency
+//! 2 omega; their azimuthal numbers are 0 and 2. L averaged over a period is stationary in p, r and d (with the volume as
+//! a constraint), and L_2 a^2 + L_4 a^4 in a, as in `third_order.rs`. The order-3 fields drop out,
+//! because the first order is stationary.
+//!
+//! The u_j are the solid harmonics r^m, z r^m, ... about a point on the axis, zeta are polynomials.
+//! Both are complete in a liquid without holes. The result does not depend on the choice of the lines,
+//! which tests use.
+
+use core::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::contour::Wall;
+use crate::gauss::Gauss;
+use crate::third_order::in_circle;
+
+/// Depth below the surface, over the largest radius, beyond which the liquid is at rest: 2e-5 of the
+/// motion of a cylinder's first mode.
+const DEEP: f64 = 3.0;
+
+/// Smallest eigenvalue of the kinetic energy's matrix over the largest for a combination of harmonics
+/// that is not rounding noise.
+const NOISE: f64 = 1e-13;
+
+/// Periodic waves of the first mode. Lengths are over the radius of the surface.
+#[derive(Clone, Debug)]
+pub(crate) struct Waves {
+    /// lambda_1 = omega_1^2/g.
+    pub lambda: f64,
+    /// Relative shifts of omega^2 per squared slosh angle, planar and circular.
+    pub shifts: [f64; 2],
+    /// Second-order elevation at the wall of planar motion per squared slosh angle when it is largest there.
+    pub second_wave: f64,
+    /// Azimuthal number, number from 1 and lambda of modes that the square of the first mode excites.
+    pub excited: Vec<([usize; 2], f64)>,
+}
+
+/// Harmonics of one azimuthal number at points, one a column.
+struct Fields {
+    u: DMatrix<f64>,
+    r: DMatrix<f64>,
+    z: DMatrix<f64>,
+    rz: DMatrix<f64>,
+    zz: DMatrix<f64>,
+}
+
+impl Fields {
+    /// Computes u_n = s^-n |x|^n P_n^m at the points (r, z), n from m (from 1 for m = 0) to `degree`.
+    fn new(m: usize, degree: usize, scale: f64, points: &[[f64; 2]]) -> Fields {
+        let first = m.max(1);
+        let count = degree + 1 - first;
+        let zero = || DMatrix::zeros(points.len(), count);
+        let mut fields = Fields { u: zero(), r: zero(), z: zero(), rz: zero(), zz: zero() };
+        for (i, [r, z]) in points.iter().map(|p| p.map(|x| x / scale)).enumerate() {
+            let mut u = vec![0.0; degree + 1];
+            u[m] = r.powi(m as i32);
+            if degree > m {
+                u[m + 1] = (2 * m + 1) as f64 * z * u[m];
+            }
+            for n in m + 1..degree {
+                u[n + 1] = ((2 * n + 1) as f64 * z * u[n]
+                    - (n + m) as f64 * (r * r + z * z) * u[n - 1])
+                    / (n + 1 - m) as f64;
+            }
+            // d/dz lowers the degree; r d/dr + z d/dz multiplies by it
+            let lower = |n: usize| if n > m { (n + m) as f64 * u[n - 1] } else { 0.0 };
+            for n in first..=degree {
+                let j = n - first;
+                let along_z = lower(n);
+                let twice = if n > m { (n + m) as f64 * lower(n - 1) } else { 0.0 };
+                let across = |n: usize| (n as f64 * u[n] - z * lower(n)) / r;
+                fields.u[(i, j)] = u[n];
+                fields.z[(i, j)] = along_z / scale;
+                fields.r[(i, j)] = across(n) / scale;
+                fields.zz[(i, j)] = twice / (scale * scale);
+                fields.rz[(i, j)] =
+                    if n > m { (n + m) as f64 * across(n - 1) } else { 0.0 } / (scale * scale);
+            }
+        }
+        fields
+    }
+
+    fn times(&self, e: &DMatrix<f64>) -> Fields {
+        Fields {
+            u: &self.u * e,
+            r: &self.r * e,
+            z: &self.z * e,
+            rz: &self.rz * e,
+            zz: &self.zz * e,
+        }
+    }
+}
+
+/// Points with weights r ds and normals.
+struct Boundary {
+    points: Vec<[f64; 2]>,
+    normals: Vec<[f64; 2]>,
+    weights: Vec<f64>,
+}
+
+/// The liquid at rest, over the radius of the surface, z from the surface.
+struct Liquid {
+    boundary: Boundary,
+    /// Height of the harmonics' centre, half way to the bottom, and the largest distance from it.
+    centre: f64,
+    size: f64,
+    /// Slope and curvature of the wall at the contact line, dR/dz and d^2R/dz^2.
+    wall: [f64; 2],
+    rho: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Liquid {
+    fn new(wall: &Wall, degree: usize) -> Option<Liquid> {
+        let radius = wall.r_outer;
+        if wall.r_inner > 0.0 || radius <= 0.0 {
+            return None;
+        }
+        let rule = Gauss::new(degree + 16);
+        let mut boundary =
+            Boundary { points: Vec::new(), normals: Vec::new(), weights: Vec::new() };
+        let scaled = |p: [f64; 2]| [p[0] / radius, (p[1] - wall.z_surface) / radius];
+        let across = |p: &crate::curve::Segment| {
+            (0..=32).map(|i| p.at(f64::from(i) / 32.0)[0]).fold(0.0, f64::max)
+        };
+        let widest = wall.segments.iter().map(across).fold(0.0, f64::max) / radius;
+        let bottom = -DEEP * widest;
+        let mut add = |p: [f64; 2], slope: [f64; 2], weight: f64| {
+            let speed = slope[0].hypot(slope[1]);
+            if p[0] > 0.0 && speed > 0.0 {
+                boundary.points.push(p);
+                boundary.normals.push([slope[1] / speed, -slope[0] / speed]);
+                boundary.weights.push(weight * p[0] * speed);
+            }
+        };
+        // From the contact line downwards.
+        for segment in wall.segments.iter().rev() {
+            let height = |t: f64| scaled(segment.curve.at(t))[1];
+            let (mut from, to) = (segment.from, segment.to);
+            let cut = height(from) < bottom;
+            if cut {
+                let (mut below, mut above) = (from, to);
+                for _ in 0..60 {
+                    let middle = 0.5 * (below + above);
+                    (below, above) =
+                        if height(middle) < bottom { (middle, above) } else { (below, middle) };
+                }
+                from = above;
+            }
+            for (x, w) in rule.nodes.iter().zip(&rule.weights) {
+                let t = from + (to - from) * x;
+                let slope = segment.curve.slope(t).map(|d| d * (to - from) / radius);
+                add(scaled(segment.curve.at(t)), slope, *w);
+            }
+            if cut {
+                let end = scaled(segment.curve.at(from))[0];
+                for (x, w) in rule.nodes.iter().zip(&rule.weights) {
+                    add([end * x, bottom], [end, 0.0], *w);
+                }
+                break;
+            }
+        }
+        let rho = rule.nodes.clone();
+        let weights: Vec<f64> = rule.nodes.iter().zip(&rule.weights).map(|(x, w)| x * w).collect();
+        for (x, w) in rho.iter().zip(&rule.weights) {
+            add([*x, 0.0], [-1.0, 0.0], *w);
+        }
+        let centre = 0.5 * boundary.points.iter().map(|p| p[1]).fold(0.0, f64::min);
+        for p in &mut boundary.points {
+            p[1] -= centre;
+        }
+        let size = boundary.points.iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max);
+        let last = wall.segments.last()?;
+        let inclination = |t: f64| {
+            let [r, z] = last.curve.slope(t);
+            r / z
+        };
+        let step = 1e-4;
+        let rise = last.curve.slope(last.to)[1];
+        let bend = (inclination(last.to + step) - inclination(last.to - step))
+            / (2.0 * step * rise)
+            * radius;
+        Some(Liquid { boundary, centre, size, wall: [inclination(last.to), bend], rho, weights })
+    }
+
+    fn integral(&self, f: impl Fn(usize) -> f64) -> f64 {
+        self.weights.iter().enumerate().map(|(i, w)| w * f(i)).sum()
+    }
+
+    /// Returns harmonics whose kinetic energies are orthonormal, by the boundary integral of u du/dn.
+    fn harmonics(&self, m: usize, degree: usize) -> Harmonics {
+        let Boundary { points, normals, weights } = &self.boundary;
+        let fields = Fields::new(m, degree, self.size, points);
+        let mut flux = fields.u.clone();
+        for (i, (n, w)) in normals.iter().zip(weights).enumerate() {
+            for j in 0..flux.ncols() {
+                flux[(i, j)] = w * (n[0] * fields.r[(i, j)] + n[1] * fields.z[(i, j)]);
+            }
+        }
+        let energy = fields.u.tr_mul(&flux);
+        let norm: Vec<f64> = (0..energy.ncols()).map(|j| energy[(j, j)].abs().sqrt()).collect();
+        let scaled = DMatrix::from_fn(norm.len(), norm.len(), |i, j| {
+            0.5 * (energy[(i, j)] + energy[(j, i)]) / (norm[i] * norm[j])
+        });
+        let eigen = scaled.symmetric_eigen();
+        let largest = eigen.eigenvalues.max();
+        let kept: Vec<usize> =
+            (0..norm.len()).filter(|k| eigen.eigenvalues[*k] > NOISE * largest).collect();
+        let e = DMatrix::from_fn(norm.len(), kept.len(), |i, k| {
+            eigen.eigenvectors[(i, kept[k])] / (eigen.eigenvalues[kept[k]].sqrt() * norm[i])
+        });
+        let surface: Vec<[f64; 2]> = self.rho.iter().map(|r| [*r, -self.centre]).collect();
+        let surface = Fields::new(m, degree, self.size, &surface).times(&e);
+        Harmonics { e, surface }
+    }
+
+    /// Returns orthonormal polynomials at the surface's points, and at the wall in a last row.
+    fn elevations(&self, m: usize, count: usize) -> DMatrix<f64> {
+        let mut all = DMatrix::zeros(self.rho.len() + 1, count);
+        for (i, rho) in self.rho.iter().chain(&[1.0]).enumerate() {
+            for (j, (f, _)) in in_circle(m as f64, rho * rho, count, 1.0).into_iter().enumerate() {
+                all[(i, j)] = f;
+            }
+        }
+        all
+    }
+
+    /// int f_i u_k rho drho
+    fn coupling(&self, f: &DMatrix<f64>, u: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(f.ncols(), u.ncols(), |i, k| self.integral(|q| f[(q, i)] * u[(q, k)]))
+    }
+}
+
+/// Function of azimuth and phase.
+type Wave = fn(f64, f64) -> f64;
+
+/// Shapes of a motion over azimuth and phase; `None` for a field that it does not excite.
+struct Shape {
+    /// Azimuthal number of the field.
+    m: usize,
+    mean: Option<Wave>,
+    /// Elevation at 2 omega, potential, and the potential's derivative by theta.
+    double: Option<[Wave; 3]>,
+}
+
+/// E, S, and S's derivative by theta, of a motion, and the shapes of the second order.
+struct Motion {
+    first: [Wave; 3],
+    second: Vec<Shape>,
+}
+
+fn motions() -> [Motion; 2] {
+    let planar = Motion {
+        first: [|h, t| h.cos() * t.cos(), |h, t| h.cos() * t.sin(), |h, t| -h.sin() * t.sin()],
+        second: vec![
+            Shape {
+                m: 0,
+                mean: Some(|_, _| 1.0),
+                double: Some([|_, t| (2.0 * t).cos(), |_, t| (2.0 * t).sin(), |_, _| 0.0]),
+            },
+            Shape {
+                m: 2,
+                mean: Some(|h, _| (2.0 * h).cos()),
+                double: Some([
+                    |h, t| (2.0 * h).cos() * (2.0 * t).cos(),
+                    |h, t| (2.0 * h).cos() * (2.0 * t).sin(),
+                    |h, t| -2.0 * (2.0 * h).sin() * (2.0 * t).sin(),
+                ]),
+            },
+        ],
+    };
+    let circular = Motion {
+        first: [|h, t| (t - h).cos(), |h, t| (t - h).sin(), |h, t| -(t - h).cos()],
+        second: vec![
+            Shape { m: 0, mean: Some(|_, _| 1.0), double: None },
+            Shape {
+                m: 2,
+                mean: None,
+                double: Some([
+                    |h, t| (2.0 * (t - h)).cos(),
+                    |h, t| (2.0 * (t - h)).sin(),
+                    |h, t| -2.0 * (2.0 * (t - h)).cos(),
+                ]),
+            },
+        ],
+    };
+    [planar, circular]
+}
+
+/// Mean over azimuth and phase, exact for trigonometric polynomials of degree 11.
+fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
+    let angle = |i: i32| TAU * f64::from(i) / 12.0;
+    (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
+}
+
+/// The first mode at the surface's points, and what the higher orders need of it.
+struct First {
+    lambda: f64,
+    /// Elevation with int f^2 rho drho = 1.
+    f: Vec<f64>,
+    /// (U w)_z, (U w)_zz along the lines.
+    along: [Vec<f64>; 2],
+    /// U_r, U_z, U/r.
+    gradient: [Vec<f64>; 3],
+    /// ((U_r^2 + U_z^2) w)_z, (U^2/r^2 w)_z along the lines.
+    energy: [Vec<f64>; 2],
+    /// w_z, w_zz along the lines.
+    w: [Vec<f64>; 2],
+    /// Slope of the lines, dr/dz.
+    slope: Vec<f64>,
+}
+
+/// A field of the second order: elevations p and r, potential d, and its share of L_4.
+struct Second {
+    l_4: f64,
+    p: DVector<f64>,
+    r: DVector<f64>,
+    d: DVector<f64>,
+}
+
+impl Second {
+    /// Elevation at the wall on the side of the crest, when it is largest there.
+    fn at_wall(&self, f: &DMatrix<f64>) -> f64 {
+        (f.row(f.nrows() - 1) * (&self.p + &self.r))[0]
+    }
+}
+
+/// Combinations e of harmonics, one a column, with orthonormal kinetic energies, and their values at the surface.
+struct Harmonics {
+    #[cfg_attr(not(test), allow(dead_code))]
+    e: DMatrix<f64>,
+    surface: Fields,
+}
+
+/// Computes the waves with solid harmonics up to `degree`. The lines' slope grows with the power `lines` of the radius,
+/// an odd number. `detuning` is added to 1 as a factor of 2 omega in the response of the second order, see
+/// `third_order.rs`. Returns `None` for a liquid with a hole.
+pub(crate) fn waves(wall: &Wall, degree: usize, lines: i32, detuning: f64) -> Option<Waves> {
+    let liquid = Liquid::new(wall, degree)?;
+    let count = degree / 2;
+    let (u, f) = (liquid.harmonics(1, degree), liquid.elevations(1, count));
+    let coupling = liquid.coupling(&f, &u.surface.u);
+    let eigen = (&coupling * coupling.transpose()).symmetric_eigen();
+    let best = eigen.eigenvalues.imax();
+    let shape = eigen.eigenvectors.column(best).into_owned();
+    let lambda = 1.0 / eigen.eigenvalues[best];
+    let first =
+        First::new(&liquid, &u.surface, lambda, &(&f * &shape), &coupling.tr_mul(&shape), lines);
+    let amplitude = liquid.integral(|q| first.f[q] * liquid.rho[q]);
+    let mut waves = Waves { lambda, shifts: [0.0; 2], second_wave: 0.0, excited: Vec::new() };
+    let fields = [0, 2].map(|m| (liquid.harmonics(m, degree), liquid.elevations(m, count)));
+    for (k, (u, f)) in fields.iter().enumerate() {
+        // The constant elevation of m = 0 changes the volume and is no mode.
+        let coupling = liquid.coupling(f, &u.surface.u).remove_rows(0, 1 - k);
+        let mut all =
+            (&coupling * coupling.transpose()).symmetric_eigenvalues().as_slice().to_vec();
+        all.sort_by(|a, b| b.total_cmp(a));
+        let lowest = all.iter().take(4).enumerate();
+        waves.excited.extend(lowest.map(|(n, value)| ([2 * k, n + 1], 1.0 / value)));
+    }
+    for (kind, motion) in motions().into_iter().enumerate() {
+        let [e, s, s_theta] = motion.first;
+        let fourth = average(|h, t| e(h, t).powi(4));
+        let [along, round] = [s, s_theta].map(|s| average(|h, t| (s(h, t) * e(h, t)).powi(2)));
+        let mut l_4 = liquid.integral(|q| {
+            let f = first.f[q];
+            lambda / 6.0 * fourth * first.along[1][q] * f.powi(3)
+                - lambda / 4.0 * (along * first.energy[0][q] + round * first.energy[1][q]) * f * f
+                - fourth / 8.0 * first.w[1][q] * f.powi(4)
+        });
+        let mut at_wall = 0.0;
+        for shape in &motion.second {
+            let (u, f) = &fields[shape.m / 2];
+            let second = first.second(&liquid, &motion, shape, (&u.surface, f), detuning);
+            l_4 += second.l_4;
+            at_wall += second.at_wall(f);
+        }
+        let square = average(|h, t| e(h, t).powi(2));
+        waves.shifts[kind] = -4.0 * l_4 / square * amplitude * amplitude;
+        if kind == 0 {
+            waves.second_wave = at_wall * amplitude * amplitude;
+        }
+    }
+    Some(waves)
+}
+
+impl First {
+    fn new(
+        liquid: &Liquid,
+        fields: &Fields,
+        lambda: f64,
+        f: &DVector<f64>,
+        c: &DVector<f64>,
+        lines: i32,
+    ) -> First {
+        let [big_u, u_r, u_z, u_rz, u_zz] =
+            [&fields.u, &fields.r, &fields.z, &fields.rz, &fields.zz].map(|field| field * c);
+        let [inclination, bend] = liquid.wall;
+        let size = liquid.rho.len();
+        let empty = || vec![0.0; size];
+        let mut first = First {
+            lambda,
+            f: f.as_slice()[..size].to_vec(),
+            along: [empty(), empty()],
+            gradient: [empty(), empty(), empty()],
+            energy: [empty(), empty()],
+            w: [empty(), empty()],
+            slope: empty(),
+        };
+        for (q, &rho) in liquid.rho.iter().enumerate() {
+            // r = rho + slope z + curve z^2/2
+            let power = rho.powi(lines);
+            let [slope, curve] = [inclination * power, bend * power];
+            let grows = f64::from(lines) / rho;
+            let w_z = slope / rho + slope * grows;
+            let w_zz = curve / rho + curve * grows + 2.0 * slope * slope * grows / rho;
+            let (u, ur, uz, urz, uzz) = (big_u[q], u_r[q], u_z[q], u_rz[q], u_zz[q]);
+            let urr = -ur / rho + u / (rho * rho) - uzz;
+            let along = uz + slope * ur;
+            let twice = uzz + 2.0 * slope * urz + slope * slope * urr + curve * ur;
+            first.along[0][q] = along + u * w_z;
+            first.along[1][q] = twice + 2.0 * along * w_z + u * w_zz;
+            let [along_r, along_z] = [urz + slope * urr, uzz + slope * urz];
+            first.energy[0][q] = 2.0 * (ur * along_r + uz * along_z) + (ur * ur + uz * uz) * w_z;
+            let over = u / rho;
+            let over_along = along / rho - slope * u / (rho * rho);
+            first.energy[1][q] = 2.0 * over * over_along + over * over * w_z;
+            for (field, value) in first.gradient.iter_mut().zip([ur, uz, over]) {
+                field[q] = value;
+            }
+            (first.w[0][q], first.w[1][q], first.slope[q]) = (w_z, w_zz, slope);
+        }
+        first
+    }
+
+    /// Returns a field of the second order.
+    fn second(
+        &self,
+        liquid: &Liquid,
+        motion: &Motion,
+        shape: &Shape,
+        (fields, f): (&Fields, &DMatrix<f64>),
+        detuning: f64,
+    ) -> Second {
+        let [e, s, s_theta] = motion.first;
+        let [u_r, u_z, over] = &self.gradient;
+        let count = f.ncols();
+        // what an elevation of a shape adds to L_4, per coefficient
+        let source = |z: Wave| {
+            let square = average(|h, t| e(h, t).powi(2) * z(h, t));
+            let along = average(|h, t| s(h, t).powi(2) * z(h, t));
+            let round = average(|h, t| s_theta(h, t).powi(2) * z(h, t));
+            DVector::from_fn(count, |i, _| {
+                liquid.integral(|q| {
+                    let energy =
+                        along * (u_r[q] * u_r[q] + u_z[q] * u_z[q]) + round * over[q] * over[q];
+                    f[(q, i)]
+                        * (self.lambda * square * self.along[0][q] * self.f[q]
+                            - 0.5 * self.lambda * energy
+                            - square * self.w[0][q] * self.f[q] * self.f[q])
+                })
+            })
+        };
+        // change of volume by the first order's square, to be made up by the second
+        let squeezed = liquid.integral(|q| self.w[0][q] * self.f[q] * self.f[q]);
+        let level = liquid.integral(|q| f[(q, 0)]);
+        let zero = DVector::zeros(count);
+        let mut second =
+            Second { l_4: 0.0, p: zero.clone(), r: zero, d: DVector::zeros(fields.u.ncols()) };
+        if let Some(mean) = shape.mean {
+            let norm = average(|h, t| mean(h, t).powi(2));
+            let source = source(mean);
+            let mut p = &source / norm;
+            if shape.m == 0 {
+                p[0] = -0.5 * average(|h, t| e(h, t).powi(2)) * squeezed / level;
+            }
+            second.l_4 += source.dot(&p) - 0.5 * norm * p.norm_squared();
+            second.p = p;
+        }
+        if let Some([z, potential, potential_theta]) = shape.double {
+            let omega = self.lambda.sqrt();
+            let driven = omega * (1.0 + detuning);
+            // The constant of m = 0 is the volume's multiplier.
+            let constant = usize::from(shape.m == 0);
+            let harmonics = fields.u.ncols();
+            let size = count + harmonics + constant;
+            let [norm, norm_potential] = [z, potential].map(|z| average(|h, t| z(h, t).powi(2)));
+            let square = average(|h, t| e(h, t).powi(2) * z(h, t));
+            let along = average(|h, t| s(h, t) * potential(h, t) * e(h, t));
+            let round = average(|h, t| s_theta(h, t) * potential_theta(h, t) * e(h, t));
+            let coupling = liquid.coupling(f, &fields.u);
+            let mut matrix = DMatrix::zeros(size, size);
+            let mut vector = DVector::zeros(size);
+            vector.rows_mut(0, count).copy_from(&source(z));
+            for i in 0..count {
+                matrix[(i, i)] = -norm;
+                for k in 0..harmonics {
+                    matrix[(i, count + k)] = -2.0 * driven * norm * coupling[(i, k)];
+                    matrix[(count + k, i)] = matrix[(i, count + k)];
+                }
+            }
+            for k in 0..harmonics {
+                matrix[(count + k, count + k)] = -norm_potential;
+                vector[count + k] = omega
+                    * liquid.integral(|q| {
+                        let (u, r, z) = (fields.u[(q, k)], fields.r[(q, k)], fields.z[(q, k)]);
+                        let grows = z + self.slope[q] * r + u * self.w[0][q];
+                        self.f[q]
+                            * (along * (u_r[q] * r + u_z[q] * z)
+                                + round * over[q] * u / liquid.rho[q]
+                                - square * grows * self.f[q])
+                    });
+            }
+            if constant == 1 {
+                let last = size - 1;
+                matrix[(0, last)] = -2.0 * driven * norm * level;
+                matrix[(last, 0)] = matrix[(0, last)];
+                vector[last] = -omega * square * squeezed;
+            }
+            if let Some(x) = matrix.lu().solve(&vector) {
+                second.l_4 -= 0.5 * vector.dot(&x);
+                second.r.copy_from(&-x.rows(0, count));
+                second.d.copy_from(&-x.rows(count, harmonics));
+            }
+        }
+        second
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contour::Contour;
+    use crate::curve::Segment;
+
+    fn wall(segments: Vec<Segment>, fill: f64) -> Wall {
+        Contour::new(segments).unwrap().cut(fill).unwrap()
+    }
+
+    fn sphere(fill: f64) -> Wall {
+        wall(vec![Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)], fill)
+    }
+
+    /// 1e-5: what the harmonics leave out at degree 24, and the depth beyond which the liquid is at rest.
+    #[test]
+    fn cylinders_have_the_waves_of_vertical_walls() {
+        let overlaps = crate::third_order::Overlaps::round(0.0, 0.5, 20);
+        for fill in [0.2, 0.35, 0.61, 1.2] {
+            let sides =
+                vec![Segment::line([0.0, 0.0], [0.5, 0.0]), Segment::line([0.5, 0.0], [0.5, 2.0])];
+            let found = waves(&wall(sides, fill), 24, 1, 0.0).unwrap();
+            for (a, b) in found.shifts.into_iter().zip(overlaps.shifts(fill)) {
+                assert!((a - b).abs() < 3e-5 * (1.0 + b.abs()), "{fill} {a} {b}");
+            }
+            let second = overlaps.second_wave(fill);
+            assert!(
+                (0.5 * found.second_wave / second - 1.0).abs() < 1e-3,
+                "{fill} {found:?} {second}"
+            );
+        }
+    }
+
+    /// Lines whose slope grows with the third power of the radius are others than those with the first.
+    #[test]
+    fn results_do_not_depend_on_the_lines_of_the_elevation() {
+        let cone = wall(vec![Segment::line([0.0, 0.0], [1.0, 2.0])], 1.3);
+        for wall in [cone, sphere(0.4), sphere(1.4)] {
+            let [a, b] = [1, 3].map(|lines| waves(&wall, 20, lines, 0.0).unwrap());
+            for (a, b) in a.shifts.into_iter().zip(b.shifts) {
+                assert!((a - b).abs() < 1e-4 * (1.0 + a.abs()), "{a} {b}");
+            }
+            assert!((a.second_wave - b.second_wave).abs() < 1e-3, "{a:?} {b:?}");
+        }
+    }
+
+    /// Shallow liquid in a paraboloid oscillates as a whole with a frequency that does not depend on its amplitude,
+    /// planar or circular (Thacker, J. Fluid Mech. 107 (1981) 499), to the leading order in 1/depth. In a
+    /// cylinder of this depth the shifts are 1e6.
+    #[test]
+    fn shallow_liquid_in_a_bowl_keeps_its_frequency() {
+        for fill in [1e-3, 1e-2] {
+            let shifts = waves(&sphere(fill), 16, 1, 0.0).unwrap().shifts;
+            assert!(shifts.iter().all(|shift| shift.abs() < 0.6), "{fill} {shifts:?}");
+        }
+    }
+
+    /// Luke's functional of the first and the second order, without any expansion: the integrals over the liquid run along
+    /// the lines up to the surface, with the sphere's true wall. Its fourth order in the amplitude is L_4.
+    #[test]
+    fn fourth_order_is_that_of_the_functional_itself() {
+        let (fill, degree, count) = (0.7, 14, 7);
+        let shape = sphere(fill);
+        let liquid = Liquid::new(&shape, degree).unwrap();
+        let radius = shape.r_outer;
+        let (u, f) = (liquid.harmonics(1, degree), liquid.elevations(1, count));
+        let coupling = liquid.coupling(&f, &u.surface.u);
+        let eigen = (&coupling * coupling.transpose()).symmetric_eigen();
+        let best = eigen.eigenvalues.imax();
+        let mode = eigen.eigenvectors.column(best).into_owned();
+        let lambda = 1.0 / eigen.eigenvalues[best];
+        let c = coupling.tr_mul(&mode);
+        let first = First::new(&liquid, &u.surface, lambda, &(&f * &mode), &c, 1);
+        let amplitude = liquid.integral(|q| first.f[q] * liquid.rho[q]);
+        let known = waves(&shape, degree, 1, 0.0).unwrap().shifts;
+        for (motion, known) in motions().into_iter().zip(known) {
+            let [e, s, s_theta] = motion.first;
+            let second: Vec<_> = motion
+                .second
+                .iter()
+                .map(|shape| {
+                    let (u, f) =
+                        (liquid.harmonics(shape.m, degree), liquid.elevations(shape.m, count));
+                    let second = first.second(&liquid, &motion, shape, (&u.surface, &f), 0.0);
+                    (shape, u.e, f, second)
+                })
+                .collect();
+            let omega = lambda.sqrt();
+            let wall_at = |z: f64| {
+                let z = fill - 1.0 + radius * z;
+                (1.0 - z * z).sqrt() / radius
+            };
+            // potentials and their derivatives by r and z over the radius, each for its azimuthal number
+            let at = |rho: f64, z: f64| -> Vec<[f64; 3]> {
+                let point = [[rho * wall_at(z), z - liquid.centre]];
+                let of = |m: usize, c: DVector<f64>| {
+                    let fields = Fields::new(m, degree, liquid.size, &point);
+                    [&fields.u, &fields.r, &fields.z].map(|field| (field * &c)[0])
+                };
+                let mut all = vec![of(1, &u.e * &c)];
+                all.extend(second.iter().map(|(shape, e, _, second)| of(shape.m, e * &second.d)));
+                all
+            };
+            let rule = Gauss::new(4);
+            let functional = |a: f64| {
+                let mut sum = 0.0;
+                for (q, weight) in liquid.weights.iter().enumerate() {
+                    let rho = liquid.rho[q];
+                    for k in 0..144 {
+                        let (h, t) =
+                            (TAU * f64::from(k / 12) / 12.0, TAU * f64::from(k % 12) / 12.0);
+                        let mut zeta = a * first.f[q] * e(h, t);
+                        // E's derivative by the phase is -S
+                        let mut rate = -omega * a * first.f[q] * s(h, t);
+                        for (shape, _, f, second) in &second {
+                            let row = f.row(q);
+                            if let Some(mean) = shape.mean {
+                                zeta += a * a * (row * &second.p)[0] * mean(h, t);
+                            }
+                            if let Some([z, potential, _]) = shape.double {
+                                let r = (row * &second.r)[0];
+                                zeta += a * a * r * z(h, t);
+                                rate -= 2.0 * omega * a * a * r * potential(h, t);
+                            }
+                        }
+                        // The multiplier of the volume at 2 omega does not matter: the volume is
+                        // constant to the third order, and its multiplier is of the second.
+                        let phi = |z: f64| {
+                            let mut phi = [0.0; 4];
+                            for (i, [u, r, z]) in at(rho, z).into_iter().enumerate() {
+                                let [value, slope] = match i {
+                                    0 => [s, s_theta].map(|s| -omega * a * s(h, t)),
+                                    _ => match second[i - 1].0.double {
+                                        Some([_, potential, by_theta]) => {
+                                            [potential, by_theta].map(|f| a * a * f(h, t))
+                                        }
+                                        None => [0.0; 2],
+                                    },
+                                };
+                                phi = [
+                                    phi[0] + value * u,
+                                    phi[1] + value * r,
+                                    phi[2] + value * z,
+                                    phi[3] + slope * u,
+                                ];
+                            }
+                            phi
+                        };
+                        let volume = |z: f64| wall_at(z).powi(2);
+                        let mut value = phi(zeta)[0] * volume(zeta) * rate;
+                        for (x, w) in rule.nodes.iter().zip(&rule.weights) {
+                            let z = zeta * x;
+                            let [_, r, up, round] = phi(z);
+                            let round = round / (rho * wall_at(z));
+                            let energy = 0.5 * (r * r + up * up + round * round) + z;
+                            value -= w * zeta * volume(z) * energy;
+                        }
+                        sum += weight / 144.0 * value;
+                    }
+                }
+                // the energy below the surface at rest: the combinations are orthonormal
+                sum -= 0.5 * lambda * a * a * c.norm_squared() * average(|h, t| s(h, t).powi(2));
+                for (shape, _, _, second) in &second {
+                    if let Some([_, potential, _]) = shape.double {
+                        let norm = average(|h, t| potential(h, t).powi(2));
+                        sum -= 0.5 * a.powi(4) * second.d.norm_squared() * norm;
+                    }
+                }
+                sum
+            };
+            // The sixth order drops out.
+            let [large, small] = [0.04, 0.02].map(|a| functional(a) / f64::powi(a, 4));
+            let l_4 = (4.0 * small - large) / 3.0;
+            let square = average(|h, t| e(h, t).powi(2));
+            let shift = -4.0 * l_4 / square * amplitude * amplitude;
+            assert!((shift - known).abs() < 1e-4, "{shift} {known}");
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! Finite amplitude of a tank's first mode: frequency, and the second-order wave, from its shape.
+//!
+//! The equivalent mass with the slosh angle A = |q|/l is
+//!
+//! ```text
+//! L = (1/2) m (q'^2 + s (q.q')^2/l^2) - (1/2) m omega^2 (q^2 + kappa q^4/(4 l^2))
+//! planar  delta omega^2/omega^2 = (3 kappa/8 - s/2) A^2,   circular  (kappa/2) A^2
+//! ```
+//!
+//! s and kappa give it the shifts of potential flow to third order: [`crate::third_order`] for vertical
+//! walls and a flat bottom, `contour_waves` for other bodies of revolution.
+
+use core::f64::consts::PI;
+
+use serde::Serialize;
+
+use crate::contour::Wall;
+use crate::contour_waves;
+use crate::curve::Point;
+use crate::modal::ModalData;
+use crate::tank::{Geometry, Tank};
+use crate::third_order::{DETUNING, Overlaps};
+
+/// Largest stated error of s and kappa, over 1 + |s| or 1 + |kappa|.
+const WORST: f64 = 0.05;
+/// Largest distance of a vertical wall and a flat bottom from the tank's, over its size.
+const SAME: f64 = 1e-6;
+/// Rounding, the lower limit of an estimate.
+const ROUNDING: f64 = 1e-7;
+/// Excited modes of each azimuthal number, of two truncations.
+const COUNTS: [usize; 2] = [10, 20];
+/// Degrees of the harmonics of two truncations.
+const DEGREES: [usize; 2] = [18, 24];
+/// Difference of a box's lengths, relative, below which the modes along both exchange energy.
+const NEARLY_SQUARE: f64 = 0.1;
+/// Largest angle of the third order's validity, rad. At 26 degrees the circular wave of a cylinder with h/R 0.613 is 4 %
+/// from fully nonlinear flow.
+const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
+/// Largest second-order wave at the wall, over the first-order wave, for which the third order holds.
+const STEEPEST: f64 = 0.5;
+
+/// Meaning of missing coefficients.
+const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
+    +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
+
+/// Angle below which the end of the third order's validity is a warning, rad.
+const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
+
+/// Amplitude dependence of the first mode.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct FiniteAmplitude {
+    /// Coefficients of the first mode (of a box along its first length); `None` if they are not known.
+    pub mode: Option<Coefficients>,
+    /// Coefficients of a box's first mode along its second length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode_y: Option<Coefficients>,
+    /// Limits of the coefficients, and reasons for missing ones, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Third-order coefficients of a mode.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Coefficients {
+    /// s, `nonlinear_inertia` in the FMUs; 1 for a pendulum.
+    pub nonlinear_inertia: f64,
+    /// kappa, `nonlinear_stiffness` in the FMUs; 1 for a pendulum.
+    pub nonlinear_stiffness: f64,
+    /// Estimated error of both, over 1 + |s| and 1 + |kappa|.
+    pub error: f64,
+    /// Relative shift of omega^2 per squared slosh angle, planar motion.
+    pub planar: f64,
+    /// The same for circular motion; `None` for a mode along one length of a box.
+    pub circular: Option<f64>,
+    /// Second-order elevation at the wall per squared slosh angle, m/rad². At an angle A the crest is wave A + wave_second
+    /// A^2 high, the trough wave A - wave_second A^2 deep.
+    pub wave_second: f64,
+    /// Angle above which the third order is not valid, rad: the second-order wave is half of the first-order wave. At most 30
+    /// degrees.
+    pub angle_limit: f64,
+}
+
+impl Coefficients {
+    /// Combines the results of two truncations, the finer one last, for a wave at the wall per angle, m/rad.
+    fn new([rough, fine]: [Found; 2], wave: f64) -> Coefficients {
+        let [s, kappa] = fine.equivalent;
+        let differ = |i: usize| {
+            (rough.equivalent[i] - fine.equivalent[i]).abs() / (1.0 + fine.equivalent[i].abs())
+        };
+        Coefficients {
+            nonlinear_inertia: s,
+            nonlinear_stiffness: kappa,
+            error: (2.0 * differ(0).max(differ(1))).max(ROUNDING),
+            planar: fine.planar,
+            circular: fine.circular,
+            wave_second: fine.second,
+            angle_limit: (STEEPEST * wave / fine.second).abs().min(MOST_ANGLE),
+        }
+    }
+}
+
+/// Result of one truncation.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    /// s and kappa.
+    equivalent: [f64; 2],
+    planar: f64,
+    circular: Option<f64>,
+    second: f64,
+}
+
+impl Found {
+    fn of(overlaps: &Overlaps, depth: f64) -> Found {
+        let [planar, circular] = overlaps.shifts(depth);
+        Found {
+            equivalent: overlaps.equivalent(depth),
+            planar,
+            circular: overlaps.fourth[1].map(|_| circular),
+            second: overlaps.second_wave(depth),
+        }
+    }
+}
+
+/// Returns the amplitude dependence of a tank's first mode, solved as `data`. The coefficients do not depend on the
+/// specific force; they hold without surface tension.
+pub fn of_tank(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
+    let (Some(mode), depth) = (data.modes.first(), data.fill) else {
+        return FiniteAmplitude::default();
+    };
+    let mut warnings = Vec::new();
+    let [mode, mode_y] = match (&tank.geometry, &data.axes) {
+        (Geometry::Box { length_x, length_y }, Some(axes)) => {
+            let wave_y = axes.y.modes.first().map_or(mode.wave, |mode| mode.wave);
+            of_box([*length_x, *length_y], depth, [mode.wave, wave_y], &mut warnings)
+        }
+        _ => {
+            let known = match (ring(data), &data.wall) {
+                (Some([inner, outer]), _) => {
+                    let all = COUNTS.map(|count| Overlaps::round(inner, outer, count));
+                    of_overlaps(all.each_ref(), depth, mode.wave, &mut warnings)
+                }
+                (None, Some(wall)) => of_contour(wall, mode.wave, mode.lambda, &mut warnings),
+                (None, None) => None,
+            };
+            [known, None]
+        }
+    };
+    let mut judge = |mode: Option<Coefficients>| {
+        let known = mode?;
+        if known.error > WORST {
+            warnings.push(format!(
+                "finite amplitude: s and kappa of mode 1 are known to {:.0e} of 1 + |s| only (allowed: {WORST}), so they are left out; \
+                 {ASSUMED}",
+                known.error
+            ));
+            return None;
+        }
+        if known.angle_limit < LEAST_ANGLE {
+            warnings.push(format!(
+                "finite amplitude: s and kappa of mode 1 hold up to {:.2} degrees. There the second-order wave is {STEEPEST} of the \
+                 first-order wave (shallow liquid, or a mode of the surface near twice the frequency)",
+                known.angle_limit.to_degrees()
+            ));
+        }
+        Some(known)
+    };
+    let [mode, mode_y] = [mode, mode_y].map(&mut judge);
+    warnings.dedup();
+    FiniteAmplitude { mode, mode_y, warnings }
+}
+
+/// Returns the coefficients from two truncations of a section with vertical walls.
+fn of_overlaps(
+    [rough, fine]: [&Overlaps; 2],
+    depth: f64,
+    wave: f64,
+    warnings: &mut Vec<String>,
+) -> Option<Coefficients> {
+    let mut known = Coefficients::new([rough, fine].map(|x| Found::of(x, depth)), wave);
+    let excited = fine.secondary_resonance(depth);
+    let detuned = |detuning| fine.detuned_equivalent(depth, detuning);
+    known.bounded_near(excited, &detuned, warnings).then_some(known)
+}
+
+impl Coefficients {
+    /// Returns whether s and kappa are bounded although a mode has nearly twice the frequency of mode 1, and counts its
+    /// share in them as an error. `detuned` gives them for another frequency of the second order.
+    fn bounded_near(
+        &mut self,
+        excited: Option<[usize; 2]>,
+        detuned: &dyn Fn(f64) -> [f64; 2],
+        warnings: &mut Vec<String>,
+    ) -> bool {
+        let Some([m, n]) = excited else { return true };
+        let known = [self.nonlinear_inertia, self.nonlinear_stiffness];
+        // The second difference leaves out what the other modes change.
+        let [below, above] = [-2.0, 2.0].map(|factor| detuned(factor * DETUNING));
+        let share = (0..2)
+            .map(|i| (0.5 * (below[i] + above[i]) - known[i]).abs() / (1.0 + known[i].abs()))
+            .fold(0.0, f64::max);
+        let near = format!(
+            "finite amplitude: mode ({m},{n}) of the surface has twice the frequency of mode 1 within {} %, where s and kappa \
+             have a pole",
+            100.0 * DETUNING
+        );
+        if share > WORST {
+            warnings.push(format!("{near}, so they are left out; {ASSUMED}"));
+            return false;
+        }
+        warnings.push(format!("{near}; here it changes them by at most {share:.0e} of 1 + |s|"));
+        self.error = self.error.max(share);
+        true
+    }
+}
+
+/// Returns the radii of a tank with vertical walls and a flat bottom, the inner one 0 without an inner wall.
+fn ring(data: &ModalData) -> Option<[f64; 2]> {
+    let wall = data.wall.as_ref()?;
+    let (inner, outer, bottom) = (wall.r_inner, wall.r_outer, wall.z_surface - data.fill);
+    let size = outer.max(data.fill);
+    let is_on = |[r, z]: Point| {
+        let to_inner = if inner > 0.0 { (r - inner).abs() } else { f64::INFINITY };
+        (r - outer).abs().min(to_inner).min((z - bottom).abs()) < SAME * size
+    };
+    let mut points =
+        wall.segments.iter().flat_map(|part| (0..=32).map(|i| part.at(f64::from(i) / 32.0)));
+    points.all(is_on).then_some([inner, outer])
+}
+
+fn of_box(
+    [length_x, length_y]: [f64; 2],
+    depth: f64,
+    waves: [f64; 2],
+    warnings: &mut Vec<String>,
+) -> [Option<Coefficients>; 2] {
+    if length_x == length_y {
+        let [side, diagonal] = [false, true].map(|diagonal| Overlaps::square(length_x, diagonal));
+        let shifts = [&side, &diagonal].map(|overlaps| overlaps.shifts(depth)[0]);
+        let known = of_overlaps([&side; 2], depth, waves[0], warnings);
+        if known.is_some() {
+            warnings.push(format!(
+                "finite amplitude: in a square box omega^2 shifts by {:.4} A^2 in planar motion along a side, and by {:.4} A^2 along a \
+                 diagonal. s and kappa are those of a side and of circular motion",
+                shifts[0], shifts[1]
+            ));
+        }
+        return [known; 2];
+    }
+    let known = [(length_x, waves[0]), (length_y, waves[1])].map(|(length, wave)| {
+        let overlaps = Overlaps::rectangle(length);
+        of_overlaps([&overlaps; 2], depth, wave, warnings)
+    });
+    let difference = (length_x / length_y - 1.0).abs();
+    if difference < NEARLY_SQUARE {
+        warnings.push(format!(
+            "finite amplitude: the box's lengths differ by {:.1} %, so its modes along both exchange energy at finite amplitude; s and \
+             kappa hold for motion along one length alone",
+            100.0 * difference
+        ));
+    }
+    known
+}
+
+/// Computes the coefficients of a body of revolution with any wall; `lambda`, 1/m, is the first mode's by the boundary
+/// integral equation.
+fn of_contour(
+    wall: &Wall,
+    wave: f64,
+    lambda: f64,
+    warnings: &mut Vec<String>,
+) -> Option<Coefficients> {
+    let [Some(rough), Some(fine)] =
+        DEGREES.map(|degree| contour_waves::waves(wall, degree, 1, 0.0))
+    else {
+        warnings.push(format!(
+            "finite amplitude: s and kappa of mode 1 are not known for a ring of liquid, except between vertical walls (shape = {{ annulus \
+             = … }}); {ASSUMED}"
+        ));
+        return None;
+    };
+    let radius = wall.r_outer;
+    let equivalent = |[planar, circular]: [f64; 2]| [1.5 * circular - 2.0 * planar, 2.0 * circular];
+    let found = [&rough, &fine].map(|waves| Found {
+        equivalent: equivalent(waves.shifts),
+        planar: waves.shifts[0],
+        circular: Some(waves.shifts[1]),
+        second: waves.second_wave * radius,
+    });
+    let mut known = Coefficients::new(found, wave);
+    // the harmonics' own error, seen in a number that is known to ten digits
+    known.error = known.error.max(2.0 * (fine.lambda / (lambda * radius) - 1.0).abs());
+    let detuned_by = |lambda: f64| ((4.0 * fine.lambda / lambda).sqrt() - 1.0).abs();
+    let excited = fine.excited.iter().find(|(_, lambda)| detuned_by(*lambda) < DETUNING);
+    let detuned = |detuning| {
+        let waves = contour_waves::waves(wall, DEGREES[1], 1, detuning);
+        waves.map_or([f64::INFINITY; 2], |waves| equivalent(waves.shifts))
+    };
+    known.bounded_near(excited.map(|(mode, _)| *mode), &detuned, warnings).then_some(known)
+}

@@ -1,0 +1,139 @@
+//! Coefficients of the first mode at finite amplitude.
+
+use hubslosh_tank::finite_amplitude::{Coefficients, FiniteAmplitude, of_tank};
+use hubslosh_tank::{Tank, table};
+
+use crate::common::tank;
+
+fn found(text: &str, fill: f64) -> FiniteAmplitude {
+    let tank = tank(&format!("density = 1000.0\n{text}"));
+    of_tank(&tank, &tank.solve(fill, 1).unwrap())
+}
+
+fn known(text: &str, fill: f64) -> Coefficients {
+    let found = found(text, fill);
+    found.mode.unwrap_or_else(|| panic!("{text} {fill} {found:?}"))
+}
+
+fn refused(text: &str, fill: f64, why: &str) {
+    let found = found(text, fill);
+    assert_eq!((found.mode, found.mode_y), (None, None), "{text} {fill}");
+    assert!(found.warnings[0].contains(why), "{text} {fill} {found:?}");
+    assert!(found.warnings[0].contains("pendulum"), "{found:?}");
+}
+
+/// Fully nonlinear potential flow in the bench's tank of 81.5 mm, with 10 and 5 cm of liquid. Each pair is a slosh angle in
+/// degrees and the frequency over that of small waves. The computation has no expansion in the steepness. At 8 degrees the
+/// fifth order adds 3e-4.
+#[test]
+fn backbones_of_the_bench_are_those_of_fully_nonlinear_flow() {
+    for (fill, planar, circular) in [
+        (0.1, [(4.0, 0.998962), (8.0, 0.995954)], [(4.0, 1.00091), (6.0, 1.00208)]),
+        (0.05, [(4.0, 0.999368), (8.0, 0.997373)], [(4.0, 1.00104), (6.0, 1.00238)]),
+    ] {
+        let known = known("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", fill);
+        let (s, kappa) = (known.nonlinear_inertia, known.nonlinear_stiffness);
+        assert!((known.planar - (0.375 * kappa - 0.5 * s)).abs() < 1e-12, "{known:?}");
+        assert!((known.circular.unwrap() - 0.5 * kappa).abs() < 1e-12, "{known:?}");
+        let shifts = [known.planar, known.circular.unwrap()];
+        for (shift, exact) in shifts.into_iter().zip([planar, circular]) {
+            for (angle, ratio) in exact {
+                let third = (1.0 + shift * f64::to_radians(angle).powi(2)).sqrt();
+                assert!((third - ratio).abs() < 4e-4, "{fill} {angle} {third} {ratio}");
+            }
+        }
+    }
+}
+
+/// The same tank as a shape, as a profile, and with a bottom that is a hair from flat, which the other method solves.
+#[test]
+fn both_methods_agree_within_their_errors() {
+    for fill in [0.5, 1.3, 2.5] {
+        let shape = known("shape = { cylinder = { radius = 1.0, height = 3.0 } }", fill);
+        let profile = known("profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 3] }]", fill);
+        assert_eq!(shape, Coefficients { angle_limit: shape.angle_limit, ..profile });
+        let domed =
+            known("profile = [{ line = [0, 0, 1, 1e-5] }, { line = [1, 1e-5, 1, 3] }]", fill);
+        assert!(domed.error < 1e-3 && shape.error < 1e-4, "{domed:?} {shape:?}");
+        let allowed = shape.error + domed.error + 1e-4;
+        for (a, b) in [
+            (shape.nonlinear_inertia, domed.nonlinear_inertia),
+            (shape.nonlinear_stiffness, domed.nonlinear_stiffness),
+        ] {
+            assert!((a - b).abs() < allowed * (1.0 + a.abs()), "{fill} {a} {b}");
+        }
+        assert!((shape.wave_second / domed.wave_second - 1.0).abs() < 2e-3, "{shape:?} {domed:?}");
+    }
+}
+
+/// Lengths scale, coefficients do not; a capsule is a sphere up to its tangent.
+#[test]
+fn coefficients_are_those_of_the_shape_alone() {
+    let sphere = known("shape = { sphere = { radius = 1.0 } }", 0.7);
+    let small = known("shape = { sphere = { radius = 0.01 } }", 0.007);
+    let capsule =
+        "shape = { domed_cylinder = { radius = 1.0, height = 1.0, bottom = 1.0, top = 1.0 } }";
+    let capsule = known(capsule, 0.7);
+    for (other, scale) in [(small, 0.01), (capsule, 1.0)] {
+        assert!((sphere.nonlinear_inertia - other.nonlinear_inertia).abs() < 1e-6, "{other:?}");
+        assert!((sphere.nonlinear_stiffness - other.nonlinear_stiffness).abs() < 1e-6, "{other:?}");
+        assert!((scale * sphere.wave_second - other.wave_second).abs() < 1e-6 * scale);
+        assert!((sphere.angle_limit - other.angle_limit).abs() < 1e-6, "{other:?}");
+    }
+}
+
+/// A ring with walls that lean, a nearly full sphere, where the error is large, and secondary resonances.
+#[test]
+fn what_is_not_known_is_refused_with_its_reason() {
+    refused("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3, "ring of liquid");
+    refused("shape = { sphere = { radius = 1.0 } }", 1.95, "are known to");
+    // 2 omega_1 = omega at 0.8314 R: mode (2,2) of the cylinder
+    refused("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.8314, "mode (2,2)");
+    refused("shape = { sphere = { radius = 1.0 } }", 1.12, "mode (2,2)");
+    let shallow = found("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.1);
+    assert!(
+        shallow.mode.is_some() && shallow.warnings[0].contains("hold up to 1.7"),
+        "{shallow:?}"
+    );
+}
+
+/// A rectangle has its planar shifts, with s = 1; a square has circular motion too.
+#[test]
+fn boxes_have_a_pair_for_each_length() {
+    let long = found("box = [0.8, 0.5]", 0.4);
+    let (x, y) = (long.mode.unwrap(), long.mode_y.unwrap());
+    assert!((x.planar + 0.3155).abs() < 1e-4 && (y.planar + 0.3943).abs() < 1e-4, "{x:?} {y:?}");
+    for mode in [x, y] {
+        assert_eq!((mode.nonlinear_inertia, mode.circular), (1.0, None));
+        assert!((0.375 * mode.nonlinear_stiffness - 0.5 - mode.planar).abs() < 1e-12);
+    }
+    assert!(long.warnings.is_empty(), "{long:?}");
+    let near = found("box = [1.0, 0.95]", 0.6);
+    assert!(near.warnings[0].contains("exchange energy"), "{near:?}");
+    let square = found("box = [0.5, 0.5]", 0.4);
+    let mode = square.mode.unwrap();
+    assert_eq!(square.mode, square.mode_y);
+    assert!((mode.planar - y.planar).abs() < 1e-12 && mode.circular.unwrap() > 0.0, "{mode:?}");
+    assert!(square.warnings[0].contains("along a diagonal"), "{square:?}");
+}
+
+#[test]
+fn the_table_has_coefficients_waves_and_warnings() {
+    let text = |text: &str, fill: f64| {
+        let tank: Tank = tank(&format!("density = 1000.0\n{text}"));
+        let mut data = tank.solve(fill, 1).unwrap();
+        data.finite_amplitude = Some(of_tank(&tank, &data));
+        table(&data, 9.80665)
+    };
+    let cylinder = text("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", 0.1);
+    for line in [
+        "s = 1.4076, kappa = 0.7341, error 1e-5, up to 30 degrees",
+        "planar motion, circular +0.3671 A^2",
+        "crest 0.068202 A +0.056965 A^2, trough 0.068202 A -0.056965 A^2",
+    ] {
+        assert!(cylinder.contains(line), "{line}\n{cylinder}");
+    }
+    let torus = text("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3);
+    assert!(torus.contains("warning: finite amplitude: s and kappa"), "{torus}");
+    assert!(text("box = [0.8, 0.5]", 0.4).contains("motion along y: s = 1.0000"));
+}
