@@ -195,14 +195,14 @@ pub fn parameters(
         ParameterSet::new(tank, &row, target, liquid)
     };
     let (least, mut set) = (with_modes(first)?, with_modes(last)?);
-    let zeta = format!("{prefix}.zeta[1]");
-    let ratio = |set: &ParameterSet| {
-        set.values.iter().find_map(|(name, value)| match value {
-            Value::Real(x) if *name == zeta => Some(*x),
+    let value = |set: &ParameterSet, what: &str| {
+        let name = format!("{prefix}.{what}[1]");
+        set.values.iter().find_map(|(other, value)| match value {
+            Value::Real(x) if *other == name => Some(*x),
             _ => None,
         })
     };
-    if let (Some(low), Some(high)) = (ratio(&least), ratio(&set))
+    if let (Some(low), Some(high)) = (value(&least, "zeta"), value(&set, "zeta"))
         && low != high
     {
         let text = format!(
@@ -211,6 +211,15 @@ pub fn parameters(
         );
         set.notes.push(text.clone());
         set.warnings.push(text);
+    }
+    for what in ["nonlinear_inertia", "nonlinear_stiffness"] {
+        if let Some(high) = value(&set, what) {
+            let low =
+                value(&least, what).map_or("not known".to_string(), |low| format!("{low:.4}"));
+            set.notes.push(format!(
+                "{what}[1] stays that of the largest fill while the tank drains: {high:.4}; at the least fill it is {low}"
+            ));
+        }
     }
     set.notes.push(format!(
         "table of {} fills, {} to {} m; liquid_0 is the largest, outlet the tank's lowest point",

@@ -43,8 +43,9 @@ const STEEPEST: f64 = 0.5;
 const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
     +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
 
-/// Angle below which the end of the third order's validity is a warning, rad.
-const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
+/// Angle below which the end of the third order's validity is a warning, rad. Files for the FMUs leave such coefficients
+/// out.
+pub(crate) const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
 
 /// Amplitude dependence of the first mode.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

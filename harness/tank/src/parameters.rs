@@ -9,11 +9,15 @@ use names::hubslosh::{self, DampingLaw, SloshSource, slosh};
 use names::{sloshtank, spacecraft};
 
 use crate::contour::Problems;
+use crate::finite_amplitude::{self, Coefficients, FiniteAmplitude};
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
 use crate::table::{short, significant};
 use crate::tank::{Geometry, Shape, Tank};
 use crate::{damping, modal};
+
+/// Largest share of capillarity in the stiffness of mode 1 at which the coefficients of finite amplitude hold.
+const MOST_CAPILLARY: f64 = 0.1;
 
 /// The FMU that the parameters are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -328,6 +332,44 @@ impl ParameterSet {
                 vec![0.0; modes.len()]
             }
         };
+        let mut found = finite_amplitude::of_tank(tank, data);
+        // Potential flow without surface tension gives them.
+        let stiff = modes[0].m * modes[0].lambda * liquid.gravity * MOST_CAPILLARY;
+        if springs[0].first().is_some_and(|spring| spring.abs() > stiff) {
+            found = FiniteAmplitude {
+                warnings: vec![
+                    "finite amplitude: surface tension adds more than a tenth to the stiffness of mode 1; s and kappa, which are known \
+                     without it, are left out"
+                        .to_string(),
+                ],
+                ..FiniteAmplitude::default()
+            };
+        }
+        // HubSlosh has modes along both lengths of a box in its linear and planar models only.
+        let is_linear = both.is_some() && target == Target::HubSlosh;
+        let third_order: Vec<(usize, Coefficients)> = chosen
+            .iter()
+            .enumerate()
+            .filter(|(_, (_, of_axis))| *of_axis == 0 && !is_linear)
+            .filter_map(|(n, (axis, _))| Some((n, [found.mode, found.mode_y][*axis]?)))
+            .filter(|(_, known)| known.angle_limit >= finite_amplitude::LEAST_ANGLE)
+            .collect();
+        for (n, known) in &third_order {
+            notes.push(format!(
+                "nonlinear_inertia[{0}] = {1}, nonlinear_stiffness[{0}] = {2}: third order of potential flow, error {3:.0e}, for \
+                 slosh angles up to {4:.0} degrees",
+                n + 1,
+                significant(known.nonlinear_inertia),
+                significant(known.nonlinear_stiffness),
+                known.error,
+                known.angle_limit.to_degrees()
+            ));
+        }
+        if is_linear {
+            notes.push("separate modes along both lengths have no coefficients of finite amplitude in HubSlosh".to_string());
+        } else {
+            warnings.extend(found.warnings);
+        }
         // The same parameters for every FMU, with the prefix of its tank.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
             for (n, (mode, &(axis, of_axis))) in modes.iter().zip(&chosen).enumerate() {
@@ -338,6 +380,14 @@ impl ParameterSet {
                     ("k", springs[axis][of_axis]),
                     ("zeta", ratios[n]),
                     ("wave", mode.wave),
+                ] {
+                    values.push((format!("{prefix}.{what}[{}]", n + 1), Value::Real(value)));
+                }
+            }
+            for (n, known) in &third_order {
+                for (what, value) in [
+                    ("nonlinear_inertia", known.nonlinear_inertia),
+                    ("nonlinear_stiffness", known.nonlinear_stiffness),
                 ] {
                     values.push((format!("{prefix}.{what}[{}]", n + 1), Value::Real(value)));
                 }

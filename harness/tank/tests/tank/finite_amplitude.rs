@@ -1,6 +1,9 @@
 //! Coefficients of the first mode at finite amplitude.
 
+use hubslosh_tank::fill_table;
 use hubslosh_tank::finite_amplitude::{Coefficients, FiniteAmplitude, of_tank};
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value};
+use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::{Tank, table};
 
 use crate::common::tank;
@@ -136,4 +139,87 @@ fn the_table_has_coefficients_waves_and_warnings() {
     let torus = text("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3);
     assert!(torus.contains("warning: finite amplitude: s and kappa"), "{torus}");
     assert!(text("box = [0.8, 0.5]", 0.4).contains("motion along y: s = 1.0000"));
+}
+
+fn third_order_of(set: &ParameterSet) -> Vec<(String, f64)> {
+    let of = |(name, value): &(String, Value)| match value {
+        Value::Real(x) if name.contains("nonlinear") => Some((name.clone(), *x)),
+        _ => None,
+    };
+    set.values.iter().filter_map(of).collect()
+}
+
+const WATER: Liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+
+/// Mode 1 alone has coefficients, and of a box the first mode along each length. HubSlosh has none for a box.
+#[test]
+fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
+    let cylinder =
+        tank("density = 1000.0\nshape = { cylinder = { radius = 0.0815, height = 0.2 } }");
+    let data = cylinder.solve(0.1, 3).unwrap();
+    let mode = of_tank(&cylinder, &data).mode.unwrap();
+    for (target, prefix) in [
+        (Target::HubSlosh, "slosh.table"),
+        (Target::SloshTank, "tank"),
+        (Target::Spacecraft { tank: 2 }, "tank[2]"),
+    ] {
+        let set = ParameterSet::new(&cylinder, &data, target, WATER).unwrap();
+        let expected = [
+            (format!("{prefix}.nonlinear_inertia[1]"), mode.nonlinear_inertia),
+            (format!("{prefix}.nonlinear_stiffness[1]"), mode.nonlinear_stiffness),
+        ];
+        assert_eq!(third_order_of(&set), expected);
+        assert!(set.warnings.is_empty(), "{:?}", set.warnings);
+    }
+    let long = tank("density = 1000.0\nbox = [0.8, 0.5]");
+    let data = long.solve(0.4, 3).unwrap();
+    let found = of_tank(&long, &data);
+    let set = ParameterSet::new(&long, &data, Target::SloshTank, WATER).unwrap();
+    let names: Vec<String> = third_order_of(&set).into_iter().map(|(name, _)| name).collect();
+    let expected =
+        [1, 2].map(|n| ["inertia", "stiffness"].map(|x| format!("tank.nonlinear_{x}[{n}]")));
+    assert_eq!(names, expected.concat());
+    assert_eq!(third_order_of(&set)[3].1, found.mode_y.unwrap().nonlinear_stiffness);
+    let set = ParameterSet::new(&long, &data, Target::HubSlosh, WATER).unwrap();
+    assert!(third_order_of(&set).is_empty());
+}
+
+/// A torus, a pole, shallow liquid and surface tension that rules: no coefficients, but the reason.
+#[test]
+fn files_without_coefficients_say_why() {
+    let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
+    let low = Liquid { gravity: 0.01, sigma: Some(0.07), ..WATER };
+    for (text, fill, liquid, why) in [
+        (
+            "shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }",
+            0.3,
+            WATER,
+            "ring of liquid",
+        ),
+        (cylinder, 0.08314, WATER, "mode (2,2)"),
+        (cylinder, 0.01, WATER, "hold up to 1.7"),
+        (cylinder, 0.2, low, "surface tension"),
+    ] {
+        let tank = tank(&format!("density = 1000.0\n{text}"));
+        let data = tank.solve(fill, 1).unwrap();
+        let set = ParameterSet::new(&tank, &data, Target::SloshTank, liquid).unwrap();
+        assert!(third_order_of(&set).is_empty(), "{why}");
+        assert!(
+            set.warnings.iter().any(|warning| warning.contains(why)),
+            "{why} {:?}",
+            set.warnings
+        );
+    }
+}
+
+/// A draining tank keeps the coefficients of its largest fill and notes those of the least.
+#[test]
+fn a_draining_tank_has_the_coefficients_of_its_largest_fill() {
+    let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
+    let table = sweep(&sphere, &[0.1, 0.2, 0.4], 1).unwrap();
+    let set = fill_table::parameters(&sphere, &table, None, Target::SloshTank, WATER).unwrap();
+    let [least, most] = [0, 2].map(|row: usize| of_tank(&sphere, &table.rows[row]).mode.unwrap());
+    assert_eq!(third_order_of(&set)[0].1, most.nonlinear_inertia);
+    let words = format!("at the least fill it is {:.4}", least.nonlinear_inertia);
+    assert!(set.notes.iter().any(|note| note.contains(&words)), "{:?}", set.notes);
 }

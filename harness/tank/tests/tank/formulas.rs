@@ -267,7 +267,8 @@ fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
             let omega2 = g / value("length[1]") + value("k[1]") / value("mass[1]");
             let found = omega2 * 1000.0 * 0.1f64.powi(3) / sigma;
             assert!((found - expected).abs() < 5.1e-5, "{bond} {angle}: {found}");
-            assert_eq!(set.warnings.len(), usize::from(angle != 90.0), "{:?}", set.warnings);
+            let of_meniscus = set.warnings.iter().filter(|text| text.starts_with("capillarity"));
+            assert_eq!(of_meniscus.count(), usize::from(angle != 90.0), "{:?}", set.warnings);
         }
     }
 }
