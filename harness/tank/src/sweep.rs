@@ -5,6 +5,7 @@ use core::fmt::Write as _;
 use crate::contour::Problems;
 use crate::interpolation::Monotone;
 use crate::modal::{ModalData, Mode, Rest, rest};
+use crate::parameters::{Liquid, damping_of};
 use crate::tank::Tank;
 
 /// Modal parameters at ascending fills.
@@ -40,15 +41,31 @@ pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems
 }
 
 impl Sweep {
+    /// Computes the damping of every row that has modes, see [`damping_of`].
+    ///
+    /// # Errors
+    /// Those of [`damping_of`].
+    pub fn damp(&mut self, tank: &Tank, nu: f64, liquid: Liquid) -> Result<(), Problems> {
+        for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
+            row.damping = Some(damping_of(tank, row, nu, liquid)?);
+        }
+        Ok(())
+    }
+
     /// Returns comma-separated values with a heading; columns of modes that a row lacks are empty. Units SI;
-    /// H and hinge from the contour's own zero.
+    /// H and hinge from the contour's own zero. Damping ratios with the ends of their intervals have columns if any row
+    /// has them.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
+        let is_damped = self.rows.iter().any(|row| row.damping.is_some());
         let mut text =
             "fill,m_liq,z_cg,I_frozen_cg,I_frozen_axis,I_eff_cg,m_0,H_0,I_0,error".to_string();
         for n in 1..=modes {
             for name in ["lambda", "m", "l", "H", "hinge", "wave", "beta"] {
                 let _ = write!(text, ",{name}_{n}");
+            }
+            if is_damped {
+                let _ = write!(text, ",zeta_{n},zeta_low_{n},zeta_high_{n}");
             }
         }
         text.push('\n');
@@ -81,6 +98,15 @@ impl Sweep {
                     of(&|m| Some(m.wave)),
                     of(&|m| Some(m.beta)),
                 ]);
+                if is_damped {
+                    let found = row.damping.as_ref().and_then(|damping| damping.modes.get(n));
+                    cells.extend(match found {
+                        Some(mode) => {
+                            [mode.zeta, mode.interval[0], mode.interval[1]].map(|v| v.to_string())
+                        }
+                        None => Default::default(),
+                    });
+                }
             }
             text.push_str(&cells.join(","));
             text.push('\n');

@@ -19,7 +19,7 @@ use crate::terminal;
 #[command(after_help = "Examples:\n  \
     hubslosh tank harness/tank/examples/capsule.toml --fill 1.2\n  \
     hubslosh tank tank.toml --fill 60% --modes 3 --out result.json --picture tank.svg\n  \
-    hubslosh tank tank.toml --sweep 20%,40%,60%,80% --out sweep.csv --picture sweep.svg\n  \
+    hubslosh tank tank.toml --sweep 20%,40%,60%,80% --nu 1e-6 --out sweep.csv --picture sweep.svg\n  \
     hubslosh tank tank.toml --fill 1.2 --modes 3 --nu 1e-6 --parameters tank-1.2.toml\n  \
     hubslosh tank tank.toml --sweep 2%,98% --model SloshTank --nu 1e-6 --parameters draining.toml\n  \
     hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \\\n      \
@@ -67,9 +67,9 @@ pub struct TankArgs {
     /// The tank of Spacecraft that --parameters are for, 1 to 4.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
-    /// Kinematic viscosity of the liquid, m2/s, for the damping ratios at --gravity and their expected ranges, in the table, in
-    /// --out and in --parameters. With --sweep, only --parameters has them, at the largest fill [default: none, the ratios are
-    /// 0].
+    /// Kinematic viscosity of the liquid, m2/s, for damping ratios at --gravity with their intervals. Table, --out and
+    /// --parameters have them, with --sweep at every fill. --parameters of --sweep have the ratios of the largest fill
+    /// [default: none, the ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
     /// Surface tension, N/m, for the frequencies (in table, picture and --out at --gravity), for the centring stiffness of
@@ -107,10 +107,6 @@ impl TankArgs {
         for (flag, value) in [("--nu", self.nu), ("--sigma", self.sigma)] {
             let allowed = value.is_none_or(|value| value.is_finite() && value >= 0.0);
             ensure!(allowed, "{flag} {} (allowed: 0 or more, finite)", value.unwrap_or_default());
-            ensure!(
-                value.is_none() || self.sweep.is_empty() || self.parameters.is_some(),
-                "{flag} is of no use with --sweep alone (allowed: with --fill, or with --parameters)"
-            );
         }
         ensure!(
             (0.0..=180.0).contains(&self.contact_angle),
@@ -154,7 +150,7 @@ impl TankArgs {
                 let fills: Result<Vec<f64>, _> =
                     self.sweep.iter().map(|fill| tank.height_of(*fill)).collect();
                 let fills = fills.with_context(read)?;
-                let (swept, error) = match fills[..] {
+                let (mut swept, error) = match fills[..] {
                     [low, high] if self.parameters.is_some() && low < high => {
                         let placed = fill_table::place(&tank, low, high, self.modes);
                         let placed = placed.with_context(read)?;
@@ -165,6 +161,9 @@ impl TankArgs {
                 parameters = self.set_file(|target, liquid| {
                     fill_table::parameters(&tank, &swept, error, target, liquid)
                 })?;
+                if let Some(nu) = self.nu {
+                    swept.damp(&tank, nu, self.liquid()).with_context(read)?;
+                }
                 let csv = swept.to_csv();
                 let json = serde_json::to_string_pretty(&swept.rows)? + "\n";
                 (csv.clone(), json, picture::sweep(&tank, &swept, self.gravity), csv)

@@ -130,6 +130,36 @@ fn empty_and_full_tanks_have_no_modes() {
     assert!(!csv.contains("NaN") && csv.lines().all(|l| l.split(',').count() == 24), "{csv}");
 }
 
+/// Ratio and interval of each mode at each fill, behind the mode's other columns; none without a viscosity, empty cells
+/// for an empty tank.
+#[test]
+fn a_sweep_has_the_damping_of_every_fill() {
+    let tank = tank("density = 1000.0\nshape = { cylinder = { radius = 1.0, height = 3.0 } }");
+    let mut table = sweep(&tank, &[0.0, 0.5, 2.0], 2).unwrap();
+    assert!(!table.to_csv().contains("zeta"));
+    let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
+    table.damp(&tank, 1e-6, liquid).unwrap();
+    let csv = table.to_csv();
+    let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| lines[0].iter().position(|other| *other == name).unwrap();
+    assert_eq!(lines[0].len(), 10 + 2 * 10);
+    assert_eq!((column("zeta_1"), column("zeta_high_2")), (17, 29));
+    for (row, line) in table.rows.iter().zip(&lines[1..]) {
+        for n in [1, 2] {
+            let cells = ["zeta", "zeta_low", "zeta_high"]
+                .map(|name| line[column(&format!("{name}_{n}"))].parse::<f64>().ok());
+            let expected = (!row.modes.is_empty()).then(|| {
+                let mode = damping_of(&tank, row, 1e-6, liquid).unwrap().modes[n - 1];
+                [mode.zeta, mode.interval[0], mode.interval[1]]
+            });
+            match expected {
+                Some(expected) => assert_eq!(cells, expected.map(Some)),
+                None => assert_eq!(cells, [None; 3]),
+            }
+        }
+    }
+}
+
 #[test]
 fn every_bad_fill_of_a_sweep_is_reported() {
     let tank = tank("density = 1.0\nshape = { cylinder = { radius = 1.0, height = 1.0 } }");
