@@ -19,6 +19,7 @@ from numpy.random import default_rng
 
 import bench_damping
 import compare_releases
+import damping_over_fill
 import flight_twin
 import identify_twins
 import mode_errors
@@ -67,6 +68,19 @@ def test_a_picture_of_the_book(
     monkeypatch.setattr(study, "FMU", fmu.with_name(f"{model}.fmu"))
     study.draw(tmp_path / "picture.svg")
     same_picture((tmp_path / "picture.svg").read_text(encoding="utf-8"), study.PICTURE)
+
+
+def test_damping_over_the_fill_of_a_capsule_has_no_step() -> None:
+    """The ratio at the tangent and its range around it in book/damping.md, to their digits."""
+    text = " ".join(lines("damping.md"))
+    at_tangent = re.search(r"where the ratio is ([\d.]+) %", text)
+    ends = re.search(r"From 24 to 29 % it stays between ([\d.]+) and ([\d.]+) %", text)
+    capsule = damping_over_fill.SHAPES["capsule, cylinder of 0.4 m"]
+    found = damping_over_fill.damping(capsule, [f"{share}%" for share in range(24, 30)])
+    ratios = 100 * found["zeta_1"]
+    assert ratios[1] == pytest.approx(float(at_tangent[1]), abs=5e-4)
+    assert ratios.min() == pytest.approx(float(ends[1]), abs=5e-3)
+    assert ratios.max() == pytest.approx(float(ends[2]), abs=5e-3)
 
 
 def test_tilt_slows_slosh_along_the_slope() -> None:
