@@ -282,7 +282,8 @@ impl MountedTank {
             let at_hinge = add(add(a, cross(w_d, hinge)), cross(w, cross(w, hinge)));
             let chord = add(p, e);
             let motion = [dot(chord, chord), dot(p_d, p_d)];
-            let drag = damping::coefficient(tank, n, [m[0], l[0]], dot(e, at_hinge), motion);
+            let zeta = place.and_then(|place| curves.zeta(n, place));
+            let drag = damping::coefficient(tank, n, [m[0], l[0]], zeta, dot(e, at_hinge), motion);
             let moved = match &on_surface {
                 Some((meridian, _)) => meridian.along(p_d),
                 None => p_d,

@@ -138,19 +138,23 @@ fn root(n: usize, square: f64, y: &Series) -> f64 {
     (square - both) / (2.0 * y[0])
 }
 
-/// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and
-/// |p'|^2.
+/// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and |p'|^2. `zeta` replaces
+/// the tank's own damping ratio.
 pub fn coefficient<T: Number>(
     tank: &Tank,
     n: usize,
     [m, l]: [T; 2],
+    zeta: Option<T>,
     x: T,
     [chord2, rate2]: [T; 2],
 ) -> T {
     let stiffness = m.recip() * tank.k[n];
     let reference = (l.recip() * tank.g_ref + stiffness).sqrt();
     // Evaluated in the order of `Tank::drag`, so that a constant c is bit-identical.
-    let viscous = m * reference * (2.0 * tank.zeta[n]);
+    let viscous = match zeta {
+        Some(zeta) => m * reference * (zeta * 2.0),
+        None => m * reference * (2.0 * tank.zeta[n]),
+    };
     if !tank.follows(n) {
         return viscous;
     }

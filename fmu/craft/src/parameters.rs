@@ -222,7 +222,7 @@ pub struct Tank {
     /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
     /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and the table
-    /// gives m_0, h_0, i_0, i_z, mass, length and hinge.
+    /// gives m_0, h_0, i_0, i_z, mass, length and hinge, and zeta of modes for which it is not 0.
     pub fill: FillTable,
     /// Mass of liquid at the start, kg, in a tank that can drain.
     pub liquid_0: f64,
@@ -261,6 +261,9 @@ impl Tank {
                 let mode = curves.mode(n, at).map(|jet| jet[0]);
                 [tank.mass[n], tank.length[n], tank.hinge[n]] = mode;
                 tank.m_0 -= tank.mass[n];
+                if let Some(zeta) = curves.zeta(n, at) {
+                    tank.zeta[n] = zeta;
+                }
             }
             [tank.h_0, tank.i_0, tank.i_z] = curves.rigid(at).map(|jet| jet[0]);
             return tank;
@@ -454,7 +457,8 @@ impl Tank {
 
     /// Returns true if the drag of mode n (from 0) depends on acceleration or amplitude.
     pub(crate) fn follows(&self, n: usize) -> bool {
-        let by_acceleration = self.damping_law != DampingLaw::Constant && self.zeta[n] > 0.0;
+        let is_viscous = self.zeta[n] > 0.0 || self.fill.has_zeta(n);
+        let by_acceleration = self.damping_law != DampingLaw::Constant && is_viscous;
         by_acceleration || self.zeta_amplitude[n] > 0.0
     }
 
@@ -534,6 +538,7 @@ const CYLINDER: FillTable = FillTable {
         [-0.187919, -0.15404, -0.0748788, 0.0185355, 0.116497, 0.215871, 0.31568, 0.415621, 0.515603, 0.615597, 0.715596, 0.815595],
         [-0.222781, -0.148021, -0.0520051, 0.0473908, 0.1473, 0.247286, 0.347284, 0.447284, 0.547284, 0.647284, 0.747284, 0.847284],
     ]),
+    zeta: [[0.0; POINTS]; MODES],
 };
 
 impl Default for Tank {
@@ -728,6 +733,7 @@ impl Tank {
                 problems.number(&name_of("mass"), mass, LIGHTEST, HEAVIEST, "kg");
                 problems.number(&name_of("length"), length, SHORTEST, FARTHEST, "m");
                 problems.number(&name_of("hinge"), table.hinge[n][i], -FARTHEST, FARTHEST, "m");
+                problems.number(&name_of("zeta"), table.zeta[n][i], 0.0, 10.0, "");
                 sum += mass;
             }
             if sum > masses[i] {

@@ -2,7 +2,7 @@
 //! derivatives, so that the forces of flowing liquid have no steps.
 //!
 //! ```text
-//! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   H_0, I_0, I_z
+//! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   zeta_n,   H_0, I_0, I_z
 //! ```
 //!
 //! 1/l_n is omega^2/g. Shallow liquid has a long pendulum with a hinge far above it, proportional to 1/depth. Its
@@ -40,12 +40,19 @@ pub struct FillTable {
     pub length: [[f64; POINTS]; MODES],
     /// Height of each mode's hinge, m.
     pub hinge: [[f64; POINTS]; MODES],
+    /// Damping ratio of each mode at `g_ref`; 0 at all points of a mode for `Tank::zeta` at every fill.
+    pub zeta: [[f64; POINTS]; MODES],
 }
 
 impl FillTable {
     /// Returns the masses at the points in use.
     pub fn masses(&self) -> &[f64] {
         &self.liquid[..self.points]
+    }
+
+    /// Returns true if the table gives the damping ratio of mode `n` (from 0).
+    pub(crate) fn has_zeta(&self, n: usize) -> bool {
+        self.zeta[n][..self.points].iter().any(|zeta| *zeta > 0.0)
     }
 
     /// Returns mass, length and hinge height of mode `n`, from 0, at this mass of liquid, kg.
@@ -68,6 +75,7 @@ impl FillTable {
                 stiffness: curve(used(&|i| 1.0 / l[i].max(SHORTEST))),
                 bob: curve(used(&|i| h[i] - l[i])),
                 share: curve(used(&|i| mass[i] / self.liquid[i].max(LIGHTEST))),
+                zeta: (n < modes && self.has_zeta(n)).then(|| curve(self.zeta[n])),
             }
         };
         FillCurves {
@@ -113,6 +121,7 @@ struct ModeCurves {
     stiffness: Curve,
     bob: Curve,
     share: Curve,
+    zeta: Option<Curve>,
 }
 
 /// A table with its curves.
@@ -155,9 +164,14 @@ impl FillCurves {
         [0, 1, 2].map(|k| self.rigid[k].at(at))
     }
 
+    /// Returns the damping ratio of a mode at `g_ref`, if the table gives it.
+    pub fn zeta<T: Number>(&self, n: usize, at: Place<T>) -> Option<T> {
+        self.modes[n].zeta.as_ref().map(|curve| curve.at(at)[0])
+    }
+
     /// Returns mass, length and hinge height of a mode.
     pub fn mode<T: Number>(&self, n: usize, at: Place<T>) -> [Jet<T>; 3] {
-        let ModeCurves { stiffness, bob, share } = &self.modes[n];
+        let ModeCurves { stiffness, bob, share, .. } = &self.modes[n];
         let [k, k_d, k_dd] = stiffness.at(at);
         let l = k.recip();
         let l_d = -(k_d * l * l);

@@ -22,8 +22,8 @@ use super::records::STEP;
 
 type V = Vector3<f64>;
 
-/// A tank with a table: an upright cylinder of 0.45 m radius at eight depths, `modes` modes,
-/// rotated and off the centre.
+/// A tank with a table: an upright cylinder of 0.45 m radius, `modes` modes, rotated and off the centre. An odd number
+/// of modes has damping ratios in the table.
 pub fn tank(random: &mut Random, modes: usize) -> Tank {
     let mut tank = Tank { modes, diameter: 0.0, ..random.tank() };
     let mut table = FillTable { points: POINTS, ..tank.fill };
@@ -39,6 +39,7 @@ pub fn tank(random: &mut Random, modes: usize) -> Tank {
             table.mass[n][i] = liquid * 0.9 * tanh / (xi * (xi * xi - 1.0) * depth);
             table.length[n][i] = 0.45 / (xi * tanh);
             table.hinge[n][i] = depth - 0.2 * tanh;
+            table.zeta[n][i] = if modes % 2 == 1 { 0.004 * (n + 1) as f64 / depth } else { 0.0 };
             left -= table.mass[n][i];
         }
         table.h_0[i] = 0.45 * depth;
@@ -355,6 +356,26 @@ fn directional_derivatives_of_draining_craft_are_those_by_differences() {
             let other = (8.0 * (p1[i] - m1[i]) - (p2[i] - m2[i])) / (12.0 * e);
             let size = 1.0 + exact[i].abs() + p1[i].abs();
             assert!((exact[i] - other).abs() < 1e-7 * size, "{seed} [{i}]: {} {other}", exact[i]);
+        }
+    }
+}
+
+/// At each point of the table, under every damping law: the rates are those of a tank with this ratio at every fill.
+#[test]
+fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
+    for (i, law) in DampingLaw::ALL.into_iter().enumerate() {
+        let (mut p, u) = craft(i as u64, 1);
+        p.tank[0].damping_law = law;
+        for point in [0, 5, POINTS - 1] {
+            p.tank[0].liquid_0 = p.tank[0].fill.liquid[point];
+            let rates = |p: &Parameters| Spacecraft::new(p, &u, 0.0, 1e-9).unwrap().derivatives(&u);
+            let mut constant = p;
+            constant.tank[0].zeta[0] = p.tank[0].fill.zeta[0][point];
+            constant.tank[0].fill.zeta = [[0.0; POINTS]; MODES];
+            assert_eq!(rates(&p), rates(&constant), "{law:?} {point}");
+            let other = if point == 5 { 6 } else { 5 };
+            constant.tank[0].zeta[0] = p.tank[0].fill.zeta[0][other];
+            assert_ne!(rates(&p), rates(&constant), "{law:?} {point}");
         }
     }
 }
