@@ -10,7 +10,10 @@ impl Tank {
     /// if the mode is not in use. `field` is its name in the FMUs after `tank.`, `indices` are the element's, from 0.
     pub fn overridden(&self, field: &str, indices: &[usize]) -> Option<String> {
         let n = *indices.first().unwrap_or(&0);
-        let is_of_mode = matches!(field, "mass" | "length" | "hinge" | "wave" | "zeta");
+        let is_of_mode = matches!(
+            field,
+            "mass" | "length" | "hinge" | "wave" | "zeta" | "breaking_steepness"
+        );
         if is_of_mode && n >= self.modes {
             return None;
         }
@@ -29,6 +32,9 @@ impl Tank {
             }
             "length" if self.frequency[n] > 0.0 => {
                 Some(format!("frequency[{}] = {:?} Hz", n + 1, self.frequency[n]))
+            }
+            "breaking_steepness" if self.zeta_breaking[n] == 0.0 => {
+                Some(format!("zeta_breaking[{}] = 0.0", n + 1))
             }
             _ => None,
         }

@@ -215,6 +215,10 @@ pub struct Tank {
     pub g_floor: f64,
     /// Growth of the damping ratio with the amplitude, 1/rad.
     pub zeta_amplitude: [f64; MODES],
+    /// Growth of the damping ratio with the steepness k a beyond `breaking_steepness`, where waves break (`damping.rs`).
+    pub zeta_breaking: [f64; MODES],
+    /// Steepness k a at which waves begin to break.
+    pub breaking_steepness: [f64; MODES],
     /// Coefficient s of the mode's inertia at finite amplitude, 1 for a pendulum (`surface.rs`).
     pub nonlinear_inertia: [f64; MODES],
     /// Coefficient kappa of the mode's stiffness at finite amplitude, 1 for a pendulum (`surface.rs`).
@@ -459,7 +463,7 @@ impl Tank {
     pub(crate) fn follows(&self, n: usize) -> bool {
         let is_viscous = self.zeta[n] > 0.0 || self.fill.has_zeta(n);
         let by_acceleration = self.damping_law != DampingLaw::Constant && is_viscous;
-        by_acceleration || self.zeta_amplitude[n] > 0.0
+        by_acceleration || self.zeta_amplitude[n] > 0.0 || self.zeta_breaking[n] > 0.0
     }
 
     /// Returns c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), at g_ref, N s/m.
@@ -569,6 +573,8 @@ impl Default for Tank {
             damping_law: DampingLaw::Laminar,
             g_floor: 0.0,
             zeta_amplitude: [0.0; MODES],
+            zeta_breaking: [0.0; MODES],
+            breaking_steepness: [0.0; MODES],
             nonlinear_inertia: [1.0; MODES],
             nonlinear_stiffness: [1.0; MODES],
             wave: modes_of([0.376618, 0.0328144, 0.0125218]),
@@ -801,6 +807,12 @@ impl Tank {
             problems.number(&format!("{name}.zeta[{i}]"), self.zeta[n], 0.0, 10.0, "");
             let growth = self.zeta_amplitude[n];
             problems.number(&format!("{name}.zeta_amplitude[{i}]"), growth, 0.0, 10.0, "1/rad");
+            for (what, value) in [
+                ("zeta_breaking", self.zeta_breaking[n]),
+                ("breaking_steepness", self.breaking_steepness[n]),
+            ] {
+                problems.number(&format!("{name}.{what}[{i}]"), value, 0.0, 10.0, "");
+            }
             for (what, value) in [
                 ("nonlinear_inertia", self.nonlinear_inertia[n]),
                 ("nonlinear_stiffness", self.nonlinear_stiffness[n]),

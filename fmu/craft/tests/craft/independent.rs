@@ -125,7 +125,13 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
         .map(|(binomial, n)| 2.0 * chord2.powi(n) / (f64::from(n * n) * binomial))
         .sum();
     let amplitude = (squared + rate2 / w(above).powi(2) + 1e-8).sqrt();
-    2.0 * m * w(above) * (zeta + tank.zeta_amplitude[n] * amplitude)
+    // First-mode steepness in a cylinder: zeros of J1', k = xi/R, elevation 2 R/(xi^2 - 1).
+    let xi = [1.841183781340659, 5.331442773525033, 8.536316366346286][n];
+    let (begins, corner) = (tank.breaking_steepness[n], 0.02);
+    let rounded = |x: f64| (x + x.hypot(corner)) / 2.0;
+    let steepness = 2.0 * xi / (xi * xi - 1.0) * amplitude;
+    let breaking = tank.zeta_breaking[n] * (rounded(steepness - begins) - rounded(-begins));
+    2.0 * m * w(above) * (zeta + tank.zeta_amplitude[n] * amplitude + breaking)
 }
 
 /// A bob's place x from its hinge on the surface

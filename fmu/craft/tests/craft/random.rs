@@ -56,13 +56,22 @@ impl Random {
         tank
     }
 
-    /// Makes the drag of a tank follow acceleration and amplitude: every law; half the bobs with drag that grows.
+    /// Makes the drag of a tank follow acceleration and amplitude: every law; half the bobs with drag that grows, half of
+    /// them with waves that break.
     pub fn follow(&mut self, tank: &mut Tank) {
         tank.damping_law = DampingLaw::ALL[self.below(3)];
         // Wide enough for differences of the kink there is without it at reversed thrust.
         tank.g_floor = self.between(0.3, 1.0);
         for growth in &mut tank.zeta_amplitude {
             *growth = [0.0, self.between(0.0, 0.1)][self.below(2)];
+        }
+        for (n, growth) in tank.zeta_amplitude.iter_mut().enumerate() {
+            if *growth > 0.05 {
+                // 0.025 to 0.05 from a steepness of 0 to 0.5; every other one without growth below it.
+                (tank.zeta_breaking[n], tank.breaking_steepness[n]) =
+                    (0.5 * *growth, 10.0 * (*growth - 0.05));
+                *growth *= f64::from((*growth * 1e6) as u32 % 2);
+            }
         }
     }
 
