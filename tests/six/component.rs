@@ -127,6 +127,8 @@ impl Settings {
             ("k", &tank.k),
             ("zeta", &tank.zeta),
             ("zeta_amplitude", &tank.zeta_amplitude),
+            ("zeta_breaking", &tank.zeta_breaking),
+            ("breaking_steepness", &tank.breaking_steepness),
             ("nonlinear_inertia", &tank.nonlinear_inertia),
             ("nonlinear_stiffness", &tank.nonlinear_stiffness),
             ("wave", &tank.wave),

@@ -58,7 +58,7 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
 /// Scalar parameters, and those of them that a craft with one tank of one mode has: without further tanks and modes.
 fn parameters<M: Model>() -> [usize; 2] {
     /// Arrays of a tank whose first index is the mode.
-    const OF_MODES: [&str; 17] = [
+    const OF_MODES: [&str; 19] = [
         "mass",
         "length",
         "frequency",
@@ -68,6 +68,8 @@ fn parameters<M: Model>() -> [usize; 2] {
         "k",
         "zeta",
         "zeta_amplitude",
+        "zeta_breaking",
+        "breaking_steepness",
         "nonlinear_inertia",
         "nonlinear_stiffness",
         "wave",
