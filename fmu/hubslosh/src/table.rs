@@ -346,6 +346,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("slosh.zeta_amplitude", |p, _| &mut p.slosh.zeta_amplitude, "1/rad",
         "Growth of a mode's damping ratio with its amplitude A: zeta(A) = zeta + zeta_amplitude A; A combines angle and rate over natural frequency in both directions")
         .range(0.0, 10.0),
+    V::parameter("slosh.zeta_breaking", |p, _| &mut p.slosh.zeta_breaking, "1",
+        "Growth of a mode's damping ratio with the steepness of its wave above slosh.breaking_steepness: zeta_breaking per unit of steepness. 0: waves do not break")
+        .range(0.0, 10.0),
+    V::parameter("slosh.breaking_steepness", |p, _| &mut p.slosh.breaking_steepness, "1",
+        "Steepness from which a mode's wave breaks. Steepness is wave number times amplitude at the wall. In an upright cylinder it is 1.541 times the amplitude of slosh_angle for mode 1; elsewhere slosh.table.wave_number times slosh.table.wave times the amplitude. Only if slosh.zeta_breaking is not 0")
+        .range(0.0, 10.0),
     V::parameter("slosh.hardening", |p, _| &mut p.slosh.hardening, "1",
         "Coefficient of the quartic spring, for slosh.model = paraboloid only")
         .range(0.0, 100.0),
@@ -388,6 +394,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("slosh.table.wave", |p, n| &mut p.slosh.table.wave[n], "m/rad",
         "Surface elevation at the wall per slosh angle of a slosh mode, source table; 0: that of an upright cylinder of diameter tank.d")
         .shape(TABLE_OF_MODES).range(0.0, 1e4),
+    V::parameter("slosh.table.wave_number", |p, n| &mut p.slosh.table.wave_number[n], "1/m",
+        "Wave number of a slosh mode, source table, for slosh.breaking_steepness: pi/L in a box of length L; 0: that of an upright cylinder of diameter tank.d")
+        .shape(TABLE_OF_MODES).range(0.0, 1e6),
     V::parameter("slosh.table.nonlinear_inertia", |p, n| &mut p.slosh.table.nonlinear_inertia[n], "1",
         "Coefficient s of a slosh mode, source table and slosh.model = liquid: its inertia grows with 1 + s A^2 along the amplitude A. The amplitude changes the squared frequency of planar motion by (3 kappa/8 - s/2) A^2. 1 for a pendulum")
         .shape(TABLE_OF_MODES).range(-1e6, 1e6),

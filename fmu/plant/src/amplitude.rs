@@ -1,22 +1,36 @@
-//! Damping that grows in proportion to the amplitude.
+//! Damping that grows with the amplitude.
 //!
 //! ```text
-//! zeta(A) = zeta + zeta_A A,   A^2 = |q|^2 + |q'|^2/W,   W = omega_n^2
+//! zeta(A) = zeta + zeta_A A + zeta_b b(sigma A),   A^2 = |q|^2 + |q'|^2/W,   W = omega_n^2
 //! ```
 //!
-//! q is the slosh angle in both directions, rad. Waves of finite height dissipate more energy per period
-//! than the laminar layer at the wall: the surface film stretches, the contact line moves, crests break up.
-//! There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The drag on the bob is 2
-//! zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation A' = -omega_n (zeta +
-//! zeta_A A) A:
+//! q is the slosh angle in both directions, rad (displacement over length in the models paraboloid and liquid). Waves of
+//! finite height dissipate more energy per period than the laminar layer at the wall: the surface film stretches, the
+//! contact line moves. There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The drag on
+//! the bob is 2 zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation
+//! A' = -omega_n zeta(A) A.
+//!
+//! Waves break above a steepness s_b. Steepness is k a, with the wave's amplitude a at the wall and the mode's wave
+//! number k. Linear theory gives a = `wave` A, so k a = sigma A with sigma = k `wave`. In an upright cylinder k = xi_n/R
+//! and `wave` = 2 R/(xi_n^2 - 1), hence sigma = 2 xi_n/(xi_n^2 - 1) = 1.541 for mode 1. b is max(0, k a - s_b) with its
+//! corner rounded over delta, and b(0) = 0:
+//!
+//! ```text
+//! b(s) = [s - s_b + ((s - s_b)^2 + delta^2)^(1/2) - B]/2,   B = (s_b^2 + delta^2)^(1/2) - s_b
+//! ```
+//!
+//! b grows with s, so it is never below 0. It exceeds max(0, s - s_b) by at most delta/2, at the corner.
+//!
+//! The drag is expanded in
 //!
 //! ```text
 //! c_A = 2 m zeta_A u^(1/2),   u = W (|q|^2 + A_0^2) + |q'|^2
+//! c_b = m zeta_b [y + (y^2 + delta^2 W)^(1/2) - B omega_n],   y = sigma u^(1/2) - s_b omega_n
 //! ```
 //!
 //! A_0, far below any motion of interest, keeps u away from 0, where the root has no power series.
 
-use taylor::series::{Series, ZERO, mul_ramp};
+use taylor::series::{Series, ZERO, mul_ramp, square};
 
 /// A_0, rad.
 const FLOOR: f64 = 1e-4;
@@ -24,11 +38,33 @@ const FLOOR: f64 = 1e-4;
 /// Lower bound of W, as a part of 1/l times 1 m/s2: without restoring force there is no drag.
 const WEIGHTLESS: f64 = 1e-6;
 
+/// delta: range of steepness over which the onset of breaking is rounded.
+const ROUNDED: f64 = 0.02;
+
+/// Waves of one mode that break.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Breaking {
+    /// zeta_b; 0: waves do not break.
+    pub zeta: f64,
+    /// s_b
+    pub onset: f64,
+    /// sigma, 1/rad
+    pub steepness: f64,
+}
+
+impl Breaking {
+    /// Waves that do not break.
+    const NONE: Breaking = Breaking { zeta: 0.0, onset: 0.0, steepness: 0.0 };
+}
+
 /// Growth of one mode's drag with amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// zeta_A, 1/rad; 0: the drag does not depend on the amplitude.
-    pub zeta: f64,
+    /// True if the drag depends on the amplitude.
+    pub acts: bool,
+    /// zeta_A, 1/rad
+    zeta: f64,
+    breaking: Breaking,
     /// Constant added to W, 1/s2.
     w_floor: f64,
     /// W and its rate.
@@ -37,33 +73,45 @@ pub struct Growth {
     q2: Series,
     u: Series,
     root: Series,
+    /// omega_n, y, (y^2 + delta^2 W)^(1/2)
+    omega: Series,
+    excess: Series,
+    rounded: Series,
     /// Viscous drag relative to its value at the start of the expansion.
     pub viscous: Series,
-    /// Share of the other drag, viscous or a baffle's, in the whole at the start; 2 m zeta_A over the whole.
+    /// Share of the other drag, viscous or a baffle's, in the whole at the start; 2 m zeta_A and m zeta_b over the whole.
     share: f64,
     gain: f64,
+    gain_breaking: f64,
 }
 
 impl Default for Growth {
     fn default() -> Self {
         Growth {
+            acts: false,
             zeta: 0.0,
+            breaking: Breaking::NONE,
             w_floor: 0.0,
             w: [0.0; 2],
             q2: ZERO,
             u: ZERO,
             root: ZERO,
+            omega: ZERO,
+            excess: ZERO,
+            rounded: ZERO,
             viscous: ZERO,
             share: 0.0,
             gain: 0.0,
+            gain_breaking: 0.0,
         }
     }
 }
 
 impl Growth {
     /// Creates the growth for a mode of length `l`, m.
-    pub fn new(zeta: f64, l: f64) -> Growth {
-        Growth { zeta, w_floor: WEIGHTLESS / l, ..Growth::default() }
+    pub fn new(zeta: f64, breaking: Breaking, l: f64) -> Growth {
+        let acts = zeta > 0.0 || breaking.zeta > 0.0;
+        Growth { acts, zeta, breaking, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
     /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2], with the other drag coefficient `c`, whose viscous
@@ -71,10 +119,14 @@ impl Growth {
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
-        (self.share, self.gain) = (1.0, 0.0);
+        (self.share, self.gain, self.gain_breaking) = (1.0, 0.0, 0.0);
         self.expand(0, at, 1.0);
-        let both = c + 2.0 * m * self.zeta * self.root[0];
+        let mut both = c + 2.0 * m * self.zeta * self.root[0];
+        if self.breaking.zeta > 0.0 {
+            both += m * self.breaking.zeta * self.expand_breaking(0);
+        }
         (self.share, self.gain) = (c / both, 2.0 * m * self.zeta / both);
+        self.gain_breaking = m * self.breaking.zeta / both;
         both
     }
 
@@ -83,13 +135,33 @@ impl Growth {
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2], other: f64) -> f64 {
         self.q2[n] = q2 + if n == 0 { FLOOR * FLOOR } else { 0.0 };
         self.u[n] = mul_ramp(n, &self.w, &self.q2) + v2;
-        // y^2 = u
-        self.root[n] = if n == 0 {
-            libm::sqrt(self.u[0])
-        } else {
-            let both: f64 = (1..n).map(|j| self.root[j] * self.root[n - j]).sum();
-            (self.u[n] - both) / (2.0 * self.root[0])
-        };
-        self.share * other + self.gain * self.root[n]
+        self.root[n] = root(n, self.u[n], &self.root);
+        let drag = self.share * other + self.gain * self.root[n];
+        if self.breaking.zeta > 0.0 {
+            return drag + self.gain_breaking * self.expand_breaking(n);
+        }
+        drag
     }
+
+    /// Returns coefficient n of c_b/(m zeta_b) from that of u^(1/2).
+    fn expand_breaking(&mut self, n: usize) -> f64 {
+        let Breaking { onset, steepness, .. } = self.breaking;
+        let w = if n < 2 { self.w[n] } else { 0.0 };
+        self.omega[n] = root(n, w, &self.omega);
+        self.excess[n] = steepness * self.root[n] - onset * self.omega[n];
+        let rounded2 = square(n, &self.excess) + ROUNDED * ROUNDED * w;
+        self.rounded[n] = root(n, rounded2, &self.rounded);
+        let at_rest = libm::hypot(onset, ROUNDED) - onset;
+        self.excess[n] + self.rounded[n] - at_rest * self.omega[n]
+    }
+}
+
+/// Returns coefficient n of y = u^(1/2) from that of u and the lower ones of y.
+fn root(n: usize, u: f64, y: &Series) -> f64 {
+    // y^2 = u
+    if n == 0 {
+        return libm::sqrt(u);
+    }
+    let both: f64 = (1..n).map(|j| y[j] * y[n - j]).sum();
+    (u - both) / (2.0 * y[0])
 }

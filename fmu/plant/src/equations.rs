@@ -296,6 +296,11 @@ mod tests {
         p.slosh.zeta_amplitude = 0.05;
     }
 
+    /// Sets waves that break, from below the motion of these tests to within the rounded corner.
+    fn breaking_waves(p: &mut Parameters) {
+        (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (0.3, 0.8);
+    }
+
     /// Sets modes in any direction, if the model allows it.
     fn every_direction(p: &mut Parameters) {
         every_option(p);
@@ -310,11 +315,13 @@ mod tests {
     /// Sets a table with another third order than a pendulum's.
     fn third_order(p: &mut Parameters) {
         every_option(p);
+        breaking_waves(p);
         p.slosh.source = SloshSource::Table;
         let table = &mut p.slosh.table;
         table.m_liq = 3.0;
         (table.mass[0], table.mass[1]) = (1.5, 1.2);
         (table.length[0], table.length[1]) = (0.05, 0.04);
+        (table.wave_number[0], table.wave_number[1]) = (18.0, 30.0);
         (table.nonlinear_inertia[0], table.nonlinear_stiffness[0]) = (1.7, 0.6);
         (table.nonlinear_inertia[1], table.nonlinear_stiffness[1]) = (0.4, 2.3);
     }
@@ -400,6 +407,7 @@ mod tests {
         compare_directional_derivatives(every_option);
         compare_directional_derivatives(every_direction);
         compare_directional_derivatives(third_order);
+        compare_directional_derivatives(breaking_waves);
     }
 
     fn compare_directional_derivatives(change: fn(&mut Parameters)) {
@@ -457,6 +465,7 @@ mod tests {
         compare_output_derivatives(every_option);
         compare_output_derivatives(every_direction);
         compare_output_derivatives(third_order);
+        compare_output_derivatives(breaking_waves);
     }
 
     /// Lists every continuous output with its name.

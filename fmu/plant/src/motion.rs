@@ -113,7 +113,7 @@ impl Motion {
         let mut hub = HubMotion::REST;
         hub.tilt.tangent = libm::tan(p.bench.tilt);
         hub.tilt.azimuth = p.bench.tilt_azimuth;
-        let with_amplitude = (p.baffle.width > 0.0 || p.slosh.zeta_amplitude > 0.0)
+        let with_amplitude = (p.baffle.width > 0.0 || p.slosh.damping_grows())
             && p.slosh.model != SloshModel::Frozen;
         let is_askew =
             p.slosh.source == SloshSource::Table && p.slosh.table.is_askew(p.slosh.modes);

@@ -132,6 +132,8 @@ pub struct Slosh {
     pub zeta: f64,
     pub damping_law: DampingLaw,
     pub zeta_amplitude: f64,
+    pub zeta_breaking: f64,
+    pub breaking_steepness: f64,
     pub hardening: f64,
 }
 
@@ -150,6 +152,7 @@ pub struct ModeTable {
     pub k: [f64; MODES],
     pub zeta: [f64; MODES],
     pub wave: [f64; MODES],
+    pub wave_number: [f64; MODES],
     /// Coefficients s and kappa of the third order in the amplitude; 1 and 1 for a pendulum.
     pub nonlinear_inertia: [f64; MODES],
     pub nonlinear_stiffness: [f64; MODES],
@@ -318,6 +321,8 @@ impl Default for Slosh {
             zeta: 0.003,
             damping_law: DampingLaw::BySource,
             zeta_amplitude: 0.0,
+            zeta_breaking: 0.0,
+            breaking_steepness: 0.0,
             hardening: 0.58,
         }
     }
@@ -337,6 +342,7 @@ impl Default for ModeTable {
             k: none,
             zeta: none,
             wave: none,
+            wave_number: none,
             nonlinear_inertia: [1.0; MODES],
             nonlinear_stiffness: [1.0; MODES],
             direction: none,

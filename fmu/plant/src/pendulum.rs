@@ -99,7 +99,7 @@ impl Pendulum {
     /// Returns true if the drag depends on the amplitude of the motion.
     #[inline(always)]
     pub fn follows_amplitude(&self) -> bool {
-        self.baffle.zeta > 0.0 || self.growth.zeta > 0.0
+        self.baffle.zeta > 0.0 || self.growth.acts
     }
 
     /// Adds the drag of the baffle and the amplitude-dependent drag, at [|q|^2, |q'|^2], squares of angle and rate.
@@ -108,7 +108,7 @@ impl Pendulum {
         if self.baffle.zeta > 0.0 {
             self.c = self.baffle.start(w, at, self.m, self.c, self.course);
         }
-        if self.growth.zeta > 0.0 {
+        if self.growth.acts {
             self.c = self.growth.start(w, at, self.m, self.c, self.course);
         }
         self.c_m = self.c / self.m;
@@ -119,7 +119,7 @@ impl Pendulum {
     pub fn expand_drag(&mut self, n: usize, at: [f64; 2]) {
         let Pendulum { baffle, growth, .. } = self;
         let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
-        self.course[n] = if growth.zeta > 0.0 { growth.expand(n, at, other) } else { other };
+        self.course[n] = if growth.acts { growth.expand(n, at, other) } else { other };
     }
 
     /// Returns true if the bob moves in another direction than the tangent.

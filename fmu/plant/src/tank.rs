@@ -20,7 +20,7 @@ use formulas::damping;
 use formulas::similarity;
 use formulas::third_order::{coefficients, secondary_resonance};
 
-use crate::amplitude::Growth;
+use crate::amplitude::{Breaking, Growth};
 use crate::baffle::{self, Baffle};
 use crate::leaning::{self, Leaning};
 use crate::parameters::{MODES, ModeTable, Parameters, Slosh, SloshModel, SloshSource};
@@ -197,6 +197,7 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         SloshSource::Table => {}
     }
     let calculated = Calculated::new(p, g);
+    warnings.extend(breaking_warning(p, &calculated));
     let Calculated { bond, mass, centring, .. } = calculated;
     let mut used = mass.iter().zip(centring).take_while(|(mass, _)| **mass > 0.0);
     if let Some(n) = used.position(|(_, a)| g + a <= 0.0) {
@@ -222,6 +223,21 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
 }
 
 impl Slosh {
+    /// Returns true if a mode's damping ratio depends on its amplitude.
+    pub(crate) fn damping_grows(&self) -> bool {
+        self.zeta_amplitude > 0.0 || self.zeta_breaking > 0.0
+    }
+
+    /// Returns the breaking of mode `n`, from 0, whose wave at the wall is `wave` per angle, m/rad. Without a wave number
+    /// in the table, it is that of an upright cylinder of this radius.
+    fn breaking(&self, n: usize, wave: f64, radius: f64) -> Breaking {
+        let k = match self.source {
+            SloshSource::Table if self.table.wave_number[n] > 0.0 => self.table.wave_number[n],
+            _ => XI[n] / radius,
+        };
+        Breaking { zeta: self.zeta_breaking, onset: self.breaking_steepness, steepness: k * wave }
+    }
+
     /// Returns s and kappa of mode `n`, from 0, in a tank filled to h/R = `fill`. The modes of an upright cylinder after
     /// the first, and all modes of the other models, have those of a pendulum.
     pub(crate) fn third_order(&self, n: usize, fill: f64) -> (f64, f64) {
@@ -273,6 +289,33 @@ fn third_order_warning(fill: f64) -> Option<String> {
             "slosh.model = liquid at h/R = {fill:.3}: twice the frequency of mode 1 is within 1 % \
              of that of mode ({azimuth},{n}). Near this secondary resonance the dependence \
              on amplitude (s = {s:.3}, kappa = {kappa:.3}) is unknown"
+        )
+    })
+}
+
+/// Returns a warning if waves break at every amplitude or at none that the model reaches.
+fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
+    let Slosh { zeta_breaking, breaking_steepness: onset, .. } = p.slosh;
+    if zeta_breaking <= 0.0 {
+        return None;
+    }
+    if onset <= 0.0 {
+        return Some(format!(
+            "slosh.zeta_breaking = {zeta_breaking} with slosh.breaking_steepness = 0: damping grows from the smallest wave \
+             on. Measured waves break above a steepness of 0.60 to 0.66; for growth without a threshold use \
+             slosh.zeta_amplitude"
+        ));
+    }
+    let largest = match p.slosh.model {
+        SloshModel::Paraboloid | SloshModel::Liquid => 1.0,
+        _ => core::f64::consts::FRAC_PI_2,
+    };
+    let first = calculated.pendulums(p).next()?;
+    let steepness = p.slosh.breaking(0, first.wave, p.tank.d / 2.0).steepness * largest;
+    (onset >= steepness).then(|| {
+        format!(
+            "slosh.zeta_breaking hardly acts on mode 1: its steepness reaches {steepness:.3} at an amplitude of \
+             {largest:.3}, the end of the model's range, and slosh.breaking_steepness is {onset}"
         )
     })
 }
@@ -390,8 +433,8 @@ impl Calculated {
                     true => Baffle::new(&p, wave, l),
                     false => Baffle::default(),
                 },
-                growth: match slosh.zeta_amplitude > 0.0 {
-                    true => Growth::new(slosh.zeta_amplitude, l),
+                growth: match slosh.damping_grows() {
+                    true => Growth::new(slosh.zeta_amplitude, slosh.breaking(n, wave, radius), l),
                     false => Growth::default(),
                 },
                 ..Pendulum::default()

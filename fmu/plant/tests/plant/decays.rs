@@ -138,6 +138,84 @@ fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     }
 }
 
+/// Steepness per angle of mode 1 in an upright cylinder, k a/A = (xi_1/R) 2 R/(xi_1^2 - 1).
+const STEEPNESS: f64 = 2.0 * 1.8411837813 / (1.8411837813 * 1.8411837813 - 1.0);
+
+/// A' = -omega zeta_b (sigma A - s_b) A above the onset, with the solution
+/// 1/A = sigma/s_b + (1/A_1 - sigma/s_b) exp(-omega zeta_b s_b t).
+///
+/// The rounded corner adds up to 4e-4 to a steepness that exceeds the onset by 0.26 to 0.72.
+#[test]
+fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
+    let (zeta_b, onset) = (0.05, 0.2);
+    let mut p = held(SloshModel::Linear);
+    (p.slosh.zeta_from_correlation, p.slosh.zeta, p.init.slosh_angle) = (false, 0.0, 0.6);
+    (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (zeta_b, onset);
+    let plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+    let omega = (9.81 / plant.calculated().length[0]).sqrt();
+    let points = turning_points(&p, 6.0);
+    let [start, first] = points[0];
+    let limit = STEEPNESS / onset;
+    let last = points.iter().rfind(|[_, a]| STEEPNESS * a - onset > 0.26).unwrap();
+    assert!(last[1] < 0.7 * first, "{last:?}");
+    for [t, amplitude] in points.iter().filter(|[_, a]| a >= &last[1]) {
+        let decay = f64::exp(-omega * zeta_b * onset * (t - start));
+        let expected = 1.0 / (limit + (1.0 / first - limit) * decay);
+        assert!((amplitude / expected - 1.0).abs() < 1e-3, "{t} {amplitude} {expected}");
+    }
+}
+
+/// zeta + zeta_b max(0, k a - s_b) from each decrement, 0.1 of steepness away from the corner, where its rounding makes
+/// 1 % of zeta. A nonlinear model's amplitude varies within a period by the share A^2/16 of a pendulum's.
+#[test]
+fn waves_lose_more_above_their_breaking_steepness_in_every_model() {
+    for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
+        let (zeta_b, onset) = (0.05, 0.3);
+        let mut p = held(model);
+        p.init.slosh_angle = 0.42;
+        (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (zeta_b, onset);
+        let plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+        let zeta = plant.calculated().damping[0];
+        let (mut above, mut below) = (0, 0);
+        for pair in turning_points(&p, 40.0).windows(2) {
+            let [[_, a], [_, b]] = [pair[0], pair[1]];
+            let excess = STEEPNESS * (a * b).sqrt() - onset;
+            if excess.abs() < 0.1 {
+                continue;
+            }
+            *if excess > 0.0 { &mut above } else { &mut below } += 1;
+            let expected = zeta + zeta_b * excess.max(0.0);
+            let off = (a / b).ln() / TAU / expected - 1.0;
+            assert!(off.abs() < 0.025, "{model:?} at {excess}: {off:e}");
+        }
+        assert!(above > 3 && below > 5, "{model:?} {above} {below}");
+    }
+}
+
+/// Without other damping the power is that of breaking alone, from far above the onset to rest.
+#[test]
+fn breaking_waves_never_drive() {
+    for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
+        for onset in [0.0, 0.1, 0.66] {
+            let mut p = held(model);
+            (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.0);
+            (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (3.0, onset);
+            for (angle, rate) in [(0.6, 2.0), (0.05, -0.5), (1e-4, 0.0), (0.0, 1e-9)] {
+                (p.init.slosh_angle, p.init.slosh_rate_radial) = (angle, rate);
+                let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+                let mut heat = 0.0;
+                for _ in 0..100 {
+                    plant.step(&at(9.81), 0.05).unwrap();
+                    let now = plant.outputs(&at(9.81));
+                    assert!(now.power_dissipated >= 0.0 && now.heat >= heat, "{model:?} {onset}");
+                    heat = now.heat;
+                }
+                assert!(heat > 0.0 || rate == 1e-9, "{model:?} {onset} {angle}");
+            }
+        }
+    }
+}
+
 /// A_0 = 1e-4 rad makes the least: 1e-4 zeta_A, to be seen below it alone.
 #[test]
 fn a_vanishing_amplitude_leaves_the_viscous_damping() {

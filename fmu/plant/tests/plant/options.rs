@@ -28,6 +28,7 @@ fn everything(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
     (p.baffle.width, p.baffle.depth) = (0.008, 0.01);
     p.slosh.zeta_amplitude = 0.05;
+    (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (0.2, 0.3);
     p.slosh.capillarity = true;
     p.fluid.sigma = 7.0;
     p
@@ -409,4 +410,55 @@ fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
             assert!((change / (1e-3 * expected) - 1.0).abs() < 1e-3, "{model:?} {omega}: {change}");
         }
     }
+}
+
+/// Breaking needs both of its parameters, and a steepness that the model reaches: 1.541 at an amplitude of 1.
+#[test]
+fn breaking_without_effect_or_threshold_is_warned_of() {
+    let mut p = bench(SloshModel::Liquid, FrictionModel::None);
+    p.slosh.breaking_steepness = 0.66;
+    assert_eq!(Plant::warnings(&p, &at(9.81)), [""; 0]);
+    assert!(p.overridden("slosh.breaking_steepness").is_some_and(|why| why.contains("is 0")));
+    p.slosh.zeta_breaking = 0.04;
+    assert_eq!(p.overridden("slosh.breaking_steepness"), None);
+    for (model, onset, what) in [
+        (SloshModel::Liquid, 0.0, "smallest wave"),
+        (SloshModel::Liquid, 1.54, ""),
+        (SloshModel::Liquid, 1.55, "hardly acts on mode 1: its steepness reaches 1.541 at"),
+        (SloshModel::Spherical, 1.55, ""),
+        (SloshModel::Spherical, 2.43, "steepness reaches 2.420 at an amplitude of 1.571"),
+        (SloshModel::Frozen, 0.0, ""),
+    ] {
+        (p.slosh.model, p.slosh.breaking_steepness) = (model, onset);
+        let warnings = Plant::warnings(&p, &at(9.81));
+        let first = warnings.first().map_or("", String::as_str);
+        assert!(first.contains(what) && warnings.is_empty() == what.is_empty(), "{warnings:?}");
+    }
+}
+
+/// The onset of a wave in a table follows from its elevation and wave number: as in the cylinder if they are its own.
+#[test]
+fn the_steepness_of_a_table_has_its_own_wave_and_wave_number() {
+    let power = |p: &Parameters| plant(p).outputs(&at(9.81)).power_dissipated;
+    let mut p = bench(SloshModel::Spherical, FrictionModel::None);
+    (p.slosh.zeta_breaking, p.slosh.breaking_steepness, p.init.slosh_rate) = (0.04, 0.25, 1.0);
+    let (expected, known) = (power(&p), *plant(&p).calculated());
+    p.slosh.source = SloshSource::Table;
+    let table = &mut p.slosh.table;
+    (table.m_liq, table.mass[0], table.length[0]) = (known.m_liq, known.mass[0], known.length[0]);
+    table.zeta[0] = known.damping[0];
+    let close = |p: &Parameters, share: f64| {
+        let found = power(p);
+        assert!((found / (share * expected) - 1.0).abs() < 1e-12, "{found} {expected}");
+    };
+    close(&p, 1.0);
+    let xi: f64 = 1.841_183_781_340_66;
+    p.slosh.table.wave_number[0] = xi / 0.0815;
+    close(&p, 1.0);
+    // Half the elevation at twice the wave number is as steep.
+    p.slosh.table.wave[0] = 0.0815 / (xi * xi - 1.0);
+    p.slosh.table.wave_number[0] *= 2.0;
+    close(&p, 1.0);
+    p.slosh.table.wave_number[0] /= 2.0;
+    assert!(power(&p) < 0.9 * expected, "half as steep: it does not break");
 }
