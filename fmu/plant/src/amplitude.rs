@@ -12,14 +12,14 @@
 //!
 //! Waves break above a steepness s_b. Steepness is k a, with the wave's amplitude a at the wall and the mode's wave
 //! number k. Linear theory gives a = `wave` A, so k a = sigma A with sigma = k `wave`. In an upright cylinder k = xi_n/R
-//! and `wave` = 2 R/(xi_n^2 - 1), hence sigma = 2 xi_n/(xi_n^2 - 1) = 1.541 for mode 1. b is max(0, k a - s_b) with its
-//! corner rounded over delta, and b(0) = 0:
+//! and `wave` = 2 R/(xi_n^2 - 1), hence sigma = 2 xi_n/(xi_n^2 - 1), 1.541 for mode 1. The function b is
+//! max(0, k a - s_b) with its corner rounded over delta, and b(0) = 0:
 //!
 //! ```text
 //! b(s) = [s - s_b + ((s - s_b)^2 + delta^2)^(1/2) - B]/2,   B = (s_b^2 + delta^2)^(1/2) - s_b
 //! ```
 //!
-//! b grows with s, so it is never below 0. It exceeds max(0, s - s_b) by at most delta/2, at the corner.
+//! b grows with s, so it is never below 0. It differs from max(0, s - s_b) by at most delta/2.
 //!
 //! The drag is expanded in
 //!

@@ -189,9 +189,8 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         _ if slosh.model != SloshModel::Liquid => {}
         SloshSource::Geometry => warnings.extend(third_order_warning(p.tank.h / radius)),
         SloshSource::Table if slosh.third_order(0, 0.0) == (1.0, 1.0) => warnings.push(
-            "slosh.model = liquid with slosh.table.nonlinear_inertia[1] = 1 and slosh.table.nonlinear_stiffness[1] = 1: \
-             the frequency of mode 1 depends on the amplitude as that of a pendulum, in any tank. Set both to the \
-             coefficients of this tank"
+            "slosh.table.nonlinear_inertia[1] and slosh.table.nonlinear_stiffness[1] are 1 with slosh.model = liquid: mode 1 \
+             has the frequency of a pendulum over amplitude, in any tank. Set both to the coefficients of this tank"
                 .to_string(),
         ),
         SloshSource::Table => {}

@@ -58,7 +58,7 @@ fn coefficients_of_a_table_give_their_shifts() {
 fn coefficients_of_a_table_are_asked_for() {
     let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());
     let p = table(held(SloshModel::Liquid, 0.1), 1.0, 1.0);
-    assert!(warnings(&p)[0].contains("as that of a pendulum"), "{:?}", warnings(&p));
+    assert!(warnings(&p)[0].contains("frequency of a pendulum"), "{:?}", warnings(&p));
     assert_eq!(warnings(&table(p, 1.0, 1.1)), [""; 0]);
     for (model, is_used) in [
         (SloshModel::Linear, true),
