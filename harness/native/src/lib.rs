@@ -1,9 +1,12 @@
 //! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and drives their instances by single calls
-//! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]).
+//! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]). It also finds the [`crossings`]
+//! of loop gains.
 //!
 //! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
 //! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.
 
+mod complex;
+mod crossings;
 mod feedback;
 mod fmu;
 mod instance;
@@ -13,6 +16,8 @@ mod run;
 /// Functions of `hubslosh._native`.
 #[pyo3::pymodule]
 mod _native {
+    #[pymodule_export]
+    use crate::crossings::Model;
     #[pymodule_export]
     use crate::fmu::{Fmu, FmuError, FmuWarning, Variable};
     #[pymodule_export]

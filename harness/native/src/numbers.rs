@@ -37,6 +37,14 @@ pub fn number(value: Value) -> f64 {
     }
 }
 
+/// Returns the numbers of an array of numpy.
+///
+/// # Errors
+/// If it is not an array of floats.
+pub fn numbers(array: &Bound<PyAny>) -> PyResult<Vec<f64>> {
+    PyBuffer::get(array)?.to_vec(array.py())
+}
+
 /// An array of numpy, rows × width, and the rows that are on their way to or from it.
 pub struct Numbers {
     array: PyBuffer<f64>,

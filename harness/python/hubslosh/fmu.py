@@ -5,6 +5,7 @@ import difflib
 import math
 import re
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,7 +17,7 @@ __all__ = ["Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "did_you_mean",
 Value = float | int | bool | str
 """A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name."""
 
-_INDICES = re.compile(r"\[\d+(,\d+)*\]")
+_INDICES = re.compile(r"\[\d+(,\d+)*\]$")
 """End of the name of a vector's or matrix's element."""
 
 INTEGERS = range(-(2**31), 2**31)
@@ -117,13 +118,18 @@ class Fmu:
 
         A matrix gives its elements row after row. Other names stay as they are.
         """
-        found: list[str] = []
+        parts: list[str] = []
         for name in names:
-            if name in self.variables:
-                found.append(name)
-                continue
-            elements = [of for of in self.variables if of.startswith(f"{name}[")]
-            found += [of for of in elements if _INDICES.fullmatch(of, len(name))] or [name]
+            parts += [name] if name in self.variables else self._elements.get(name, [name])
+        return parts
+
+    @cached_property
+    def _elements(self) -> dict[str, list[str]]:
+        """Names of the elements of each vector and matrix."""
+        found: dict[str, list[str]] = {}
+        for name in self.variables:
+            if end := _INDICES.search(name):
+                found.setdefault(name[: end.start()], []).append(name)
         return found
 
     def variable(self, name: str) -> Variable:

@@ -62,6 +62,11 @@ class Loop:
 
     def problems(self) -> list[str]:
         """Return everything that is wrong with it."""
+        return self._examined()[0]
+
+    def _examined(self) -> tuple[list[str], LinearModel | None]:
+        """Return everything that is wrong with it, and the controller if it is linear."""
+        controller = None
         found = wrong_seconds(period=self.period)
         if not _is_whole(self.latency, 0):
             found.append(f"latency must be a whole number from 0 on, not {self.latency!r}")
@@ -90,10 +95,10 @@ class Loop:
             found.append("there is no command")
         if not found:
             try:
-                self.linear()
+                controller = _linear(self.controller, self.period, measured, commands)
             except FmuError as error:
                 found.append(str(error))
-        return found
+        return found, controller
 
     def check(self) -> None:
         """Raise FmuError with everything that is wrong with it."""
@@ -113,7 +118,10 @@ class Loop:
         return _linear(self.controller, self.period, measured, command)
 
     def _must_be_linear(self) -> LinearModel:
-        controller = self.linear()
+        """Return the controller of a loop that is right, or raise FmuError."""
+        found, controller = self._examined()
+        if found:
+            raise FmuError("; ".join(found))
         if controller is None:
             raise FmuError(
                 "the loop gain needs a linear controller: a matrix of gains, a LinearModel, or a "
@@ -143,12 +151,10 @@ class Loop:
 
         It is exact at the sampling instants, delay included. more_delay: s, added.
         """
-        self.check()
-        self._must_be_linear()
-        return self._gain(self.plant(parameters), more_delay)
-
-    def _gain(self, plant: LinearModel, more_delay: float = 0.0) -> LinearModel:
         K = self._must_be_linear()
+        return self._gain(self.plant(parameters), K, more_delay)
+
+    def _gain(self, plant: LinearModel, K: LinearModel, more_delay: float = 0.0) -> LinearModel:
         cycles, rest = split_delay(self.delay + more_delay, self.period)
         # measured as in the simulation: before the command changes
         P = plant._delayed(self.period, cycles + int(self.latency), rest)

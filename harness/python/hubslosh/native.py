@@ -37,3 +37,4 @@ except ImportError:
 
 Fmu, Instance, Variable = _native.Fmu, _native.Instance, _native.Variable
 FmuError, FmuWarning = _native.FmuError, _native.FmuWarning
+Model = _native.Model

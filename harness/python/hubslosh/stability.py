@@ -1,6 +1,5 @@
 """Margins of a loop: every gain and phase crossing, however narrow."""
 
-import itertools
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from .fmu import FmuError, Quantity
 from .linearization import LinearModel
 from .loop import Loop, _from_control
+from .native import Model
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,14 +21,14 @@ Matrix = NDArray[np.float64]
 NEAR = 0.2
 """A crossing is near a mode if their frequencies differ by at most this part of the mode's."""
 
-INTEGRATOR = 1e8
-"""A loop gain above this is at an integrator, or another pole on the axis: no phase crossing."""
-
 FAR = 20
 """dB; phase crossings with larger margins are not printed."""
 
 LIGHT = 0.2
 """Damping ratio below which a pole is a mode to be named."""
+
+MOVED = 1e-11
+"""Residue, over the norms of B and C, below which an input does not move a mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,10 +108,10 @@ def margins(
       With several commands each loop is broken in turn while the others are closed.
     * ``parameters``: Parameters of the FMU in addition to the loop's own.
 
-    No frequency grid is involved: crossings are eigenvalues of a matrix pencil, the roots of 1 -
-    L(s) L(-s) and of L(s) - L(-s), or the same in z. These roots divide the frequencies into
-    intervals. A change of sign from one interval to the next is a crossing, which bisection refines
-    to rounding.
+    No frequency grid decides what is found: poles and zeros bound slope and curvature of the loop
+    gain, and intervals of frequency are halved until each has one crossing at most. Crossings are
+    then refined in the state space to rounding. A phase crossing with a loop gain below 1e-12 or
+    above 1e8 is left out.
     """
     return margins_and_gain(loop, parameters)[0]
 
@@ -121,34 +121,50 @@ def margins_and_gain(
 ) -> tuple[Margins, LinearModel]:
     """Return what `margins` finds, and the loop gain."""
     if isinstance(loop, Loop):
-        loop.check()
-        loop._must_be_linear()
+        K = loop._must_be_linear()
         plant = loop.plant(parameters)
         modes = plant.modes(LIGHT)
         small = minimal(plant)
-        gain = loop._gain(small)
+        gain = loop._gain(small, K)
 
         def delayed(more: float) -> LinearModel:
-            return loop._gain(small, more)
+            return loop._gain(small, K, more)
 
-        moved = [_moved_by(plant, i, modes) for i in range(len(plant.inputs))]
-        return _margins(gain, modes, moved, delayed), gain
+        return _margins(gain, modes, _moved(plant, _rows(modes)), delayed), gain
     if parameters:
         raise FmuError("parameters are for a Loop; this loop gain has none")
     gain = loop if isinstance(loop, LinearModel) else _loop_gain(loop)
     modes = gain.modes(LIGHT)
-    return _margins(gain, modes, [modes] * gain.D.shape[1], None), gain
+    return _margins(gain, modes, [_rows(modes)] * gain.D.shape[1], None), gain
 
 
-def _moved_by(plant: LinearModel, i: int, modes: "pd.DataFrame") -> "pd.DataFrame":
-    """Return the modes that one input moves and an output shows."""
-    A, B, C, D = plant
-    one = LinearModel(
-        A, B[:, i : i + 1], C, D[:, i : i + 1], plant.states, plant.inputs[i : i + 1], plant.outputs
-    )
-    here = minimal(one).modes(LIGHT)["frequency"].to_numpy()
-    kept = [bool((np.abs(here - f) < 1e-6 * f).any()) for f in modes["frequency"]]
-    return modes[np.array(kept, bool)]
+Modes = list[tuple[float, float, tuple[str, ...]]]
+"""Frequency, damping ratio and states of each."""
+
+
+def _rows(modes: "pd.DataFrame") -> Modes:
+    return list(zip(modes["frequency"], modes["zeta"], modes["states"], strict=True))
+
+
+def _moved(plant: LinearModel, modes: Modes) -> list[Modes]:
+    """Return, for each input, the modes that it moves and an output shows.
+
+    Modes of one frequency go together: of two equal tanks an input moves a combination.
+    """
+    from scipy.linalg import eig
+
+    A, B, C, _ = plant
+    poles, left, right = eig(A, left=True)
+    kept = np.zeros((B.shape[1], len(modes)), bool)
+    for k, (frequency, _, _) in enumerate(modes):
+        same = (np.abs(np.abs(poles) / (2 * np.pi) - frequency) < 1e-6 * frequency) & (
+            poles.imag > 0
+        )
+        L, R = left[:, same].conj().T, right[:, same]
+        residues = (C @ R) @ np.linalg.lstsq(L @ R, L @ B, rcond=1e-12)[0]
+        size = np.linalg.norm(C) * np.linalg.norm(B, axis=0)
+        kept[:, k] = np.linalg.norm(residues, axis=0) > MOVED * size
+    return [[mode for mode, here in zip(modes, row, strict=True) if here] for row in kept]
 
 
 def _loop_gain(system: Any) -> LinearModel:
@@ -163,7 +179,7 @@ def _loop_gain(system: Any) -> LinearModel:
 def _margins(
     gain: LinearModel,
     modes: "pd.DataFrame",
-    moved: "list[pd.DataFrame]",
+    moved: list[Modes],
     delayed: Callable[[float], LinearModel] | None,
 ) -> Margins:
     import pandas as pd
@@ -174,10 +190,11 @@ def _margins(
     if abs(np.linalg.det(np.eye(inputs) + gain.D)) < 1e-12:
         raise FmuError("the loop cannot be closed: I + D is singular")
     rows, modulus, least_delay = [], np.inf, np.inf
+    poles = _closed(gain)
     for i in range(inputs):
         one = _broken_at(gain, i)
         name = gain.inputs[i] if i < len(gain.inputs) else f"u[{i + 1}]"
-        found, closest = _crossings(one)
+        found, closest = _crossings(one, poles)
         modulus = min(modulus, closest)
         for kind, w, L in found:
             late = np.nan
@@ -204,11 +221,10 @@ def _margins(
     table = table.reset_index(drop=True)
     units = {"frequency": "Hz", "gain_margin": "dB", "phase_margin": "deg", "delay_margin": "s"}
     table.attrs["units"] = units
-    poles = _closed(gain)
-    stable = _largest(gain) < (0 if gain.period is None else 1)
+    stable = _largest(poles, gain.period) < (0 if gain.period is None else 1)
     delay = 0.0
     if stable:
-        delay = least_delay if delayed is None else _delay_margin(delayed, least_delay)
+        delay = least_delay if delayed is None else _delay_margin(delayed, gain)
     return Margins(table, bool(stable), poles, float(modulus), float(delay), modes)
 
 
@@ -239,146 +255,90 @@ def _closed(gain: LinearModel) -> NDArray[np.complex128]:
     return poles[np.argsort(np.abs(poles))]
 
 
-def _largest(gain: LinearModel) -> float:
+def _largest(poles: NDArray[np.complex128], period: float | None) -> float:
     """Return what decides stability: largest real part, or magnitude in the z plane."""
-    poles = _closed(gain)
-    sizes = poles.real if gain.period is None else np.abs(poles)
-    return float(max(sizes, default=-np.inf if gain.period is None else 0.0))
+    sizes = poles.real if period is None else np.abs(poles)
+    return float(max(sizes, default=-np.inf if period is None else 0.0))
 
 
-def _pencils(gain: LinearModel) -> "list[tuple[Matrix, Matrix]]":
-    """Return (M, E) with the zeros of 1 - L(s) L(-s) and of L(s) - L(-s) as eigenvalues.
+def _zeros(gain: LinearModel) -> NDArray[np.complex128]:
+    """Return the finite zeros of a model with one input and one output.
 
-    In the z plane 1/z is in the place of -s. The states are those of L, then of the other factor;
-    then u, the input of L, and y, its output.
+    Without D the output's derivatives take its place, until one of them follows the input at once.
     """
-    A, B, C, D = gain
-    n = len(A)
-    one, none, column = np.eye(n), np.zeros((n, n)), np.zeros((n, 1))
-    row, zero, unit = column.T, np.zeros((1, 1)), np.ones((1, 1))
-    if gain.period is None:  # s x1 = A x1 + B u, -s x2 = A x2 + B y or B u
-        gains = (
-            np.block([[A, none, B, column], [none, -A, column, -B], [C, row, D, -unit],
-                      [row, C, -unit, D]]),
-            np.diag([1.0] * (2 * n) + [0.0, 0.0]),
-        )  # fmt: skip
-        phases = (
-            np.block([[A, none, B], [none, -A, -B], [C, -C, zero]]),
-            np.diag([1.0] * (2 * n) + [0.0]),
-        )
-    else:  # z x1 = A x1 + B u, x2 = z (A x2 + B y or B u)
-        gains = (
-            np.block([[A, none, B, column], [none, one, column, column], [C, row, D, -unit],
-                      [row, C, -unit, D]]),
-            np.block([[one, none, column, column], [none, A, column, B],
-                      [np.zeros((2, 2 * n + 2))]]),
-        )  # fmt: skip
-        phases = (
-            np.block([[A, none, B], [none, one, column], [C, -C, zero]]),
-            np.block([[one, none, column], [none, A, B], [np.zeros((1, 2 * n + 1))]]),
-        )
-    return [gains, phases]
+    A, b, c, d = gain.A, gain.B[:, 0], gain.C[0], float(gain.D[0, 0])
+    while len(A):
+        size = np.linalg.norm(c)
+        if abs(d) > 1e-10 * size * np.linalg.norm(b):
+            return np.linalg.eigvals(A - np.outer(b, c) / d).astype(complex)
+        if size <= 1e-300 or not b.any():
+            break
+        # the first state is to be the output: a reflection takes c to it
+        v = c / size
+        v[0] += np.copysign(1.0, v[0])
+        H = np.eye(len(A)) - 2 * np.outer(v, v) / (v @ v)
+        A, b = H @ A @ H, H @ b
+        c, d, A, b = A[0, 1:], float(b[0]), A[1:, 1:], b[1:]
+    return np.zeros(0, complex)
 
 
 def _frequencies(values: Any, period: float | None) -> Matrix:
-    """Return the frequencies of poles, zeros or eigenvalues, rad/s, without 0 and infinity."""
+    """Return the frequencies of poles or zeros, rad/s, without 0 and infinity."""
     values = np.asarray(values, complex)
     values = values[np.isfinite(values) & (values != 0)]
     sizes = np.abs(values.imag) if period is None else np.abs(np.angle(values)) / period
     return sizes[(sizes > 0) & np.isfinite(sizes)]
 
 
-def _nodes(gain: LinearModel, more: Any, low: float, high: float) -> Matrix:
-    """Return frequencies between which L does nothing that is not seen at them, rad/s.
+def _compiled(model: LinearModel) -> Any:
+    """Return the model as compiled code evaluates it."""
+    return Model(*(np.ascontiguousarray(matrix, float) for matrix in model), model.period or 0.0)
 
-    Those of the eigenvalues ``more``; and for what rounding may do to these, a grid of 400, closer
-    about each pole of the open and the closed loop in steps of its bandwidth.
+
+def _crossings(
+    gain: LinearModel, closed: NDArray[np.complex128]
+) -> "tuple[list[tuple[str, float, complex]], float]":
+    """Return kind, frequency (rad/s) and loop gain of each crossing; and the modulus margin.
+
+    closed: poles of the closed loop.
     """
-    nodes = [np.geomspace(low, high, 400), _frequencies(more, gain.period)]
-    for pole in (*np.linalg.eigvals(gain.A), *_closed(gain)):
-        if gain.period is not None:
-            pole = np.log(complex(pole)) / gain.period if pole else -1.0
-        width = max(abs(np.real(pole)), 1e-9 * abs(pole))
-        about = width * np.array([0, 0.3, 1, 3, 10, 30, 100])
-        nodes.append(abs(np.imag(pole)) + np.concatenate([-about, about]))
-    every = np.unique(np.concatenate(nodes))
-    return every[(every > low) & (every < high)]
+    poles, zeros = np.linalg.eigvals(gain.A).astype(complex), _zeros(gain)
+    low, high = _band(gain, [poles, zeros, closed])
+    roots = [np.ascontiguousarray(values).view(float) for values in (poles, zeros, closed)]
+    found, closest = _compiled(gain).crossings(roots, low, high)
+    kinds = {True: "gain", False: "phase"}
+    return [(kinds[is_gain], w, complex(re, im)) for is_gain, w, re, im in found], closest
 
 
-def _crossings(gain: LinearModel) -> "tuple[list[tuple[str, float, complex]], float]":
-    """Return kind, frequency (rad/s) and loop gain of each crossing; and the modulus margin."""
-    from scipy.linalg import eigvals
-    from scipy.optimize import brentq, minimize_scalar
-
-    def L(w: Any) -> Any:
-        try:
-            return gain.response(np.asarray(w) / (2 * np.pi))[:, 0, 0]
-        except np.linalg.LinAlgError:  # on an undamped pole
-            if len(w) == 1:
-                return np.array([complex(np.inf)])
-            return np.concatenate([L([one]) for one in w])
-
-    with np.errstate(all="ignore"):
-        gains, phases = (eigvals(*pencil) for pencil in _pencils(gain))
-    every = [gains, phases, np.linalg.eigvals(gain.A)]
-    known = np.concatenate([_frequencies(values, gain.period) for values in every])
+def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float, float]:
+    """Return the frequencies between which a loop gain is looked at, rad/s."""
     nyquist = np.inf if gain.period is None else np.pi / gain.period
-    known = known[known < nyquist]
+    known = np.concatenate([_frequencies(values, gain.period) for values in roots])
+    sizes = np.concatenate([np.abs(values) for values in roots])
+    if gain.period is None:  # real poles too
+        known = np.concatenate([known, sizes[(sizes > 0) & np.isfinite(sizes)]])
+    else:
+        near = np.concatenate(roots)
+        near = near[np.abs(near) > 0]
+        known = np.concatenate([known, np.abs(np.log(near)) / gain.period])
+    known = known[(known < nyquist) & np.isfinite(known)]
     size = max(known, default=1.0 if gain.period is None else nyquist)
     low = 1e-3 * min(known[known > 1e-9 * size], default=size)
-    high = min(1e3 * size, (1 - 1e-7) * nyquist)
-
-    found: list[tuple[str, float, complex]] = []
-    signs: list[tuple[str, Any, Callable[[complex], float]]] = [
-        ("gain", gains, lambda value: float(np.log(max(abs(value), 1e-300)))),
-        ("phase", phases, lambda value: float(np.nan_to_num(value.imag / abs(value)))),
-    ]
-    closest = np.inf
-    for kind, eigenvalues, sign in signs:
-        nodes = _nodes(gain, eigenvalues, low, high)
-        points = np.sort(np.concatenate([[low], (nodes[1:] + nodes[:-1]) / 2, [high]]))
-        values = L(points)
-        finite = values[np.isfinite(values)]
-        closest = min(closest, np.abs(1 + finite).min(initial=np.inf))
-        good = np.isfinite(values) & (np.abs(values) > 1e-300)
-        points, values = points[good], values[good]
-        height = np.array([sign(value) for value in values])
-        for k in np.flatnonzero((height[1:] > 0) != (height[:-1] > 0)):
-            bounds = points[k], points[k + 1]
-            w = brentq(lambda w, sign=sign: sign(L([w])[0]), *bounds, xtol=1e-300, rtol=1e-15)
-            value = complex(L([w])[0])
-            jump = abs(sign(value)) > 1e-6 or abs(value) > INTEGRATOR  # a pole on the axis
-            if not jump and (kind == "gain" or value.real < 0):
-                found.append((kind, float(w), value))
-        for k in np.argsort(np.abs(1 + values))[:5]:
-            bounds = points[max(k - 1, 0)], points[min(k + 1, len(points) - 1)]
-            best = minimize_scalar(
-                lambda w: float(abs(1 + L([w])[0])), bounds=bounds, method="bounded",
-                options={"xatol": 1e-10 * bounds[1]},
-            )  # fmt: skip
-            closest = min(closest, best.fun)
-    for w in (0.0, nyquist):  # where L is real in any case
-        s = 1j * w if gain.period is None else np.exp(1j * w * gain.period)
-        end = complex(L([w])[0]) if np.isfinite(s) else 0j
-        if end.real < 0 and abs(end) < INTEGRATOR:
-            found.append(("phase", w, complex(end.real)))
-    found.sort(key=lambda crossing: crossing[1])
-    return found, closest
+    return low, min(1e3 * size, (1 - 1e-7) * nyquist)
 
 
-def _near(frequency: float, modes: "pd.DataFrame") -> str:
+def _near(frequency: float, modes: Modes) -> str:
     """Return the modes near a frequency, by name."""
-    apart = (modes["frequency"] - frequency).abs()
-    close = modes[apart <= NEAR * modes["frequency"]]
-    if not len(close):
+    close = [mode for mode in modes if abs(mode[0] - frequency) <= NEAR * mode[0]]
+    if not close:
         return ""
-    who = sorted({_mode_of(state) for mode in close.itertuples() for state in mode.states})
-    f, zeta = close["frequency"], 100 * close["zeta"]
+    who = sorted({_mode_of(state) for _, _, states in close for state in states})
+    f, zeta = [f for f, _, _ in close], [100 * zeta for _, zeta, _ in close]
     return f"{', '.join(who)} ({_span(f)} Hz, ζ = {_span(zeta)} %)"
 
 
-def _span(values: "pd.Series") -> str:
-    low, high = (f"{values.min():.3g}", f"{values.max():.3g}")
+def _span(values: list[float]) -> str:
+    low, high = (f"{min(values):.3g}", f"{max(values):.3g}")
     return low if low == high else f"{low} to {high}"
 
 
@@ -391,26 +351,102 @@ def _mode_of(state: str) -> str:
     return state
 
 
-def _delay_margin(delayed: Callable[[float], LinearModel], first: float) -> float:
+def _delay_margin(delayed: Callable[[float], LinearModel], gain: LinearModel) -> float:
     """Return the least further delay at which a sampled loop is no longer stable, s.
 
-    first: what the crossings say, which for a sampled loop holds at whole cycles.
+    Where an eigenvalue of L has the magnitude 1, a delay of whole cycles can turn it to -1. The
+    hold acts otherwise between whole cycles, so that frequency and delay are then refined.
     """
+    least = np.inf
+    with np.errstate(all="ignore"):  # an eigenvalue of 0
+        for delay, w in sorted(_unit_eigenvalues(gain)):
+            # what the hold changes between whole cycles is less than half a cycle
+            if delay - (gain.period or 0.0) / 2 >= least:
+                break
+            least = min(least, _exact_delay(delayed, gain, delay, w))
+    return least
+
+
+def _exact_delay(
+    delayed: Callable[[float], LinearModel], gain: LinearModel, delay: float, w: float
+) -> float:
+    """Return the delay at which an eigenvalue of L is -1, from its value without the hold."""
+    period, count = gain.period or 0.0, len(gain.D)
+
+    def turned(delay: float) -> float:
+        """Return a better delay: the magnitude is 1 at w, and the phase is made up for."""
+        nonlocal w
+        cycles = int(delay / period)
+        model = _compiled(delayed(delay - cycles * period))
+
+        def logarithm(w: float) -> complex:
+            values = _eigenvalues(model, count, np.array([w]))[0]
+            values = np.log(-values * np.exp(-1j * w * period * cycles))
+            return complex(values[np.argmin(np.abs(values))])
+
+        before, after = w, w * (1 + 1e-6)
+        at_before, at_after = logarithm(before), logarithm(after)
+        for _ in range(20):
+            if at_after.real == at_before.real or abs(after - before) <= 1e-15 * after:
+                break
+            slope = (at_after.real - at_before.real) / (after - before)
+            step = np.clip(-at_after.real / slope, -0.01 * w, 0.01 * w)
+            before, at_before, after = after, at_after, after + step
+            at_after = logarithm(after)
+        w = after
+        return float(delay + at_after.imag / w)
+
+    for _ in range(20):  # Steffensen's iteration
+        first = turned(delay)
+        second = turned(first)
+        bend = second - 2 * first + delay
+        new = second if bend == 0 else delay - (first - delay) ** 2 / bend
+        done = abs(second - first) <= 1e-13 * first or abs(new - delay) <= 1e-13 * first
+        delay = new
+        if done:
+            break
+    return delay
+
+
+def _eigenvalues(model: Any, count: int, w: Matrix) -> NDArray[np.complex128]:
+    """Return the eigenvalues of L at frequencies in rad/s, by magnitude."""
+    values = np.array(model.response(w)).view(complex).reshape(-1, count, count)
+    values = np.where(np.isfinite(values), values, 1e300)
+    found = values[:, 0] if count == 1 else np.linalg.eigvals(values)
+    return np.take_along_axis(found, np.argsort(np.abs(found), axis=1), axis=1)
+
+
+def _unit_eigenvalues(gain: LinearModel) -> list[tuple[float, float]]:
+    """Return delay (s) and frequency (rad/s) where an eigenvalue of L has the magnitude 1."""
     from scipy.optimize import brentq
 
-    def excess(delay: float) -> float:
-        return _largest(delayed(delay)) - 1
+    model, period, count = _compiled(gain), gain.period or 0.0, len(gain.D)
 
-    if not np.isfinite(first):
-        return np.inf
-    period = delayed(0.0).period or first
-    # quarters of a cycle, whose exponentials come again; or multiples of them
-    step = period / 4 * max(np.ceil(first / period / 10), 1) if first > period else first / 20
-    end = 1.5 * first + 2 * period
-    for low, high in itertools.pairwise(np.arange(0, end + step, step)):
-        if excess(high) >= 0:
-            return float(brentq(excess, low, high, xtol=1e-12 * high))
-    return np.inf
+    def eigenvalues(w: Matrix) -> NDArray[np.complex128]:
+        return _eigenvalues(model, count, w)
+
+    roots = [np.linalg.eigvals(gain.A).astype(complex), _closed(gain)]
+    low, high = _band(gain, roots)
+    nodes = [np.geomspace(low, high, 100)]
+    for pole in np.concatenate(roots):
+        root = np.log(complex(pole)) / period if pole else complex(-np.inf)
+        if root.imag > 0 and -root.real < LIGHT * abs(root):
+            around = max(abs(root.real), 1e-9 * abs(root)) * np.array([0, 0.3, 1, 3, 10])
+            nodes.append(root.imag + np.concatenate([-around, around]))
+    every = np.unique(np.concatenate(nodes))
+    every = np.ascontiguousarray(every[(every > low) & (every < high)])
+    above = np.abs(eigenvalues(every)) > 1
+    found = []
+    for k, i in zip(*np.nonzero(above[1:] != above[:-1]), strict=True):
+
+        def height(w: float, i: int = i) -> float:
+            return float(np.log(np.abs(eigenvalues(np.array([w]))[0, i])))
+
+        w = brentq(height, every[k], every[k + 1], xtol=1e-300, rtol=1e-10)
+        value = eigenvalues(np.array([w]))[0, i]
+        if abs(abs(value) - 1) < 1e-6:
+            found.append((float(np.angle(-value) % (2 * np.pi)) / w, float(w)))
+    return found
 
 
 def minimal(model: LinearModel, tolerance: float = 1e-11) -> LinearModel:

@@ -1,10 +1,16 @@
 """Crossings and margins of loops for which they are known, to 1e-6."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import control
 import numpy as np
 import pytest
+from scipy.linalg import eigvals
+from scipy.optimize import brentq
 
-from hubslosh import FmuError, LinearModel, margins
+from hubslosh import FmuError, LinearModel, Loop, margins
+from hubslosh.stability import _broken_at, _closed, minimal
 
 EXACT = 1e-6
 """The tolerance that is promised; what is found is better by orders of magnitude."""
@@ -119,6 +125,17 @@ def test_the_modulus_margin_is_the_least_distance_to_minus_one() -> None:
     assert margins(1 / (S * (S + 1))).modulus_margin == pytest.approx(least, rel=1e-8)
 
 
+def test_a_loop_gain_without_states_is_a_number() -> None:
+    """Half of it is no crossing; its distance to -1 is 1.5."""
+    none = np.zeros((0, 0))
+    half = LinearModel(
+        none, np.zeros((0, 1)), np.zeros((1, 0)), np.full((1, 1), 0.5), (), ("u",), ("y",)
+    )
+    found = margins(half)
+    assert not len(found.crossings) and found.stable
+    assert found.modulus_margin == 1.5
+
+
 def test_a_loop_without_crossings_says_so() -> None:
     """1/(2 (s + 1)) is nowhere 1; its distance to -1 is least at infinity, 1. And L = 0."""
     for gain in (0.5, 0.0):
@@ -139,3 +156,137 @@ def test_loops_that_cannot_be_closed_are_refused() -> None:
         margins(LinearModel(none - 1, one, one, none, ("x",), ("u",), ("y",))).delay_margin
         == np.inf
     )
+
+
+def by_pencils(gain: LinearModel) -> list[tuple[str, float]]:
+    """Return kind and frequency (rad/s) of the crossings of one loop, in another way.
+
+    They are generalised eigenvalues, the roots of 1 - L(s) L(-s) and of L(s) - L(-s), with 1/z for
+    -s in discrete time. Rounding moves them, so that they only part the frequencies, with a grid
+    closer about the poles: between neighbours a sign changes once.
+    """
+    A, B, C, D = gain
+    n, T = len(A), gain.period
+    one, none, column = np.eye(n), np.zeros((n, n)), np.zeros((n, 1))
+    row, zero, unit = column.T, np.zeros((1, 1)), np.ones((1, 1))
+    last = [[C, row, D, -unit], [row, C, -unit, D]]
+    if T is None:
+        pencils = {
+            "gain": ([[A, none, B, column], [none, -A, column, -B], *last],
+                     np.diag([1.0] * (2 * n) + [0.0, 0.0])),
+            "phase": ([[A, none, B], [none, -A, -B], [C, -C, zero]],
+                      np.diag([1.0] * (2 * n) + [0.0])),
+        }  # fmt: skip
+    else:
+        late = [[one, none, column, column], [none, A, column, B], [np.zeros((2, 2 * n + 2))]]
+        pencils = {
+            "gain": ([[A, none, B, column], [none, one, column, column], *last], np.block(late)),
+            "phase": (
+                [[A, none, B], [none, one, column], [C, -C, zero]],
+                np.block([[one, none, column], [none, A, B], [np.zeros((1, 2 * n + 1))]]),
+            ),
+        }
+
+    def places(values: np.ndarray) -> np.ndarray:
+        values = values[np.isfinite(values) & (values != 0)]
+        found = np.abs(values.imag) if T is None else np.abs(np.angle(values)) / T
+        return found[found > 0]
+
+    def at(w: float) -> complex:
+        return complex(gain.response(w / TURN)[0, 0, 0])
+
+    found = []
+    for kind, (M, E) in pencils.items():
+        with np.errstate(all="ignore"):
+            nodes = [places(eigvals(np.block(M), E)), np.geomspace(1e-3, 300 if T is None else
+                     (1 - 1e-7) * np.pi / T, 400)]  # fmt: skip
+        for pole in filter(abs, (*np.linalg.eigvals(A), *_closed(gain))):
+            root = pole if T is None else np.log(complex(pole)) / T
+            about = abs(np.real(root)) * np.array([0, 0.3, 1, 3, 10, 30])
+            nodes.append(abs(np.imag(root)) + np.concatenate([-about, about]))
+        every = np.unique(np.concatenate(nodes))
+        every = every[(every >= nodes[1][0]) & (every <= nodes[1][-1])]
+        points = (every[1:] + every[:-1]) / 2
+
+        def sign(w: float, kind: str = kind) -> float:
+            value = at(w)
+            return np.log(abs(value)) if kind == "gain" else value.imag / abs(value)
+
+        heights = np.array([sign(w) for w in points])
+        for k in np.flatnonzero((heights[1:] > 0) != (heights[:-1] > 0)):
+            w = brentq(sign, points[k], points[k + 1], xtol=1e-300, rtol=1e-14)
+            if abs(sign(w)) < 1e-6 and (kind == "gain" or at(w).real < 0):
+                found.append((kind, w))
+    return sorted(found, key=lambda crossing: crossing[1])
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_loops_have_the_crossings_of_matrix_pencils(seed: int) -> None:
+    """One to three loops with light and heavy modes, integrators and delays; 1e-9."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(1, 4))
+    blocks = [np.zeros((1, 1))] * int(random.integers(0, 2))
+    for _ in range(random.integers(2, 8)):
+        w, zeta = 10 ** random.uniform(-1, 1.2), 10 ** random.uniform(-4, 0)
+        light = random.random() < 0.7
+        blocks.append(np.array([[0, 1], [-w * w, -2 * zeta * w]]) if light else np.array([[-w]]))
+    n = sum(len(block) for block in blocks)
+    A, k = np.zeros((n, n)), 0
+    for block in blocks:
+        A[k : k + len(block), k : k + len(block)] = block
+        k += len(block)
+    B, C = random.standard_normal((n, count)), random.standard_normal((count, n))
+    D = random.choice([0.0, 0.3]) * random.standard_normal((count, count))
+    names = tuple(f"u{i}" for i in range(count))
+    C *= 10 ** random.uniform(-2, 0.5)
+    gain = LinearModel(A, B, C, D, tuple(f"x{i}" for i in range(n)), names, names)
+    if random.random() < 0.6:
+        gain = gain.sampled(0.1, int(random.integers(0, 3)))
+    found = margins(gain)
+    table = found.crossings
+    table = table[(table["frequency"] > 1e-3 / TURN) & (table["frequency"] < 300 / TURN)]
+    if gain.period:  # there it is real in any case
+        table = table[table["frequency"] < (1 - 1e-7) / 2 / gain.period]
+    for i, name in enumerate(names):
+        mine = table[table["loop"] == name]
+        expected = by_pencils(_broken_at(gain, i))
+        assert mine["crossing"].to_list() == [kind for kind, _ in expected]
+        assert mine["frequency"].to_numpy() * TURN == pytest.approx(
+            [w for _, w in expected], rel=1e-9
+        )
+    # the least distance is at most that on any grid
+    w = np.geomspace(1e-3, 3 if gain.period is None else 31, 4000)
+    for i in range(count):
+        distance = np.abs(1 + _broken_at(gain, i).response(w / TURN)[:, 0, 0])
+        assert found.modulus_margin <= distance.min() + 1e-12
+
+
+def test_the_delay_margin_puts_a_pole_on_the_unit_circle(fmu: Path) -> None:
+    """Three axes with two tanks: stable at each quarter of a cycle before, unstable just after."""
+    craft = {"tanks": 2, "force[3]": 400.0, "tank[2].position[2]": 0.7, "craft.Jxy": 30.0}
+    model = fmu.with_name("Spacecraft.fmu")
+    gains = np.hstack([np.diag([80.0, 70.0, 60.0]), np.diag([500.0, 450.0, 400.0])])
+    measured = ["q[2]", "q[3]", "q[4]", "omega"]
+    for period, delay in ((0.1, 0.0), (0.5, 0.33), (1.0, 1.0)):
+        loop = Loop(gains, period, model, craft, measured, "torque", delay=delay)
+        found = margins(loop)
+        assert found.stable and 0 < found.delay_margin < 20
+        small, controller = minimal(loop.plant()), loop.linear()
+
+        def largest(more: float) -> float:
+            return np.abs(_closed(loop._gain(small, controller, more))).max()  # noqa: B023
+
+        before = np.arange(0, found.delay_margin, period / 4)
+        assert all(largest(more) < 1 for more in before)
+        assert (
+            largest(found.delay_margin * (1 - 1e-7)) < 1 < largest(found.delay_margin * (1 + 1e-7))
+        )
+        late = margins(replace(loop, delay=delay + found.delay_margin / 2))
+        assert late.delay_margin == pytest.approx(found.delay_margin / 2, rel=1e-9)
+
+
+def test_a_loop_gain_of_rounding_is_no_crossing(fmu: Path) -> None:
+    """A roll-off by Tustin's rule is 0 at half the sampling rate, but for rounding."""
+    lag = control.ss(1 / (S / 3 + 1) ** 2)
+    found = margins(Loop(5 * lag, 0.1, fmu, {"friction.model": "viscous"}, "theta"))
+    assert found.crossings["gain_margin"].dropna().abs().max() < 200
