@@ -1,0 +1,72 @@
+"""Mass properties and margins at 20 fills against the same numbers put together by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import telecom
+
+import hubslosh
+
+DRY = {"craft.mass": 1400.0, "tanks": 2, "force[3]": 400.0}
+DRY |= {f"craft.r[{i}]": x for i, x in zip((1, 2, 3), (0.012, -0.008, 1.05), strict=True)}
+DRY |= {"craft.Jxx": 1150.0, "craft.Jyy": 980.0, "craft.Jzz": 870.0}
+DRY |= {"craft.Jxy": -14.0, "craft.Jxz": 22.0, "craft.Jyz": 9.0}
+PLACES = {"NTO": (0.06, 0.42, 0.2), "MMH": (-0.05, -0.62, 0.1)}
+
+# in low gravity the tanks are larger than those whose damping was measured
+pytestmark = pytest.mark.filterwarnings("ignore:(tank|damping).*outside the measured")
+
+
+def test_mass_properties_and_margins_are_those_by_hand(spacecraft: str) -> None:
+    """1e-12 of mass, centre of mass and inertia; 1e-9 of every crossing and margin."""
+    craft = replace(telecom.craft, model=spacecraft)
+    for fill in telecom.FILLS:
+        tanks = {
+            name: hubslosh.tank(of.source, fill, modes=2, nu=of.nu, gravity=1.0)
+            for name, of in craft.tanks.items()
+        }
+        mass = 1400 + sum(tank.mass for tank in tanks.values())
+        moment = 1400 * np.array([0.012, -0.008, 1.05])
+        about_O = np.array([[1150.0, -14.0, 22.0], [-14.0, 980.0, 9.0], [22.0, 9.0, 870.0]])
+        points = [(1400.0, np.array([0.012, -0.008, 1.05]))]
+        for name, tank in tanks.items():
+            across = tank.all["I_eff_cg"]
+            about_O += np.diag([across, across, 0.0])
+            points.append((tank.mass, np.array(PLACES[name]) + np.array([0, 0, tank.all["z_cg"]])))
+            moment += tank.mass * points[-1][1]
+        for m, (x, y, z) in points:
+            about_O += m * np.array(
+                [[y * y + z * z, -x * y, -x * z], [-x * y, x * x + z * z, -y * z],
+                 [-x * z, -y * z, x * x + y * y]]
+            )  # fmt: skip
+        x, y, z = center = moment / mass
+        inertia = about_O - mass * np.array(
+            [[y * y + z * z, -x * y, -x * z], [-x * y, x * x + z * z, -y * z],
+             [-x * z, -y * z, x * x + y * y]]
+        )  # fmt: skip
+        found = craft.mass_properties(fill)
+        assert found.mass == pytest.approx(mass, rel=1e-12)
+        assert found.center_of_mass == pytest.approx(center, abs=1e-12)
+        assert found.inertia == pytest.approx(inertia, abs=1e-12 * inertia.max())
+
+        mine = replace(telecom.loop(fill), model=spacecraft)
+        hand = dict(DRY)
+        for number, (name, of) in enumerate(craft.tanks.items(), 1):
+            own = hubslosh.tank(of.source, fill, modes=2, nu=of.nu, gravity=400 / mass)
+            hand |= own.parameters("Spacecraft", number, position=PLACES[name])
+        by_craft, by_hand = hubslosh.margins(mine), hubslosh.margins(replace(mine, parameters=hand))
+        assert by_craft.stable and by_hand.stable
+        assert by_craft.delay_margin == pytest.approx(by_hand.delay_margin, rel=1e-9)
+        columns = ["frequency", "gain_margin", "phase_margin"]
+        assert by_craft.crossings[columns].to_numpy() == pytest.approx(
+            by_hand.crossings[columns].to_numpy(), rel=1e-9, abs=1e-9, nan_ok=True
+        )
+
+
+def test_the_numbers_of_the_readme() -> None:
+    """The craft in ten lines at most; what it weighs at 60 %."""
+    assert len(str(telecom.craft).splitlines()) <= 10
+    at = telecom.craft.mass_properties("60%")
+    assert at.mass == pytest.approx(2503.1, abs=0.1)
+    assert at.inertia[0] == pytest.approx([1580.0, -45.3, 24.8], abs=0.1)
