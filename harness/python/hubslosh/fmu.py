@@ -99,6 +99,10 @@ class Fmu:
         self.variables: dict[str, Variable] = {v.name: v for v in self.native.variables}
         atexit.register(self.native.close)
 
+    def __repr__(self) -> str:
+        """Return name, number of variables and file."""
+        return f"Fmu {self.name}: {len(self.variables)} variables, {self.path}"
+
     @classmethod
     def open(cls, model: str | Path) -> "Fmu":
         """Return the FMU of a model; see `find`."""

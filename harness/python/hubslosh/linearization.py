@@ -74,6 +74,26 @@ class LinearModel:
         """Yield A, B, C, D."""
         return iter((self.A, self.B, self.C, self.D))
 
+    def __repr__(self) -> str:
+        """Return sizes and names."""
+        from .short import names
+
+        time = "continuous" if self.period is None else f"sampled with {self.period:g} s"
+        sizes = ", ".join(
+            f"{len(of)} {what} ({names(of)})" if of else f"0 {what}"
+            for what, of in {
+                "states": self.states, "inputs": self.inputs, "outputs": self.outputs,
+            }.items()
+        )  # fmt: skip
+        return f"LinearModel, {time}: {sizes}"
+
+    def __str__(self) -> str:
+        """Return sizes, names and the first modes."""
+        from .short import rows
+
+        modes = self.modes().assign(states=lambda table: table["states"].map(", ".join))
+        return f"{self!r}\n{rows(modes) if len(modes) else 'no oscillatory modes'}"
+
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues of A by magnitude: rad/s in continuous time, otherwise in the z plane."""

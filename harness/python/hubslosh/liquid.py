@@ -79,6 +79,12 @@ class LiquidModes:
     error: "pd.DataFrame" = field(repr=False)
     """Relative difference of frequency and mass of each mode between two meshes."""
 
+    def __repr__(self) -> str:
+        """Return the liquid and its first modes."""
+        from .short import rows
+
+        return f"LiquidModes of {self.mass:.6g} kg, {self.gravity:.4g} m/s²\n{rows(self.modes)}"
+
     @property
     def modes(self) -> "pd.DataFrame":
         """A row per mode, by frequency.

@@ -15,6 +15,7 @@ from .fmu import Fmu, FmuError, Quantity, did_you_mean
 from .linearization import LinearModel, linearize, split_delay, wrong_seconds
 from .plant import TORQUE, Plant
 from .run import Run
+from .short import names
 from .simulation import (
     History,
     check_outputs,
@@ -59,6 +60,24 @@ class Loop:
     command: Sequence[str] | str = TORQUE
     latency: int = 0
     delay: float = 0.0
+
+    def __repr__(self) -> str:
+        """Return the loop in four lines."""
+        measured, command = (names_of(of, "", []) for of in (self.measured, self.command))
+        given = self.parameters
+        known = (
+            f"{len(given)} parameters" if isinstance(given, Mapping) else given or "no parameters"
+        )
+        shape = getattr(self.controller, "shape", None)
+        law = f"{shape[0]} × {shape[1]} gains" if shape and len(shape) == 2 else None
+        law = law or type(self.controller).__name__
+        late = f"{self.delay:g} s" + (f" and {self.latency} cycles" if self.latency else "")
+        return (
+            f"Loop around {Path(self.model).stem} with {known}\n"
+            f"  controller: {law}, every {self.period} s, {late} late\n"
+            f"  measured: {names(measured)}\n"
+            f"  command: {names(command)}"
+        )
 
     def problems(self) -> list[str]:
         """Return everything that is wrong with it."""

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sysconfig
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -174,6 +175,17 @@ class Identification:
     verdict: tuple[str, ...]
     """The verdict in words."""
     all: dict[str, Any]
+
+    def __repr__(self) -> str:
+        """Return verdict and estimates."""
+        every = self.parameters | self.measurement
+        lines = [
+            f"{name} = {e.value:.6g} ± {e.std:.2g} {e.unit}".rstrip() for name, e in every.items()
+        ]
+        most = 12
+        more = [f"and {len(lines) - most} more"] if len(lines) > most else []
+        words = [textwrap.shorten(line, 200, placeholder=" …") for line in self.verdict[:5]]
+        return "\n".join([f"Identification, model {self.model}", *words, *lines[:most], *more])
 
 
 def _file(table: "Table", needed: Sequence[str], path: Path) -> Path:

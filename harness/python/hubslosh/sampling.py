@@ -116,7 +116,7 @@ def monte_carlo(
     outcomes. If the FMU refuses a run, its outcomes are NaN, and the column ``refused`` has the
     reason. Any other exception ends the study; stored runs stay. `quantiles` summarises the table.
     """
-    import pandas as pd
+    from .short import ShortTable
 
     problems = _wrong(ranges) + _not_whole(runs=(runs, 1), seed=(seed, 0))
     problems += [] if workers is None else _not_whole(workers=(workers, 1))
@@ -131,7 +131,7 @@ def monte_carlo(
     runs, seed = int(runs), int(seed)  # numpy's integers too
     draws = [draw(ranges, run, seed) for run in range(runs)]
     if outcome is None:
-        return pd.DataFrame([{"run": run} | values for run, values in enumerate(draws)])
+        return ShortTable([{"run": run} | values for run, values in enumerate(draws)])
     with _opened(folder, seed, ranges) as store:
         rows = {run: {"run": run} | draws[run] | row for run, row in store.rows(draws).items()}
         missing = [run for run in range(runs) if run not in rows]
@@ -149,7 +149,7 @@ def monte_carlo(
         finally:
             bar.close()
             made.close()
-        table = pd.DataFrame([rows[run] for run in sorted(rows)])
+        table = ShortTable([rows[run] for run in sorted(rows)])
         if FAILED in table:
             table[FAILED] = table[FAILED].fillna("")
         store.finish(table.to_csv(index=False, lineterminator="\n"))
@@ -320,8 +320,9 @@ def quantiles(
     ``high`` with at least ``confidence``, for any distribution (binomial; Conover, Practical
     Nonparametric Statistics, section 3.2). They are infinite if there are too few runs.
     """
-    import pandas as pd
     from scipy.stats import binom
+
+    from .short import ShortTable
 
     check_table(table, "the table")
     check_numbers(confidence=confidence)
@@ -351,4 +352,4 @@ def quantiles(
             high = int(binom.ppf((1 + confidence) / 2, n, share)) + 1
             value = float(np.quantile(values, share)) if n else np.nan
             rows.append((name, share, value, bounded[low], bounded[min(high, n + 1)], n))
-    return pd.DataFrame(rows, columns=["result", "quantile", "value", "low", "high", "runs"])
+    return ShortTable(rows, columns=["result", "quantile", "value", "low", "high", "runs"])

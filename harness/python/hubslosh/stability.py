@@ -24,6 +24,9 @@ NEAR = 0.2
 FAR = 20
 """dB; phase crossings with larger margins are not printed."""
 
+MOST = 13
+"""Number of crossings that are printed: those with the least gain and phase margins."""
+
 LIGHT = 0.2
 """Damping ratio below which a pole is a mode to be named."""
 
@@ -75,17 +78,26 @@ class Margins:
             f"delay margin {self.delay_margin:.3g} s, modulus margin {self.modulus_margin:.3g}",
         ]
         if near := sorted({name for name in self.crossings["near"] if name}):
-            lines.append(f"crossings near lightly damped modes: {'; '.join(near)}")
+            more = f" and {len(near) - 2} groups more" if len(near) > 2 else ""
+            lines.append(f"crossings near lightly damped modes: {'; '.join(near[:2])}{more}")
         if not len(self.crossings):
             return "\n".join([*lines, "no crossings"])
-        margin = self.crossings["gain_margin"]
-        far = (margin.abs() > FAR) & ~margin.isin(self.gain_margins)
-        shown = self.crossings[~far].to_string(
-            index=False, na_rep="", float_format=lambda v: f"{v:.4g}"
-        )
+        margin, phase = self.crossings["gain_margin"].abs(), self.crossings["phase_margin"].abs()
+        far = (margin > FAR) & ~self.crossings["gain_margin"].isin(self.gain_margins)
+        # 6 dB and 45° are as good
+        ease = (margin / 6).fillna(phase / 45)[~far].sort_values(kind="stable")
+        first = self.crossings["delay_margin"].dropna().nsmallest(1).index
+        shown = self.crossings.loc[sorted({*ease.index[:MOST], *first})]
+        lines.append(shown.to_string(index=False, na_rep="", float_format=lambda v: f"{v:.4g}"))
+        if left := len(ease) - len(shown):
+            lines.append(f"and {left} crossings with larger margins")
         if far.any():
-            shown += f"\nand {far.sum()} phase crossings with gain margins beyond {FAR} dB"
-        return "\n".join([*lines, shown])
+            lines.append(f"and {far.sum()} phase crossings with gain margins beyond {FAR} dB")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        """Return the verdict in a line."""
+        return f"Margins({'; '.join(str(self).splitlines()[:2])})"
 
 
 def _degrees(value: float) -> str:

@@ -69,6 +69,14 @@ class Tank:
         table.attrs["units"] = {"frequency": "Hz", "mass": "kg", "wave": "m/rad"} | units
         return table
 
+    def __repr__(self) -> str:
+        """Return the liquid and its first modes."""
+        from .short import rows
+
+        what = f"{self.all['name']}: " if self.all.get("name") else ""
+        full = f"Tank, {what}{self.mass:.6g} kg of liquid at a fill of {self.all['fill']:.4g} m"
+        return f"{full}, {self.gravity:.4g} m/s² along the axis\n{rows(self.modes)}"
+
     def _repr_svg_(self) -> str:
         return self.picture
 

@@ -1,0 +1,38 @@
+"""Texts for ``print``: at most 20 lines."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+
+MOST = 10
+"""Rows of a table that are printed."""
+
+
+class ShortTable(pd.DataFrame):
+    """A pandas.DataFrame that prints in ten rows and eight columns; notebooks show it as ever."""
+
+    @property
+    def _constructor(self) -> Any:
+        """Return the type of a part of the table."""
+        return type(self)
+
+    def __repr__(self) -> str:
+        """Return the first and last rows."""
+        options: list[Any] = ["display.max_rows", MOST, "display.min_rows", MOST]
+        options += ["display.max_columns", 8, "display.expand_frame_repr", False]
+        with pd.option_context(*options):
+            return super().__repr__()
+
+
+def rows(table: pd.DataFrame, most: int = MOST) -> str:
+    """Return the first rows of a table, and how many follow."""
+    text = table.head(most).to_string(index=False, na_rep="", float_format=lambda x: f"{x:.4g}")
+    left = len(table) - most
+    return f"{text}\nand {left} more" if left > 0 else text
+
+
+def names(of: Sequence[str], most: int = 6) -> str:
+    """Return names with commas, the first of many."""
+    left = len(of) - most
+    return ", ".join(of[:most]) + (f" and {left} more" if left > 0 else "")
