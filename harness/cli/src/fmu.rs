@@ -65,6 +65,12 @@ pub fn installed(file: &str) -> Option<PathBuf> {
     folders().into_iter().map(|folder| folder.join(file)).find(|path| path.is_file())
 }
 
+/// A folder of the Python package that came with this command.
+pub fn came_with(folder: &str) -> Option<PathBuf> {
+    let packages = folders().into_iter().filter_map(|fmus| fmus.parent().map(Path::to_path_buf));
+    packages.map(|package| package.join(folder)).find(|path| path.is_dir())
+}
+
 /// The folders that [`INSTALLED`] means.
 fn folders() -> Vec<PathBuf> {
     let command = std::env::current_exe().and_then(|path| path.canonicalize());

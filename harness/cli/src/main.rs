@@ -44,8 +44,8 @@ use terminal::Terminal;
 
 /// Packs FMUs, checks them, simulates campaigns and reports.
 ///
-/// Without a subcommand: packs dist/HubSlosh.fmu and simulates the 22 sine sweeps of Rubaga's thesis with a linear and a
-/// spherical liquid. Writes dist/campaign/report.html and features.csv.
+/// `cargo run --release` without a subcommand packs dist/HubSlosh.fmu, simulates the 22 sine sweeps of Rubaga's thesis
+/// with a linear and a spherical liquid, and writes dist/campaign/report.html and features.csv.
 #[derive(Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Cli {
@@ -132,6 +132,7 @@ enum Command {
     Tank(tank::TankArgs),
     Gyro(gyro::GyroArgs),
     Example(example::ExampleArgs),
+    Examples(examples::ExamplesArgs),
     Identify(identify::IdentifyArgs),
     Design(design::DesignArgs),
     Release(release::ReleaseArgs),
@@ -179,6 +180,10 @@ fn main() -> ExitCode {
         if cli.parse_only {
             return Ok(0);
         }
+        if cli.command.is_none() && !is_run_by_cargo() {
+            print!("{}", command.render_help());
+            return Ok(0);
+        }
         match (cli.guarded, cli.command.is_none() || cli.fmu().is_some()) {
             (false, true) => guarded(&cli),
             (true, _) => guard::enter().map(|()| carry_out(cli)),
@@ -201,6 +206,11 @@ fn main() -> ExitCode {
     });
     guard::done(code);
     code.into()
+}
+
+/// `cargo run` sets this variable for the program that it runs.
+fn is_run_by_cargo() -> bool {
+    std::env::var_os("CARGO_MANIFEST_DIR").is_some()
 }
 
 /// Has a guarded process carry the command out.
@@ -272,6 +282,7 @@ fn carry_out(cli: Cli) -> u8 {
         Some(Command::Tank(args)) => args.run(),
         Some(Command::Gyro(args)) => args.run(),
         Some(Command::Example(args)) => args.run(),
+        Some(Command::Examples(args)) => args.run(),
         Some(Command::Identify(args)) => args.run(),
         Some(Command::Design(args)) => args.run(),
         Some(Command::Release(args)) => args.run(),

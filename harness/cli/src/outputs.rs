@@ -10,7 +10,7 @@ use files::input;
 
 /// Options whose values are files or directories that a command writes: command, option, and the endings of files that
 /// it writes there. Every other value that names a file is an input.
-const OUTPUTS: [(&str, &str, &[&str]); 20] = [
+const OUTPUTS: [(&str, &str, &[&str]); 21] = [
     ("analyse", "out", &[]),
     ("book", "out", &[]),
     ("campaign", "out", &[]),
@@ -18,6 +18,7 @@ const OUTPUTS: [(&str, &str, &[&str]); 20] = [
     ("check", "junit", &["xml"]),
     ("check", "sarif", &["sarif", "json"]),
     ("design", "out", &["csv", "parquet"]),
+    ("examples", "copy", &[]),
     ("gyro", "out", &[]),
     ("identify", "out", &["json"]),
     ("identify", "report", &["html"]),

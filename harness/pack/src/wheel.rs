@@ -213,6 +213,9 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
         .filter(|(name, _)| !name.contains("__pycache__"))
         .map(|(name, bytes)| (format!("{PACKAGE}/{name}"), bytes))
         .collect();
+    for (name, bytes) in examples(&root().join("examples"))? {
+        files.push((format!("{PACKAGE}/examples/{name}"), bytes));
+    }
     for (name, bytes) in binaries.fmus {
         files.push((format!("{PACKAGE}/fmus/{name}"), bytes));
     }
@@ -247,6 +250,20 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     let record = format!("{info}/RECORD");
     let list = files.iter().map(|(name, bytes)| record_line(name, bytes)).collect::<String>();
     files.push((record.clone(), format!("{list}{record},,\n").into_bytes()));
+    Ok(files)
+}
+
+/// Returns scripts and pages of the examples in Python, without tests; the scripts draw the pictures.
+///
+/// # Errors
+/// If a file cannot be read.
+pub fn examples(folder: &Path) -> Result<Files> {
+    let mut files = below(folder)?;
+    files.retain(|(name, _)| {
+        let file = name.rsplit('/').next().unwrap_or_default();
+        let is_test = file.starts_with("test_") || file == "conftest.py";
+        (file.ends_with(".py") || file.ends_with(".md")) && !is_test
+    });
     Ok(files)
 }
 

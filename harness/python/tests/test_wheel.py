@@ -67,6 +67,9 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
     models = [f"{model}{fmi}" for model in MODELS for fmi in ("", "-fmi3")]
     fmus = {f"hubslosh/fmus/{model}.fmu" for model in models}
     assert {"hubslosh/py.typed", *fmus} <= set(names)
+    examples = {name for name in names if name.startswith("hubslosh/examples/")}
+    assert "hubslosh/examples/12_spacecraft/spacecraft.py" in examples
+    assert not any("/test_" in name or name.endswith((".svg", ".toml")) for name in examples)
 
 
 def test_the_fmus_of_fmi_3_are_found_by_name(installed: Path, tmp_path: Path) -> None:

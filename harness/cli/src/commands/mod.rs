@@ -18,6 +18,7 @@ pub mod completions;
 pub mod design;
 pub mod estimates;
 pub mod example;
+pub mod examples;
 pub mod gyro;
 pub mod identify;
 pub mod pack;

@@ -605,3 +605,31 @@ fn an_installed_command_finds_the_fmus_that_came_with_it() {
     assert!(done.stderr.is_empty(), "nothing is built: {}", String::from_utf8_lossy(&done.stderr));
     assert_eq!(files(&place("elsewhere")), ["a.csv"]);
 }
+
+#[test]
+fn without_arguments_an_installed_command_prints_help_and_writes_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
+    // cargo sets it for the programs that it runs, tests too
+    command.env_remove("CARGO_MANIFEST_DIR").current_dir(directory.path());
+    let done = command.output().unwrap();
+    let said = String::from_utf8_lossy(&done.stdout);
+    assert!(done.status.success() && done.stderr.is_empty());
+    assert!(said.contains("Usage: hubslosh") && said.contains("examples"), "{said}");
+    assert!(files(directory.path()).is_empty());
+}
+
+#[test]
+fn examples_are_listed_and_copied_to_a_new_folder() {
+    let directory = tempfile::tempdir().unwrap();
+    let listed = hubslosh(directory.path(), &["examples"]);
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    let scripts = listed.lines().filter(|line| line.contains(". ")).count();
+    assert!(scripts >= 15 && listed.contains("12_spacecraft"), "{listed}");
+    let copied = hubslosh(directory.path(), &["examples", "--copy", "mine"]);
+    assert!(copied.status.success(), "{}", String::from_utf8_lossy(&copied.stderr));
+    let own = files(&directory.path().join("mine/12_spacecraft"));
+    assert_eq!(own, ["README.md", "spacecraft.py"]);
+    let again = || hubslosh(directory.path(), &["examples", "--copy", "mine"]);
+    refuses(directory.path(), again, &["mine", "exists", "a new folder"]);
+}
