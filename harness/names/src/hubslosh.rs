@@ -53,6 +53,8 @@ pub mod slosh {
     pub const DAMPING_LAW: &str = "slosh.damping_law";
     pub const DAMPING_LAW_KIND: &str = "slosh.damping_law_kind";
     pub const ZETA_AMPLITUDE: &str = "slosh.zeta_amplitude";
+    pub const ZETA_BREAKING: &str = "slosh.zeta_breaking";
+    pub const BREAKING_STEEPNESS: &str = "slosh.breaking_steepness";
     pub const HARDENING: &str = "slosh.hardening";
     pub const CAPILLARITY: &str = "slosh.capillarity";
     pub const CAPILLARITY_KIND: &str = "slosh.capillarity_kind";
@@ -72,6 +74,7 @@ pub mod slosh {
         pub const K: crate::Array<1> = crate::Array("slosh.table.k");
         pub const ZETA: crate::Array<1> = crate::Array("slosh.table.zeta");
         pub const WAVE: crate::Array<1> = crate::Array("slosh.table.wave");
+        pub const WAVE_NUMBER: crate::Array<1> = crate::Array("slosh.table.wave_number");
         pub const NONLINEAR_INERTIA: crate::Array<1> =
             crate::Array("slosh.table.nonlinear_inertia");
         pub const NONLINEAR_STIFFNESS: crate::Array<1> =

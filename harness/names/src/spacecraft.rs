@@ -81,6 +81,8 @@ pub mod tank {
     pub const DAMPING_LAW_KIND: crate::Array<1> = crate::Array("tank[].damping_law_kind");
     pub const G_FLOOR: crate::Array<1> = crate::Array("tank[].g_floor");
     pub const ZETA_AMPLITUDE: crate::Array<2> = crate::Array("tank[].zeta_amplitude");
+    pub const ZETA_BREAKING: crate::Array<2> = crate::Array("tank[].zeta_breaking");
+    pub const BREAKING_STEEPNESS: crate::Array<2> = crate::Array("tank[].breaking_steepness");
     pub const NONLINEAR_INERTIA: crate::Array<2> = crate::Array("tank[].nonlinear_inertia");
     pub const NONLINEAR_STIFFNESS: crate::Array<2> = crate::Array("tank[].nonlinear_stiffness");
     pub const WAVE: crate::Array<2> = crate::Array("tank[].wave");
