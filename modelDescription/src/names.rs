@@ -80,8 +80,8 @@ pub fn module<M: Model>() -> String {
     text
 }
 
-/// Returns the largest value of a parameter that counts elements of an array, as its name does not tell: the length of an
-/// array, unless it stands for an enumeration or a Boolean.
+/// Returns the largest value of an integer parameter if it is the length of an array. Parameters that stand for an
+/// enumeration or a Boolean have none.
 fn size<M: Model>(variable: &Variable<M>) -> Option<i32> {
     let Kind::Integer { max: Some(max), .. } = variable.kind else { return None };
     let lengths = |v: &Variable<M>| v.shape.iter().any(|d| i32::try_from(d.most()) == Ok(max));
