@@ -155,9 +155,12 @@ impl Settings {
         ] {
             self.reals(elements(&of(what), POINTS), values);
         }
-        for (what, values) in
-            [("mass", &table.mass), ("length", &table.length), ("hinge", &table.hinge)]
-        {
+        for (what, values) in [
+            ("mass", &table.mass),
+            ("length", &table.length),
+            ("hinge", &table.hinge),
+            ("zeta", &table.zeta),
+        ] {
             self.reals(rows(&of(what), (MODES, POINTS)), values.as_flattened());
         }
     }

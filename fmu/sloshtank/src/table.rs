@@ -289,6 +289,8 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(TABLE_OF_MODE).range(0.0, 1e4),
     V::parameter("tank.fill.hinge", |p, n| &mut p.tank.fill.hinge[n / POINTS][n % POINTS], "m", "Height of a slosh mode's hinge on the tank's axis at each point of the fill table")
         .shape(TABLE_OF_MODE),
+    V::parameter("tank.fill.zeta", |p, n| &mut p.tank.fill.zeta[n / POINTS][n % POINTS], "1", "Damping ratio of a slosh mode at g_ref at each point of the fill table; 0 at all points of a mode: zeta at every fill")
+        .shape(TABLE_OF_MODE).range(0.0, 10.0),
     V::parameter("tank.p_0", |p, n| &mut p.tank.p_0[n / 3][n % 3], "1",
         "Unit vector from hinge to bob at the start, tank axes; the FMU normalises it, for a planar mode within its plane")
         .shape(MODE_VECTOR),

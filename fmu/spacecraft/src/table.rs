@@ -468,6 +468,8 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(TABLE_OF_MODE).range(0.0, 1e4),
     V::parameter("tank[].fill.hinge", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.hinge[m][k] }, "m", "Height of a slosh mode's hinge on the tank's axis at each point of the fill table")
         .shape(TABLE_OF_MODE),
+    V::parameter("tank[].fill.zeta", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.zeta[m][k] }, "1", "Damping ratio of a slosh mode at g_ref at each point of the fill table; 0 at all points of a mode: zeta at every fill")
+        .shape(TABLE_OF_MODE).range(0.0, 10.0),
     V::parameter("tank[].p_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_0[m][k] }, "1",
         "Unit vector from hinge to bob at the start, tank axes; the FMU normalises it, for a planar mode within its plane")
         .shape(MODE_VECTOR),

@@ -87,6 +87,7 @@ pub mod tank {
         pub const MASS: crate::Array<2> = crate::Array("tank.fill.mass");
         pub const LENGTH: crate::Array<2> = crate::Array("tank.fill.length");
         pub const HINGE: crate::Array<2> = crate::Array("tank.fill.hinge");
+        pub const ZETA: crate::Array<2> = crate::Array("tank.fill.zeta");
     }
 }
 

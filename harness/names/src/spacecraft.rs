@@ -112,6 +112,7 @@ pub mod tank {
         pub const MASS: crate::Array<3> = crate::Array("tank[].fill.mass");
         pub const LENGTH: crate::Array<3> = crate::Array("tank[].fill.length");
         pub const HINGE: crate::Array<3> = crate::Array("tank[].fill.hinge");
+        pub const ZETA: crate::Array<3> = crate::Array("tank[].fill.zeta");
     }
 }
 

@@ -16,7 +16,7 @@ use crate::interpolation::Monotone;
 use crate::modal::ModalData;
 use crate::parameters::{Liquid, ParameterSet, Target, Value};
 use crate::sweep::{self, Sweep};
-use crate::table::short;
+use crate::table::{short, significant};
 use crate::tank::Tank;
 
 /// Number of fills among which points are chosen.
@@ -194,32 +194,42 @@ pub fn parameters(
         let row = ModalData { modes: row.modes[..modes].to_vec(), ..row.clone() };
         ParameterSet::new(tank, &row, target, liquid)
     };
-    let (least, mut set) = (with_modes(first)?, with_modes(last)?);
-    let value = |set: &ParameterSet, what: &str| {
-        let name = format!("{prefix}.{what}[1]");
+    let mut sets = rows.iter().map(with_modes).collect::<Result<Vec<_>, _>>()?;
+    let value = |set: &ParameterSet, what: &str, n: usize| {
+        let name = format!("{prefix}.{what}[{n}]");
         set.values.iter().find_map(|(other, value)| match value {
             Value::Real(x) if *other == name => Some(*x),
             _ => None,
         })
     };
-    if let (Some(low), Some(high)) = (value(&least, "zeta"), value(&set, "zeta"))
-        && low != high
-    {
+    let ratio = |set: &ParameterSet, n: usize| value(set, "zeta", n).unwrap_or(0.0);
+    let ratios: Vec<Vec<f64>> =
+        sets.iter().map(|set| (1..=modes).map(|n| ratio(set, n)).collect()).collect();
+    let of_mode_1 = |set: Option<&ParameterSet>, what: &str| value(set?, what, 1);
+    let third_order = ["nonlinear_inertia", "nonlinear_stiffness"]
+        .map(|what| (what, of_mode_1(sets.first(), what), of_mode_1(sets.last(), what)));
+    let [low, high] = [sets.first(), sets.last()].map(|set| of_mode_1(set, "k").unwrap_or(0.0));
+    let mut set = sets.pop().unwrap_or_else(|| unreachable!("there are at least two rows"));
+    if low != high {
         let text = format!(
-            "damping ratios and stiffnesses stay those of the largest fill while the tank drains: zeta[1] is {high:.4} there, \
-             {low:.4} at the least fill"
+            "stiffnesses stay those of the largest fill while the tank drains: k[1] is {} N/m there, {} N/m at the least fill",
+            significant(high),
+            significant(low)
         );
         set.notes.push(text.clone());
         set.warnings.push(text);
     }
-    for what in ["nonlinear_inertia", "nonlinear_stiffness"] {
-        if let Some(high) = value(&set, what) {
-            let low =
-                value(&least, what).map_or("not known".to_string(), |low| format!("{low:.4}"));
+    for (what, low, high) in third_order {
+        if let Some(high) = high {
+            let low = low.map_or("not known".to_string(), |low| format!("{low:.4}"));
             set.notes.push(format!(
                 "{what}[1] stays that of the largest fill while the tank drains: {high:.4}; at the least fill it is {low}"
             ));
         }
+    }
+    if liquid.nu.is_some() {
+        let text = "fill.zeta has the damping ratios of every fill; zeta and its interval above are those of the largest";
+        set.notes.push(text.to_string());
     }
     set.notes.push(format!(
         "table of {} fills, {} to {} m; liquid_0 is the largest, outlet the tank's lowest point",
@@ -265,6 +275,9 @@ pub fn parameters(
             real(&fill::MASS.at([n + 1, at]), mode.m);
             real(&fill::LENGTH.at([n + 1, at]), mode.l);
             real(&fill::HINGE.at([n + 1, at]), bob(row, n) + mode.l);
+            if liquid.nu.is_some() {
+                real(&fill::ZETA.at([n + 1, at]), ratios[i][n]);
+            }
         }
     }
     set.values.push((target.name(fill::POINTS), Value::Integer(rows.len() as i64)));

@@ -68,8 +68,7 @@ pub struct TankArgs {
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
     /// Kinematic viscosity of the liquid, m2/s, for damping ratios at --gravity with their intervals. Table, --out and
-    /// --parameters have them, with --sweep at every fill. --parameters of --sweep have the ratios of the largest fill
-    /// [default: none, the ratios are 0].
+    /// --parameters have them, with --sweep at every fill [default: none, the ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
     /// Surface tension, N/m, for the frequencies (in table, picture and --out at --gravity), for the centring stiffness of

@@ -207,7 +207,7 @@ fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
 }
 
 #[test]
-fn a_draining_tank_gets_the_damping_of_its_largest_fill_and_says_so() {
+fn a_draining_tank_gets_the_damping_of_every_fill() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
     let shape = "density = 1000\nshape = { cylinder = { radius = 0.5, height = 2 } }\n";
@@ -227,12 +227,12 @@ fn a_draining_tank_gets_the_damping_of_its_largest_fill_and_says_so() {
             .map(|line| line.split('=').nth(1).unwrap().trim().parse::<f64>().unwrap());
         (zeta, text, said)
     };
-    let (zeta, text, said) = written(&["--nu", "1e-6"]);
+    let (zeta, text, _) = written(&["--nu", "1e-6"]);
     // a clean wall of this size: some 0.1 %
     assert!(zeta.is_some_and(|zeta| (1e-4..1e-2).contains(&zeta)), "{zeta:?}");
-    let words =
-        "damping ratios and stiffnesses stay those of the largest fill while the tank drains";
-    assert!(text.contains(words) && said.contains(words), "{said}\n{text}");
+    for point in 1..=3 {
+        assert!(text.contains(&format!("\"tank.fill.zeta[1,{point}]\" = 0.00")), "{text}");
+    }
     let alone = ["tank", "tank.toml", "--sweep", "0.2,0.5,1", "--modes=1", "--nu=1e-6"];
     let output = hubslosh(directory.path(), &alone);
     let csv = String::from_utf8(output.stdout).unwrap();

@@ -348,12 +348,16 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
         assert!(set.notes.iter().any(|note| note.contains(&words)), "{:?}", set.notes);
         let warned = |words: &str| set.warnings.iter().any(|warning| warning.contains(words));
         assert_eq!(warned("3 points are few for this tank"), few, "{:?}", set.warnings);
-        // the ratio that stays, and what it is at the other end
-        let ratio = |fill: f64| {
-            let data = tank.solve(fill, 1).unwrap();
-            damping_of(&tank, &data, 1e-6, liquid).unwrap().modes[0].zeta
-        };
-        let [most, least] = [0.8, 0.1].map(ratio);
-        assert!(warned(&format!("zeta[1] is {most:.4} there, {least:.4} at the least")));
+        // the ratio of every fill
+        for (i, row) in table.rows.iter().enumerate() {
+            let ratio = damping_of(&tank, row, 1e-6, liquid).unwrap().modes[0].zeta;
+            let name = format!("tank.fill.zeta[1,{}]", i + 1);
+            assert!(set.values.contains(&(name, Value::Real(ratio))), "{:?}", set.values);
+        }
+        assert!(!warned("stay those of the largest fill"), "{:?}", set.warnings);
     }
+    // and the stiffness that stays
+    let wet = Liquid { sigma: Some(0.07), ..liquid };
+    let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, wet).unwrap();
+    assert!(set.warnings.iter().any(|why| why.contains("stiffnesses stay")), "{:?}", set.warnings);
 }
