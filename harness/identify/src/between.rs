@@ -149,7 +149,7 @@ pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Other
             if let Some(index) = delayed {
                 let scale = problem.unknowns[index].scale;
                 let rows = late(now) - late(behaviour);
-                let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
+                let delay = scale.value(x[index]) + rows * problem.recordings[0].torque_step();
                 x[index] = scale.variable(delay);
             }
             (x, minimum.jacobian.clone())

@@ -245,9 +245,10 @@ fn same_motion(problem: &Problem, x: &[f64], name: &str, factor: f64) -> Option<
             }
         }
     }
-    let delay = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay);
-    if let (Some(delay), "clock") = (delay, name) {
-        set(delay, values[delay] * factor, &mut there);
+    for (place, unknown) in problem.unknowns.iter().enumerate() {
+        if name == "clock" && matches!(unknown.quantity, Quantity::Delay | Quantity::AngleDelay) {
+            set(place, values[place] * factor, &mut there);
+        }
     }
     Some(there)
 }

@@ -247,6 +247,9 @@ fn unknowns(
             list.push(Unknown::asymmetry());
         }
         list.push(Unknown::delay());
+        if recordings.iter().any(|r| r.angle.is_some()) {
+            list.push(Unknown::angle_delay());
+        }
         list.extend((0..recordings.len()).map(Unknown::gyro_bias));
     }
     // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise

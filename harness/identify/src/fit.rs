@@ -5,8 +5,8 @@
 //! ```
 //!
 //! ω is the FMU's answer (see [`crate::simulate`]), s, b and δ are the gyro's scale, its bias and the delay. The second sum holds
-//! the priors. [`analysis::gauss_markov`] has the whitening filter. An encoder's angle, less an offset, adds a sum of the same
-//! form without the gyro's scale.
+//! the priors. [`analysis::gauss_markov`] has the whitening filter. An encoder's angle, less an offset, with a delay of its
+//! own, adds a sum of the same form without the gyro's scale.
 //!
 //! Far from the minimum the search is that of [`crate::minimum`]. Near it, Gauss–Newton steps reuse their sensitivities while
 //! they still reduce the cost: one simulation a step instead of one for each unknown. It ends by the Newton decrement
@@ -28,6 +28,7 @@
 //! directions move the answer by one standard deviation each, at right angles to one another. With D the differences along them,
 //! J = D L⁻¹ is as accurate along the valley as across it.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -236,7 +237,8 @@ impl<'a> Problem<'a> {
             channels.push(Channel { recording: index, signal: Signal::Rate, noise });
             if let Some(angle) = &recording.angle {
                 // the angle integrates the residual of the rate: much drift
-                let white = analysis::statistics::noise_level(angle).max(FLOOR);
+                let angle = recording.of_fresh_angle(angle);
+                let white = analysis::statistics::noise_level(&angle).max(FLOOR);
                 let noise = Noise { white, drift: 30.0, time: 100.0 };
                 channels.push(Channel { recording: index, signal: Signal::Angle, noise });
             }
@@ -350,7 +352,8 @@ impl<'a> Problem<'a> {
             }
             Signal::Angle => {
                 let offset = self.value_of(x, &Quantity::AngleOffset(i), 0.0);
-                let pairs = recording.angle.iter().flatten().zip(&motion.angle);
+                let angle = angle_at(&recording.time, motion, self.angle_lead(x));
+                let pairs = recording.angle.iter().flatten().zip(angle.iter());
                 pairs.map(|(y, theta)| y - theta - offset).collect()
             }
         }
@@ -360,8 +363,14 @@ impl<'a> Problem<'a> {
     fn fresh(&self, channel: &Channel) -> Option<&'a [bool]> {
         match channel.signal {
             Signal::Rate => self.recordings[channel.recording].fresh.as_deref(),
-            Signal::Angle => None,
+            Signal::Angle => self.recordings[channel.recording].angle_fresh.as_deref(),
         }
+    }
+
+    /// How much later the encoder's angle is taken than the gyro's rate, s.
+    fn angle_lead(&self, x: &[f64]) -> f64 {
+        let delay = self.value_of(x, &Quantity::Delay, 0.0);
+        delay - self.value_of(x, &Quantity::AngleDelay, delay)
     }
 
     fn filters(&self) -> Vec<Whitening> {
@@ -515,7 +524,14 @@ impl<'a> Problem<'a> {
                 (Quantity::Delay, Signal::Rate) => {
                     motion.acceleration.iter().map(|a| scale * a * slope).collect()
                 }
-                (Quantity::Delay, Signal::Angle) => motion.rate.iter().map(|w| w * slope).collect(),
+                (Quantity::Delay, Signal::Angle) if self.has_angle_delay() => {
+                    vec![0.0; motion.rate.len()]
+                }
+                (Quantity::Delay | Quantity::AngleDelay, Signal::Angle) => {
+                    let time = &self.recordings[c.recording].time;
+                    let rate = rate_at(time, motion, self.angle_lead(x));
+                    rate.iter().map(|w| w * slope).collect()
+                }
                 _ => vec![0.0; motion.rate.len()],
             }
         };
@@ -559,15 +575,25 @@ impl<'a> Problem<'a> {
         };
         let behind = behind.as_deref().unwrap_or(base);
         let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
+        let lead = self.angle_lead(x);
         let difference = |c: &Channel| -> Vec<f64> {
             let (a, b) = (&ahead[c.recording], &behind[c.recording]);
+            let time = &self.recordings[c.recording].time;
+            let angles = [a, b].map(|m| match c.signal {
+                Signal::Rate => Cow::Borrowed(&[][..]),
+                Signal::Angle => angle_at(time, m, lead),
+            });
             let (a, b, factor) = match c.signal {
-                Signal::Rate => (&a.rate, &b.rate, scale / width),
-                Signal::Angle => (&a.angle, &b.angle, 1.0 / width),
+                Signal::Rate => (&a.rate[..], &b.rate[..], scale / width),
+                Signal::Angle => (&*angles[0], &*angles[1], 1.0 / width),
             };
             a.iter().zip(b).map(|(a, b)| -factor * (a - b)).collect()
         };
         Ok(self.channels.iter().map(difference).collect())
+    }
+
+    fn has_angle_delay(&self) -> bool {
+        self.unknowns.iter().any(|unknown| unknown.quantity == Quantity::AngleDelay)
     }
 
     /// Steps of the differences that move the answer by [`MOVE`] at these sensitivities.
@@ -1047,6 +1073,51 @@ fn at_places(columns: &DMatrix<f64>, places: &[usize], n: usize) -> DMatrix<f64>
     all
 }
 
+/// A cubic between two rows from values and slopes at them, and its slope; beyond the ends the slope stays.
+fn hermite(time: &[f64], values: &[f64], slopes: &[f64], lead: f64) -> Vec<(f64, f64)> {
+    let last = time.len() - 1;
+    let mut row = 0;
+    let at = |t: f64| {
+        let t = t + lead;
+        while row + 1 < last && time[row + 1] <= t {
+            row += 1;
+        }
+        while row > 0 && time[row] > t {
+            row -= 1;
+        }
+        for (end, beyond) in [(0, t <= time[0]), (last, t >= time[last])] {
+            if beyond {
+                return (values[end] + slopes[end] * (t - time[end]), slopes[end]);
+            }
+        }
+        let h = time[row + 1] - time[row];
+        let u = (t - time[row]) / h;
+        let (a, b) = (values[row], values[row + 1]);
+        let (p, q) = (h * slopes[row], h * slopes[row + 1]);
+        let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
+        (a + u * (p + u * (c + u * d)), (p + u * (2.0 * c + 3.0 * u * d)) / h)
+    };
+    time.iter().copied().map(at).collect()
+}
+
+/// The angle of a motion `lead` (s) after the instants at which it was read.
+fn angle_at<'m>(time: &[f64], motion: &'m Motion, lead: f64) -> Cow<'m, [f64]> {
+    if lead == 0.0 {
+        return Cow::Borrowed(&motion.angle);
+    }
+    let cubic = hermite(time, &motion.angle, &motion.rate, lead);
+    Cow::Owned(cubic.into_iter().map(|(angle, _)| angle).collect())
+}
+
+/// The rate there.
+fn rate_at<'m>(time: &[f64], motion: &'m Motion, lead: f64) -> Cow<'m, [f64]> {
+    if lead == 0.0 {
+        return Cow::Borrowed(&motion.rate);
+    }
+    let cubic = hermite(time, &motion.angle, &motion.rate, lead);
+    Cow::Owned(cubic.into_iter().map(|(_, rate)| rate).collect())
+}
+
 /// Speeds of some of the rows, growing, rad/s.
 pub fn speeds(motion: &[Motion]) -> Vec<f64> {
     let mut speeds: Vec<f64> =
@@ -1085,6 +1156,26 @@ mod tests {
     fn channels(white: f64, drift: f64) -> [Channel; 1] {
         let noise = Noise { white, drift, time: 100.0 };
         [Channel { recording: 0, signal: Signal::Angle, noise }]
+    }
+
+    /// An encoder that is later or earlier than the gyro reads the motion's angle at its own instants.
+    #[test]
+    fn an_angle_is_known_between_rows() {
+        let time: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
+        let (sine, cosine) = (|t: f64| (15.0 * t).sin(), |t: f64| 15.0 * (15.0 * t).cos());
+        let motion = Motion {
+            angle: time.iter().map(|t| sine(*t)).collect(),
+            rate: time.iter().map(|t| cosine(*t)).collect(),
+            ..Motion::default()
+        };
+        for lead in [-0.053, -0.004, 0.0, 0.02, 0.031] {
+            let (angle, rate) = (angle_at(&time, &motion, lead), rate_at(&time, &motion, lead));
+            // the cubic's remainder, (15 h)⁴/384, and that of its slope
+            for k in 3..197 {
+                assert!((angle[k] - sine(time[k] + lead)).abs() < 3e-5, "{lead} {k}");
+                assert!((rate[k] - cosine(time[k] + lead)).abs() < 5e-3, "{lead} {k}");
+            }
+        }
     }
 
     /// To second order the sum of squares falls by the decrement's square; by how much that may be too little is for whoever asks.

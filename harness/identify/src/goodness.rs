@@ -13,7 +13,7 @@ pub fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
         let recording = &problem.recordings[channel.recording];
         let of = |x: &[f64]| match channel.signal {
             Signal::Rate => recording.of_fresh(x),
-            Signal::Angle => x.to_vec(),
+            Signal::Angle => recording.of_fresh_angle(x),
         };
         Tests::of(&of(&recording.time), &of(&recording.torque), &of(e), channel.noise.white)
     };

@@ -1,10 +1,11 @@
 //! Recordings of a bench: reading them, and what must be true of them before anything is fitted.
 //!
 //! A recording is torque command and hub rate against time, in SI units. It is not resampled: the
-//! FMU is stepped to the very instants of the rows. Where rows are missing for longer than
-//! [`LONGEST_GAP`], nobody knows the torque in between; the recording is cut there and each part has
-//! a start of its own.
+//! FMU is stepped to the very instants of the rows. Each signal has its own clock: a row without a value of a sensor is not
+//! fitted to it, and drives the FMU all the same ([`crate::clocks`]). Where torque is missing and cannot be foretold, the
+//! recording is cut ([`crate::gaps`]) and each part has a start of its own.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use analysis::innovations;
@@ -12,11 +13,10 @@ use analysis::statistics::{about_mean, correlation, deviation, mean, noise_level
 use anyhow::{Context, Result, bail, ensure};
 use files::budget;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
+use signals::table::Table;
 
-use crate::spikes;
-
-/// Longest time between two rows over which torque is joined by a line, s.
-pub const LONGEST_GAP: f64 = 0.25;
+use crate::clocks::{self, Clocked, completed};
+use crate::{gaps, sensor_faults, spikes};
 
 /// Shortest recording, s: in it, of slosh at 2.4 Hz, some fifty periods.
 pub const SHORTEST: f64 = 20.0;
@@ -25,6 +25,13 @@ pub const SHORTEST: f64 = 20.0;
 /// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
 /// damping and mass, and its intervals are as wide as that.
 pub const LONG: f64 = 120.0;
+
+/// Time after the beginning of a part that is already moving in which no sensor is fitted, s: a sensor that is late shows
+/// what happened before the part's first torque.
+const LATE: f64 = 0.1;
+
+/// Part of the rows up to which a gyro with new values in them is slower than the recording.
+const SLOW: f64 = 0.75;
 
 /// Rows of a free decay: the spectrum of its residual takes 400 sines a row.
 const DECAY_ROWS: usize = 1_000_000;
@@ -58,6 +65,34 @@ pub struct Recording {
     pub from_rest: bool,
     /// Rows with a new value of the gyro that belongs to its motion; the others are not fitted. `None`: all.
     pub fresh: Option<Vec<bool>>,
+    /// The same of the encoder.
+    pub angle_fresh: Option<Vec<bool>>,
+    /// Rows with a value of the torque; in the others it lies between those. `None`: all.
+    pub commanded: Option<Vec<bool>>,
+}
+
+/// A row among those that are filled in.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// s.
+    pub time: f64,
+    /// The row of the recording that it is.
+    pub own: Option<usize>,
+    /// A torque that is filled in, N·m.
+    pub filled: Option<f64>,
+}
+
+/// The values of the rows that a mask has.
+fn masked(values: &[f64], mask: Option<&[bool]>) -> Vec<f64> {
+    match mask {
+        None => values.to_vec(),
+        Some(mask) => values.iter().zip(mask).filter(|(_, new)| **new).map(|(v, _)| *v).collect(),
+    }
+}
+
+/// Takes a row out of a mask.
+fn take_out(mask: &mut Option<Vec<bool>>, row: usize, rows: usize) {
+    mask.get_or_insert_with(|| vec![true; rows])[row] = false;
 }
 
 impl Recording {
@@ -84,17 +119,75 @@ impl Recording {
             off_axis: self.off_axis.clone().map(|axis| axis.map(|x| x[from..to].to_vec())),
             from_rest: false,
             fresh: self.fresh.as_ref().map(|x| x[from..to].to_vec()),
+            angle_fresh: self.angle_fresh.as_ref().map(|x| x[from..to].to_vec()),
+            commanded: self.commanded.as_ref().map(|x| x[from..to].to_vec()),
+        }
+    }
+
+    /// Rows with a value of the torque.
+    pub fn commands(&self) -> Vec<usize> {
+        let commanded = self.commanded.as_deref();
+        (0..self.time.len()).filter(|k| commanded.is_none_or(|rows| rows[*k])).collect()
+    }
+
+    /// Usual time between values of the torque, s.
+    pub fn torque_step(&self) -> f64 {
+        match &self.commanded {
+            None => self.step(),
+            Some(commanded) => {
+                let time = masked(&self.time, Some(commanded));
+                (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
+            }
+        }
+    }
+
+    /// The recording on other rows.
+    pub fn with_rows(&self, rows: &[Row]) -> Recording {
+        let time: Vec<f64> = rows.iter().map(|row| row.time).collect();
+        let of = |values: &[f64], mask: Option<&[bool]>| {
+            let value = |row: &Row| {
+                let own = row.own.filter(|k| mask.is_none_or(|mask| mask[*k]));
+                own.map_or(f64::NAN, |k| values[k])
+            };
+            completed(&time, rows.iter().map(value).collect())
+        };
+        let torque: Vec<f64> = {
+            let (own, _) = of(&self.torque, self.commanded.as_deref());
+            rows.iter().zip(own).map(|(row, own)| row.filled.unwrap_or(own)).collect()
+        };
+        let commanded = |row: &Row| {
+            let own = row.own.filter(|k| self.commanded.as_ref().is_none_or(|c| c[*k]));
+            row.filled.is_some() || own.is_some()
+        };
+        let commanded: Vec<bool> = rows.iter().map(commanded).collect();
+        let (rate, fresh) = of(&self.rate, self.fresh.as_deref());
+        let angle = self.angle.as_ref().map(|angle| of(angle, self.angle_fresh.as_deref()));
+        let (angle, angle_fresh) = angle.map_or((None, None), |(angle, mask)| (Some(angle), mask));
+        let plain = |values: &Option<Vec<f64>>| values.as_ref().map(|x| of(x, None).0);
+        Recording {
+            name: self.name.clone(),
+            torque,
+            rate,
+            angle,
+            gravity: plain(&self.gravity),
+            wheel_speed: plain(&self.wheel_speed),
+            off_axis: [plain(&self.off_axis[0]), plain(&self.off_axis[1])],
+            from_rest: self.from_rest,
+            fresh,
+            angle_fresh,
+            commanded: (!commanded.iter().all(|c| *c)).then_some(commanded),
+            time,
         }
     }
 
     /// Values of the rows with a new value of the gyro.
     pub fn of_fresh(&self, values: &[f64]) -> Vec<f64> {
-        match &self.fresh {
-            None => values.to_vec(),
-            Some(fresh) => {
-                values.iter().zip(fresh).filter(|(_, new)| **new).map(|(v, _)| *v).collect()
-            }
-        }
+        masked(values, self.fresh.as_deref())
+    }
+
+    /// Values of the rows with a value of the encoder.
+    pub fn of_fresh_angle(&self, values: &[f64]) -> Vec<f64> {
+        masked(values, self.angle_fresh.as_deref())
     }
 
     /// Standard deviation of the gyro's white noise, rad/s.
@@ -115,7 +208,22 @@ impl Recording {
             off_axis: [None, None],
             from_rest: true,
             fresh: None,
+            angle_fresh: None,
+            commanded: None,
         }
+    }
+
+    /// Finds the rows in which a gyro that is slower than the recording has a new value; `false`: all have one.
+    fn with_repeats(&mut self) -> bool {
+        let places: Vec<usize> = (0..self.time.len())
+            .filter(|k| self.fresh.as_ref().is_none_or(|fresh| fresh[*k]))
+            .collect();
+        let Some(new) = fresh(&self.of_fresh(&self.rate)) else { return false };
+        let rows = self.time.len();
+        for (k, _) in new.iter().enumerate().filter(|(_, new)| !**new) {
+            take_out(&mut self.fresh, places[k], rows);
+        }
+        true
     }
 
     /// The rows from one time to another, s.
@@ -181,6 +289,29 @@ impl Recording {
     /// # Errors
     /// If times or values are out of range.
     pub fn even(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {
+        let own = self.of_gyro();
+        own.even_rows()
+    }
+
+    /// The rows of a gyro that is slower than the recording; else all.
+    pub fn of_gyro(&self) -> Cow<'_, Recording> {
+        let rows: Vec<usize> =
+            (0..self.time.len()).filter(|k| self.fresh.as_ref().is_none_or(|f| f[*k])).collect();
+        if rows.len() as f64 > SLOW * self.time.len() as f64 || rows.len() < 3 {
+            return Cow::Borrowed(self);
+        }
+        let of = |values: &Vec<f64>| rows.iter().map(|k| values[*k]).collect::<Vec<f64>>();
+        Cow::Owned(Recording {
+            angle: self.angle.as_ref().map(of),
+            gravity: self.gravity.as_ref().map(of),
+            wheel_speed: self.wheel_speed.as_ref().map(of),
+            off_axis: [0, 1].map(|axis| self.off_axis[axis].as_ref().map(of)),
+            from_rest: self.from_rest,
+            ..Recording::of(&self.name, of(&self.time), of(&self.torque), of(&self.rate))
+        })
+    }
+
+    fn even_rows(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {
         self.check()?;
         let step = self.step();
         let mut row = 0;
@@ -209,8 +340,6 @@ pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "
 pub struct Source {
     /// Columns and units of the signals.
     pub columns: Columns,
-    /// Treatment of a torque that is sampled more slowly than the rows.
-    pub slow: Between,
     /// First and last time, s.
     pub trim: Option<(f64, f64)>,
 }
@@ -223,29 +352,70 @@ pub fn read(
     coarsest: f64,
     done: &mut dyn FnMut(String),
 ) -> Result<Vec<Recording>> {
-    let signal = |name: &'static str, required: bool, between: Between| Signal {
+    let signal = |name: &'static str| Signal {
         name,
-        required,
-        between,
+        required: REQUIRED.contains(&name),
+        between: Between::Missing,
         unit: None,
     };
-    let mut signals =
-        vec![signal("omega", true, Between::Line), signal("tau_cmd", true, source.slow)];
-    signals.extend(OPTIONAL.map(|name| signal(name, false, Between::Line)));
-    let table =
-        recording::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
-    let maybe = |name: &str| table.column(name).map(<[f64]>::to_vec);
-    let column = |name: &str| maybe(name).context("a column that was read");
+    let signals: Vec<Signal> =
+        ["omega", "tau_cmd"].into_iter().chain(OPTIONAL).map(signal).collect();
+    let wanted = Wanted { signals: &signals, columns: &source.columns };
+    let table = recording::read(path, &wanted, done)?;
     let name = path.display().to_string();
-    let all = Recording {
-        angle: maybe("theta"),
-        gravity: maybe("g_axial"),
-        wheel_speed: maybe("wheel_speed"),
-        off_axis: [maybe("omega_x"), maybe("omega_y")],
-        from_rest: false,
-        ..Recording::of(&name, column("time")?, column("tau_cmd")?, column("omega")?)
-    };
+    let all = assembled(&name, &table, done).with_context(|| format!("{name} cannot be used"))?;
     prepare(trimmed(all, source.trim, done), coarsest, done)
+}
+
+/// The rows in which something was measured, from the first to the last value of the torque, with each signal on its own clock.
+fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<Recording> {
+    let column = |name: &str| table.column(name);
+    let (time, torque) = (column("time"), column("tau_cmd"));
+    let (time, torque) = time.zip(torque).context("columns that were read")?;
+    let measured: Vec<&[f64]> = ["omega", "theta"].into_iter().filter_map(column).collect();
+    let first = torque.iter().position(|v| !v.is_nan());
+    let last = torque.iter().rposition(|v| !v.is_nan());
+    let (Some(first), Some(last)) = (first, last) else { bail!("tau_cmd has no value") };
+    let is_of_use =
+        |k: &usize| !torque[*k].is_nan() || measured.iter().any(|values| !values[*k].is_nan());
+    let rows: Vec<usize> = (first..=last).filter(is_of_use).collect();
+    let at: Vec<f64> = rows.iter().map(|k| time[*k]).collect();
+    let mut of = |name: &str| -> Result<Option<Clocked>> {
+        let Some(values) = column(name) else { return Ok(None) };
+        let values: Vec<f64> = rows.iter().map(|k| values[*k]).collect();
+        let there = values.iter().filter(|v| !v.is_nan()).count();
+        ensure!(there > 1, "{name} has values in {there} rows (allowed: at least 2)");
+        if there < rows.len() {
+            let held: Vec<f64> =
+                at.iter().zip(&values).filter(|(_, v)| !v.is_nan()).map(|(t, _)| *t).collect();
+            done(format!(
+                "{name} has a value in {there} of {} rows, {:.4} s apart mostly; {}",
+                rows.len(),
+                clocks::usual(&held),
+                match name {
+                    "tau_cmd" => "the others are between its samples",
+                    "omega" | "theta" => "the others drive the model and are not fitted to it",
+                    _ => "lines join them",
+                }
+            ));
+        }
+        Ok(Some(completed(&at, values)))
+    };
+    let (rate, fresh) = of("omega")?.context("a column that was read")?;
+    let (torque, commanded) = of("tau_cmd")?.context("a column that was read")?;
+    let (angle, angle_fresh) = of("theta")?.map_or((None, None), |(v, mask)| (Some(v), mask));
+    let mut plain = |name: &str| -> Result<Option<Vec<f64>>> { Ok(of(name)?.map(|of| of.0)) };
+    Ok(Recording {
+        angle,
+        gravity: plain("g_axial")?,
+        wheel_speed: plain("wheel_speed")?,
+        off_axis: [plain("omega_x")?, plain("omega_y")?],
+        from_rest: false,
+        fresh,
+        angle_fresh,
+        commanded,
+        ..Recording::of(name, at.clone(), torque, rate)
+    })
 }
 
 /// Signals of a free decay, in the order of preference.
@@ -314,22 +484,32 @@ pub fn prepare(
 ) -> Result<Vec<Recording>> {
     let name = all.name.clone();
     check_time(&all, coarsest)?;
-    let mut cuts = vec![0];
-    for (row, pair) in all.time.windows(2).enumerate() {
-        if pair[1] - pair[0] > LONGEST_GAP.max(10.0 * all.step()) {
-            let gap = pair[1] - pair[0];
-            done(format!("{name}: cut at {:.2} s, where rows are missing for {gap:.2} s", pair[0]));
-            cuts.push(row + 1);
-        }
+    let (all, gaps) = gaps::bridged(all, done);
+    // each part begins and ends with a torque
+    let mut cuts: Vec<(usize, usize)> = Vec::new();
+    let mut from = 0;
+    for row in gaps {
+        let next = all
+            .commanded
+            .as_ref()
+            .map_or(Some(row + 1), |commanded| (row + 1..all.time.len()).find(|k| commanded[*k]));
+        let Some(next) = next else { break };
+        let gap = all.time[next] - all.time[row];
+        done(format!(
+            "{name}: cut at {:.2} s, where tau_cmd is missing for {gap:.2} s and cannot be foretold",
+            all.time[row]
+        ));
+        cuts.push((from, row + 1));
+        from = next;
     }
-    cuts.push(all.time.len());
+    cuts.push((from, all.time.len()));
     let mut parts = Vec::new();
-    for (index, pair) in cuts.windows(2).enumerate() {
-        let mut part = all.rows(pair[0], pair[1]);
+    for (index, (from, to)) in cuts.iter().enumerate() {
+        let mut part = all.rows(*from, *to);
         let seconds = if part.time.len() > 1 { part.duration() } else { 0.0 };
         if seconds < SHORTEST {
             ensure!(
-                cuts.len() > 2,
+                cuts.len() > 1,
                 "{name}: {seconds:.0} s of data are too few (allowed: at least {SHORTEST} s, and {LONG} s where the \
                  damping of a bare tank is to be seen: its slosh decays in some 23 s, its resonance is 14 mHz wide)"
             );
@@ -339,9 +519,9 @@ pub fn prepare(
             ));
             continue;
         }
-        part.fresh = fresh(&part.rate);
+        let repeats = part.with_repeats();
         part.from_rest = starts_at_rest(&part);
-        if cuts.len() > 2 {
+        if cuts.len() > 1 {
             part.name = format!("{name}, part {}", index + 1);
         }
         done(describe(&part));
@@ -352,7 +532,7 @@ pub fn prepare(
                 part.name
             ));
         }
-        if let Some(fresh) = &part.fresh {
+        if let (Some(fresh), true) = (&part.fresh, repeats) {
             let new = fresh.iter().filter(|new| **new).count();
             done(format!(
                 "{}: omega has a new value in {new} of {} rows; those are fitted",
@@ -360,7 +540,15 @@ pub fn prepare(
                 fresh.len()
             ));
         }
+        without_faults(&mut part, done);
         without_spikes(&mut part, done);
+        if !part.from_rest {
+            let rows = part.time.len();
+            for row in (0..rows).take_while(|k| part.time[*k] < part.time[0] + LATE) {
+                take_out(&mut part.fresh, row, rows);
+                take_out(&mut part.angle_fresh, row, rows);
+            }
+        }
         check_signals(&part)?;
         parts.push(part);
     }
@@ -375,9 +563,33 @@ pub fn prepare(
     Ok(parts)
 }
 
+/// Takes values that a sensor did not measure out of a part, and says which.
+fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
+    let rows = part.time.len();
+    let Recording { name, time, rate, angle, fresh, angle_fresh, .. } = part;
+    let sensors = [("omega", Some(rate), fresh), ("theta", angle.as_mut(), angle_fresh)];
+    for (sensor, whole, mask) in sensors {
+        let Some(whole) = whole else { continue };
+        let places: Vec<usize> =
+            (0..rows).filter(|k| mask.as_ref().is_none_or(|mask| mask[*k])).collect();
+        let (at, values): (Vec<f64>, Vec<f64>) =
+            places.iter().map(|k| (time[*k], whole[*k])).unzip();
+        let found = sensor_faults::find(sensor, &at, &values);
+        found.words.iter().for_each(|words| done(format!("{name}: {words}")));
+        found.rows.iter().for_each(|k| take_out(mask, places[*k], rows));
+        if let (Some(mask), false) = (&*mask, found.rows.is_empty()) {
+            // what stands there serves spectra and plots
+            let known =
+                mask.iter().zip(whole.iter()).map(|(new, v)| if *new { *v } else { f64::NAN });
+            let known = known.collect();
+            *whole = completed(time, known).0;
+        }
+    }
+}
+
 /// Takes single values that belong to no motion out of a part, and says which.
 fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
-    let found = spikes::find(&part.rate, &part.torque, part.fresh.as_deref());
+    let found = spikes::find(&part.time, &part.rate, &part.torque, part.fresh.as_deref());
     let Some(largest) = found.iter().map(|(k, y)| (part.rate[*k] - y).abs()).reduce(f64::max)
     else {
         return;
@@ -466,13 +678,24 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
         }
     );
     ensure!(step >= 1e-4, "{name}: rows are {step} s apart. Time must be in seconds");
+    let masks = [("tau_cmd", &all.commanded), ("omega", &all.fresh), ("theta", &all.angle_fresh)];
+    for (signal, mask) in masks {
+        let Some(mask) = mask else { continue };
+        let apart = clocks::usual(&masked(&all.time, Some(mask)));
+        ensure!(
+            apart <= coarsest,
+            "{name}: values of {signal} are {apart:.3} s apart, at most {:.3} s are allowed: the slosh must be seen between them. \
+             Leave its column out, or log it faster",
+            coarsest
+        );
+    }
     Ok(())
 }
 
 /// Returns true if rate and torque allow a start at rest: neither exceeds what noise, bias and the first moment of motion
 /// explain. (If both pass zero by chance in the middle of a motion, the answer is wrong, and the residual tests show it.)
 fn starts_at_rest(part: &Recording) -> bool {
-    let rate = (part.rate[0] + part.rate[1]) / 2.0;
+    let rate = mean(&part.of_fresh(&part.rate).iter().take(2).copied().collect::<Vec<_>>());
     // a gyro's bias is not motion: up to 3 % of the signal, or 5 times the noise
     let slow = rate.abs() < 5.0 * part.rate_noise() + 0.03 * deviation(&part.rate);
     slow && part.torque[0].abs() < 0.1 * deviation(&part.torque)
@@ -625,17 +848,89 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_long_gap_cuts_the_recording_and_a_short_one_does_not() {
-        let mut gap = rigid();
-        for (k, t) in gap.time.iter_mut().enumerate() {
-            *t += if k >= 7_000 { 5.0 } else { 0.0 } + if k >= 3_000 { 0.1 } else { 0.0 };
+    /// The rows of a recording without those between some.
+    fn without(all: &Recording, lost: &[std::ops::Range<usize>]) -> Recording {
+        let mut parts: Vec<Recording> = Vec::new();
+        let mut from = 0;
+        let end = all.time.len()..all.time.len();
+        for range in lost.iter().cloned().chain(std::iter::once(end)) {
+            parts.push(all.rows(from, range.start));
+            from = range.end;
         }
+        let column = |of: fn(&Recording) -> &Vec<f64>| parts.iter().flat_map(of).copied().collect();
+        Recording {
+            from_rest: false,
+            ..Recording::of(
+                "a.csv",
+                column(|r| &r.time),
+                column(|r| &r.torque),
+                column(|r| &r.rate),
+            )
+        }
+    }
+
+    #[test]
+    fn lost_rows_of_a_sweep_are_filled_and_those_of_noise_cut_the_recording() {
+        let mut random = analysis::random::Random::new(1, 0);
+        let noise: Vec<f64> = (0..15_000).map(|_| 4e-4 * random.normal()).collect();
+        let noisy = |mut recording: Recording| {
+            recording.rate.iter_mut().zip(&noise).for_each(|(w, n)| *w += n);
+            recording
+        };
+        let lost = [3_000..3_010, 7_000..7_050];
         let mut said = Vec::new();
-        let parts = prepare(gap, COARSEST, &mut |line| said.push(line)).unwrap();
-        assert_eq!(parts.iter().map(|p| p.time.len()).collect::<Vec<_>>(), [7_000, 8_000]);
-        assert!(said[0].contains("rows are missing for 5.02 s"), "{said:?}");
+        let sweep = noisy(rigid());
+        let parts = prepare(without(&sweep, &lost), COARSEST, &mut |line| said.push(line)).unwrap();
+        assert_eq!(parts.len(), 1, "{said:?}");
+        let (found, fresh) = (&parts[0], parts[0].fresh.as_ref().unwrap());
+        assert_eq!((found.time.len(), fresh.iter().filter(|f| **f).count()), (15_000, 14_935));
+        let off = found.torque.iter().zip(&sweep.torque).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 2e-4, "{said:?}");
+        assert!(
+            said[0].contains("60 samples of tau_cmd are missing in 2 gaps of up to 1.02 s"),
+            "{said:?}"
+        );
+        // a torque that nothing foretells
+        let mut jumps = sweep.clone();
+        jumps.torque.iter_mut().for_each(|t| *t += 0.05 * random.normal());
+        said.clear();
+        let parts = prepare(without(&jumps, &lost), COARSEST, &mut |line| said.push(line)).unwrap();
+        assert_eq!(parts.iter().map(|p| p.time.len()).collect::<Vec<_>>(), [3_000, 3_990, 7_950]);
+        assert!(
+            said[0].contains("tau_cmd is missing for 0.22 s and cannot be foretold"),
+            "{said:?}"
+        );
         assert!(!parts[1].from_rest);
+    }
+
+    /// Empty cells of a slow gyro: the rows drive the model all the same, at every torque.
+    #[test]
+    fn rows_without_a_sensor_keep_their_torque() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.csv");
+        let mut text = String::from("time,tau_cmd,omega,theta\n");
+        let all = rigid();
+        for k in 0..15_000 {
+            let rate = if k % 5 == 2 { all.rate[k].to_string() } else { String::new() };
+            let angle = if k % 2 == 0 { "0.1" } else { "" };
+            text += &format!("{},{},{rate},{angle}\n", all.time[k], all.torque[k]);
+        }
+        std::fs::write(&path, text).unwrap();
+        let source = Source { columns: Columns::default(), trim: None };
+        let mut said = Vec::new();
+        let parts = read(&path, &source, COARSEST, &mut |line| said.push(line)).unwrap();
+        assert_eq!((parts.len(), parts[0].torque.len()), (1, 15_000), "{said:?}");
+        assert_eq!(parts[0].torque, all.torque);
+        let (rate, angle) =
+            (parts[0].fresh.as_ref().unwrap(), parts[0].angle_fresh.as_ref().unwrap());
+        let count = |mask: &[bool]| mask.iter().filter(|new| **new).count();
+        // less those of the first 0.1 s, for it begins in motion
+        assert_eq!((count(rate), count(angle)), (2_999, 7_497));
+        assert!(
+            said.iter().any(|line| line
+                .contains("omega has a value in 3000 of 15000 rows, 0.1000 s apart mostly")),
+            "{said:?}"
+        );
     }
 
     #[test]

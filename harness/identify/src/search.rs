@@ -305,7 +305,7 @@ impl<'a> Search<'a, '_> {
         {
             return Ok(near);
         }
-        let step = self.problem.recordings[0].step();
+        let step = self.problem.recordings[0].torque_step();
         let others = between::alternatives(&self.problem, &near, self.others.as_ref());
         let said = between::evidence(&self.problem, &near, step, self.acausal, &others.all);
         self.say(format!("{}: {said}", self.model));

@@ -6,6 +6,7 @@ use host::drive::Inputs;
 use host::fmu::Fmu;
 use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA};
 
+use crate::clocks;
 use crate::recording::Recording;
 
 /// Instants closer than this are the same, s.
@@ -89,6 +90,41 @@ pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
     (0..n).map(|k| signal[k] - two[k] / 12.0 + four[k] / 90.0).collect()
 }
 
+/// Instants of a recording's torque, s, and its values there; those of a band-limited torque are joined by lines ([`smooth`]).
+/// The recording's ends are among them.
+pub fn course(recording: &Recording, intersample: Intersample) -> (Vec<f64>, Vec<f64>) {
+    let of = |values: &[f64]| recording.commands().iter().map(|k| values[*k]).collect::<Vec<_>>();
+    let (mut knots, mut torque) = match recording.commanded {
+        None => (recording.time.clone(), recording.torque.clone()),
+        Some(_) => (of(&recording.time), of(&recording.torque)),
+    };
+    if intersample == Intersample::BandLimited && knots.len() > 3 {
+        let (fine, values) = clocks::refined(&knots, &torque);
+        torque = smooth(&fine, &values);
+        knots = fine;
+    }
+    let last = recording.time.len() - 1;
+    if knots.first().is_none_or(|t| *t > recording.time[0]) {
+        knots.insert(0, recording.time[0]);
+        torque.insert(0, recording.torque[0]);
+    }
+    if knots[knots.len() - 1] < recording.time[last] {
+        knots.push(recording.time[last]);
+        torque.push(recording.torque[last]);
+    }
+    (knots, torque)
+}
+
+/// A signal at a time, on the line between two rows; `row` is the row before, and grows from call to call.
+fn at(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
+    while *row + 2 < time.len() && time[*row + 1] <= t {
+        *row += 1;
+    }
+    let k = *row;
+    let part = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
+    signal[k] + part * (signal[k + 1] - signal[k])
+}
+
 /// Setup and drive of the FMU.
 #[derive(Clone, Debug)]
 pub struct Setup {
@@ -130,19 +166,22 @@ impl Setup {
         for (name, value) in values {
             instance.set_real(&[reference(name)?], &[*value])?;
         }
-        let smoothed;
-        let torque = match self.intersample {
-            Intersample::BandLimited => {
-                smoothed = smooth(&recording.time, &recording.torque);
-                &smoothed
-            }
-            Intersample::FirstOrderHold | Intersample::ZeroOrderHold => &recording.torque,
-        };
-        let mut driven = vec![(TAU_CMD, torque.as_slice())];
-        driven.extend(recording.gravity.as_ref().map(|gravity| (G_AXIAL, gravity.as_slice())));
-        driven.extend(besides.map(|torque| (TORQUE_BESIDES, torque)));
-        let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let held = self.intersample == Intersample::ZeroOrderHold;
+        let (knots, torque) = course(recording, self.intersample);
+        let at_knots = |signal: &[f64]| -> Vec<f64> {
+            if knots.len() == recording.time.len() && knots == recording.time {
+                return signal.to_vec();
+            }
+            let mut row = 0;
+            let value = |t: &f64| at(&recording.time, signal, *t, &mut row);
+            knots.iter().map(value).collect()
+        };
+        let gravity = recording.gravity.as_deref().map(at_knots);
+        let besides = besides.map(at_knots);
+        let mut driven = vec![(TAU_CMD, torque.as_slice())];
+        driven.extend(gravity.as_ref().map(|gravity| (G_AXIAL, gravity.as_slice())));
+        driven.extend(besides.as_ref().map(|torque| (TORQUE_BESIDES, torque.as_slice())));
+        let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let inputs = Inputs::new(fmu.description(), &names, held)?;
         let time = &recording.time;
         let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
@@ -155,7 +194,7 @@ impl Setup {
             Read::States => &outputs[..2],
         };
         let mut motion = Motion::default();
-        // the row that is read next; the row from which on the signals go to the one after it
+        // the row that is read next; the knot from which on the signals go to the one after it
         let (mut row, mut knot) = (0, 0);
         inputs.drive(&mut instance, time[0], |instance, t, course| {
             let target = loop {
@@ -174,16 +213,16 @@ impl Setup {
                 }
                 row += 1;
             };
-            if time.get(knot + 1).is_some_and(|end| t >= *end) {
+            if knots.get(knot + 1).is_some_and(|end| t >= *end) {
                 knot += 1;
             }
-            let end = time.get(knot + 1).copied();
+            let end = knots.get(knot + 1).copied();
             for (i, signal) in signals.iter().enumerate() {
                 course.slopes[i] = match end {
-                    Some(end) if !held => (signal[knot + 1] - signal[knot]) / (end - time[knot]),
+                    Some(end) if !held => (signal[knot + 1] - signal[knot]) / (end - knots[knot]),
                     _ => 0.0,
                 };
-                course.values[i] = signal[knot] + course.slopes[i] * (t - time[knot]);
+                course.values[i] = signal[knot] + course.slopes[i] * (t - knots[knot]);
             }
             Ok(Some(end.filter(|end| *end < target + SAME).unwrap_or(target)))
         })?;

@@ -1,18 +1,22 @@
 //! Single values of the gyro that belong to no motion: transmission errors, bits that fell over.
 //!
-//! A value is held against the cubic through its two neighbours on either side,
+//! A value is held against the cubic through its two neighbours on either side, at even rows
 //!
 //! ```text
 //! r_k = y_k − (−y_{k−2} + 4 y_{k−1} + 4 y_{k+1} − y_{k+2})/6
 //! ```
 //!
 //! White noise σ makes √(1 + 34/36) σ = 1.39 σ of it, a motion of a few hertz next to nothing, a step of the torque a kink.
+//! At uneven rows r is scaled to the same noise. The limit follows the values around: a resonance that is sampled slowly is in
+//! all of them.
 //! The largest is taken out first, for a spike spoils the cubic of its neighbours. The rows are left out of the fit, which is
 //! Hampel's loss with its three bends in one place: far out a value has no weight at all.
 
 use std::collections::{BTreeMap, BinaryHeap};
 
 use analysis::statistics::{median, noise_level, peak};
+
+use crate::clocks::weights;
 
 /// Deviations of r beyond which a value is a spike; of 135,000 rows of noise none is in 10¹⁴ recordings.
 const BEYOND: f64 = 10.0;
@@ -25,23 +29,47 @@ const NEAR_STEP: usize = 3;
 /// Part of the torque's peak that is a step from one row to the next.
 const STEP: f64 = 0.5;
 
-/// Rows of an evenly sampled rate whose value is a spike, growing, each with the cubic's rate; of `fresh` rows alone where given.
+/// Rows on either side whose median is what is usual around a row.
+const AROUND: usize = 50;
+
+/// Returns the differences of values at growing times from the cubics through their neighbours, scaled to the noise of even rows.
+/// They are 0 at the ends.
+pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
+    let sound = Sound { rows: y.len(), out: BTreeMap::new() };
+    let inner = 2..y.len().saturating_sub(2);
+    (0..y.len())
+        .map(|k| if inner.contains(&k) { off((time, y), &sound, k).0 } else { 0.0 })
+        .collect()
+}
+
+/// Rows of a rate whose value is a spike, growing, each with the cubic's rate; of `fresh` rows alone where given.
 /// Empty where there are none, or more than can be called so.
-pub fn find(rate: &[f64], torque: &[f64], fresh: Option<&[bool]>) -> Vec<(usize, f64)> {
+pub fn find(
+    time: &[f64],
+    rate: &[f64],
+    torque: &[f64],
+    fresh: Option<&[bool]>,
+) -> Vec<(usize, f64)> {
     let rows: Vec<usize> = (0..rate.len()).filter(|&k| fresh.is_none_or(|f| f[k])).collect();
-    let y: Vec<f64> = rows.iter().map(|&k| rate[k]).collect();
+    let (t, y): (Vec<f64>, Vec<f64>) = rows.iter().map(|&k| (time[k], rate[k])).unzip();
     if y.len() < 100 {
         return Vec::new();
     }
     let mut sound = Sound { rows: y.len(), out: BTreeMap::new() };
     let residuals: Vec<f64> =
-        (2..y.len() - 2).map(|k| (y[k] - cubic(&y, &sound, k)).abs()).collect();
+        off_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
     // the median of |r| is 0.6745 σ for noise, and more where friction's kinks are in many rows
-    let typical = median(&residuals).map_or(0.0, |m| m / 0.6745);
-    let limit = BEYOND * typical.max(GAIN * noise_level(&y));
+    let typical = |residuals: &[f64]| median(residuals).map_or(0.0, |m| m / 0.6745);
+    let around: Vec<f64> = residuals.chunks(AROUND).map(typical).collect();
+    let usual = typical(&residuals).max(GAIN * noise_level(&y));
+    let limit = |k: usize| {
+        let chunk = (k.max(2) - 2) / AROUND;
+        let near = chunk.saturating_sub(1)..(chunk + 2).min(around.len());
+        BEYOND * around[near].iter().copied().fold(usual, f64::max)
+    };
     let step = STEP * peak(torque);
     let suspects: Vec<usize> = (2..y.len() - 2)
-        .filter(|&k| residuals[k - 2] > limit && !near_step(torque, rows[k], step))
+        .filter(|&k| residuals[k - 2] > limit(k) && !near_step(torque, rows[k], step))
         .collect();
     let most = (FEW * y.len() as f64) as usize;
     // a spike is in the cubics of four neighbours
@@ -54,9 +82,9 @@ pub fn find(rate: &[f64], torque: &[f64], fresh: Option<&[bool]>) -> Vec<(usize,
         suspects.iter().map(|&k| (residuals[k - 2].to_bits(), k)).collect();
     let mut taken: Vec<usize> = Vec::new();
     while let Some((bits, k)) = by_size.pop() {
-        let off = |sound: &Sound, k: usize| (y[k] - cubic(&y, sound, k)).abs();
-        if f64::from_bits(bits) <= limit {
-            break;
+        let off = |sound: &Sound, k: usize| off((&t, &y), sound, k).0.abs();
+        if f64::from_bits(bits) <= limit(k) {
+            continue;
         }
         if !sound.has(k) || off(&sound, k).to_bits() != bits {
             continue;
@@ -68,7 +96,7 @@ pub fn find(rate: &[f64], torque: &[f64], fresh: Option<&[bool]>) -> Vec<(usize,
     }
     // put back neighbours of spikes that were taken by mistake
     for k in taken.iter().copied() {
-        if (y[k] - cubic(&y, &sound, k)).abs() < limit {
+        if off((&t, &y), &sound, k).0.abs() < limit(k) {
             sound.put_back(k);
         }
     }
@@ -77,7 +105,7 @@ pub fn find(rate: &[f64], torque: &[f64], fresh: Option<&[bool]>) -> Vec<(usize,
         return Vec::new();
     }
     taken.sort_unstable();
-    taken.iter().map(|&k| (rows[k], cubic(&y, &sound, k))).collect()
+    taken.iter().map(|&k| (rows[k], off((&t, &y), &sound, k).1)).collect()
 }
 
 /// Rows without those taken out.
@@ -136,15 +164,15 @@ impl Sound {
     }
 }
 
-/// Returns the value at row k of the cubic through the two nearest sound values on either side.
-fn cubic(y: &[f64], sound: &Sound, k: usize) -> f64 {
+/// Returns the difference of row k from the cubic through the two nearest sound values on either side, scaled to the noise of even
+/// rows, and the cubic there.
+fn off((time, y): (&[f64], &[f64]), sound: &Sound, k: usize) -> (f64, f64) {
     let nodes: Vec<usize> = sound.near(k).collect();
-    let (at, gap) = (k as f64, |a: usize, b: usize| a as f64 - b as f64);
-    let weight = |&j: &usize| -> f64 {
-        let others = nodes.iter().filter(|&&i| i != j);
-        others.map(|&i| (at - i as f64) / gap(j, i)).product()
-    };
-    nodes.iter().map(|j| y[*j] * weight(j)).sum()
+    let times: Vec<f64> = nodes.iter().map(|j| time[*j]).collect();
+    let weights = weights(&times, time[k]);
+    let cubic = nodes.iter().zip(&weights).map(|(j, weight)| y[*j] * weight).sum();
+    let gain = (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt();
+    ((y[k] - cubic) * GAIN / gain.max(GAIN), cubic)
 }
 
 /// Returns true if the torque changes by more than `step` from one row to the next near a row.
@@ -171,8 +199,8 @@ mod tests {
     }
 
     fn found(spikes: &[(usize, f64)]) -> Vec<(usize, f64)> {
-        let [_, torque, rate] = with(spikes);
-        find(&rate, &torque, None)
+        let [time, torque, rate] = with(spikes);
+        find(&time, &rate, &torque, None)
     }
 
     #[test]
@@ -202,7 +230,8 @@ mod tests {
             let size = |k: usize| if burst(k) { 0.4 } else { 4e-4 };
             (0..400_000).map(|k| size(k) * random.normal()).collect()
         };
-        assert_eq!(find(&rate(), &vec![0.0; 400_000], None), []);
+        let time: Vec<f64> = (0..400_000).map(|k| 0.02 * f64::from(k)).collect();
+        assert_eq!(find(&time, &rate(), &vec![0.0; 400_000], None), []);
     }
 
     #[test]
@@ -229,12 +258,34 @@ mod tests {
     #[test]
     fn a_step_of_the_torque_makes_no_spike() {
         let [time, mut torque, mut rate] = with(&[]);
-        for (k, t) in time.into_iter().enumerate() {
+        for (k, t) in time.iter().enumerate() {
             torque[k] = if (k / 1000) % 2 == 0 { 2.0 } else { -2.0 };
             // a triangle of 4 N·m/0.3 kg·m²: its kinks are 0.09 rad/s
             let part = (t / 20.0).fract() - 0.5;
             rate[k] += 13.0 * 20.0 * (0.5 - part.abs()) / 2.0;
         }
-        assert_eq!(find(&rate, &torque, None), []);
+        assert_eq!(find(&time, &rate, &torque, None), []);
+    }
+
+    /// A resonance that a slow gyro samples three times a period, and rows that come when they like.
+    #[test]
+    fn a_motion_that_is_sampled_coarsely_or_unevenly_has_no_spikes() {
+        let mut random = Random::new(9, 0);
+        let motion = |t: f64| {
+            let resonance = 1.0 / (1.0 + ((t - 100.0) / 3.0).powi(2));
+            (2e-3 + 0.1 * resonance) * (std::f64::consts::TAU * 3.0 * t).sin()
+        };
+        for jitter in [0.0, 0.04] {
+            let time: Vec<f64> =
+                (0..2000).map(|k| 0.1 * f64::from(k) + jitter * random.uniform()).collect();
+            let rate: Vec<f64> = time.iter().map(|t| motion(*t) + 4e-4 * random.normal()).collect();
+            assert_eq!(find(&time, &rate, &vec![0.0; 2000], None), []);
+        }
+        let time: Vec<f64> =
+            (0..10_000).map(|k| 0.02 * (f64::from(k) + 0.6 * random.uniform())).collect();
+        let mut rate: Vec<f64> = time.iter().map(|t| motion(*t) + 4e-4 * random.normal()).collect();
+        rate[4000] += 0.05;
+        let found = find(&time, &rate, &vec![0.0; 10_000], None);
+        assert_eq!(found.iter().map(|(row, _)| *row).collect::<Vec<_>>(), [4000]);
     }
 }

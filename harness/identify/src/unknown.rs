@@ -43,6 +43,8 @@ pub enum Quantity {
     /// Delay from recorded torque to recorded rate, s. Torque's and gyro's own delays add up to it;
     /// torque and rate alone cannot tell one from the other.
     Delay,
+    /// Delay of the encoder's angle, s. It is that of the rate where the two sensors are equally late.
+    AngleDelay,
     /// Reading of the gyro over the rate.
     GyroScale,
     /// Reading of the gyro at rest, rad/s, one for each recording.
@@ -59,6 +61,7 @@ impl Quantity {
         match self {
             Quantity::Parameter(name) => name.clone(),
             Quantity::Delay => "delay".into(),
+            Quantity::AngleDelay => "angle_delay".into(),
             Quantity::GyroScale => "gyro_scale".into(),
             Quantity::GyroBias(recording) => format!("gyro_bias[{}]", recording + 1),
             Quantity::AngleOffset(recording) => format!("angle_offset[{}]", recording + 1),
@@ -204,6 +207,11 @@ impl Unknown {
     /// The delay from torque to rate.
     pub fn delay() -> Self {
         Unknown::new(Quantity::Delay, "s", 0.0, Scale::Linear(1e-3))
+    }
+
+    /// The delay from torque to the encoder's angle.
+    pub fn angle_delay() -> Self {
+        Unknown::new(Quantity::AngleDelay, "s", 0.0, Scale::Linear(1e-3))
     }
 
     /// The gyro's scale.

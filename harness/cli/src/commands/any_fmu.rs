@@ -85,6 +85,8 @@ pub struct Told<'a> {
     pub settings: &'a [(String, String)],
     /// `--columns`.
     pub columns: &'a str,
+    /// `--rate`.
+    pub rate: Option<f64>,
     /// The FMU.
     pub fmu: &'a Path,
     /// JSON in place of tables.
@@ -188,7 +190,7 @@ impl AnyFmuArgs {
     pub fn identify(&self, told: &Told, out: &Out) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;
-        let columns = Columns::of_variables(list(told.columns))?;
+        let columns = Columns::of_variables(list(told.columns))?.with_rate(told.rate)?;
         let mut notes = Vec::new();
         let mut records = Vec::new();
         for path in told.data {
@@ -253,7 +255,7 @@ impl AnyFmuArgs {
     pub fn design(&self, told: &Told, noise: &[String]) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;
-        let columns = Columns::of_variables(list(told.columns))?;
+        let columns = Columns::of_variables(list(told.columns))?.with_rate(told.rate)?;
         let mut given = BTreeMap::new();
         for item in noise.iter().flat_map(|flag| list(flag)) {
             let (name, std) = super::setting(item)?;

@@ -113,6 +113,7 @@ impl DesignArgs {
                 data: &self.data,
                 settings: &self.settings,
                 columns: &self.columns,
+                rate: None,
                 fmu: &self.fmu,
                 json: self.json,
             };

@@ -19,7 +19,7 @@ use identify::recording::{self, Recording, Source};
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
 use names::hubslosh::fluid;
-use signals::recording::Between;
+use signals::recording::Columns;
 use std::io::Write;
 
 use super::any_fmu::{AnyFmuArgs, Out, PointsArgs, Told};
@@ -125,6 +125,9 @@ pub struct IdentifyArgs {
         hide_default_value = true
     )]
     columns: String,
+    /// Sampling rate of a file without a time column, rows per second.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
     /// Fits an empty tank: no slosh model, all inertia belongs to the hub.
     #[arg(conflicts_with = "free", long)]
     empty: bool,
@@ -287,6 +290,7 @@ impl IdentifyArgs {
                 data: &self.data,
                 settings: &self.settings,
                 columns: &self.columns,
+                rate: self.rate,
                 fmu: &self.fmu,
                 json: self.json,
             };
@@ -381,11 +385,8 @@ impl IdentifyArgs {
 
     /// Options for reading the recordings.
     fn source(&self, trim: Option<(f64, f64)>) -> Result<Source> {
-        let slow = match self.intersample() {
-            Some(Intersample::FirstOrderHold | Intersample::BandLimited) => Between::Line,
-            Some(Intersample::ZeroOrderHold) | None => Between::Held,
-        };
-        Ok(Source { columns: self.columns.parse()?, slow, trim })
+        let columns: Columns = self.columns.parse()?;
+        Ok(Source { columns: columns.with_rate(self.rate)?, trim })
     }
 
     /// Reads free decays, which are of one signal, and identifies.

@@ -14,6 +14,7 @@ use identify::options::Options;
 use identify::recording::{Recording, Source, prepare, read};
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
+use signals::recording::Columns;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 use crate::habits::Written;
@@ -59,7 +60,7 @@ pub struct Twin {
     drift: Vec<f64>,
 }
 
-/// What a recording has of a twin.
+/// Signals of a twin as its sensors read them.
 pub struct Measured {
     /// N·m, at the instants of the commands.
     pub torque: Vec<f64>,
@@ -249,7 +250,7 @@ impl Twin {
         instants.iter().map(|t| self.clock * t).collect()
     }
 
-    /// What is measured at these instants (s) if the torque is commanded at those of `commands`; the encoder is
+    /// Reads the sensors at these instants (s) under a torque that is commanded at those of `commands`; the encoder is
     /// `encoder_delay` (s) late.
     pub fn measure(&self, commands: &[f64], instants: &[f64], encoder_delay: f64) -> Measured {
         let torque = self.torque();
@@ -306,11 +307,8 @@ impl Twin {
     ) -> Result<Identification> {
         let options = Options { intersample: self.told(), models, ..Options::default() };
         let coarsest = options.nominal(fmu)?.coarsest();
-        let source = Source {
-            columns: written.columns.parse()?,
-            slow: signals::recording::Between::Held,
-            trim: written.trim,
-        };
+        let columns: Columns = written.columns.parse()?;
+        let source = Source { columns: columns.with_rate(written.rate)?, trim: written.trim };
         let parts = read(&written.path, &source, coarsest, &mut |line| hear(&line))?;
         output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
     }

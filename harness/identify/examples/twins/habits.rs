@@ -34,12 +34,12 @@ pub const HABITS: [&str; 20] = [
     "frozen",
 ];
 
-/// A file, and what its user states of it.
+/// A file, and the options with which its user reads it.
 #[derive(Default)]
 pub struct Written {
     /// Its place.
     pub path: PathBuf,
-    /// As `--columns` takes it.
+    /// Value of `--columns`.
     pub columns: String,
     /// First and last time that are used, s.
     pub trim: Option<(f64, f64)>,

@@ -729,6 +729,8 @@ fn given(problem: &Problem, options: &Options, liquid: f64) -> Result<Vec<(usize
 /// Estimates friction and inertia from recordings whose liquid does not move.
 pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Result<Found> {
     ensure!(!recordings.is_empty(), "there is no recording");
+    let own: Vec<Recording> = recordings.iter().map(|r| r.of_gyro().into_owned()).collect();
+    let recordings = &own[..];
     for recording in recordings {
         recording.check()?;
         ensure!(

@@ -580,7 +580,7 @@ fn torque_between_rows(
     if options.intersample.is_some() || !between::matters(problem.recordings) {
         return Ok(BetweenRows::default());
     }
-    let (step, acausal) = (problem.recordings[0].step(), options.acausal);
+    let (step, acausal) = (problem.recordings[0].torque_step(), options.acausal);
     let mut others = between::alternatives(problem, found, before).all;
     if let Some(best) = between::better(found.cost, step, acausal, &others) {
         let before = std::mem::replace(&mut problem.setup.intersample, best.behaviour);
@@ -606,7 +606,7 @@ fn torque_between_rows(
 /// A rate that comes before the torque, if that is not allowed, in words.
 fn acausal(problem: &Problem, found: &Polished, options: &Options) -> Option<String> {
     let (delay, std) = between::delay(problem, &found.x, &found.covariance)?;
-    let step = problem.recordings[0].step();
+    let step = problem.recordings[0].torque_step();
     (!options.acausal && between::is_acausal((delay, std), step)).then(|| {
         format!(
             "the rate comes {:.2} ± {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \

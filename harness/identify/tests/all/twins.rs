@@ -4,6 +4,7 @@ use host::fmu::Fmu;
 use pack::packed_for_tests;
 
 use crate::draw::Twin;
+use crate::habits::{self, HABITS};
 
 /// Identified as a user would, it is described, nothing is further off than five standard deviations, and the intervals of `held` hold the truth.
 fn is_described(seed: u64, held: &[&str]) {
@@ -65,4 +66,29 @@ fn a_point_of_the_profile_that_went_astray_ends_no_interval() {
     let truth = twin.truths().into_iter().find(|(name, _)| *name == "friction.omega_s").unwrap().1;
     // 3 of 1000 recordings are further off than that, and the seed is fixed
     assert!((speed.value - truth).abs() < 3.0 * speed.std, "{truth}, found {speed:?}");
+}
+
+/// Each twin is refused, or the verdict is that no model fits, where rows without a gyro lose their torque, printed times are taken at
+/// their word, gaps are joined by lines, one delay serves two sensors or rows are held that the torque's clock does not have.
+#[test]
+#[ignore = "minutes: .ci/run --nightly"]
+fn recordings_with_the_habits_of_loggers_are_described() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let (mut inside, mut all) = (0, 0);
+    for (seed, habit) in (1..).zip(HABITS) {
+        let twin = habits::of(Twin::draw(seed, 200.0), habit);
+        let written = habits::write(&twin, habit, directory.path()).unwrap();
+        let found = twin.identify_file(&fmu, twin.models(), &written, &|_| {}).unwrap();
+        assert!(found.converged && found.fits == Some(true), "{habit}: {:?}", found.verdict);
+        for (name, truth) in twin.truths() {
+            let p = found.parameters.get(name).or(found.measurement.get(name));
+            // the bias of a part is not that of the whole
+            let Some(p) = p.filter(|_| !name.starts_with("gyro_bias")) else { continue };
+            all += 1;
+            inside += usize::from((p.interval[0]..=p.interval[1]).contains(&truth));
+        }
+    }
+    // of 200 intervals with 95 % one in 1000 sets has fewer than 180
+    assert!(10 * inside > 9 * all, "{inside} of {all}");
 }

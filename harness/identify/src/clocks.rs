@@ -1,0 +1,166 @@
+//! Signals on clocks of their own, on one set of rows: which rows have a value of a signal, and what stands in the others.
+//!
+//! The rows of a recording are all instants at which something was measured. A sensor that has no value in a row is not fitted
+//! there; a torque that has none lies between its own samples. The values that stand in such rows serve spectra and plots alone.
+
+use std::f64::consts::PI;
+
+/// Spacing of values, in usual ones, up to which a cubic joins them.
+const NEAR: f64 = 2.5;
+/// Rows of a torque that are wider apart than this, s, are no broken line of a band-limited torque: lines then leave images of it.
+const COARSE: f64 = 0.035;
+/// Time between the instants that a coarse torque gets, s, at most.
+const FINE: f64 = 0.02;
+/// Half the length of the kernel that interpolates a coarse torque, in its samples.
+const KERNEL: isize = 24;
+/// Shape of its Kaiser window: side lobes of 80 dB.
+const SHAPE: f64 = 7.9;
+
+/// Values at all rows, and the rows that had one; `None`: all.
+pub type Clocked = (Vec<f64>, Option<Vec<bool>>);
+
+/// Completes values that are NaN in rows without one.
+///
+/// Those between others are on the cubic through the four nearest ones or, where some were lost, on a line.
+pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
+    let there: Vec<bool> = values.iter().map(|v| !v.is_nan()).collect();
+    if there.iter().all(|there| *there) {
+        return (values, None);
+    }
+    let rows: Vec<usize> = (0..values.len()).filter(|k| there[*k]).collect();
+    let usual = usual(&rows.iter().map(|k| time[*k]).collect::<Vec<_>>());
+    let mut next = 0;
+    let filled = (0..values.len()).map(|k| {
+        while next < rows.len() && rows[next] < k {
+            next += 1;
+        }
+        match (next.checked_sub(1).map(|n| rows[n]), rows.get(next).copied()) {
+            (_, Some(b)) if b == k => values[k],
+            (Some(a), Some(b)) => {
+                let far = [next.checked_sub(2).map(|n| rows[n]), rows.get(next + 1).copied()];
+                let is_near = |pair: &[usize]| time[pair[1]] - time[pair[0]] < NEAR * usual;
+                let nodes: Vec<usize> =
+                    [far[0], Some(a), Some(b), far[1]].into_iter().flatten().collect();
+                match nodes.windows(2).all(is_near) {
+                    true => through(&nodes, time, &values, time[k]),
+                    false => through(&[a, b], time, &values, time[k]),
+                }
+            }
+            (Some(only), None) | (None, Some(only)) => values[only],
+            (None, None) => f64::NAN,
+        }
+    });
+    (filled.collect(), Some(there))
+}
+
+/// The median of the times between rows, s.
+pub fn usual(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len().saturating_sub(1) / 2;
+    if steps.is_empty() {
+        f64::INFINITY
+    } else {
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}
+
+/// Lagrange's weights of nodes at a time.
+pub fn weights(nodes: &[f64], at: f64) -> Vec<f64> {
+    let weight = |(j, node): (usize, &f64)| -> f64 {
+        let others = nodes.iter().enumerate().filter(|(i, _)| *i != j);
+        others.map(|(_, other)| (at - other) / (node - other)).product()
+    };
+    nodes.iter().enumerate().map(weight).collect()
+}
+
+fn through(nodes: &[usize], time: &[f64], values: &[f64], at: f64) -> f64 {
+    let times: Vec<f64> = nodes.iter().map(|k| time[*k]).collect();
+    weights(&times, at).iter().zip(nodes).map(|(weight, k)| weight * values[*k]).sum()
+}
+
+/// Samples of a torque, and those of a band-limited one at instants close enough for lines: the samples themselves unless they are
+/// coarse. Even samples are interpolated by a windowed sinc, which is odd about the ends; uneven ones by cubics.
+pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let n = time.len();
+    let step = (time[n - 1] - time[0]) / (n - 1) as f64;
+    if step <= COARSE {
+        return (time.to_vec(), values.to_vec());
+    }
+    let parts = (step / FINE).ceil() as usize;
+    let even = time.windows(2).all(|t| (t[1] - t[0] - step).abs() < 0.01 * step);
+    let sample = |k: isize| match k {
+        k if k < 0 => 2.0 * values[0] - values[(-k as usize).min(n - 1)],
+        k if k as usize >= n => {
+            2.0 * values[n - 1] - values[(2 * (n - 1)).saturating_sub(k as usize)]
+        }
+        k => values[k as usize],
+    };
+    let between = |k: usize, part: f64| -> f64 {
+        if even {
+            let k = k as isize;
+            return (1 - KERNEL..=KERNEL).map(|j| sample(k + j) * kernel(part - j as f64)).sum();
+        }
+        let from = k.saturating_sub(1).min(n.saturating_sub(4));
+        let nodes: Vec<usize> = (from..(from + 4).min(n)).collect();
+        through(&nodes, time, values, time[k] + part * (time[k + 1] - time[k]))
+    };
+    let (mut fine_time, mut fine) = (vec![time[0]], vec![values[0]]);
+    for k in 0..n - 1 {
+        for j in 1..parts {
+            let part = j as f64 / parts as f64;
+            fine_time.push(time[k] + part * (time[k + 1] - time[k]));
+            fine.push(between(k, part));
+        }
+        fine_time.push(time[k + 1]);
+        fine.push(values[k + 1]);
+    }
+    (fine_time, fine)
+}
+
+/// Sinc under a Kaiser window, x in samples.
+fn kernel(x: f64) -> f64 {
+    let bessel = |z: f64| {
+        let mut term = 1.0;
+        (1..60).fold(1.0, |sum, k| {
+            term *= (0.5 * z / f64::from(k)).powi(2);
+            sum + term
+        })
+    };
+    let inside = 1.0 - (x / KERNEL as f64).powi(2);
+    if inside <= 0.0 {
+        return 0.0;
+    }
+    let sinc = if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) };
+    sinc * bessel(SHAPE * inside.sqrt()) / bessel(SHAPE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_gyro_is_completed_and_its_own_rows_are_known() {
+        let time: Vec<f64> = (0..2000).map(|k| 0.02 * f64::from(k)).collect();
+        let sine = |t: f64| (2.0 * PI * 2.0 * t).sin();
+        let values =
+            time.iter().enumerate().map(|(k, t)| if k % 3 == 1 { sine(*t) } else { f64::NAN });
+        let (filled, there) = completed(&time, values.collect());
+        let there = there.unwrap();
+        assert_eq!(there.iter().filter(|there| **there).count(), 667);
+        let worst = time.iter().zip(&filled).skip(10).take(1980).map(|(t, y)| (y - sine(*t)).abs());
+        assert!(worst.fold(0.0, f64::max) < 0.02);
+        assert_eq!(completed(&time, filled.clone()), (filled, None));
+    }
+
+    #[test]
+    fn a_band_limited_torque_of_10_hz_is_known_between_its_samples() {
+        let sine = |t: f64| (2.0 * PI * 3.6 * t + 0.4).sin() + 0.5 * (2.0 * PI * 1.3 * t).cos();
+        let time: Vec<f64> = (0..600).map(|k| 0.1 * f64::from(k)).collect();
+        let (fine, found) = refined(&time, &time.iter().map(|t| sine(*t)).collect::<Vec<_>>());
+        assert_eq!(fine.len(), 5 * 599 + 1);
+        let off = fine.iter().zip(&found).map(|(t, y)| (t, (y - sine(*t)).abs()));
+        // but for the ends, where the kernel has only half its samples
+        let inner = off.filter(|(t, _)| (3.0..56.0).contains(*t));
+        assert!(inner.map(|(_, off)| off).fold(0.0, f64::max) < 1e-3);
+    }
+}

@@ -1,0 +1,202 @@
+//! Values of a sensor that are not its motion: repeated by the logger, clipped at the end of the range, frozen. They are named and
+//! not fitted.
+
+use analysis::statistics::{mean, median, noise_level, peak};
+
+use crate::spikes;
+
+/// Fewest values at an end of the range that are clipped, and how many times as many they are as values just inside it.
+const CLIPPED: (usize, f64) = (20, 4.0);
+/// Width of that inside, in units of the noise.
+const INSIDE: f64 = 3.0;
+/// Step, in units of the noise, that a value takes when it comes back from being clipped or frozen; a hub at rest leaves slowly.
+const LEAVES: f64 = 5.0;
+/// Probability that a run of equal values is chance.
+const CHANCE: f64 = 1e-6;
+/// Fewest values in a frozen run.
+const SHORTEST_RUN: usize = 5;
+/// Fewest repeats, and how much larger their mean square off the neighbours is than that of other values.
+const REPEATS: (usize, f64) = (10, 3.0);
+/// Part of the largest value that rounding may make.
+const ROUNDING: f64 = 1e-9;
+
+/// Faults of a sensor.
+#[derive(Debug, Default, PartialEq)]
+pub struct Faults {
+    /// Values that are not to be fitted.
+    pub rows: Vec<usize>,
+    /// Sentences that name them.
+    pub words: Vec<String>,
+}
+
+/// Looks for faults in values, of `name`, at growing times, s.
+pub fn find(name: &str, time: &[f64], values: &[f64]) -> Faults {
+    let mut found = Faults::default();
+    if values.len() < 100 {
+        return found;
+    }
+    let noise = noise_level(values);
+    let mut out = vec![false; values.len()];
+    let at = |k: usize| format!("{:.2} s", time[k]);
+    for (end, sign) in [("upper", 1.0), ("lower", -1.0)] {
+        let rows = clipped(values, sign, noise);
+        if let [first, .., last] = rows[..] {
+            found.words.push(format!(
+                "{name} is clipped: {} values are {:.4e}, the {end} end of its range, between {} and {}; they are not fitted",
+                rows.len(),
+                values[first],
+                at(first),
+                at(last)
+            ));
+        }
+        for k in rows {
+            // close to the limit noise is cut on one side
+            (k.saturating_sub(1)..=(k + 1).min(values.len() - 1)).for_each(|k| out[k] = true);
+        }
+    }
+    let runs = frozen(values, &out, noise);
+    if let Some((first, _)) = runs.first() {
+        let longest = runs.iter().map(|(a, b)| time[*b] - time[*a]).fold(0.0, f64::max);
+        found.words.push(format!(
+            "{name} is frozen {} times for up to {longest:.2} s, first at {}; those values are not fitted",
+            runs.len(),
+            at(*first)
+        ));
+    }
+    runs.iter().for_each(|(first, last)| out[first + 1..=*last].fill(true));
+    let repeats = repeated(time, values, &out);
+    if !repeats.is_empty() {
+        found.words.push(format!(
+            "{} of {} values of {name} only repeat the one before, though it moves; they are not fitted",
+            repeats.len(),
+            values.len()
+        ));
+    }
+    repeats.into_iter().for_each(|k| out[k] = true);
+    found.rows = (0..values.len()).filter(|k| out[*k]).collect();
+    found
+}
+
+/// Rows at an end of the range, if that clips.
+fn clipped(values: &[f64], sign: f64, noise: f64) -> Vec<usize> {
+    let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
+    let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
+    let beside = |v: &&f64| (end - INSIDE * noise..end).contains(&(sign * **v));
+    let inside = values.iter().filter(beside).count();
+    let is_run = |k: &&usize| {
+        let equal = |j: usize| values.get(j) == Some(&values[**k]);
+        **k > 0 && equal(**k - 1) || equal(**k + 1)
+    };
+    let in_runs = rows.iter().filter(is_run).count();
+    let steps: Vec<f64> = rows
+        .iter()
+        .filter_map(|k| values.get(k + 1).map(|next| (next - values[*k]).abs()))
+        .filter(|step| *step > 0.0)
+        .collect();
+    let leaves = median(&steps).is_some_and(|step| step > LEAVES * noise);
+    let many = rows.len() >= CLIPPED.0 && rows.len() as f64 > CLIPPED.1 * inside as f64;
+    if many && leaves && 2 * in_runs > rows.len() { rows } else { Vec::new() }
+}
+
+/// First and last rows of runs of equal values that chance does not make, that are off the mean and that end in a jump. A hub at
+/// rest reads its gyro's bias, which is near the mean.
+fn frozen(values: &[f64], out: &[bool], noise: f64) -> Vec<(usize, usize)> {
+    let mut runs = Vec::new();
+    let mut first = 0;
+    for k in 1..=values.len() {
+        if values.get(k) != Some(&values[first]) {
+            runs.push((first, k - 1));
+            first = k;
+        }
+    }
+    let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= SHORTEST_RUN;
+    let mean = mean(values);
+    let repeats: usize = runs.iter().filter(|run| !is_long(run)).map(|(a, b)| b - a).sum();
+    let chance = (repeats + 1) as f64 / values.len() as f64;
+    let least = 1.0 + (CHANCE / values.len() as f64).ln() / chance.ln();
+    let is_frozen = |run: &&(usize, usize)| {
+        let (a, b) = **run;
+        let jump = values.get(b + 1).is_some_and(|next| (next - values[b]).abs() > LEAVES * noise);
+        let moves = (values[b] - mean).abs() > LEAVES * noise;
+        is_long(run) && (b - a + 1) as f64 >= least && jump && moves && !out[a] && !out[b]
+    };
+    runs.iter().filter(is_frozen).copied().collect()
+}
+
+/// Rows that repeat the value before them, if they do so where it moves.
+fn repeated(time: &[f64], values: &[f64], out: &[bool]) -> Vec<usize> {
+    let repeats: Vec<usize> =
+        (1..values.len()).filter(|k| values[*k] == values[k - 1] && !out[*k]).collect();
+    if repeats.len() < REPEATS.0 {
+        return Vec::new();
+    }
+    let off = spikes::off_neighbours(time, values);
+    let squares: Vec<f64> = off.iter().map(|e| e * e).collect();
+    // the median of a χ² with one degree of freedom is 0.4549
+    let usual = median(&squares).unwrap_or(0.0) / 0.4549;
+    let usual = usual.max((ROUNDING * peak(values)).powi(2));
+    let of_repeats = repeats.iter().map(|k| squares[*k]).sum::<f64>() / repeats.len() as f64;
+    if of_repeats > REPEATS.1 * usual { repeats } else { Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use analysis::random::Random;
+
+    const LEAST: f64 = 1.5e-4;
+
+    /// 200 s at 50 Hz of a motion of 2 Hz whose amplitude grows, read by a gyro that rounds.
+    fn gyro() -> (Vec<f64>, Vec<f64>) {
+        let mut random = Random::new(5, 0);
+        let time: Vec<f64> = (0..10_000).map(|k| 0.02 * f64::from(k)).collect();
+        let rate = time.iter().map(|t| {
+            let motion = 5e-4 * t * (std::f64::consts::TAU * 2.0 * t).sin();
+            ((motion + 4e-4 * random.normal()) / LEAST).round() * LEAST
+        });
+        let rate = rate.collect();
+        (time, rate)
+    }
+
+    fn words(time: &[f64], values: &[f64]) -> (usize, String) {
+        let found = find("omega", time, values);
+        (found.rows.len(), found.words.join("\n"))
+    }
+
+    #[test]
+    fn a_sound_gyro_has_no_faults() {
+        let (time, mut rate) = gyro();
+        assert_eq!(find("omega", &time, &rate), Faults::default());
+        // a hub that rests for 20 s under a gyro that is coarser than its noise
+        rate[..1000].fill(3e-4);
+        assert_eq!(find("omega", &time, &rate), Faults::default());
+        // a coarse gyro
+        rate.iter_mut().for_each(|w| *w = (*w / 5e-3).round() * 5e-3);
+        assert_eq!(find("omega", &time, &rate), Faults::default());
+    }
+
+    #[test]
+    fn each_fault_is_named() {
+        let (time, rate) = gyro();
+        let clipped: Vec<f64> = rate.iter().map(|w| w.clamp(-0.06, 0.06)).collect();
+        let (rows, said) = words(&time, &clipped);
+        assert!(said.contains("omega is clipped") && said.contains("the upper end"), "{said}");
+        // 42 % of the rows from 120 s on, and a neighbour on each side of 320 runs
+        assert!((2250..2450).contains(&rows), "{rows}");
+        let mut frozen = rate.clone();
+        for from in [5003, 7003] {
+            let value = frozen[from];
+            frozen[from..from + 30].fill(value);
+        }
+        let (rows, said) = words(&time, &frozen);
+        assert!(
+            said.contains("omega is frozen 2 times for up to 0.58 s, first at 100.06 s"),
+            "{said}"
+        );
+        assert_eq!(rows, 58);
+        let mut repeats = rate.clone();
+        (1..500).for_each(|k| repeats[20 * k] = repeats[20 * k - 1]);
+        let (rows, said) = words(&time, &repeats);
+        assert!(said.contains("only repeat the one before") && rows > 499, "{rows} {said}");
+    }
+}
