@@ -276,9 +276,10 @@ fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &
         {
             let all: Vec<_> =
                 kind.needed.iter().chain(kind.optional).map(|(name, _)| *name).collect();
+            let all = if all.is_empty() { "none".to_string() } else { all.join(", ") };
             findings.add(
                 place(element),
-                format!("the schema has no attribute {attribute} (allowed: {})", all.join(", ")),
+                format!("the schema has no attribute {attribute} (allowed: {all})"),
             );
         }
     }

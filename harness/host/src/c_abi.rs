@@ -381,10 +381,24 @@ pub(crate) fn load(
     guard::before_loading();
     let (before, calls) = (HostState::now(), Calls::one());
     // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
-    let library = unsafe { Library::new(&path) }
-        .with_context(|| format!("{binary} in {name} cannot be loaded"))?;
+    let library = unsafe { Library::new(&path) }.map_err(|error| {
+        let needs = needs(&error.to_string());
+        anyhow::Error::new(error).context(format!("{binary} in {name} cannot be loaded{needs}"))
+    })?;
     drop(calls);
     Ok(Loaded { library, hash, changed: before.changed(), binary })
+}
+
+/// Names the host that a binary needs, by the loader's message; empty if it needs none.
+fn needs(error: &str) -> &'static str {
+    let symbol = error.split("undefined symbol: ").nth(1).unwrap_or_default();
+    match symbol.trim_start_matches('_').starts_with("Py") {
+        true => {
+            ": it needs a Python host, whose process brings the Python interpreter that the binary is not linked to (allowed: \
+             FMUs that load without one)"
+        }
+        false => "",
+    }
 }
 
 /// Functions of this list that a library lacks.
