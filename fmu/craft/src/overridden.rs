@@ -10,10 +10,8 @@ impl Tank {
     /// if the mode is not in use. `field` is its name in the FMUs after `tank.`, `indices` are the element's, from 0.
     pub fn overridden(&self, field: &str, indices: &[usize]) -> Option<String> {
         let n = *indices.first().unwrap_or(&0);
-        let is_of_mode = matches!(
-            field,
-            "mass" | "length" | "hinge" | "wave" | "zeta" | "breaking_steepness"
-        );
+        let is_of_mode =
+            matches!(field, "mass" | "length" | "hinge" | "wave" | "zeta" | "breaking_steepness");
         if is_of_mode && n >= self.modes {
             return None;
         }

@@ -12,14 +12,14 @@ use std::sync::Once;
 use anyhow::Result;
 use libloading::Library;
 
-use crate::c_abi::version::FmuState;
+pub use crate::c_abi::version::FmuState;
 use crate::c_abi::version::{
     self, Call, Common, Component, Exchange, Getter, Interface, Refs, Setter, Updated, Version,
 };
 use crate::c_abi::{self, Environment, Function, c_string, copied, functions, pointer};
 pub use crate::c_abi::{CallError, Called, HostState, Message, Status};
 use crate::description::{CType, Value};
-pub use crate::xml::Element;
+use crate::xml::Element;
 
 pub mod guarded;
 
