@@ -198,7 +198,7 @@ impl Part {
         self.weight == 1.0 && self.factor >= 1.0
     }
 
-    /// Returns true if the whole wall has this shape's correlation.
+    /// Returns true if the part is the whole wetted wall and its shape's measured correlation applies.
     pub fn is_measured(&self) -> bool {
         self.share == 1.0 && self.is_in_range()
     }

@@ -524,8 +524,8 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 findings.add(
                     v.place(),
                     format!(
-                        "it goes from {} to {} in {steps} steps of {:.1e} s, but to {} in {count} \
-                         steps of {:.1e} s (allowed: steps of any length, since {VARIABLE})",
+                        "its value goes from {} to {} in {steps} steps of {:.1e} s, but to {} in {count} steps of {:.1e} s over \
+                         the same time (required: results that do not depend on the step, since {VARIABLE})",
                         before[n],
                         usually[n],
                         time / steps,

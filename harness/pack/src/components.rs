@@ -174,7 +174,7 @@ fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Compo
     let metadata = MetadataCommand::new()
         .current_dir(&root)
         .exec()
-        .context("cargo does not say what the FMU is linked from")?;
+        .context("`cargo metadata` failed, which lists the crates of the FMU")?;
     let lock = std::fs::read_to_string(root.join("Cargo.lock")).context("Cargo.lock")?;
     let lock: toml::Table = lock.parse().context("Cargo.lock cannot be understood")?;
     let nodes = metadata.resolve.as_ref().map_or(&[][..], |resolve| &resolve.nodes);
@@ -307,7 +307,7 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     let metadata = MetadataCommand::new()
         .current_dir(project::root())
         .exec()
-        .context("cargo does not say what the program is linked from")?;
+        .context("`cargo metadata` failed, which lists the crates of the program")?;
     let ours = project::root().join("modelDescription/licenses");
     // the same text once, with all that is under it
     let mut texts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();

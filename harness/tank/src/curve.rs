@@ -44,8 +44,8 @@ pub enum Curve {
         /// Semi-axis along z, m.
         a_z: f64,
     },
-    /// Oval of Cassini about (0, zc): rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2 2t) at the polar
-    /// angle t, rad; a > c.
+    /// Oval of Cassini about (0, zc), a > c. At the polar angle t, rad, the distance rho from the centre follows from
+    /// rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2 2t).
     Cassini {
         /// Height of the centre, m.
         zc: f64,

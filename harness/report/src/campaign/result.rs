@@ -204,8 +204,8 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
     finished(&sentences)
 }
 
-/// Describes how antiresonance and resonance move along an axis: linear models first, else all; at most
-/// three series.
+/// Describes in sentences how antiresonance and resonance depend on the varied parameter `name`, for three series at most. If there
+/// are series of the linear model, only these are described.
 fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String> {
     let linear = series.iter().any(|s| s.model == SloshModel::Linear.name());
     let these: Vec<&Series> = series

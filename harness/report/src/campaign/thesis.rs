@@ -374,7 +374,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.5, fig. 7.16",
         who: Who::Bench,
-        says: "The leakage is in the resonance band, with only noise outside it.",
+        says: "Motion across the torque's plane (leakage) occurs only near the resonance; elsewhere there is only noise.",
         rule: "at 0.25 N·m more than 90 % of its square lies within 0.3 Hz of the linear resonance",
         shows: |group| {
             let run = at(group, MOST)?;

@@ -14,7 +14,7 @@ pub enum Comma {
     Decimal,
 }
 
-/// The convention of a column, as far as its fields have shown it.
+/// Decimal and thousands separators of a column, as far as its fields have shown them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Style {
     /// The decimal sign.
