@@ -19,7 +19,7 @@ const STARTS: u64 = 600;
 /// Starts that are looked at at the least, to find dependencies that are not declared.
 const AT_LEAST: u64 = 40;
 /// Tries to find them: parameters drawn at random may not go together.
-const TRIES: u64 = 4 * STARTS;
+const TRIES: u64 = 16 * STARTS;
 /// Part of the starts other than 0 that are made a hundredth of what they are.
 const NEXT_TO_NOTHING: f64 = 0.1;
 /// A change below this share of a variable's size is rounding, and no dependency.

@@ -37,7 +37,7 @@ use identify::methods::identification::Identification;
 use identify::methods::output_error::identify;
 use identify::nominal::COARSEST;
 use identify::options::Options;
-use identify::recording;
+use identify::reading;
 use identify::simulate::Intersample;
 use identify::start::PARAMETERS;
 use identify::tolerance::Tolerances;
@@ -234,7 +234,7 @@ fn main() -> Result<()> {
                 println!("  {line}");
             }
         };
-        let recordings = recording::prepare(recording, COARSEST, &mut hear)?;
+        let recordings = reading::prepare(recording, COARSEST, &mut hear)?;
         let mut options = asked.options.clone();
         if asked.far {
             for (i, name) in PARAMETERS.iter().enumerate() {

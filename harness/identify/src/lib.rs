@@ -23,6 +23,7 @@ pub mod nominal;
 pub mod options;
 pub mod overridden;
 pub mod plausible;
+pub mod reading;
 pub mod recording;
 pub mod search;
 pub mod sensor_faults;

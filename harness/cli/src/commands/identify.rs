@@ -15,7 +15,8 @@ use identify::methods::{Identified, Method, Task};
 use identify::news::News;
 use identify::nominal::{self, Nominal};
 use identify::options::Options;
-use identify::recording::{self, Recording, Source};
+use identify::reading::{self, Source};
+use identify::recording::Recording;
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
 use names::hubslosh::fluid;
@@ -372,7 +373,7 @@ impl IdentifyArgs {
         let mut read = |paths: &[PathBuf]| -> Result<Vec<Recording>> {
             let mut all = Vec::new();
             for path in paths {
-                all.extend(recording::read(path, &source, coarsest, &mut |line| {
+                all.extend(reading::read(path, &source, coarsest, &mut |line| {
                     terminal::note(&line);
                     notes.push(line);
                 })?);
@@ -398,7 +399,7 @@ impl IdentifyArgs {
         let (source, mut notes) = (self.source(trim)?, Vec::new());
         let (mut signals, mut recordings) = (Vec::new(), Vec::new());
         for path in &self.data {
-            let (signal, recording) = recording::read_decay(path, &source, &mut |line| {
+            let (signal, recording) = reading::read_decay(path, &source, &mut |line| {
                 terminal::note(&line);
                 notes.push(line);
             })?;

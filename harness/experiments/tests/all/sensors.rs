@@ -251,8 +251,8 @@ fn what_is_wrong_with_a_sensor_is_said_with_what_is_allowed() {
         ("a=camera", ("slosh.source_kind", "2"), "upright cylinder alone"),
         ("a=pressure:height=0.2", ("tank.h", "0.1"), "above the liquid at rest, tank.h = 0.1 m"),
         ("a=force:of=theta", ("tank.h", "0.1"), "unit rad (allowed: N)"),
-        ("a=gauge:rate=30", ("tank.h", "0.1"), "no multiple of the step, 0.02 s"),
-        ("a=gauge:rate=100", ("tank.h", "0.1"), "no multiple of the step"),
+        ("a=gauge:rate=30", ("tank.h", "0.1"), "not a multiple of the step, 0.02 s"),
+        ("a=gauge:rate=100", ("tank.h", "0.1"), "not a multiple of the step"),
         ("theta=encoder", ("tank.h", "0.1"), "a column has that name already"),
     ] {
         assert!(refused(text, &[set]).contains(words), "{text}: {}", refused(text, &[set]));
