@@ -14,6 +14,7 @@
 //!   `shape`: recognises measured shapes
 
 pub mod closed_form;
+pub mod coefficients;
 pub mod contour;
 mod contour_waves;
 pub mod curve;

@@ -16,8 +16,8 @@
 
 use serde::Serialize;
 
+use crate::coefficients::FiniteAmplitude;
 use crate::contour::{Problems, Volume, Wall};
-use crate::finite_amplitude::FiniteAmplitude;
 use crate::potential_flow::{Discretisation, Solution};
 
 /// Share of the liquid's mass below which a mode has no height.

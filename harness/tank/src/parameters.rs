@@ -8,8 +8,9 @@ use core::fmt::Write as _;
 use names::hubslosh::{self, DampingLaw, SloshSource, slosh};
 use names::{sloshtank, spacecraft};
 
+use crate::coefficients::{Coefficients, FiniteAmplitude};
 use crate::contour::Problems;
-use crate::finite_amplitude::{self, Coefficients, FiniteAmplitude};
+use crate::finite_amplitude;
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
 use crate::table::{short, significant};

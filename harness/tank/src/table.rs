@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use crate::finite_amplitude::FiniteAmplitude;
+use crate::coefficients::FiniteAmplitude;
 use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest};
 
 /// Formats a length in m to 1e-9 m without trailing zeros; fills from a volume have 17 digits.

@@ -1,7 +1,8 @@
 //! Coefficients of the first mode at finite amplitude.
 
+use hubslosh_tank::coefficients::{Coefficients, FiniteAmplitude};
 use hubslosh_tank::fill_table;
-use hubslosh_tank::finite_amplitude::{Coefficients, FiniteAmplitude, of_tank};
+use hubslosh_tank::finite_amplitude::of_tank;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value};
 use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::{Tank, table};
