@@ -77,7 +77,7 @@ mod tests {
             ("torque", "NAME=NUMBER"),
             ("mass=1%", "no tolerance"),
             ("clock=80%", "0 to 50 %"),
-            ("clock=x", "no number"),
+            ("clock=x", "not a number"),
         ] {
             let error = Tolerances::default().with(text).unwrap_err().to_string();
             assert!(error.contains(says), "{error}");

@@ -387,16 +387,11 @@ class Craft:
                     of.source, between, modes=of.modes, gravity=tank.gravity, nu=of.nu,
                     sigma=of.sigma, contact_angle=of.contact_angle, program=self.program,
                 )  # fmt: skip
-                # what it says about damping does not hold: see below
-                self._said.extend(f"tank {name}: {text}" for text in said if "damping" not in text)
+                self._said.extend(f"tank {name}: {text}" for text in said)
             table: dict[str, Quantity] = {
                 f"tank[{number}]{key.removeprefix('tank[1]')}": value
                 for key, value in self._known[key].items()
             }
-            # where the program's table has one damping ratio for all fills, that of this fill holds
-            if not any(".fill.zeta" in key for key in table):
-                own = tank.parameters("Spacecraft", number)
-                table |= {key: value for key, value in own.items() if ".zeta[" in key}
             found |= table | {f"tank[{number}].liquid_0": tank.mass}
             found[f"mass_flow[{number}]"] = float(flow)
         return found

@@ -43,7 +43,9 @@ def test_between_its_points_a_table_is_the_tank_s_own_parameters(
     table = hubslosh.read_parameters(parameters("--sweep", "2%,98%"))
     for fill in FILLS:
         own = hubslosh.read_parameters(parameters("--fill", f"{fill}%"))
-        exact = swing(own)
+        # the table has the third-order coefficients of its largest fill
+        third_order = {name: value for name, value in table.items() if ".nonlinear_" in name}
+        exact = swing({**own, **third_order})
         met = swing({**table, "tank.liquid_0": exact["mass"][0]})
         stiffness = met["der(tank.p_dot[1,1])"][0] / exact["der(tank.p_dot[1,1])"][0]
         assert np.sqrt(stiffness) == pytest.approx(1, abs=5e-3), fill

@@ -369,7 +369,7 @@ impl ParameterSet {
         if is_linear {
             notes.push("separate modes along both lengths have no coefficients of finite amplitude in HubSlosh".to_string());
         } else {
-            warnings.extend(found.warnings);
+            notes.extend(found.warnings);
         }
         // The same parameters for every FMU, with the prefix of its tank.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
