@@ -9,7 +9,7 @@ use core::f64::consts::PI;
 use names::sloshtank::tank::MOST_MODES as MODES;
 use names::sloshtank::tank::fill;
 pub use names::sloshtank::tank::fill::MOST_POINTS as POINTS;
-use names::sloshtank::tank::{H_0, HINGE, I_0, I_Z, LENGTH, LIQUID_0, M_0, MASS, OUTLET};
+use names::sloshtank::tank::{H_0, HINGE, I_0, I_Z, LENGTH, LIQUID_0, M_0, MASS, OUTLET, ZETA};
 
 use crate::contour::Problems;
 use crate::interpolation::Monotone;
@@ -228,7 +228,7 @@ pub fn parameters(
         }
     }
     if liquid.nu.is_some() {
-        let text = "fill.zeta has the damping ratios of every fill; zeta and its interval above are those of the largest";
+        let text = "fill.zeta has the damping ratios of every fill; the interval above is that of the largest";
         set.notes.push(text.to_string());
     }
     set.notes.push(format!(
@@ -255,6 +255,8 @@ pub fn parameters(
     }
     // parameters that the table replaces
     let of_modes = (1..=modes).flat_map(|n| [MASS, LENGTH, HINGE].map(|array| array.at([n])));
+    let ratios_of_modes = (1..=modes).filter(|_| liquid.nu.is_some()).map(|n| ZETA.at([n]));
+    let of_modes = of_modes.chain(ratios_of_modes);
     let replaced = [M_0, H_0, I_0, I_Z].map(String::from).into_iter().chain(of_modes);
     let replaced: Vec<String> = replaced.map(|name| target.name(&name)).collect();
     set.values.retain(|(name, _)| !replaced.contains(name));
