@@ -143,7 +143,7 @@ fn number(said: &str, word: &str) -> f64 {
     before.rsplit(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("no {word} in: {said}"))
 }
 
-/// Thousands of instances step in turns and give the bits that each gives alone. The library is loaded hundreds of times and is
+/// Thousands of instances step in turns, and each has the same results as alone. The library is loaded hundreds of times and is
 /// gone after unloading. States go there and back, Model Exchange passes its events, steps take no memory.
 fn a_whole_life(fmi: Fmi, share: Share) {
     let fmu = Unpacked::new(HUBSLOSH, fmi);

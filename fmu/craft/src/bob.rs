@@ -80,7 +80,7 @@ pub struct Bob {
     pub hinge: Vec3,
     /// b of a planar mode (`contents.rs`), body axes, for impulses only: this file does not expand its motion.
     across: Option<Vec3>,
-    /// Surface of a bob that is no pendulum (`surface.rs`), for impulses only.
+    /// Surface of a bob that is not a pendulum (`surface.rs`), for impulses only.
     surface: Option<Surface>,
     /// Elevation at the wall per slosh angle, m/rad.
     pub wave: f64,
@@ -270,7 +270,7 @@ impl Bob {
     }
 
     /// Adds to a matrix what the craft carries of the bob beyond its inertia along the rod: m u u^T, u = [b; rho x b], of
-    /// a planar mode, or m J^T N J - m u u^T, u = [p; P x p], of a bob that is no pendulum. `x` is its six numbers.
+    /// a planar mode, or m J^T N J - m u u^T, u = [p; P x p], of a bob that is not a pendulum. `x` is its six numbers.
     pub fn add_held(&self, matrix: &mut Mat6, x: &[f64]) {
         let mut p = times(&self.axes, [x[0], x[1], x[2]]);
         if let Some(surface) = self.surface {
@@ -437,7 +437,7 @@ impl Bob {
 
     /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes. The bob keeps
     /// its velocity across the rod: l p' changes by -(1 - p p^T)(dV + dw x rho), in a planar mode by -(1 - p p^T - b
-    /// b^T)(dV + dw x rho), and of a bob that is no pendulum by -M^-1 Pi D^T (dV + dw x rho) (`surface.rs`). `x` is the six
+    /// b^T)(dV + dw x rho), and of a bob that is not a pendulum by -M^-1 Pi D^T (dV + dw x rho) (`surface.rs`). `x` is the six
     /// numbers at the start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let p = self.p[0];

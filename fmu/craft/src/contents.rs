@@ -84,7 +84,7 @@ pub struct MountedTank {
     /// True if there are planar modes; their b, body axes.
     planar: bool,
     across: [Option<Vec3>; MODES],
-    /// True if there are surfaces other than spheres; they.
+    /// True if a bob is on a surface other than a sphere; the surfaces of all modes.
     curved: bool,
     surfaces: [Option<Surface>; MODES],
     /// The rigid liquid and all liquid at rest, if they are not axially symmetric.

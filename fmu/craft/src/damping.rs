@@ -33,7 +33,7 @@
 
 use taylor::angle::{self, SquaredAngle};
 use taylor::number::Number;
-use taylor::series::{Series, ZERO, constant, mul, mul_tail};
+use taylor::series::{Series, ZERO, constant, mul, mul_tail, sqrt};
 
 use crate::parameters::{DampingLaw, Tank};
 use formulas::cylinder::XI;
@@ -92,11 +92,11 @@ impl Excess {
     /// Returns coefficient n from those of w^2 and w A.
     fn expand(&mut self, n: usize, w2: f64, speed: f64) -> f64 {
         let Breaking { begins, steepness, .. } = self.law;
-        self.w[n] = root(n, w2, &self.w);
+        self.w[n] = sqrt(n, w2, &self.w);
         self.steep[n] = steepness * speed;
         self.above[n] = self.steep[n] - begins * self.w[n];
         let square = mul(n, &self.above, &self.above) + CORNER * CORNER * w2;
-        self.root[n] = root(n, square, &self.root);
+        self.root[n] = sqrt(n, square, &self.root);
         self.divisor[n] = self.root[n] + self.law.root * self.w[n];
         let over = self.above[n] - begins * self.w[n];
         self.quotient[n] = if n == 0 {
@@ -194,7 +194,7 @@ impl Drag {
     /// Returns coefficient n of c, from those of x, of |p + e|^2 and of |p'|^2.
     pub fn expand(&mut self, n: usize, chord2: f64, rate2: f64) -> f64 {
         let square = mul(n, &self.x, &self.x) + constant(n, self.floor2);
-        self.root[n] = root(n, square, &self.root);
+        self.root[n] = sqrt(n, square, &self.root);
         // This form avoids cancellation for x < 0: a_f^2/2 over sqrt(x^2 + a_f^2) - x.
         self.above[n] = if self.x[0] >= 0.0 {
             0.5 * (self.x[n] + self.root[n])
@@ -216,7 +216,7 @@ impl Drag {
         if self.grows {
             self.tilt2[n] = self.angle2.expand(n, chord2) + constant(n, SMALLEST * SMALLEST);
             self.speed2[n] = mul(n, &self.w2, &self.tilt2) + rate2;
-            self.speed[n] = root(n, self.speed2[n], &self.speed);
+            self.speed[n] = sqrt(n, self.speed2[n], &self.speed);
             self.c[n] += self.growth * self.speed[n];
             if let Some(excess) = &mut self.excess {
                 let share = self.twice_m * excess.law.zeta;
@@ -225,16 +225,6 @@ impl Drag {
         }
         self.c[n]
     }
-}
-
-/// Returns coefficient n of a square root from that of the square and the root's own coefficients
-/// below n.
-fn root(n: usize, square: f64, y: &Series) -> f64 {
-    if n == 0 {
-        return libm::sqrt(square);
-    }
-    let both: f64 = (1..n).map(|j| y[j] * y[n - j]).sum();
-    (square - both) / (2.0 * y[0])
 }
 
 /// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and |p'|^2. `zeta` replaces

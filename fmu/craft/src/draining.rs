@@ -38,7 +38,7 @@ pub struct Acting<T> {
     pub h_wheels: Vec3<T>,
     /// Outflow of each tank.
     pub flow: [T; TANKS],
-    /// Its slope.
+    /// Slope.
     pub flow_slope: [f64; TANKS],
 }
 

@@ -821,7 +821,7 @@ impl Lump {
     }
 
     /// Returns functions that cross zero at events, for hosts that integrate themselves; `bobs` are those of the tank.
-    /// They cross where [`Lump::next`] finds the event, with directions of unit length, which a host's need not be.
+    /// The indicators cross where [`Lump::next`] finds the event, with directions of unit length, which a host's need not be.
     pub fn indicators<'a>(
         &self,
         [a, w, w_d]: [&Vector; 3],

@@ -232,7 +232,7 @@ impl CraftMotion {
     }
 
     /// Replaces rigid liquids and bobs by those of `tanks`, with as many tanks and modes. Bobs of planar modes and
-    /// those that are no pendulums count at their current positions.
+    /// those that are not pendulums count at their current positions.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {

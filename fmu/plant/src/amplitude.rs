@@ -30,7 +30,7 @@
 //!
 //! A_0, far below any motion of interest, keeps u away from 0, where the root has no power series.
 
-use taylor::series::{Series, ZERO, mul_ramp, square};
+use taylor::series::{Series, ZERO, mul_ramp, sqrt, square};
 
 /// A_0, rad.
 const FLOOR: f64 = 1e-4;
@@ -135,7 +135,7 @@ impl Growth {
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2], other: f64) -> f64 {
         self.q2[n] = q2 + if n == 0 { FLOOR * FLOOR } else { 0.0 };
         self.u[n] = mul_ramp(n, &self.w, &self.q2) + v2;
-        self.root[n] = root(n, self.u[n], &self.root);
+        self.root[n] = sqrt(n, self.u[n], &self.root);
         let drag = self.share * other + self.gain * self.root[n];
         if self.breaking.zeta > 0.0 {
             return drag + self.gain_breaking * self.expand_breaking(n);
@@ -147,21 +147,11 @@ impl Growth {
     fn expand_breaking(&mut self, n: usize) -> f64 {
         let Breaking { onset, steepness, .. } = self.breaking;
         let w = if n < 2 { self.w[n] } else { 0.0 };
-        self.omega[n] = root(n, w, &self.omega);
+        self.omega[n] = sqrt(n, w, &self.omega);
         self.excess[n] = steepness * self.root[n] - onset * self.omega[n];
         let rounded2 = square(n, &self.excess) + ROUNDED * ROUNDED * w;
-        self.rounded[n] = root(n, rounded2, &self.rounded);
+        self.rounded[n] = sqrt(n, rounded2, &self.rounded);
         let at_rest = libm::hypot(onset, ROUNDED) - onset;
         self.excess[n] + self.rounded[n] - at_rest * self.omega[n]
     }
-}
-
-/// Returns coefficient n of y = u^(1/2) from that of u and the lower ones of y.
-fn root(n: usize, u: f64, y: &Series) -> f64 {
-    // y^2 = u
-    if n == 0 {
-        return libm::sqrt(u);
-    }
-    let both: f64 = (1..n).map(|j| y[j] * y[n - j]).sum();
-    (u - both) / (2.0 * y[0])
 }

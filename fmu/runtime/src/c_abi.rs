@@ -207,7 +207,7 @@ pub struct Component<M: Model, V: Version> {
     mark: u64,
     /// The instance.
     pub instance: Instance<M, V>,
-    /// Its way to the host's logger.
+    /// Way to the host's logger.
     pub log: Log,
     /// Further data about the host that its version keeps.
     pub host: V::Host<M>,

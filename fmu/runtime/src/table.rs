@@ -94,18 +94,18 @@ const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
 /// One scalar of the table.
 #[derive(Debug)]
 pub struct Scalar<M: Model> {
-    /// Its entry.
+    /// Entry.
     pub variable: &'static Variable<M>,
     /// Access of the entry, copied here because every call needs it.
     pub access: Access<M>,
     /// The C type that it is got and set with, likewise.
     pub c_type: CType,
-    /// Its place among the model's continuous states, if it is one, likewise.
+    /// Place among the model's continuous states, if it is one, likewise.
     pub state: Option<Place>,
-    /// Its place among all scalars, from which its value reference follows (see
+    /// Place among all scalars, from which its value reference follows (see
     /// [`Version`](crate::version::Version)).
     pub index: u32,
-    /// Its place in the array, 0 for the first.
+    /// Place in the array, 0 for the first.
     pub element: usize,
     /// Number of scalar parameters before it; for a discrete output, number of discrete outputs before it.
     pub slot: usize,
@@ -177,12 +177,12 @@ const fn is_discrete<M: Model>(variable: &Variable<M>) -> bool {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Its name, with its indices in an array.
+    /// Returns the name, with its indices in an array.
     pub fn name(&self) -> String {
         self.variable.element_name(self.element)
     }
 
-    /// Its place among the model's continuous states, if it is one.
+    /// Returns the place among the model's continuous states, if it is one.
     #[inline]
     pub fn state(&self) -> Option<usize> {
         self.state.map(|place| place(self.element))
@@ -194,7 +194,7 @@ impl<M: Model> Scalar<M> {
         self.variable.problem(self.element, value)
     }
 
-    /// Its value before the host sets anything: `None` when it is computed.
+    /// Returns the value before the host sets anything: `None` when it is computed.
     pub fn start(&self) -> Option<Value> {
         let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
         self.variable.start(&mut parameters, &mut inputs, self.element)

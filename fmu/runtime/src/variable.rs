@@ -48,7 +48,7 @@ pub struct Quantity {
 /// An item of an enumeration; the first has the number 1.
 #[derive(Debug)]
 pub struct Item {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Meaning of the item.
     pub description: &'static str,
@@ -68,7 +68,7 @@ pub struct Enumeration {
     pub name: &'static str,
     /// Purpose of the enumeration.
     pub description: &'static str,
-    /// Its items.
+    /// Items.
     pub items: &'static [Item],
 }
 
@@ -144,20 +144,20 @@ pub enum Access<M: Model> {
 /// A scalar variable, or an array of them.
 #[derive(Debug)]
 pub struct Variable<M: Model> {
-    /// Its name. An array's element has its indices, counted from 1, in the name's empty brackets. Further indices follow in
+    /// Name. An array's element has its indices, counted from 1, in the name's empty brackets. Further indices follow in
     /// brackets of their own: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
     pub name: &'static str,
     /// Description with sign and frame.
     pub description: &'static str,
-    /// Its role.
+    /// Role.
     pub causality: Causality,
-    /// Its type.
+    /// Type.
     pub kind: Kind,
     /// Access in the model.
     pub access: Access<M>,
     /// An array's dimensions, none for a scalar.
     pub shape: &'static [Dimension],
-    /// Its place, if it is a continuous state.
+    /// Place, if it is a continuous state.
     pub state: Option<Place>,
     /// True if an event can make this state jump.
     pub reinit: bool,
@@ -418,7 +418,7 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Its order of magnitude.
+    /// Sets the order of magnitude.
     pub const fn nominal(mut self, nominal: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.nominal = Some(nominal);
@@ -462,7 +462,7 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Its initial value depends on these parameters and inputs besides.
+    /// Adds parameters and inputs on which the initial value depends.
     pub const fn initial_depends_on(mut self, known: &'static [&'static str]) -> Self {
         self.initial_depends_on = known;
         self
@@ -483,7 +483,7 @@ impl<M: Model> Variable<M> {
         self.shape.iter().map(|dimension| dimension.most())
     }
 
-    /// Its name where an array is one variable: `tank[].p` is `tank.p`.
+    /// Returns the name where an array is one variable: `tank[].p` is `tank.p`.
     pub fn array_name(&self) -> String {
         self.name.replace("[]", "")
     }
@@ -536,7 +536,7 @@ impl<M: Model> Variable<M> {
         name + closing
     }
 
-    /// Its value before the host sets anything: `None` when it is computed.
+    /// Returns the value before the host sets anything: `None` when it is computed.
     pub fn start(
         &self,
         parameters: &mut M::Parameters,
@@ -549,7 +549,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// Its value in `parameters`: `None` when it is not a parameter. They are not changed: the
+    /// Returns the value in `parameters`: `None` when it is not a parameter. They are not changed: the
     /// accessors that lend a field to be written serve reading as well.
     pub fn parameter_value(&self, parameters: &mut M::Parameters, element: usize) -> Option<Value> {
         match self.access {

@@ -96,6 +96,15 @@ pub fn square(n: usize, a: &Series) -> f64 {
     2.0 * (half + a[0] * a[n]) + middle
 }
 
+/// Returns coefficient n of a^(1/2) from coefficient n of a and the root's own ones below n. a_0 is above 0.
+pub fn sqrt(n: usize, a: f64, root: &Series) -> f64 {
+    if n == 0 {
+        return libm::sqrt(a);
+    }
+    let both: f64 = (1..n).map(|j| root[j] * root[n - j]).sum();
+    (a - both) / (2.0 * root[0])
+}
+
 /// Returns coefficient n of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.
 #[inline(always)]
 pub fn mul_ramp(n: usize, ramp: &[f64; 2], a: &Series) -> f64 {
@@ -191,6 +200,17 @@ mod tests {
             e[n] = if n == 0 { f64::exp(u(0)) } else { chain(n, u(n), &mut u_d, &e) };
         }
         assert!((values([&e], ORDER, 0.1)[0] - f64::exp(0.395)).abs() < 4.0 * ULPS);
+    }
+
+    #[test]
+    fn sqrt_of_a_series_is_the_series_of_sqrt() {
+        let mut root = ZERO;
+        for n in 0..ORDER {
+            root[n] = sqrt(n, u(n), &root);
+        }
+        // u is 0 at t = -0.26, so the series converges more slowly than the others.
+        let found = values([&root], ORDER, 0.02)[0];
+        assert!((found - f64::sqrt(0.3198)).abs() < 4.0 * ULPS);
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub struct Record<'a> {
 pub struct Value {
     /// The estimate.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub std: f64,
 }
 
@@ -212,7 +212,7 @@ impl FreeDecay {
 
 /// The residual's spectrum.
 struct Beside {
-    /// Its power near the frequency, as the variance of white noise of equal power.
+    /// Power near the frequency, as the variance of white noise of equal power.
     power: f64,
     /// Frequency, Hz, and amplitude of its largest line.
     other: (f64, f64),

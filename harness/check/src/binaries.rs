@@ -64,7 +64,7 @@ struct Declared {
 /// A binary in its place.
 struct Placed {
     name: String,
-    /// Its name without the ending.
+    /// Name without the ending.
     identifier: String,
     folder: String,
     kind: Option<Kind>,

@@ -32,9 +32,9 @@ pub struct Variable {
     pub index: usize,
     /// Line of the file.
     pub line: u64,
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its value reference; 0 if that cannot be read.
+    /// Value reference; 0 if that cannot be read.
     pub reference: u32,
     /// Causality as written, or the default "local".
     pub causality: Causality,
@@ -42,7 +42,7 @@ pub struct Variable {
     pub variability: Variability,
     /// Attribute `initial` as written, or the default for causality and variability, if there is one.
     pub initial: Option<String>,
-    /// Its type.
+    /// Type.
     pub kind: Type,
     /// The element of its type, attributes of the declared type filled in.
     pub typed: Element,
@@ -90,13 +90,13 @@ impl Variable {
             || (self.causality == Causality::Parameter && self.variability != Variability::Constant)
     }
 
-    /// Its order of magnitude.
+    /// Returns the order of magnitude.
     pub fn nominal(&self) -> f64 {
         let nominal = self.typed.number("nominal").filter(|n| n.is_finite() && *n > 0.0);
         nominal.unwrap_or(1.0)
     }
 
-    /// Its bounds; infinite where there are none.
+    /// Returns the bounds; infinite where there are none.
     pub fn bounds(&self) -> (f64, f64) {
         let bound = |name, none| self.typed.number(name).filter(|x| !x.is_nan()).unwrap_or(none);
         (bound("min", f64::NEG_INFINITY), bound("max", f64::INFINITY))

@@ -46,7 +46,7 @@ pub struct Found {
 /// Known quantities of the flight tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
-    /// Its radius, m; wanted is the acceleration.
+    /// Radius, m; wanted is the acceleration.
     Radius(f64),
     /// The acceleration, m/s2 or rad/s2; wanted is the radius.
     Acceleration(f64),
@@ -213,7 +213,7 @@ pub struct Comparison {
     pub printed: &'static str,
     /// Value that follows from the formulas.
     pub value: f64,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
     /// Reason for a difference, if there is one.
     pub remark: &'static str,

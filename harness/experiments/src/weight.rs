@@ -84,7 +84,7 @@ impl std::fmt::Display for Weightless {
 /// A tank of Spacecraft or SloshTank.
 #[derive(Clone, Debug)]
 struct Tank {
-    /// Its variables' names begin so: `tank[1]`, `tank`.
+    /// Prefix of variables' names: `tank[1]`, `tank`.
     name: String,
     contents: Contents,
     /// The hinge of mode 1 from O, m, and the direction out of the liquid, axes of craft or host.

@@ -344,7 +344,7 @@ pub(crate) struct Loaded {
     pub hash: String,
     /// Changes of the whole process by loading it.
     pub changed: Vec<&'static str>,
-    /// Its path within the FMU.
+    /// Path within the FMU.
     pub binary: String,
 }
 

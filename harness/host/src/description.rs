@@ -67,7 +67,7 @@ pub struct Array {
 pub struct ArrayElement {
     /// Value reference of the array.
     pub array: u32,
-    /// Its place, counted from 0, by rows.
+    /// Place, counted from 0, by rows.
     pub index: usize,
 }
 
@@ -140,7 +140,7 @@ impl BaseUnit {
 /// Element `DisplayUnit`: a number in it is `factor` times the value, plus `offset`.
 #[derive(Clone, Debug)]
 pub struct DisplayUnit {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Factor on the value.
     pub factor: f64,
@@ -162,9 +162,9 @@ pub struct SimpleType {
 /// One value of an enumeration.
 #[derive(Clone, Debug)]
 pub struct Item {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its number.
+    /// Number.
     pub value: i64,
 }
 
@@ -176,7 +176,7 @@ pub struct Variable {
     /// Number by which calls refer to it (within its type); of an element of an array one of this host's own, that no
     /// other variable has.
     pub reference: u32,
-    /// Its role.
+    /// Role.
     pub causality: Causality,
     /// When its value can change; `Other` with an empty text if it is not given.
     pub variability: Variability,
@@ -310,7 +310,7 @@ impl Value {
 }
 
 impl Variable {
-    /// Its type.
+    /// Returns the type.
     pub fn kind(&self) -> Type {
         self.kind
     }

@@ -50,7 +50,7 @@ const SETTLED: f64 = 0.1;
 
 /// Effect of an error of something that is known within a tolerance.
 pub struct Slope {
-    /// Its name.
+    /// Name.
     name: &'static str,
     /// Relative standard deviation of what is known of it.
     tolerance: f64,

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 /// Spacing of values, in usual ones, up to which a cubic joins them.
 const NEAR: f64 = 2.5;
-/// Rows of a torque that are wider apart than this, s, are no broken line of a band-limited torque: lines then leave images of it.
+/// Rows of a torque that are wider apart than this, s, do not describe a band-limited torque by lines between them: lines leave images of it.
 const COARSE: f64 = 0.035;
 /// Time between the instants that a coarse torque gets, s, at most.
 const FINE: f64 = 0.02;
@@ -21,7 +21,7 @@ pub type Clocked = (Vec<f64>, Option<Vec<bool>>);
 
 /// Completes values that are NaN in rows without one.
 ///
-/// Those between others are on the cubic through the four nearest ones or, where some were lost, on a line.
+/// A value between others is on the cubic through the four nearest ones or, where some were lost, on a line.
 pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
     let there: Vec<bool> = values.iter().map(|v| !v.is_nan()).collect();
     if there.iter().all(|there| *there) {
@@ -53,7 +53,7 @@ pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
     (filled.collect(), Some(there))
 }
 
-/// The median of the times between rows, s.
+/// Returns the median of the times between rows, s.
 pub fn usual(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len().saturating_sub(1) / 2;
@@ -64,7 +64,7 @@ pub fn usual(time: &[f64]) -> f64 {
     }
 }
 
-/// Lagrange's weights of nodes at a time.
+/// Returns Lagrange's weights of nodes at a time.
 pub fn weights(nodes: &[f64], at: f64) -> Vec<f64> {
     let weight = |(j, node): (usize, &f64)| -> f64 {
         let others = nodes.iter().enumerate().filter(|(i, _)| *i != j);

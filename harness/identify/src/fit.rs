@@ -87,7 +87,7 @@ pub struct Channel {
     pub recording: usize,
     /// The signal.
     pub signal: Signal,
-    /// Its noise.
+    /// Noise.
     pub noise: Noise,
 }
 

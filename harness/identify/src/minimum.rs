@@ -30,7 +30,7 @@ pub trait SumOfSquares {
     /// Returns the answer at x.
     ///
     /// # Errors
-    /// What the model refuses.
+    /// If the model refuses x.
     fn at(&self, x: &[f64]) -> Result<Self::Answer>;
 
     /// The residuals of an answer.
@@ -39,7 +39,7 @@ pub trait SumOfSquares {
     /// Returns the derivatives of the residuals at x, where the answer is known, and renews the steps.
     ///
     /// # Errors
-    /// What the model refuses.
+    /// If the model refuses x.
     fn derivatives(
         &self,
         x: &[f64],

@@ -47,7 +47,7 @@ impl Start {
 pub struct Nominal {
     /// Values that recordings of torque and rate do not show.
     pub bench: Bench,
-    /// Its parameters.
+    /// Parameters.
     pub start: Start,
     /// Inertia of hub and liquid, kg·m².
     pub inertia: f64,

@@ -1,6 +1,6 @@
 //! Reads recordings of a bench, checks what must be true of them before anything is fitted, and cuts them.
 //!
-//! Where torque is missing and cannot be foretold, the recording is cut ([`crate::gaps`]) and each part has a start of its own.
+//! If torque is missing and cannot be predicted, the recording is cut ([`crate::gaps`]) and each part has a start of its own.
 
 use std::path::Path;
 

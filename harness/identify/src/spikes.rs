@@ -33,7 +33,7 @@ const STEP: f64 = 0.5;
 const AROUND: usize = 50;
 
 /// Returns the differences of values at growing times from the cubics through their neighbours, scaled to the noise of even rows.
-/// They are 0 at the ends.
+/// The differences are 0 at the ends.
 pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
     let sound = Sound { rows: y.len(), out: BTreeMap::new() };
     let inner = 2..y.len().saturating_sub(2);

@@ -188,7 +188,7 @@ pub struct Combination {
     pub of: [String; 2],
     /// Value of the combination.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub std: f64,
     /// Unit.
     pub unit: String,

@@ -42,7 +42,7 @@ pub struct Variable {
     unit: String,
     /// Display units: name, factor, offset.
     shown: Vec<(String, f64, f64)>,
-    /// Its unit by SI base units, if the FMU defines it: exponents, factor, offset.
+    /// Unit by SI base units, if the FMU defines it: exponents, factor, offset.
     base: Option<([i32; 8], f64, f64)>,
     /// Items of an enumeration: name, number.
     items: Vec<(String, i64)>,

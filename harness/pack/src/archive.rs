@@ -32,12 +32,12 @@ impl Packed {
         Ok(Packed { folder: PLATFORM, ending: std::env::consts::DLL_SUFFIX, bytes })
     }
 
-    /// Its name in the FMU 2.0 of that modelIdentifier.
+    /// Returns the name in the FMU 2.0 of that modelIdentifier.
     pub fn name(&self, identifier: &str) -> String {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
     }
 
-    /// Its names in the FMU of a version of FMI.
+    /// Returns the names in the FMU of a version of FMI.
     pub fn names(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = String> {
         let folders = fmi.folders(self.folder).iter();
         folders.map(move |folder| format!("binaries/{folder}/{identifier}{}", self.ending))

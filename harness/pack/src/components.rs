@@ -27,9 +27,9 @@ pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 /// One part of a binary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Component {
-    /// Its name where it comes from.
+    /// Name where it comes from.
     pub name: String,
-    /// Its version; `None` if it is that of the tool that linked it.
+    /// Version; `None` if it is that of the tool that linked it.
     pub version: Option<String>,
     /// Licence as an SPDX expression.
     pub licence: String,

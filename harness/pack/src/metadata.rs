@@ -13,7 +13,7 @@ use crate::root;
 
 /// Name of the package, and of the command in it.
 pub const PACKAGE: &str = "hubslosh";
-/// Its version.
+/// Version.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Address of the project's source.
 pub const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");

@@ -126,7 +126,7 @@ def test_the_modulus_margin_is_the_least_distance_to_minus_one() -> None:
 
 
 def test_a_loop_gain_without_states_is_a_number() -> None:
-    """Half of it is no crossing; its distance to -1 is 1.5."""
+    """Half of it does not cross; its distance to -1 is 1.5."""
     none = np.zeros((0, 0))
     half = LinearModel(
         none, np.zeros((0, 1)), np.zeros((1, 0)), np.full((1, 1), 0.5), (), ("u",), ("y",)

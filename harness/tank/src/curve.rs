@@ -37,7 +37,7 @@ pub enum Curve {
     },
     /// center + (a_r cos t, a_z sin t), t the eccentric angle in rad. A circle has a_r = a_z.
     Ellipse {
-        /// Its centre.
+        /// Centre.
         center: Point,
         /// Semi-axis along r, m.
         a_r: f64,

@@ -5,7 +5,7 @@ use plant::{FrictionModel, Parameters, SloshModel};
 /// Every slosh model.
 pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
 
-/// Those of liquid that sloshes.
+/// Slosh models with liquid that moves.
 pub const SLOSHING: [SloshModel; 5] = [
     SloshModel::Linear,
     SloshModel::Planar,

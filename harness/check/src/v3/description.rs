@@ -22,9 +22,9 @@ pub struct Description {
 pub struct Variable {
     /// Line of the file.
     pub line: u64,
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its value reference; 0 if that cannot be read.
+    /// Value reference; 0 if that cannot be read.
     pub reference: u32,
     /// Value in the file, or the default "local".
     pub causality: Causality,
@@ -36,7 +36,7 @@ pub struct Variable {
     pub c_type: CType,
     /// Type for display.
     pub kind: Type,
-    /// Its start values, as written.
+    /// Start values, as written.
     pub starts: Vec<String>,
     /// Sizes with the start values of structural parameters; empty for a scalar.
     pub dimensions: Vec<usize>,
@@ -49,7 +49,7 @@ pub struct Variable {
 /// An element of ModelStructure.
 #[derive(Clone, Debug)]
 pub struct Unknown {
-    /// Its name: Output and so on.
+    /// Name: Output and so on.
     pub list: String,
     /// Line of the file.
     pub line: u64,
@@ -97,13 +97,13 @@ impl Variable {
         !matches!(self.kind, Type::Binary | Type::Clock) && self.element.get("clocks").is_none()
     }
 
-    /// Its bounds; infinite where there are none.
+    /// Returns the bounds; infinite where there are none.
     pub fn bounds(&self) -> (f64, f64) {
         let bound = |name, none| self.element.number(name).filter(|x| !x.is_nan()).unwrap_or(none);
         (bound("min", f64::NEG_INFINITY), bound("max", f64::INFINITY))
     }
 
-    /// Its order of magnitude.
+    /// Returns the order of magnitude.
     pub fn nominal(&self) -> f64 {
         let nominal = self.element.number("nominal").filter(|n| n.is_finite() && *n > 0.0);
         nominal.unwrap_or(1.0)

@@ -8,7 +8,7 @@ use pack::documentation::live;
 
 /// Writes the documentation as a book: a static site with search, to be opened from the disk.
 ///
-/// Its pages are Markdown files of this project; book/SUMMARY.md lists them.
+/// Pages are Markdown files of this project; book/SUMMARY.md lists them.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh book && xdg-open dist/book/index.html\n  hubslosh book --live"

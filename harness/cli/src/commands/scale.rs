@@ -31,7 +31,7 @@ enum Scale {
         /// Density of the bench's liquid, kg/m³.
         #[arg(long, default_value_t = scaling::WATER.density)]
         density: f64,
-        /// Its surface tension, N/m.
+        /// Surface tension, N/m.
         #[arg(long, default_value_t = scaling::WATER.tension)]
         tension: f64,
         /// Acceleration along the tank's axis, m/s².
@@ -58,7 +58,7 @@ enum Scale {
         /// Density of the liquid, kg/m³.
         #[arg(long, default_value_t = scaling::WATER.density)]
         density: f64,
-        /// Its surface tension, N/m.
+        /// Surface tension, N/m.
         #[arg(long, default_value_t = scaling::WATER.tension)]
         tension: f64,
         /// Acceleration along the tank's axis, m/s².
@@ -76,7 +76,7 @@ enum Scale {
         /// Density of the liquid, kg/m³.
         #[arg(long, default_value_t = scaling::ROUND_WATER.density)]
         density: f64,
-        /// Its surface tension, N/m.
+        /// Surface tension, N/m.
         #[arg(long, default_value_t = scaling::ROUND_WATER.tension)]
         tension: f64,
         /// Radius of the bench's tank, m.

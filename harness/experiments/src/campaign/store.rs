@@ -56,7 +56,7 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
 
 /// A stored run.
 pub struct Stored {
-    /// Its columns.
+    /// Columns.
     pub table: Table,
     /// The table has the signals for the sensors but not their readings, because another program wrote it.
     pub lacks_sensors: bool,

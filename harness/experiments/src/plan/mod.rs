@@ -122,7 +122,7 @@ struct Listed {
 /// A recording of a run, and the columns of its signals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorded {
-    /// Its file.
+    /// File.
     pub path: PathBuf,
     /// Columns and units.
     pub columns: Columns,

@@ -13,7 +13,7 @@ use super::shape::{Dwell, Piece, Pieces, Shape};
 /// A kind of torque history. Times in s, frequencies in Hz, torques in N·m.
 #[derive(Debug)]
 pub struct Kind {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Description of the torque, for readers.
     pub says: &'static str,
@@ -31,11 +31,11 @@ pub(super) type Demand = (fn(&Values) -> bool, &'static str);
 /// A number that a profile or a sensor is given.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its value where none is given.
+    /// Value where none is given.
     pub default: f64,
-    /// Its unit; empty if it has none.
+    /// Unit; empty if it has none.
     pub unit: &'static str,
     /// Label on axes.
     pub label: &'static str,

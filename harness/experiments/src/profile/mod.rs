@@ -277,7 +277,7 @@ impl Profile {
         self.get("duration").unwrap_or(0.0)
     }
 
-    /// Its parameter `amplitude`, N·m, if it has one.
+    /// Returns the parameter `amplitude`, N·m, if it has one.
     pub fn amplitude(&self) -> Option<f64> {
         self.get("amplitude")
     }

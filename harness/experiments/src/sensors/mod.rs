@@ -24,7 +24,7 @@ use signals::table::Table;
 /// A kind of sensor.
 #[derive(Debug)]
 pub struct Kind {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Description of the measured quantity, for readers.
     pub says: &'static str,

@@ -47,7 +47,7 @@ pub enum Unmodelled {
 
 /// Frequency of rocking, Hz.
 const ROCKING: f64 = 4.1;
-/// Its damping ratio.
+/// Damping ratio.
 const ROCKING_DAMPING: f64 = 0.01;
 /// Rate that the gyro sees of it far below resonance, over the hub's.
 const ROCKING_SEEN: f64 = 0.01;
@@ -121,7 +121,7 @@ impl Default for Twin {
 }
 
 impl Twin {
-    /// Its settings and that of what the models do not have.
+    /// Returns the settings, and the one of the effect that the models do not have.
     fn settings(&self, torque: &[f64], seed: Option<u32>) -> Vec<(String, String)> {
         let mut all = self.settings.clone();
         let mut set = |name: &str, value: String| all.push((name.into(), value));

@@ -38,7 +38,7 @@ enum Excitation {
 
 /// A bench with what measures it.
 pub struct Twin {
-    /// Its number.
+    /// Number.
     pub seed: u64,
     bench: Bench,
     excitation: Excitation,

@@ -37,7 +37,7 @@ pub const HABITS: [&str; 20] = [
 /// A file, and the options with which its user reads it.
 #[derive(Default)]
 pub struct Written {
-    /// Its place.
+    /// Place.
     pub path: PathBuf,
     /// Value of `--columns`.
     pub columns: String,

@@ -15,9 +15,9 @@ use analysis::gauss_markov::Noise;
 /// The bound of one unknown.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bound {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its value in the plan.
+    /// Value in the plan.
     pub value: f64,
     /// The least standard deviation of an unbiased estimate; NaN: none can be made.
     pub std: f64,
@@ -31,7 +31,7 @@ pub struct Bound {
     pub std_alone: f64,
     /// Standard deviation beforehand.
     pub prior: Option<f64>,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
     /// The unknown with which it is most correlated, and how.
     pub with: Option<(String, f64)>,

@@ -105,7 +105,7 @@ pub struct Output {
     pub recording: String,
     /// The output's.
     pub name: String,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
     /// Rows with a value.
     pub rows: usize,
@@ -117,7 +117,7 @@ pub struct Output {
     pub fit_percent: f64,
     /// Tests of the residual.
     pub tests: Tests,
-    /// Its mean over the mean's standard deviation.
+    /// Mean over the mean's standard deviation.
     pub mean: f64,
 }
 

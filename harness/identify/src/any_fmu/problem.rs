@@ -45,7 +45,7 @@ pub struct Channel {
     pub recording: usize,
     /// Number of the output.
     pub output: usize,
-    /// Its noise.
+    /// Noise.
     pub noise: Noise,
     /// Rows that have a value.
     pub sampled: Vec<bool>,
@@ -72,7 +72,7 @@ pub struct Problem<'a> {
 /// Step of the differences by one unknown, in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Its size.
+    /// Size.
     pub size: f64,
     /// Smaller steps were seen to measure the noise of the FMU's solver; 0: none was.
     pub least: f64,
@@ -90,7 +90,7 @@ struct Difference {
 /// Answers of the FMU to one set of values.
 #[derive(Clone)]
 pub struct Answer {
-    /// Its outputs.
+    /// Outputs.
     pub motion: Motion,
     /// Residuals over their standard deviation, then what is known beforehand.
     pub e: DVector<f64>,

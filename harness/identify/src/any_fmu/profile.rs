@@ -27,7 +27,7 @@ const POINTS: usize = 10;
 /// An interval and how it was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Its ends.
+    /// Ends.
     pub ends: [f64; 2],
     /// True for an end, false for a bound.
     pub ended: [bool; 2],

@@ -108,7 +108,7 @@ impl Record {
         noise_level(&self.values(output))
     }
 
-    /// Its first rows, as many as this part of its time has.
+    /// Returns the first rows, as many as this part of its time has.
     pub fn beginning(&self, part: f64) -> Record {
         let (first, last) = (self.time[0], self.time[self.time.len() - 1]);
         let end = first + part * (last - first);

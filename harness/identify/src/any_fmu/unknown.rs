@@ -13,7 +13,7 @@ use crate::unknown::range;
 pub enum What {
     /// A Real of the FMU, of one recording or of all.
     Parameter {
-        /// Its value reference.
+        /// Value reference.
         reference: u32,
         /// `None`: of all.
         recording: Option<usize>,
@@ -37,11 +37,11 @@ pub enum What {
 /// One unknown.
 #[derive(Clone, Debug)]
 pub struct Unknown {
-    /// Its name in the result.
+    /// Name in the result.
     pub name: String,
-    /// Its kind.
+    /// Kind.
     pub what: What,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
     /// Start of the search.
     pub start: f64,

@@ -140,7 +140,7 @@ fn record_with_stops(seed: u64, c: f64) -> (Record, u32) {
     (record, stops)
 }
 
-/// Its stops are events, which the FMU handles within its own steps.
+/// The stops of this FMU are events, which the FMU handles within its own steps.
 #[test]
 fn an_fmu_3_is_identified_through_its_events() {
     let c = 0.03;

@@ -437,7 +437,7 @@ fn an_encoder_shows_the_gyros_scale() {
     assert!((scale.value - 1.01).abs() < 4.0 * scale.std, "{scale:?}");
 }
 
-/// Its angle shows the scale of the gyro, without which no residual is noise: the scale must be free from the beginning.
+/// The encoder's angle shows the scale of the gyro, without which no residual is noise: the scale must be free from the beginning.
 #[test]
 fn a_recording_with_an_encoder_is_described_as_one_without() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -24,7 +24,7 @@ fn is_described(seed: u64, held: &[&str]) {
     assert!(known > 10, "{known}");
 }
 
-/// Its friction was stated in a wrong minimum, 69 standard deviations off: the sums of squares that were compared were of different noises.
+/// The twin's friction was stated in a wrong minimum, 69 standard deviations off: the sums of squares that were compared were of different noises.
 #[test]
 fn a_gentle_sweep_with_an_encoder_has_its_friction_in_the_intervals() {
     is_described(22, &[]);
@@ -43,7 +43,7 @@ fn a_delay_is_not_sure_while_another_torque_between_rows_fits_as_well() {
     is_described(89, &[]);
 }
 
-/// Its search ended a standard deviation from the minimum, for that lies at a kink: dry friction stops the hub within the first row.
+/// The search ended a standard deviation from the minimum, for that lies at a kink: dry friction stops the hub within the first row.
 #[test]
 fn an_initial_rate_that_friction_stops_at_once_leaves_the_minimum_a_minimum() {
     is_described(40, &[]);

@@ -14,7 +14,7 @@ use pulldown_latex::config::{DisplayMode, RenderConfig};
 pub struct Page {
     /// Path from the project's root, with `/`.
     pub path: String,
-    /// Its name in addresses, such as `hubslosh-model` for
+    /// Name in addresses, such as `hubslosh-model` for
     /// `modelDescription/HubSlosh/documentation/model.md`.
     pub name: String,
     /// The title: its first heading.
@@ -29,7 +29,7 @@ pub struct Page {
 pub struct Heading {
     /// 1 for the page's title.
     pub level: usize,
-    /// Its text.
+    /// Text.
     pub title: String,
     /// Anchor that GitHub derives from the heading.
     pub slug: String,

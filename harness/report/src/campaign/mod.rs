@@ -28,7 +28,7 @@ use self::page::{Group, Page, Varied, axis, best, groups, manoeuvre, runs};
 /// plotly.js, as the global `Plotly`.
 pub(crate) const PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
 
-/// Its licence, which every page that holds it holds too.
+/// Licence of Plotly, which every page with Plotly contains.
 pub(crate) const PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 
 /// Most groups that get figures of their own; more would be a book.

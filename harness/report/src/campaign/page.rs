@@ -53,7 +53,7 @@ impl Group<'_> {
 
 /// The number along which runs are drawn.
 pub(super) struct Axis {
-    /// Its place among what is varied.
+    /// Place among what is varied.
     pub place: usize,
     pub name: String,
     /// Label with unit.

@@ -81,11 +81,11 @@ pub type Surfaces = dyn Fn(f64, usize) -> anyhow::Result<Vec<Vec<f64>>>;
 pub struct Drawing {
     /// Name of the tank in the page.
     pub name: String,
-    /// Its outline.
+    /// Outline.
     pub outline: Outline,
     /// Masses of liquid, kg, rising, each with the height of its surface at rest, m.
     pub levels: Vec<[f64; 2]>,
-    /// Its modes' surfaces; none of a box, whose modes are sines.
+    /// Surfaces of the modes; none for a box, whose modes are sines.
     pub surfaces: Option<Box<Surfaces>>,
 }
 
@@ -138,7 +138,7 @@ pub(super) struct Tank {
     pub outline: Outline,
     /// Height of the surface at rest at the start, m.
     pub level: f64,
-    /// Its liquid at the start, kg.
+    /// Liquid at the start, kg.
     pub liquid: f64,
     pub modes: Vec<Pendulum>,
     /// Their surfaces where somebody has drawn the tank and it does not drain, as of [`Surfaces`].

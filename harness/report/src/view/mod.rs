@@ -30,7 +30,7 @@ use crate::campaign::{PLOTLY, PLOTLY_LICENSE};
 pub struct Run<'a> {
     /// Title of the page.
     pub title: String,
-    /// Its file, for messages.
+    /// File, for messages.
     pub source: String,
     /// The description of the FMU that made it.
     pub description: &'a ModelDescription,
@@ -40,7 +40,7 @@ pub struct Run<'a> {
     pub parameters_known: bool,
     /// Tanks that somebody has drawn, by number from 1.
     pub drawings: &'a BTreeMap<usize, Drawing>,
-    /// Its columns, `time` among them.
+    /// Columns, `time` among them.
     pub table: &'a Table,
 }
 

@@ -25,7 +25,7 @@ const BATCH: usize = 1 << 16;
 /// Reading of the time column.
 #[derive(Clone, Copy, Debug)]
 pub struct Time<'a> {
-    /// Its place among the wanted columns.
+    /// Place among the wanted columns.
     pub place: usize,
     /// Seconds in the unit that the user or the column's name states; `None`: no unit is stated.
     pub stated: Option<f64>,

@@ -12,9 +12,9 @@ use super::unit::Quantity;
 /// A column of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// Its name in the file, or `#3`: the third.
+    /// Name in the file, or `#3`: the third.
     pub name: String,
-    /// Its unit, if it is given.
+    /// Unit, if it is given.
     pub unit: Option<String>,
 }
 
@@ -48,7 +48,7 @@ pub fn quantity(signal: &str) -> Result<Quantity> {
     let known = SIGNALS.iter().find(|(name, _)| *name == signal).map(|(_, quantity)| *quantity);
     known.with_context(|| {
         let names: Vec<&str> = SIGNALS.iter().map(|(name, _)| *name).collect();
-        format!("{signal} is no signal of a recording (allowed: {})", names.join(", "))
+        format!("{signal} is not a signal of a recording (allowed: {})", names.join(", "))
     })
 }
 
@@ -68,7 +68,7 @@ fn one(item: &str) -> Result<(String, Column)> {
     if let Some(unit) = &column.unit {
         ensure!(
             quantity.factor(unit).is_some(),
-            "{signal}: \"{unit}\" is no unit of {quantity} (allowed: {})",
+            "{signal}: \"{unit}\" is not a unit of {quantity} (allowed: {})",
             quantity.units()
         );
     }
@@ -179,8 +179,8 @@ mod tests {
         assert_eq!(columns.of("theta"), column("theta", None));
         let error = "torque=T,omega=w:deg,time".parse::<Columns>().unwrap_err().to_string();
         for words in [
-            "torque is no signal of a recording (allowed: time, tau_cmd,",
-            "omega: \"deg\" is no unit of a rate (allowed: rad/s, mrad/s, deg/s,",
+            "torque is not a signal of a recording (allowed: time, tau_cmd,",
+            "omega: \"deg\" is not a unit of a rate (allowed: rad/s, mrad/s, deg/s,",
             "\"time\" is not SIGNAL=COLUMN",
         ] {
             assert!(error.contains(words), "{error}");

@@ -1,7 +1,7 @@
 //! MATLAB's `.mat` files of version 5 (MATLAB's `-v6` and `-v7`), as The MathWorks describe them in *MAT-File
 //! Format*: a header of 128 bytes, then elements of type, length and data, arrays among them, perhaps compressed.
 //! Vectors are columns under their names, matrices give `name(1)`, `name(2)`, …, fields of structures `a.b`. What
-//! is no array of real numbers (texts, cells, objects) is passed over.
+//! is not an array of real numbers (texts, cells, objects) is passed over.
 
 use std::io::{BufReader, Read, copy, sink};
 use std::path::Path;
@@ -12,7 +12,7 @@ use flate2::read::ZlibDecoder;
 
 use super::{Found, Header};
 
-/// Most columns of a matrix: a longer one is no table of signals.
+/// Most columns of a matrix: a longer one is not a table of signals.
 const WIDEST: usize = 100;
 /// Deepest structure within structures.
 const DEEPEST: usize = 8;
@@ -36,7 +36,7 @@ struct Shape {
     columns: usize,
     /// Values of one column lie side by side (else those of one row).
     by_column: bool,
-    /// Its class is one of integers.
+    /// True if the class is one of integers.
     integers: bool,
 }
 
@@ -144,11 +144,11 @@ fn walk(path: &Path, visit: Visit) -> Result<()> {
     let big = match &start[126..] {
         b"IM" => false,
         b"MI" => true,
-        _ => bail!("it is no .mat file of version 5 (MATLAB: save('FILE.mat', ..., '-v7'))"),
+        _ => bail!("it is not a .mat file of version 5 (MATLAB: save('FILE.mat', ..., '-v7'))"),
     };
     ensure!(complete, "it ends within its header");
     while let Some(tag) = Tag::next(&mut file, big)? {
-        // nothing is padded here but an element that is no compressed one
+        // nothing is padded here but an element that is not a compressed one
         let padding = if tag.kind == COMPRESSED { 0 } else { tag.padding() };
         let mut body = (&mut file).take(tag.bytes.into());
         match tag.kind {

@@ -319,7 +319,7 @@ fn factor(signal: &Signal, unit: &str) -> Result<f64> {
     let Some(own) = signal.unit else {
         let quantity = quantity(signal.name)?;
         return quantity.factor(unit).with_context(|| {
-            format!("\"{unit}\" is no unit of {quantity} (allowed: {})", quantity.units())
+            format!("\"{unit}\" is not a unit of {quantity} (allowed: {})", quantity.units())
         });
     };
     // an FMU that names no unit gives no reason to convert

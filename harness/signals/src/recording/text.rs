@@ -257,7 +257,7 @@ impl Lines {
             let line = self.number;
             ensure!(
                 (read as u64) < LONGEST_LINE,
-                "line {line} is longer than {LONGEST_LINE} bytes: it is no text"
+                "line {line} is longer than {LONGEST_LINE} bytes: it is not text"
             );
             ensure!(
                 line > 1
@@ -265,7 +265,7 @@ impl Lines {
                         || self.bytes.starts_with(&[0xfe, 0xff])),
                 "it is UTF-16; save it as UTF-8"
             );
-            ensure!(!self.bytes.contains(&0), "line {line} has a byte 0: it is no text");
+            ensure!(!self.bytes.contains(&0), "line {line} has a byte 0: it is not text");
             text.clear();
             match std::str::from_utf8(&self.bytes) {
                 Ok(valid) => text.push_str(valid),
@@ -333,7 +333,7 @@ impl Layout {
         let Some(division) = division else {
             let (line, text) = sample.get(1).unwrap_or(&sample[0]);
             bail!(
-                "line {line}, \"{}\", is no row of numbers (allowed: numbers with decimal point or comma, separated by \
+                "line {line}, \"{}\", is not a row of numbers (allowed: numbers with decimal point or comma, separated by \
                  semicolons, tabs, commas or blanks; decimal commas need another separator, or quotes; lines of \
                  comment begin with {})",
                 text.chars().take(60).collect::<String>(),

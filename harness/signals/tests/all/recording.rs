@@ -383,7 +383,7 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
         (
             "time,tau_cmd,omega [V]\n0,0,0\n",
             "",
-            "column omega: \"V\" is no unit of a rate (allowed: rad/s, mrad/s,",
+            "column omega: \"V\" is not a unit of a rate (allowed: rad/s, mrad/s,",
         ),
         (
             "time,tau_cmd,omega\n0,0,0\n",
@@ -398,9 +398,9 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
             "omega has values in 1 rows (allowed: at least 2)",
         ),
         ("time,tau_cmd,omega\n0,02,0,1,0,3\n", "", "decimal commas need another separator"),
-        ("nothing here\n", "", "line 1, \"nothing here\", is no row of numbers"),
+        ("nothing here\n", "", "line 1, \"nothing here\", is not a row of numbers"),
         ("", "", "it is empty"),
-        ("a\0b\n", "", "line 1 has a byte 0: it is no text"),
+        ("a\0b\n", "", "line 1 has a byte 0: it is not text"),
     ];
     for (text, of, words) in cases {
         let error = error(text, of);
@@ -519,7 +519,7 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
             "time,tau_cmd,omega\n0,0,true\n1,0,true\n2,0,false\n",
             "line 2, column omega: \"true\" is not a number; line 3",
         ),
-        ("a,b\nidle,x\nbusy,y\n", "line 2, \"idle,x\", is no row of numbers"),
+        ("a,b\nidle,x\nbusy,y\n", "line 2, \"idle,x\", is not a row of numbers"),
     ];
     for (text, words) in cases {
         let error = read_text("csv", text.as_bytes(), "").unwrap_err();
