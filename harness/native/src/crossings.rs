@@ -4,11 +4,11 @@
 //! value, slope and a bound of the curvature show whether it can cross at all, and whether more than once; if more than
 //! once, the interval is halved. What the intervals bound is then evaluated from the state space itself.
 
+use num_complex::Complex64 as Complex;
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::complex::Complex;
 use crate::numbers::numbers;
 
 /// A loop gain above this is at an integrator, or another pole on the axis: no crossing.
@@ -93,13 +93,13 @@ impl Model {
         for k in 0..n.saturating_sub(1) {
             let (upper, lower) = rows[k * n..][..2 * n].split_at_mut(n);
             let (upper, lower) = (&mut upper[k..], &mut lower[k..]);
-            if upper[0].square() < lower[0].square() {
+            if upper[0].norm_sqr() < lower[0].norm_sqr() {
                 upper.swap_with_slice(lower);
                 for state in states.chunks_exact_mut(n) {
                     state.swap(k, k + 1);
                 }
             }
-            if lower[0].is_zero() {
+            if lower[0] == Complex::ZERO {
                 continue;
             }
             let factor = lower[0] / upper[0];
@@ -178,7 +178,7 @@ impl Shape {
         let mut pairs: Vec<_> = zeros
             .iter()
             .map(|zero| {
-                let distance = |i: &usize| (left[*i] - *zero).square();
+                let distance = |i: &usize| (left[*i] - *zero).norm_sqr();
                 let nearest = (0..left.len()).min_by(|i, j| distance(i).total_cmp(&distance(j)));
                 [Some(*zero), nearest.map(|i| left.swap_remove(i))]
             })
@@ -191,7 +191,7 @@ impl Shape {
             .filter_map(|w| {
                 let [size, phase] = shape.at(*w, 0.0).value;
                 let value = exact(*w);
-                let factor = (value.size().ln() - size, value.phase() - phase);
+                let factor = (value.norm().ln() - size, value.arg() - phase);
                 (factor.0.is_finite() && factor.1.is_finite()).then_some(factor)
             })
             .collect();
@@ -219,10 +219,10 @@ impl Shape {
             for (root, is_zero) in pair.iter().zip([true, false]) {
                 let Some(root) = root else { continue };
                 let way = s - *root;
-                let square = way.square();
+                let square = way.norm_sqr();
                 let inverse = Complex::new(way.re / square, -way.im / square);
                 // distances from the axis, and from the part of it within reach
-                let size = root.square().sqrt();
+                let size = root.norm_sqr().sqrt();
                 let (axis, bend) = match self.period {
                     0.0 => (root.re.abs(), [1.0, 2.0 * root.re.abs()]),
                     _ => {
@@ -237,16 +237,16 @@ impl Shape {
                 bends[1] += near.min(bend[1] / (least * least * least));
                 (nearest, largest) = (nearest.min(least), largest.max(size));
                 if is_zero {
-                    product = product * way;
+                    product *= way;
                     sum += inverse;
                 } else {
-                    product = product * inverse;
+                    product *= inverse;
                     sum -= inverse;
                 }
             }
             if let [Some(zero), Some(pole)] = pair {
                 // by the derivative along the way from one to the other
-                let gap = (*zero - *pole).size();
+                let gap = (*zero - *pole).norm();
                 let least = nearest - gap / 2.0;
                 let steep = if self.period == 0.0 { 2.0 } else { 1.0 + largest };
                 if least > 0.0 {
@@ -260,12 +260,12 @@ impl Shape {
             let size = product.re.abs().max(product.im.abs());
             if !(1e-100..1e100).contains(&size) && size > 0.0 {
                 scale += size.ln();
-                product = product * (1.0 / size);
+                product *= 1.0 / size;
             }
         }
         let slope = along * sum;
         Logarithm {
-            value: [self.factor.0 + scale + product.size().ln(), self.factor.1 + product.phase()],
+            value: [self.factor.0 + scale + product.norm().ln(), self.factor.1 + product.arg()],
             slope: [slope.re, slope.im],
             curvature,
         }
@@ -316,7 +316,7 @@ impl Shape {
         for root in self.roots() {
             let (place, width) = match self.period {
                 0.0 => (root.im.abs(), root.re.abs()),
-                period => (root.phase().abs() / period, root.size().ln().abs() / period),
+                period => (root.arg().abs() / period, root.norm().ln().abs() / period),
             };
             let width = width.max(1e-9 * place);
             let steps = [0.0, 0.3, 1.0, 3.0, 10.0, 30.0];
@@ -358,8 +358,8 @@ impl Kind {
     /// Returns a number that changes its sign at a crossing.
     fn height(self, gain: Complex) -> f64 {
         match self {
-            Kind::Gain => gain.size().max(1e-300).ln(),
-            Kind::Phase => gain.im / gain.size(),
+            Kind::Gain => gain.norm().max(1e-300).ln(),
+            Kind::Phase => gain.im / gain.norm(),
         }
     }
 
@@ -413,8 +413,8 @@ fn search(
     let mut found = Vec::new();
     let mut nearest = f64::INFINITY;
     let mut add = |kind: Kind, w: f64, gain: Complex| {
-        let is = kind == Kind::Gain || (gain.re < 0.0 && gain.size() > NOTHING);
-        if is && gain.size() < INTEGRATOR {
+        let is = kind == Kind::Gain || (gain.re < 0.0 && gain.norm() > NOTHING);
+        if is && gain.norm() < INTEGRATOR {
             found.push((kind == Kind::Gain, w, gain.re, gain.im));
         }
     };
@@ -427,10 +427,10 @@ fn search(
     let mut before: Option<(f64, Complex)> = None;
     for w in ends {
         let gain = model.gain(w);
-        if !gain.is_finite() || gain.size() < 1e-300 {
+        if !gain.is_finite() || gain.norm() < 1e-300 {
             continue;
         }
-        nearest = nearest.min((gain + Complex::new(1.0, 0.0)).size());
+        nearest = nearest.min((gain + Complex::new(1.0, 0.0)).norm());
         if let Some((low, at_low)) = before {
             for kind in kinds {
                 let heights = [kind.height(at_low), kind.height(gain)];
@@ -454,7 +454,7 @@ fn search(
     for w in ends.into_iter().filter(|w| w.is_finite()) {
         let gain = model.gain(w);
         if gain.is_finite() {
-            nearest = nearest.min((gain + Complex::new(1.0, 0.0)).size());
+            nearest = nearest.min((gain + Complex::new(1.0, 0.0)).norm());
             add(Kind::Phase, w, Complex::new(gain.re, 0.0));
         }
     }
@@ -462,7 +462,7 @@ fn search(
     let return_difference =
         Shape::new([closed, poles], model.period, &grid, |w| model.gain(w) + one);
     for w in return_difference.minima(&grid) {
-        let distance = (model.gain(w) + one).size();
+        let distance = (model.gain(w) + one).norm();
         if distance.is_finite() {
             nearest = nearest.min(distance);
         }
