@@ -284,7 +284,7 @@ def _given(source: Any) -> "dict[str, Any] | Path":
     """Return a tank's file, or what would stand in one."""
     if isinstance(source, Mapping):
         given = dict(source)
-        for key in ("points", "svg"):  # files named relative to the tank file, which is copied elsewhere
+        for key in ("points", "svg"):  # relative to the tank file
             if isinstance(given.get(key), str):
                 given[key] = str(Path(given[key]).absolute())
         return given
