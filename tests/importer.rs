@@ -140,7 +140,7 @@ fn model_exchange_gives_the_crate_fmi_the_bits_that_it_gives_us() {
         ours.set_continuous_states(&x).unwrap();
         let (mut event, mut end) = (false, false);
         theirs.completed_integrator_step(true, &mut event, &mut end).unwrap();
-        assert_eq!(ours.completed_integrator_step().unwrap().0, event, "step {n}");
+        assert_eq!(ours.completed_integrator_step().unwrap().enter_event_mode, event, "step {n}");
         assert!(!end);
         if event {
             theirs.enter_event_mode().unwrap();
@@ -170,6 +170,7 @@ mod fmi3 {
     use fmi::EventFlags;
     use fmi::fmi3::import::Fmi3Import;
     use fmi::fmi3::{CoSimulation, Common, Fmi3Model, GetSet, ModelExchange};
+    use host::causality::Causality;
     use host::description::{ModelDescription, Type};
     use host::fmi2::MODEL_EXCHANGE;
     use pack::{Fmi, HUBSLOSH, MODELS, Model, packed_model_for_tests, packed_version_for_tests};
@@ -236,7 +237,8 @@ mod fmi3 {
             let (import, description) = import(model);
             let two = host::fmu::Fmu::open(packed_model_for_tests(model)).unwrap();
             let outputs = description.variables.iter();
-            let outputs = outputs.filter(|v| v.causality == "output" && v.kind() == Type::Real);
+            let outputs =
+                outputs.filter(|v| v.causality == Causality::Output && v.kind() == Type::Real);
             let names: Vec<&str> = outputs.map(|v| v.name.as_str()).collect();
             let outputs = references(&description, &names);
             let ours_outputs = references(two.description(), &names);
@@ -356,7 +358,11 @@ mod fmi3 {
             let (mut event, mut end) = (false, false);
             ModelExchange::completed_integrator_step(&mut theirs, true, &mut event, &mut end)
                 .unwrap();
-            assert_eq!(ours.completed_integrator_step().unwrap().0, event, "step {n}");
+            assert_eq!(
+                ours.completed_integrator_step().unwrap().enter_event_mode,
+                event,
+                "step {n}"
+            );
             assert!(!end);
             if event {
                 Common::enter_event_mode(&mut theirs).unwrap();
