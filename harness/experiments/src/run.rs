@@ -24,7 +24,7 @@ pub struct Run {
     pub input: Option<String>,
     /// The torque command.
     pub torque: Torque,
-    /// Further Real inputs by FMU name, each with its history in the input's unit.
+    /// Further inputs by FMU name, each with its history in the input's unit.
     pub others: Vec<(String, Torque)>,
     /// Communication step H, s.
     pub step: f64,
@@ -68,9 +68,10 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
 /// Column of a torque history that is not an input: the derivative of [`TORQUE`] until the next row.
 pub const SLOPE: &str = "tau_slope";
 
-/// Reads a file's histories of inputs: every column that is a Real input of the FMU, and
-/// [`SLOPE`] with [`TORQUE`]. Columns other than these and `time` are refused by name, or ignored
-/// with `ignore`. The first history is the input `chosen`, else [`TORQUE`], else the file's first.
+/// Reads a file's histories of inputs: every column that is an input of the FMU, and [`SLOPE`] with [`TORQUE`].
+/// Integers, enumerations (by value) and Booleans (0 and 1) hold from row to row. Other columns except `time` are
+/// refused by name, or ignored with `ignore`. The first history is the input `chosen`, else [`TORQUE`], else the
+/// file's first.
 ///
 /// # Errors
 /// The file has no such column, or other columns. The error lists all problems of the columns.
@@ -81,10 +82,11 @@ pub fn histories(
     held: bool,
     ignore: bool,
 ) -> Result<Vec<(String, Torque)>> {
-    let is_input = |name: &str| {
+    let kind = |name: &str| {
         let named = |v: &&Variable| v.name == name && v.causality == Causality::Input;
-        description.variables.iter().find(named).is_some_and(|v| v.kind() == Type::Real)
+        description.variables.iter().find(named).map(Variable::kind)
     };
+    let is_input = |name: &str| kind(name).is_some_and(Inputs::takes);
     let file = path.display();
     let there = table::names(path)?;
     let columns: Vec<&str> = there.iter().map(String::as_str).collect();
@@ -115,7 +117,7 @@ pub fn histories(
         problems.is_empty(),
         "{file} cannot be used: {}; the FMU's inputs: {}; columns in the file: {}",
         problems.join("; "),
-        all.join(", "),
+        if all.is_empty() { "none".to_string() } else { all.join(", ") },
         columns.join(", ")
     );
     let first = chosen.or_else(|| inputs.contains(&TORQUE).then_some(TORQUE)).unwrap_or(inputs[0]);
@@ -129,7 +131,26 @@ pub fn histories(
         .into_iter()
         .map(|name| {
             let slopes = (slope && name == TORQUE && !held).then(|| column(SLOPE));
-            let history = Torque::rows(column("time"), column(name), slopes, held);
+            let (values, kind) = (column(name), kind(name).unwrap_or(Type::Real));
+            let allowed: fn(&f64) -> bool = match kind {
+                Type::Real => |_| true,
+                Type::Boolean => |value| [0.0, 1.0].contains(value),
+                _ => |value| value.fract() == 0.0 && value.abs() < 2_f64.powi(31),
+            };
+            if let Some(row) = values.iter().position(|value| !allowed(value)) {
+                bail!(
+                    "{file} cannot be used: row {}: {name} is {} (allowed: {})",
+                    row + 1,
+                    values[row],
+                    if kind == Type::Boolean {
+                        "0 and 1, it is a Boolean"
+                    } else {
+                        "integers of 32 bits"
+                    }
+                );
+            }
+            let held = held || kind != Type::Real;
+            let history = Torque::rows(column("time"), values, slopes, held);
             Ok((name.to_string(), history.with_context(|| format!("{file} cannot be used"))?))
         })
         .collect()

@@ -1,15 +1,21 @@
-//! A run by Co-Simulation of either version of FMI: Real inputs set at every communication point, with the slopes that they have
-//! until the next.
+//! A run by Co-Simulation of either version of FMI: inputs set at every communication point, Reals with the slopes that they have
+//! until the next. Integers, enumerations and Booleans are held.
+
+use std::borrow::Cow;
 
 use anyhow::{Context, Result};
 
 use crate::c_abi::Called;
-use crate::description::ModelDescription;
+use crate::description::{ModelDescription, Type, Value, Variable};
 use crate::fmu::Instance;
 
-/// The Real inputs that a host drives.
+/// The inputs that a host drives.
 pub struct Inputs {
+    /// The Reals, and their places among the inputs.
     references: Vec<u32>,
+    places: Vec<usize>,
+    /// The others, with their places.
+    discrete: Vec<(usize, Variable)>,
     /// The FMU takes slopes of inputs.
     sloped: bool,
 }
@@ -26,11 +32,25 @@ pub struct Course<'a> {
 impl Inputs {
     /// Inputs by FMU name; `hold`: they are held over each step (zero-order hold).
     pub fn new(description: &ModelDescription, names: &[&str], hold: bool) -> Result<Self> {
-        let references: Result<Vec<u32>> =
-            names.iter().map(|name| Ok(description.variable(name)?.reference)).collect();
+        let (mut references, mut places, mut discrete) = (Vec::new(), Vec::new(), Vec::new());
+        for (place, name) in names.iter().enumerate() {
+            let variable = description.variable(name)?;
+            if variable.kind() == Type::Real {
+                references.push(variable.reference);
+                places.push(place);
+            } else {
+                discrete.push((place, variable.clone()));
+            }
+        }
         let interpolates =
             description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs);
-        Ok(Inputs { references: references?, sloped: !hold && interpolates && !names.is_empty() })
+        let sloped = !hold && interpolates && !references.is_empty();
+        Ok(Inputs { references, places, discrete, sloped })
+    }
+
+    /// Returns true if an input of this type can be driven.
+    pub fn takes(kind: Type) -> bool {
+        matches!(kind, Type::Real | Type::Integer | Type::Enumeration | Type::Boolean)
     }
 
     /// Takes an instance whose start values are set through its initialisation, with the inputs' first
@@ -59,8 +79,8 @@ impl Inputs {
         start: f64,
         mut at: impl FnMut(&mut Instance<'fmu>, f64, Course) -> Result<Option<f64>>,
     ) -> Result<()> {
-        let (mut values, mut slopes) =
-            (vec![0.0; self.references.len()], vec![0.0; self.references.len()]);
+        let count = self.places.len() + self.discrete.len();
+        let (mut values, mut slopes) = (vec![0.0; count], vec![0.0; count]);
         let mut t = start;
         while let Some(next) = at(instance, t, Course { values: &mut values, slopes: &mut slopes })?
         {
@@ -71,8 +91,26 @@ impl Inputs {
         Ok(())
     }
 
+    /// The Reals among values of all inputs.
+    fn reals<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
+        match self.discrete.is_empty() {
+            true => Cow::Borrowed(values),
+            false => self.places.iter().map(|place| values[*place]).collect(),
+        }
+    }
+
     fn set(&self, instance: &mut Instance, values: &[f64]) -> Called {
-        if values.is_empty() { Ok(()) } else { instance.set_real(&self.references, values) }
+        for (place, variable) in &self.discrete {
+            let value = match variable.kind() {
+                Type::Boolean => Value::Boolean(values[*place] != 0.0),
+                _ => Value::Integer(values[*place] as _),
+            };
+            instance.set_value(variable, value)?;
+        }
+        match self.references.is_empty() {
+            true => Ok(()),
+            false => instance.set_real(&self.references, &self.reals(values)),
+        }
     }
 
     fn step(
@@ -85,7 +123,10 @@ impl Inputs {
     ) -> Called {
         self.set(instance, values)?;
         match self.sloped {
-            true => instance.do_step_along(from, to - from, &self.references, values, slopes),
+            true => {
+                let (values, slopes) = (self.reals(values), self.reals(slopes));
+                instance.do_step_along(from, to - from, &self.references, &values, &slopes)
+            }
             false => instance.do_step(from, to - from),
         }
     }

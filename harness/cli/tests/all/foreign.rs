@@ -7,17 +7,28 @@ use host::fmi3::PLATFORM;
 
 /// Packs model3.c with the fault of this number.
 fn model(path: &Path, mutant: u32) {
+    changed_model(path, mutant, &[]);
+}
+
+/// The same with texts replaced, in the description or in the source.
+fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     let sources = concat!(env!("CARGO_MANIFEST_DIR"), "/../check/tests/all/");
-    let library = path.with_extension("library");
+    let changed = |name: &str| {
+        let text = std::fs::read_to_string(format!("{sources}{name}")).unwrap();
+        changes.iter().fold(text, |text, (old, new)| text.replace(old, new))
+    };
+    let (library, source) = (path.with_extension("library"), path.with_extension("c"));
+    std::fs::write(&source, changed("model3.c")).unwrap();
     let done = Command::new("cc")
         .args(["-std=gnu11", "-O1", "-fPIC", "-shared", "-o"])
         .arg(&library)
-        .args([format!("{sources}model3.c"), format!("-DMUTANT=\"{mutant:02}\""), "-lm".into()])
+        .arg(&source)
+        .args([format!("-I{sources}"), format!("-DMUTANT=\"{mutant:02}\""), "-lm".into()])
         .status()
         .unwrap();
     assert!(done.success());
     let name = format!("binaries/{PLATFORM}/Model3{}", std::env::consts::DLL_SUFFIX);
-    let xml = std::fs::read(format!("{sources}model3.xml")).unwrap();
+    let xml = changed("model3.xml").into_bytes();
     let files = vec![("modelDescription.xml".into(), xml), (name, std::fs::read(library).unwrap())];
     pack::archive::write(&files, path).unwrap();
 }
@@ -65,4 +76,44 @@ fn follows_its_closed_solution(path: &Path, folder: &Path) {
         rows += 1;
     }
     assert_eq!(rows, 101);
+}
+
+/// The counter of this model shows 100 while its Boolean is true.
+#[test]
+fn booleans_are_driven_from_a_file_and_held() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("Model3.fmu");
+    let changes = [
+        ("y[i] = m->s.n;", "y[i] = m->s.on ? 100 : m->s.n;"),
+        (
+            "causality=\"parameter\" variability=\"fixed\" initial=\"exact\" start=\"false\"",
+            "causality=\"input\" variability=\"discrete\" start=\"false\"",
+        ),
+    ];
+    changed_model(&path, 0, &changes);
+    let run = |rows: &str| {
+        let input = folder.path().join("u.csv");
+        std::fs::write(&input, format!("time,u,on\n{rows}")).unwrap();
+        let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+            .args(["run", "--columns=n", "--step=0.1", "--stop=2", "--out=-", "--fmu"])
+            .arg(&path)
+            .arg("--input")
+            .arg(&input)
+            .output()
+            .unwrap();
+        let [out, error] = [done.stdout, done.stderr].map(|text| String::from_utf8(text).unwrap());
+        if done.status.success() { Ok(out) } else { Err(error) }
+    };
+    let out = run("0,0,0\n0.95,0,1\n1.45,0,0\n2,0,0\n").unwrap();
+    let mut high = 0;
+    for line in out.lines().skip(1) {
+        let row: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
+        // read at the end of the step before, which begins with the value of its first instant
+        let on = (1.05..1.55).contains(&row[0]);
+        assert_eq!(row[3] == 100.0, on, "{line}");
+        high += usize::from(on);
+    }
+    assert_eq!(high, 5, "{out}");
+    let error = run("0,0,0\n1,0,2\n2,0,0\n").unwrap_err();
+    assert!(error.contains("row 2: on is 2 (allowed: 0 and 1, it is a Boolean)"), "{error}");
 }
