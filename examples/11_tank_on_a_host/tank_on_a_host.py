@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 
 import hubslosh
-from hubslosh.fmu import find
 
 STOP = 20.0  # s
 STEPS = (0.04, 0.02, 0.01, 0.005)
@@ -186,7 +185,7 @@ absoluteTolerance="1e-8" relativeTolerance="1e-8"/></oms:SimulationInformation>
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as out:
         out.writestr("SystemStructure.ssd", text)
         for name in ("Spacecraft", "SloshTank"):
-            out.write(find(fmu(folder, name)), f"resources/{name}.fmu")
+            out.write(hubslosh.fmu_path(fmu(folder, name)), f"resources/{name}.fmu")
 
 
 def in_libcosim(folder: Path | None, step: float) -> pd.DataFrame:

@@ -115,13 +115,11 @@ def in_libcosim(folder: Path, fmu: str | Path) -> pd.DataFrame:
 
 def pack_system(folder: Path, fmu: str | Path) -> Path:
     """Write Loop.ssp into ``folder``."""
-    from hubslosh.fmu import find
-
     system = folder / "Loop.ssp"
     with zipfile.ZipFile(system, "w", zipfile.ZIP_DEFLATED) as archive:
         texts = Path(__file__).with_name("ssp")
         archive.write(texts / "SystemStructure.ssd", "SystemStructure.ssd")
-        archive.write(find(fmu), "resources/HubSlosh.fmu")
+        archive.write(hubslosh.fmu_path(fmu), "resources/HubSlosh.fmu")
         archive.write(folder / "Controller.fmu", "resources/Controller.fmu")
     return system
 

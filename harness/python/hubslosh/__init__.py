@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .craft import Craft, MassProperties, MountedTank
     from .files import to_csv, to_mat, to_parquet
     from .fitting import TransferFunction, fit
-    from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
+    from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value, fmu_path
     from .inertia import bottom_up
     from .linearization import LinearModel, linearize
     from .liquid import LiquidModes, liquid_modes
@@ -48,7 +48,7 @@ _MODULES = {
     "craft": ("Craft", "MassProperties", "MountedTank"),
     "files": ("to_csv", "to_mat", "to_parquet"),
     "fitting": ("TransferFunction", "fit"),
-    "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value"),
+    "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "fmu_path"),
     "inertia": ("bottom_up",),
     "linearization": ("LinearModel", "linearize"),
     "liquid": ("LiquidModes", "liquid_modes"),
@@ -100,6 +100,7 @@ __all__ = [
     "draw",
     "drive",
     "fit",
+    "fmu_path",
     "frequency_response",
     "identify",
     "linearize",

@@ -12,7 +12,16 @@ from typing import Any, ClassVar
 from .native import Fmu as _Fmu
 from .native import FmuError, FmuWarning, Variable, source_tree
 
-__all__ = ["Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "did_you_mean", "source_tree"]
+__all__ = [
+    "Fmu",
+    "FmuError",
+    "FmuWarning",
+    "Quantity",
+    "Value",
+    "did_you_mean",
+    "fmu_path",
+    "source_tree",
+]
 
 Value = float | int | bool | str
 """A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name."""
@@ -50,8 +59,15 @@ class DefinedUnit(str):
         return str(self), self.exponents, self.factor, self.offset
 
 
-def find(model: str | Path) -> Path:
-    """Return the FMU of a model: a file ``….fmu``, or the name of one that is in this package."""
+def fmu_path(model: str | Path) -> Path:
+    """Return the file of an FMU by its name, for other simulators and tools.
+
+    This package contains ``HubSlosh``, ``SloshTank``, ``Spacecraft`` (four tanks of three modes),
+    ``Spacecraft_1x1`` and ``Spacecraft_2x2``, each for FMI 2.0 and, with ``-fmi3``, for FMI 3.0.
+    A file ``….fmu`` is returned as an absolute path.
+
+    Raises FmuError with the names of the FMUs that exist.
+    """
     if not isinstance(model, str | Path):
         raise FmuError(
             f'model must be the name of an FMU, such as "Spacecraft", or a file, not {model!r}'
@@ -65,14 +81,18 @@ def find(model: str | Path) -> Path:
     if root := source_tree():
         folders.append(root / "dist")
     for folder in folders:
-        path = folder / f"{model}.fmu"
+        path = folder / f"{model.replace('_4x3', '')}.fmu"
         if path.is_file():
             return path
     names = sorted({path.stem for folder in folders for path in folder.glob("*.fmu")})
-    raise FmuError(
-        f'there is no FMU "{model}" here (there are: {", ".join(names) or "none"})'
-        f"{did_you_mean(model, names)}; for another FMU give its file, ….fmu"
-    )
+    there = f'there is no FMU "{model}" here (there are: {", ".join(names) or "none"})'
+    if sizes := re.fullmatch(r"Spacecraft_(\d+)x(\d+)(-fmi3)?", model):
+        raise FmuError(
+            f"{there}; other variants are packed from the project's source, with Rust: hubslosh "
+            f"pack --model Spacecraft --tanks {sizes[1]} --modes {sizes[2]}"
+            f"{' --fmi 3' if sizes[3] else ''}"
+        )
+    raise FmuError(f"{there}{did_you_mean(model, names)}; for another FMU give its file, ….fmu")
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
@@ -92,11 +112,15 @@ class Fmu:
     def __init__(self, path: Path) -> None:
         """Read modelDescription.xml."""
         self.path = path
+        """The file."""
         self.native = _Fmu(path)
-        self.is_fmi3 = self.native.is_fmi3
+        """The FMU in the compiled half of this package."""
+        self.is_fmi3: bool = self.native.is_fmi3
         """True for FMI 3.0."""
         self.name: str = self.native.name
+        """``modelName`` of the FMU."""
         self.variables: dict[str, Variable] = {v.name: v for v in self.native.variables}
+        """Variables by name, in the order of modelDescription.xml."""
         atexit.register(self.native.close)
 
     def __repr__(self) -> str:
@@ -105,8 +129,8 @@ class Fmu:
 
     @classmethod
     def open(cls, model: str | Path) -> "Fmu":
-        """Return the FMU of a model; see `find`."""
-        path = find(model)
+        """Return the FMU of a model; see `fmu_path`."""
+        path = fmu_path(model)
         stat = path.stat()
         key = (path, stat.st_mtime_ns, stat.st_size)
         if key not in cls._opened:

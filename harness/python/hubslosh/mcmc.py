@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from . import temporary
-from .fmu import FmuError, find
+from .fmu import FmuError, fmu_path
 from .program import Free, Identification, Table, _asked, _file, _run, _settings, find_program
 
 
@@ -32,7 +32,7 @@ def posterior(
     seed: int = 1,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Sample the posterior of a result of :func:`hubslosh.identify` with ``free=``.
+    """Sample the posterior of a result of `identify` with ``free=``.
 
     * ``found``: The result. The arguments of `identify` are repeated unchanged.
     * ``walkers``: Number of walkers, at least twice the number of unknowns; by default four times.
@@ -62,7 +62,7 @@ def posterior(
         result.write_text(json.dumps(found.all), encoding="utf-8")
         tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
         files = [_file(t, (), Path(folder) / f"data{k}.csv") for k, t in enumerate(tables, 1)]
-        flags = ["--fmu", str(find(fmu)), *_asked(free, inputs, outputs, prior or {})]
+        flags = ["--fmu", str(fmu_path(fmu)), *_asked(free, inputs, outputs, prior or {})]
         flags += [*_settings(settings or {}), *arguments]
         flags += ["--points", str(points), "--found", str(result), "--out", str(answer)]
 

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import pandas as pd
 
 from . import temporary
-from .fmu import FmuError, find, source_tree
+from .fmu import FmuError, fmu_path, source_tree
 
 
 def find_program(path: str | Path | None = None) -> Path:
@@ -93,7 +93,7 @@ def campaign(
             plan = Path(folder) / "plan.toml"
             plan.write_text(text, encoding="utf-8")
         directory = Path(out) if out is not None else Path("dist") / Path(plan).stem
-        arguments: list[str | Path] = ["campaign", "--plan", plan, "--fmu", find(model)]
+        arguments: list[str | Path] = ["campaign", "--plan", plan, "--fmu", fmu_path(model)]
         arguments += ["--out", directory, *(["--force"] if force else [])]
         _run(path, arguments)
     table = pd.read_csv(directory / "runs.csv")
@@ -119,14 +119,14 @@ def analyse(
     * ``settings``: Known parameters of the bench by FMU name, ``{"tank.h": 0.1}``.
     * ``arguments``: Further flags of the command.
 
-    Returns ``runs.csv``, as :func:`campaign` does; the model of a recording is ``recording``.
+    Returns ``runs.csv``, as `campaign` does; the model of a recording is ``recording``.
     """
     files = [recordings] if isinstance(recordings, str | Path) else list(recordings)
     flags = ["--columns", columns] if columns else []
     for name, value in (settings or {}).items():
         text = str(value).lower() if isinstance(value, bool) else str(value)
         flags += ["--set", f"{name}={text}"]
-    where: list[str | Path] = ["--fmu", find(fmu), "--out", out]
+    where: list[str | Path] = ["--fmu", fmu_path(fmu), "--out", out]
     _run(find_program(program), ["analyse", *files, *flags, *arguments, *where])
     table = pd.read_csv(Path(out) / "runs.csv")
     table.attrs["directory"] = Path(out)
@@ -138,6 +138,7 @@ class Estimated:
     """An estimated number, in SI units."""
 
     value: float
+    """The estimate, in `unit`."""
     std: float
     """Standard deviation from all sources of error."""
     std_noise: float
@@ -145,6 +146,7 @@ class Estimated:
     interval: tuple[float, float | None]
     """95 % interval; None: the recording sets no upper end."""
     unit: str
+    """SI unit, as FMI writes it, such as ``kg.m2``."""
     determined: bool = True
     """True if the interval has both ends and the standard deviation is below half the value."""
 
@@ -157,7 +159,7 @@ Method = Literal[
 
 @dataclass(frozen=True)
 class Identification:
-    """Result of ``hubslosh identify``; `all` is its result.json unchanged."""
+    """Result of ``hubslosh identify``; `all` is its result.json."""
 
     parameters: dict[str, Estimated]
     """Estimates of the FMU's parameters, by name."""
@@ -175,6 +177,7 @@ class Identification:
     verdict: tuple[str, ...]
     """The verdict in words."""
     all: dict[str, Any]
+    """The whole result.json."""
 
     def __repr__(self) -> str:
         """Return verdict and estimates."""
@@ -278,7 +281,7 @@ def identify(
     path = find_program(program)
     needed: Sequence[str] = ("time",) if method == "free-decay" else ("time", "tau_cmd", "omega")
     flags = ["--model", model] if model is not None else []
-    flags += ["--fmu", str(find(fmu))]
+    flags += ["--fmu", str(fmu_path(fmu))]
     if free is None:
         flags += ["--method", method]
     else:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from . import temporary
 from .arguments import check_table
-from .fmu import DefinedUnit, Fmu, FmuError, Quantity, find
+from .fmu import DefinedUnit, Fmu, FmuError, Quantity, fmu_path
 from .program import _run, find_program
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def view(
             known = run.attrs.get("parameters", {})
         page = Path(out) if out is not None else Path(folder) / "run.html"
         arguments: list[str | Path] = ["view", file, "--out", page]
-        arguments += ["--fmu", find(model)] if model is not None else []
+        arguments += ["--fmu", fmu_path(model)] if model is not None else []
         for name, value in {**known, **(parameters or {})}.items():
             if isinstance(value, tuple) and isinstance(value[-1], DefinedUnit):
                 value = Fmu.open(model or "HubSlosh").convert(name, value)
