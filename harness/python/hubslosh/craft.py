@@ -159,7 +159,9 @@ class Craft:
     """Specific force along the tanks' axes for frequencies and damping, m/s²; by default thrust
     over mass at the fill."""
     model: str | Path = "Spacecraft"
+    """The FMU, by name or file, as for `simulate`."""
     program: str | Path | None = None
+    """Path of the program ``hubslosh``; None: it is searched for."""
     _known: dict[Any, Any] = field(default_factory=dict, init=False)
     _said: list[str] = field(default_factory=list, init=False)
 
@@ -301,8 +303,8 @@ class Craft:
     def mass_properties(self, fill: Fill, liquid: Liquid = "effective") -> MassProperties:
         """Return mass, centre of mass and inertia at a fill, every surface at rest.
 
-        liquid: "effective", with the inertia that it has under a lid, without friction (about the
-        axis of a body of revolution: 0), as the FMU has it; "rigid", as if it were solid.
+        * ``liquid``: "effective", with the inertia that it has under a lid, without friction (about
+          the axis of a body of revolution: 0), as the FMU has it; "rigid", as if it were solid.
         """
         if liquid not in ("effective", "rigid"):
             raise FmuError(f'liquid must be "effective" or "rigid", not {liquid!r}')
@@ -331,8 +333,9 @@ class Craft:
     ) -> dict[str, Quantity]:
         """Return the parameters of Spacecraft at a fill.
 
-        rigid: liquid without slosh, with its effective inertia. detach: liquid may leave the
-        bottom, by `travel`. mass_flow: tanks drain, see `drain`.
+        * ``rigid``: Liquid without slosh, with its effective inertia.
+        * ``detach``: Liquid may leave the bottom, by `travel`.
+        * ``mass_flow``: Tanks drain, see `drain`.
         """
         if detach and (rigid or mass_flow is not None):
             raise FmuError("detach is for sloshing liquid in tanks that do not drain")
@@ -401,9 +404,9 @@ class Craft:
     ) -> dict[str, Quantity]:
         """Return the parameters of Spacecraft with tanks that drain from a fill on.
 
-        mass_flow: out of each tank, kg/s; one value, or one for each tank as in `fills`. The tank
-        of a flow that is not 0 gets a fill table with the ends ``between``, which takes some 5 s of
-        CPU time and is kept. The FMU stops where liquid leaves the table.
+        * ``mass_flow``: Outflow of each tank, kg/s; one value, or one for each tank as in `fills`.
+          A tank with outflow gets a fill table with the ends ``between``, which takes some 5 s of
+          CPU time and is kept. The FMU stops where liquid leaves the table.
         """
         return self.parameters(fill, mass_flow=mass_flow, between=between)
 
@@ -435,7 +438,7 @@ class Craft:
     ) -> LinearModel:
         """Return the linear model at a fill, at rest under thrust; see `hubslosh.linearize`.
 
-        parameters: further ones of the FMU, which go before those of the craft.
+        * ``parameters``: Further parameters of the FMU, which override those of the craft.
         """
         every = self.parameters(fill, rigid=rigid) | dict(parameters or {})
         return linearize(self.model, every, inputs, outputs)
@@ -458,8 +461,8 @@ class Craft:
         """Return the loop of a sampled controller around the craft at a fill; see `Loop`.
 
         Small angles: ``q[2]``, ``q[3]``, ``q[4]`` are half the angles about the body axes.
-        parameters: further ones of the FMU, which go before those of the craft. mass_flow, between:
-        tanks drain while it is simulated, see `drain`.
+        * ``parameters``: Further parameters of the FMU, which override those of the craft.
+        * ``mass_flow``, ``between``: Tanks drain during the simulation, see `drain`.
         """
         every = self.parameters(fill, rigid=rigid, mass_flow=mass_flow, between=between)
         every |= dict(parameters or {})

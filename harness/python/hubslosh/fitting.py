@@ -19,7 +19,9 @@ class TransferFunction:
     """H(s) = B(s)/A(s), s in rad/s, coefficients from the highest power down; A begins with 1."""
 
     numerator: NDArray[np.float64]
+    """Coefficients of B."""
     denominator: NDArray[np.float64]
+    """Coefficients of A; the first is 1."""
     fit: float
     """100 (1 − |H_data − H| / |H_data − mean H_data|), %: 100 is perfect."""
 

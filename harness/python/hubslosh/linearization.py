@@ -58,9 +58,13 @@ class LinearModel:
     """
 
     A: Matrix
+    """States × states."""
     B: Matrix
+    """States × inputs."""
     C: Matrix
+    """Outputs × states."""
     D: Matrix
+    """Outputs × inputs."""
     states: tuple[str, ...]
     """Names of x."""
     inputs: tuple[str, ...]
@@ -234,13 +238,14 @@ def linearize(
 ) -> LinearModel:
     """Linearise an FMU where its parameters start it, by its directional derivatives.
 
-    model, parameters: as for `simulate`; start values among the parameters (``init.omega``) and
-    values of inputs (``g_axial``) are the point of linearisation. The FMU must offer Model Exchange
-    and directional derivatives.
-    inputs, outputs: Real variables by name, a vector by its name (``"omega"``); by default all
-    inputs and all outputs of that type.
-    all_states: keep states that no output depends on, directly or through other states. Without
-    them nothing is approximated: modes that are not used, or the work done, leave no trace.
+    * ``model``, ``parameters``: As for `simulate`. Start values among the parameters
+      (``init.omega``) and values of inputs (``g_axial``) are the point of linearisation. The FMU
+      must offer Model Exchange and directional derivatives.
+    * ``inputs``, ``outputs``: Real variables by name, a vector by its name (``"omega"``); by
+      default all inputs and all outputs of that type.
+    * ``all_states``: Keep states that no output depends on, directly or through other states. By
+      default they are left out, which approximates nothing: examples are unused modes and the
+      work done.
 
     Warns if no output depends on any input; a hub that dry friction holds does not move. Linearise
     with ``friction.model`` none or viscous, or in motion.

@@ -38,18 +38,18 @@ QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))
 class Loop:
     """A sampled controller around an FMU: what `closed_loop` simulates and `margins` looks at.
 
-    controller: a function of time (s) and the values of ``measured`` that returns a command (or as
-    many as there are). Or a linear controller of the error, reference − measured: a matrix of gains
-    (commands × measured), a `LinearModel`, or a state space or transfer function of python-control.
-    A discrete one must have the period of the loop; a continuous one is discretised by Tustin's
-    rule, which moves a frequency f to atan(π f T)/(π T).
-    period: of the controller's cycle, s.
-    model, parameters: as for `simulate`.
-    measured, command: variables and inputs of the FMU by name, one or several; ``"omega"`` of
-    Spacecraft is all three components.
-    delay: from measurement to command, s; any. latency: the same in whole cycles. The command of a
-    cycle acts that much later and is held until the next one acts: a continuous design sees half a
-    cycle more.
+    * ``controller``: A function of time (s) and the values of ``measured`` that returns a command,
+      or one for each of several. Or a linear controller of the error, reference − measured: a
+      matrix of gains (commands × measured), a `LinearModel`, or a state space or transfer function
+      of python-control. A discrete one must have the period of the loop; a continuous one is
+      discretised by Tustin's rule, which moves a frequency f to atan(π f T)/(π T).
+    * ``period``: Period of the controller's cycle, s.
+    * ``model``, ``parameters``: As for `simulate`.
+    * ``measured``, ``command``: Variables and inputs of the FMU by name, one or several;
+      ``"omega"`` of Spacecraft is all three components.
+    * ``latency``, ``delay``: Delay from measurement to command, in whole cycles and in s (any); the
+      two add up. A command is held until the next one acts: a continuous design sees half a cycle
+      more.
     """
 
     controller: Any
@@ -157,7 +157,7 @@ class Loop:
     def plant(self, parameters: Mapping[str, Quantity] | None = None) -> LinearModel:
         """Return the FMU's linear model from commands to measurements, in continuous time.
 
-        parameters: further ones, such as ``{"friction.model": "viscous"}``.
+        * ``parameters``: Further parameters, such as ``{"friction.model": "viscous"}``.
         """
         measured, command = self.names
         every = parameters_of(self.parameters) | parameters_of(parameters)
@@ -202,7 +202,7 @@ class Loop:
     ) -> Run:
         """Simulate the loop from time 0 to ``stop``, s; see `closed_loop`.
 
-        parameters: further ones, which go before those of the loop.
+        * ``parameters``: Further parameters, which override those of the loop.
         """
         fmu = Fmu.open(self.model)
         problems = wrong_seconds(period=self.period, stop=stop)
@@ -333,18 +333,19 @@ def closed_loop(
 ) -> Run:
     """Simulate an FMU under a sampled controller from time 0 to ``stop``, s.
 
-    controller, period, measured, command, latency, delay: see `Loop`. In every cycle of ``period``
-    seconds the controller gets the values of ``measured``. What it commands is set ``delay``
-    seconds (and ``latency`` cycles) later and held for one cycle; until the first arrives, commands
-    are 0.
-
-    reference: for a linear controller, a table with the column ``time`` and any of ``measured``
-    (what is wanted of it, otherwise 0) and of the commands (added to them: feedforward); straight
-    lines between the rows. With the four columns q[1], …, q[4] the error of q[2], q[3], q[4] is the
-    vector part of q⁻¹ ⊗ q_reference: half of what is left to turn about each body axis.
-    inputs: histories of other inputs, as for `simulate`; straight lines between the rows, followed
-    from substep to substep. substeps: rows of the result per cycle.
-    model, parameters, outputs, tolerance: as for `simulate`.
+    * ``controller``, ``period``, ``measured``, ``command``, ``latency``, ``delay``: See `Loop`. In
+      every cycle of ``period`` seconds the controller gets the values of ``measured``. What it
+      commands is set ``delay`` seconds (and ``latency`` cycles) later and held for one cycle; until
+      the first arrives, commands are 0.
+    * ``reference``: For a linear controller, a table with the column ``time`` and any of
+      ``measured`` (what is wanted of it, otherwise 0) and of the commands (added to them:
+      feedforward); straight lines between the rows. With the four columns q[1], …, q[4] the error
+      of q[2], q[3], q[4] is the vector part of q⁻¹ ⊗ q_reference: half of what is left to turn
+      about each body axis.
+    * ``inputs``: Histories of other inputs, as for `simulate`; straight lines between the rows,
+      followed from substep to substep.
+    * ``substeps``: Rows of the result per cycle.
+    * ``model``, ``parameters``, ``outputs``, ``tolerance``: As for `simulate`.
 
     Returns a table with the columns ``time``, the commands (as they are from that time on), the
     inputs and ``outputs``; its last row ends the last whole cycle. Units: ``.attrs["units"]``.

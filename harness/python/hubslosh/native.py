@@ -36,5 +36,8 @@ except ImportError:
     _native = _built()
 
 Fmu, Instance, Variable = _native.Fmu, _native.Instance, _native.Variable
-FmuError, FmuWarning = _native.FmuError, _native.FmuWarning
+FmuError = _native.FmuError
+"""Error in the arguments of a call, of an FMU or of the program ``hubslosh``."""
+FmuWarning = _native.FmuWarning
+"""Python warning that passes on a warning of an FMU or of the program ``hubslosh``."""
 Model = _native.Model

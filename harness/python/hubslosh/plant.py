@@ -53,7 +53,9 @@ class Instance:
     def __init__(self, fmu: Fmu, *, exchange: bool = False) -> None:
         """Instantiate for Co-Simulation, or for Model Exchange."""
         self.fmu = fmu
+        """The FMU."""
         self.native = native.Instance(fmu.native, exchange)
+        """The instance in the compiled half of this package."""
         for start in _STARTS.get(fmu.name.partition("_")[0], []):
             self.set(start, 0.0)
 
@@ -124,6 +126,7 @@ class Plant(Instance):
         """
         super().__init__(Fmu.open(fmu))
         self.time = start
+        """Present time, s."""
         if torque is not None:
             inputs = {TORQUE: torque, **(inputs or {})}
         try:

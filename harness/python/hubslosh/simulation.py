@@ -64,24 +64,24 @@ def simulate(
 ) -> Run:
     """Simulate an FMU by its own solver (Co-Simulation) and return what it shows over time.
 
-    model: the name of an FMU of this package, ``"HubSlosh"`` or, of FMI 3.0, ``"HubSlosh-fmi3"``;
-    or the file of any FMU 2.0 or 3.0 for Co-Simulation. Both give the same bits where inputs are
-    held, and the same but for last digits where they go in lines.
-    parameters: values of parameters and inputs by name, in SI units or with one of the variable's
-    own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of them, as
-    ``hubslosh tank --parameters`` writes it, see ``read_parameters``.
-    inputs: a table with the column ``time`` (s, growing; two rows at one time are a jump) and one
-    column per input; straight lines between the rows. SI, or with the units of
-    ``inputs.attrs["units"]``, such as ``{"wheel_speed": "rpm"}``, each one of the input's own.
-    ``tau_slope``, as ``hubslosh torque`` writes it, is the slope of ``tau_cmd``.
-    stop, start: s; by default those of the inputs, otherwise the FMU's suggestion.
-    step: between the rows of the result, s; by default the rows of the inputs, otherwise the FMU's
-    suggestion. The FMU steps to every row of the inputs whatever the step.
-    outputs: variables to record, a vector by its name (``"omega"``); by default all outputs, and of
-    the six-axis FMUs the slosh angles of the tanks in use (and of tanks that drain ``liquid``), by
-    which `view` draws the run.
-    tolerance: relative, for the FMU's solver; by default its own choice.
-    hold: inputs are held from row to row.
+    * ``model``: The name of an FMU of this package (see `fmu_path`), ``"HubSlosh"`` or, of FMI 3.0,
+      ``"HubSlosh-fmi3"``; or the file of any FMU 2.0 or 3.0 for Co-Simulation. Both versions give
+      the same bits if inputs are held; with interpolated inputs the last digits may differ.
+    * ``parameters``: Values of parameters and inputs by name, in SI units or with one of the
+      variable's own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of
+      them, as ``hubslosh tank --parameters`` writes it, see `read_parameters`.
+    * ``inputs``: A table with the column ``time`` (s, growing; two rows at one time are a jump) and
+      one column per input; straight lines between the rows. SI, or with the units of
+      ``inputs.attrs["units"]``, such as ``{"wheel_speed": "rpm"}``, each one of the input's own.
+      ``tau_slope``, as ``hubslosh torque`` writes it, is the slope of ``tau_cmd``.
+    * ``stop``, ``start``: Times, s; by default those of the inputs, otherwise the FMU's suggestion.
+    * ``step``: Time between the rows of the result, s; by default the rows of the inputs, otherwise
+      the FMU's suggestion. The FMU steps to every row of the inputs whatever the step.
+    * ``outputs``: Variables to record, a vector by its name (``"omega"``); by default all outputs,
+      and of the six-axis FMUs the slosh angles of the tanks in use (and of tanks that drain
+      ``liquid``), by which `view` draws the run.
+    * ``tolerance``: Relative tolerance of the FMU's solver; by default its own choice.
+    * ``hold``: Hold inputs from row to row.
 
     Returns a pandas table with the columns ``time``, the inputs and ``outputs``; enumerations by
     number.

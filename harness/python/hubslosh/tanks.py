@@ -100,12 +100,13 @@ class Tank:
     ) -> "dict[str, Value]":
         """Return it under the names of an FMU's parameters, for `simulate`, `Loop` and the others.
 
-        model: Spacecraft, with the ``number`` of the tank, 1 to 4; SloshTank; or HubSlosh, a table
-        of modes. Damping ratios and centring stiffnesses are there if `tank` was given viscosity
-        and surface tension; what the program warns of is a `FmuWarning`.
-        position: of the tank's zero (of a ``shape`` its lowest point) in body axes, m. axis:
-        upwards along the tank's axis, in body axes; by default z. rigid: the same liquid without
-        slosh, at its centre, with the inertia that it has under a lid. Not of HubSlosh.
+        * ``model``: Spacecraft, with the ``number`` of the tank, 1 to 4; SloshTank; or HubSlosh, a
+          table of modes. Damping ratios and centring stiffnesses are there if `tank` was given
+          viscosity and surface tension; what the program warns of is a `FmuWarning`.
+        * ``position``: Position of the tank's zero (of a ``shape`` its lowest point), body axes, m.
+        * ``axis``: Direction of the tank's axis, upwards, in body axes; by default z.
+        * ``rigid``: The same liquid without slosh, at its centre, with the inertia that it has
+          under a lid. Not of HubSlosh.
         """
         placed = {"position": position, "axis": axis}
         for name, value in placed.items():
@@ -180,11 +181,15 @@ def tank(
 ) -> Tank:
     """Return masses, lengths and hinges of a tank's slosh modes, by linear potential flow.
 
-    source: a tank file (.toml), or what stands in one: ``{"density": 1010, "shape": {"sphere":
-    {"radius": 0.4}}}``. fill: height above the lowest point, m, or ``"60%"`` of the volume; or
-    fill_mass: kg. modes: how many. gravity: specific force along the axis, m/s², for frequencies
-    and damping. nu: kinematic viscosity, m²/s, for damping ratios. sigma: surface tension, N/m, for
-    centring stiffnesses, with contact_angle, degrees. They go into `Tank.parameters`.
+    * ``source``: A tank file (.toml), or what stands in one: ``{"density": 1010, "shape":
+      {"sphere": {"radius": 0.4}}}``.
+    * ``fill``: Height above the lowest point, m, or ``"60%"`` of the volume.
+    * ``fill_mass``: Mass of the liquid instead of ``fill``, kg.
+    * ``modes``: Number of modes.
+    * ``gravity``: Specific force along the axis, m/s², for frequencies and damping.
+    * ``nu``: Kinematic viscosity, m²/s, for damping ratios.
+    * ``sigma``: Surface tension, N/m, for centring stiffnesses; they go into `Tank.parameters`.
+    * ``contact_angle``: Contact angle of the liquid at the wall, degrees.
 
     Needs the program ``hubslosh``; see `campaign`. Its page on tanks has every shape.
     """
@@ -212,8 +217,8 @@ def solve(
 ) -> tuple[Tank, list[str]]:
     """Return the result of `tank` and the program's warnings.
 
-    spacecraft: the same call computes the parameters of Spacecraft. A full tank has no modes, and
-    of its parameters only those of rigid liquid.
+    * ``spacecraft``: Also compute the parameters of Spacecraft. A full tank has no modes, and only
+      the parameters of rigid liquid.
     """
     from .tables import read_parameters
 
@@ -264,8 +269,10 @@ def fill_table(
 ) -> "tuple[dict[str, Value], list[str]]":
     """Return the fill table of tank 1 of Spacecraft, which lets it drain, and warnings.
 
-    between: lowest and highest fill of the table, as for `tank`. The program places up to 12 points
-    between them, in some 5 s of CPU time. The other arguments are those of `tank`.
+    * ``between``: Lowest and highest fill of the table, as ``fill`` of `tank`. The program places
+      up to 12 points between them, in some 5 s of CPU time.
+
+    The other arguments are those of `tank`.
     """
     from .tables import read_parameters
 
