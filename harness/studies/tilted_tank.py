@@ -2,8 +2,8 @@
 
     PYTHONPATH=harness/python python3 harness/studies/tilted_tank.py
 
-needs the packages in requirements.txt (``pip install 'hubslosh[fem,plot]'``). Three fills, each at
-eleven angles between the tank's axis and gravity; a minute of work.
+Needs gmsh, scikit-fem and matplotlib (``requirements.txt``). Three fills, each at eleven angles
+between the tank's axis and gravity; a minute of work.
 """
 
 from pathlib import Path

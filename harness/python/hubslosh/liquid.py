@@ -390,8 +390,8 @@ class _Tank(NamedTuple):
             import skfem  # noqa: F401, of the same extra
         except (ImportError, OSError) as error:
             raise FmuError(
-                f"{error}: modes in three dimensions need the extra fem: pip install "
-                "'hubslosh[fem]' (gmsh also needs the system's libGLU: Debian's libglu1-mesa)"
+                f"{error}: modes in three dimensions need two packages: pip install gmsh "
+                "scikit-fem (gmsh also needs the system's libGLU: Debian's libglu1-mesa)"
             ) from None
 
         gmsh.initialize(interruptible=False)

@@ -1,7 +1,7 @@
 """The posterior of an identification by Markov chain Monte Carlo, as a check of its intervals.
 
 emcee (Foreman-Mackey et al., PASP 125, 2013) samples the likelihood that ``hubslosh identify``
-maximises, with the noise that it has estimated. ``pip install "hubslosh[posterior]"`` brings emcee.
+maximises, with the noise that it has estimated. ``pip install emcee`` brings emcee.
 """
 
 import json
@@ -46,7 +46,7 @@ def posterior(
     try:
         import emcee
     except ImportError:
-        raise FmuError('posterior() needs emcee: pip install "hubslosh[posterior]"') from None
+        raise FmuError("posterior() needs emcee: pip install emcee") from None
     names = list(found.all["correlations"][0])
     estimates = found.parameters | found.measurement
     middle = np.array([estimates[name].value for name in names])

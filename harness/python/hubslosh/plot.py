@@ -1,4 +1,4 @@
-"""Figures of runs and responses with matplotlib (``pip install hubslosh[plot]``).
+"""Figures of runs and responses with matplotlib (``pip install matplotlib``).
 
 Each function draws into the axes it is given, or into a new figure, and returns the axes.
 """
@@ -30,7 +30,7 @@ def _subplots(rows: int, **options: Any) -> "Sequence[Axes]":
     try:
         import matplotlib.pyplot as plt
     except ModuleNotFoundError:
-        raise FmuError("plots need matplotlib: pip install hubslosh[plot]") from None
+        raise FmuError("plots need matplotlib: pip install matplotlib") from None
     height = 1.2 + 1.9 * rows
     _, axes = plt.subplots(
         rows, squeeze=False, figsize=(8, height), layout="constrained", **options
