@@ -1,20 +1,33 @@
-"""Drives the HubSlosh FMU through a torque history, straight lines from row to row.
+"""Calls the program ``hubslosh``, or drives the HubSlosh FMU through a torque history.
 
-python -m hubslosh --input torque.csv --out answer.csv --set slosh.model=spherical
+    python -m hubslosh book
+    python -m hubslosh --input torque.csv --out answer.csv --set slosh.model=spherical
+
+The first form takes every command of the program and needs no folder on PATH. The second form has
+straight lines from row to row.
 """
 
 import argparse
+import subprocess
 import sys
 from pathlib import Path
 
 from .fmu import FmuError
 from .plant import COLUMNS, TORQUE, drive
+from .program import find_program
 from .tables import ending_of, read_table, setting, write_table
 
 
 def main() -> None:
-    """Read a torque history, drive the FMU, write the answer."""
-    parser = argparse.ArgumentParser(description="Drives HubSlosh through a torque history.")
+    """Run a command of the program; or read a torque history, drive the FMU, write the answer."""
+    if sys.argv[1:] and not sys.argv[1].startswith("-"):
+        try:
+            sys.exit(subprocess.run([find_program(), *sys.argv[1:]], check=False).returncode)
+        except FmuError as error:
+            sys.exit(f"error: {error}")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--fmu", default="HubSlosh", metavar="FILE")
     parser.add_argument(
         "--input", type=Path, required=True, metavar="FILE",

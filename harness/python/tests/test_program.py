@@ -1,7 +1,9 @@
 """Calls of the program ``hubslosh`` by the package."""
 
 import json
+import os
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,24 @@ def test_a_campaign_comes_back_as_a_table(fmu: Path, tmp_path: Path, request) ->
     table = hubslosh.campaign(PLAN, tmp_path / "out", model=fmu, program=binary)
     assert len(table) == 2
     assert (table.attrs["directory"] / "report.html").is_file()
+
+
+def test_the_package_runs_commands_of_the_program(request) -> None:
+    """Output and exit code are the program's own."""
+    python = [sys.executable, "-m", "hubslosh"]
+    surroundings = os.environ | {
+        "HUBSLOSH": str(option(request, "--hubslosh")),
+        "PYTHONPATH": str(Path(hubslosh.__file__).parents[1]),
+    }
+    for command, code in (["check", "--rules"], 0), (["nonsense"], 2):
+        own, said = (
+            subprocess.run(
+                [*program, *command], env=surroundings, capture_output=True, text=True, check=False
+            )
+            for program in ([surroundings["HUBSLOSH"]], python)
+        )
+        assert said.returncode == own.returncode == code
+        assert (said.stdout, said.stderr) == (own.stdout, own.stderr)
 
 
 def test_a_recording_comes_back_as_a_row_beside_the_model(
