@@ -36,6 +36,25 @@ NEEDS_MORE = {"6_monte_carlo": "distributed", "7_one_loop": "the crate one-loop"
 """Examples that need what the wheel's extras do not bring."""
 
 
+FMUS = ("HubSlosh", "Spacecraft", "Spacecraft_1x1", "Spacecraft_2x2", "SloshTank")
+"""FMUs of the wheel, each in both versions of FMI."""
+
+VARIANTS = """
+import hubslosh
+start = {"tank[1].p_dot_0[1,1]": 0.3}
+names = ("Spacecraft", "Spacecraft_1x1", "Spacecraft_2x2", "Spacecraft_2x2-fmi3", "Spacecraft_4x3")
+runs = [hubslosh.simulate(name, start, stop=1) for name in names]
+assert all(run.equals(runs[0]) for run in runs) and runs[0]["omega[2]"].abs().max() > 1e-6
+assert len(runs[2].view().html) > 100_000
+try:
+    hubslosh.simulate("Spacecraft_3x1")
+except hubslosh.FmuError as error:
+    assert "hubslosh pack --model Spacecraft --tanks 3 --modes 1" in str(error), error
+    print(error)
+"""
+"""Runs the variants: the bits of Spacecraft, and a way to those that are not in the wheel."""
+
+
 class Machine:
     """An environment with the wheel and the system's programs, nothing else."""
 
@@ -123,8 +142,12 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
     if program is None:
         sys.exit("error: the wheel has brought no command hubslosh")
     print(run(program, "--version")[0].strip(), "at", program)
-    for fmu in ("HubSlosh", "Spacecraft", "SloshTank"):
+    fmus = [Path(line).stem for line in run(program, "fmus")[0].splitlines()]
+    if sorted(fmus) != sorted(f"{name}{fmi}" for name in FMUS for fmi in ("", "-fmi3")):
+        sys.exit(f"error: the wheel has the FMUs {', '.join(fmus)}")
+    for fmu in fmus:
         print(run(program, "check", fmu)[0].strip().splitlines()[-1])
+    print(run(python, "-c", VARIANTS)[0].strip())
     drawing = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
     run(program, "tank", drawing, "--fill", "1.2", "--out", "tank.json")
     run(program, "run", "--profile", "exp-sweep:amplitude=0.1", "--out", "sweep.csv")

@@ -1,36 +1,36 @@
 //! Resolves `--fmu`: a file, or one of the project's FMUs by name.
 
+use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use pack::{Fmi, Model};
+use pack::Fmi;
 
 /// Folders of the project's FMUs relative to the command's own: next to it, in its data folder,
 /// in the Python package that it came with.
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
 
-/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs. The search order is `dist`, where `hubslosh
-/// pack` puts it, the folder of this command, then `dist` of the source that the command was built from. There the command packs
-/// the FMU if necessary.
+/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs, also of a variant of Spacecraft. The search
+/// order is `dist`, where `hubslosh pack` puts it, the folder of this command, then `dist` of the source that the command was built
+/// from. There the command packs the FMU if necessary.
 ///
 /// # Errors
 /// If there is none; the error says what to do.
 pub fn find(name: &Path) -> Result<PathBuf> {
-    let all = Fmi::ALL.iter().flat_map(|fmi| pack::MODELS.iter().map(move |model| (*fmi, model)));
-    let known = all.clone().find(|(fmi, model)| name == Path::new(&named(*fmi, model)));
-    let Some((fmi, model)) = known else {
-        let all: Vec<_> = all.map(|(fmi, model)| named(fmi, model)).collect();
+    let Some((model, fmi)) = name.to_str().and_then(pack::named) else {
+        let all: Vec<_> = pack::in_wheels().map(|model| model.identifier()).collect();
         ensure!(
             name.is_file(),
-            "there is no FMU at {} (allowed: a file, or one of this project by its name: {})",
+            "there is no FMU at {} (allowed: a file, or {}, for FMI 3.0 with -fmi3 or -fmi3-arrays)",
             name.display(),
             all.join(", ")
         );
         return Ok(name.into());
     };
-    let file = format!("{}.fmu", named(fmi, model));
-    let packed = Path::new("dist").join(&file);
+    let packed = fmi.path("dist".as_ref(), &model.identifier());
+    let file = packed.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if packed.is_file() {
         return Ok(packed);
     }
@@ -39,25 +39,36 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     }
     if !pack::has_source() {
         let places: Vec<_> = folders().iter().map(|place| place.display().to_string()).collect();
+        let there: Vec<_> =
+            all().iter().filter_map(|fmu| Some(fmu.file_stem()?.display().to_string())).collect();
         bail!(
-            "{file} was not found in dist or in this command's folder ({}), and there is no source to build it from. Put it \
-             there or name it with --fmu FILE; releases and the Python package contain it",
-            places.join(", ")
+            "{file} was not found in dist or in this command's folder ({}; FMUs: {}). `hubslosh pack` builds other variants in the \
+             project's source, with Rust; --fmu FILE takes a file",
+            places.join(", "),
+            if there.is_empty() { "none".into() } else { there.join(", ") }
         );
     }
-    let packed = pack::root().join("dist").join(&file);
+    let packed = pack::root().join(packed);
     if !packed.is_file() {
         super::terminal::note(format_args!("building {}", packed.display()));
-        pack::pack(model, fmi, &packed)
+        pack::pack(&model, fmi, &packed)
             .with_context(|| format!("there is no {file} yet, and it cannot be built"))?;
     }
     Ok(packed)
 }
 
-/// Name of one of the project's FMUs for `--fmu`: `HubSlosh`, and of FMI 3.0 `HubSlosh-fmi3` and
-/// `HubSlosh-fmi3-arrays`.
-fn named(fmi: Fmi, model: &Model) -> String {
-    format!("{}{}", model.name, fmi.suffix())
+/// The FMUs that [`find`] finds without building: those of `dist`, then those that came with this command.
+pub fn all() -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> = Vec::new();
+    for folder in ["dist".into()].into_iter().chain(folders()) {
+        for model in pack::in_wheels() {
+            let paths = Fmi::ALL.map(|fmi| fmi.path(&folder, &model.identifier()));
+            found.extend(paths.into_iter().filter(|path| path.is_file()));
+        }
+    }
+    let mut seen = BTreeSet::new();
+    found.retain(|path| seen.insert(path.file_name().map(OsString::from)));
+    found
 }
 
 /// The FMU that came with this command.

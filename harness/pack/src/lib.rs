@@ -22,7 +22,7 @@ use host::description::ModelDescription;
 
 use crate::archive::{Files, Packed, below, read};
 pub use crate::fmi::Fmi;
-pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, Sizes, model};
+pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, Sizes, in_wheels, model, named};
 pub use crate::platforms::Built;
 use crate::project::build_in;
 pub use crate::project::{build, build_native, has_source, needs_source, root};

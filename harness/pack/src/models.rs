@@ -14,7 +14,7 @@ use crate::project::{self, root};
 pub const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref";
 
 /// An FMU of this project.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Model {
     /// Its `modelIdentifier`, but of a variant; the folder `modelDescription/<name>` has all that travels with the
     /// binary: `modelDescription.xml`, `documentation/`, and, if
@@ -38,6 +38,9 @@ pub struct Sizes {
 /// Sizes of Spacecraft.fmu.
 const MOST: Sizes = Sizes { tanks: 4, modes: 3 };
 
+/// Sizes of the variants of Spacecraft in wheels.
+const VARIANTS: [Sizes; 2] = [Sizes { tanks: 1, modes: 1 }, Sizes { tanks: 2, modes: 2 }];
+
 /// All of them; the first is packed unless another is named.
 pub const MODELS: [Model; 3] = [
     Model { name: "HubSlosh", package: "hubslosh-fmu", sizes: None },
@@ -59,6 +62,26 @@ pub fn model(name: &str) -> Result<&'static Model> {
         let hint = did_you_mean(name, names);
         format!("there is no model \"{name}\" (allowed: {}){hint}", all.join(", "))
     })
+}
+
+/// FMUs in wheels: all models, and variants of Spacecraft for fewer tanks and modes.
+pub fn in_wheels() -> impl Iterator<Item = Model> {
+    let variants = VARIANTS.map(|sizes| Model { sizes: Some(sizes), ..MODELS[1] });
+    MODELS.into_iter().chain(variants)
+}
+
+/// Finds an FMU by its name: `Spacecraft`, a variant such as `Spacecraft_2x2`, and either for FMI 3.0,
+/// `Spacecraft_2x2-fmi3`.
+pub fn named(name: &str) -> Option<(Model, Fmi)> {
+    let fmi = Fmi::ALL.into_iter().rev().find(|fmi| name.ends_with(fmi.suffix()))?;
+    let identifier = name.strip_suffix(fmi.suffix())?;
+    if let Ok(model) = model(identifier) {
+        return Some((*model, fmi));
+    }
+    let (name, sizes) = identifier.rsplit_once('_')?;
+    let (tanks, modes) = sizes.split_once('x')?;
+    let variant = model(name).ok()?.variant(Some(tanks.parse().ok()?), Some(modes.parse().ok()?));
+    Some((variant.ok()?, fmi))
 }
 
 impl Model {
@@ -134,5 +157,24 @@ impl Model {
     /// The software bill of materials (SBOM) in the FMU: what is in the binary, and under which licence.
     pub fn sbom(&self) -> String {
         format!("documentation/licenses/{}.cdx.json", self.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_all_fmus_lead_back_to_them() {
+        for model in in_wheels() {
+            for fmi in Fmi::ALL {
+                let name = format!("{}{}", model.identifier(), fmi.suffix());
+                assert_eq!(named(&name), Some((model, fmi)), "{name}");
+            }
+        }
+        assert_eq!(named("Spacecraft_4x3"), Some((MODELS[1], Fmi::V2)), "the full FMU");
+        for wrong in ["Spacecraft_5x1", "Spacecraft_x", "SloshTank_1x1", "Spacecraft.fmu", ""] {
+            assert_eq!(named(wrong), None, "{wrong}");
+        }
     }
 }

@@ -19,6 +19,7 @@ pub mod design;
 pub mod estimates;
 pub mod example;
 pub mod examples;
+pub mod fmus;
 pub mod gyro;
 pub mod identify;
 pub mod pack;

@@ -604,6 +604,17 @@ fn an_installed_command_finds_the_fmus_that_came_with_it() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     assert!(done.stderr.is_empty(), "nothing is built: {}", String::from_utf8_lossy(&done.stderr));
     assert_eq!(files(&place("elsewhere")), ["a.csv"]);
+    let said = |arguments: &[&str]| {
+        let done = Command::new(&command)
+            .current_dir(place("elsewhere"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8(done.stdout).unwrap().trim().to_string()
+    };
+    let package = place("lib/python3.12/site-packages/hubslosh").canonicalize().unwrap();
+    assert_eq!(Path::new(&said(&["fmus"])), package.join("fmus/HubSlosh.fmu"));
 }
 
 #[test]
