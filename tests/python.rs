@@ -56,6 +56,17 @@ fn fmpy_drives_the_fmu_as_the_harness_does() {
     pytest(&mut command, "the tests in Python failed");
 }
 
+/// 22 sweeps of 45 minutes with each of six slosh models.
+#[test]
+#[ignore = "minutes: cargo test --release --test tests -- --ignored all_sweeps_of_the_thesis"]
+fn fmpy_drives_all_sweeps_of_the_thesis() {
+    let tests = pack::root().join("harness/python/tests/test_same_as_harness.py");
+    pytest(
+        of_the_package().args(["--all-sweeps", "-k", "whole_sweep"]).arg(tests),
+        "a sweep driven by fmpy differs from the harness's",
+    );
+}
+
 #[test]
 fn the_package_finds_modes_of_liquids_and_drives_model_exchange() {
     let tests = pack::root().join("harness/python/tests");

@@ -31,6 +31,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     wheels = sorted((ROOT / "dist").glob("hubslosh-*.whl"))
     parser.addoption("--wheel", type=Path, default=wheels[-1] if wheels else ROOT / "dist" / "none")
+    parser.addoption("--all-sweeps", action="store_true")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
 
 

@@ -1,5 +1,7 @@
 """The package, fmpy and the harness give one FMU the same torque: the motion is the same."""
 
+import itertools
+import time as clock
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,10 @@ from fmpy import extract, fmi2, read_model_description
 from hubslosh import COLUMNS, TORQUE, drive, read_table, write_table
 
 MODELS = ["frozen", "linear", "planar", "spherical", "paraboloid"]
+FILLS = [0.05, 0.1]
+"""Fills of Rubaga's thesis, m."""
+AMPLITUDES = [0.0125, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25]
+"""Torque amplitudes of the thesis, N·m."""
 SWEEP = "exp-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=300"
 
 
@@ -73,6 +79,34 @@ def test_a_sweep_of_five_minutes_gives_the_same_rate(
     for name in COLUMNS:
         assert np.array_equal(ours[name], by_calls[name]), name
         assert np.abs(ours[name] - theirs[name]).max() <= 1e-12, name
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Choose four sweeps of the thesis, or all 22 with every slosh model."""
+    if "sweep" in metafunc.fixturenames:
+        sweeps = itertools.product(["linear", "spherical"], FILLS, [0.1])
+        if metafunc.config.getoption("--all-sweeps"):
+            sweeps = itertools.product([*MODELS, "liquid"], FILLS, AMPLITUDES)
+        metafunc.parametrize("sweep", list(sweeps), ids=str)
+
+
+def test_a_whole_sweep_of_the_thesis_is_the_same_by_fmpy_and_by_the_harness(
+    fmu: Path, harness: Harness, tmp_path: Path, sweep: tuple[str, float, float]
+) -> None:
+    """45 minutes at 50 Hz, rotary slosh and wave breaking included."""
+    model, fill, amplitude = sweep
+    settings = {"slosh.model": model, "tank.h": fill}
+    flags = [f for name, value in settings.items() for f in ("--set", f"{name}={value}")]
+    profile = f"exp-sweep:amplitude={amplitude},f0=1.25,f1=3.5,duration=2700"
+    theirs = harness("--profile", profile, "--step", "0.02", *flags)
+    assert len(theirs["time"]) == 135_001
+    begin = clock.process_time()
+    ours = by_fmpy(fmu, tmp_path, theirs["time"], theirs[TORQUE], settings)
+    seconds = clock.process_time() - begin
+    off = {name: float(np.abs(ours[name] - theirs[name]).max()) for name in COLUMNS}
+    print(f"{sweep}: {seconds:.1f} s of CPU in fmpy, {off}")
+    for name in COLUMNS:
+        assert off[name] <= 1e-9, name
 
 
 def test_a_held_torque_and_a_tolerance_give_the_same_rate(
