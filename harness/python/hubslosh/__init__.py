@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .modes import mode_errors
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
+    from .review import Review
     from .run import Run
     from .sampling import draw, monte_carlo, quantiles
     from .simulation import simulate
@@ -57,6 +58,7 @@ _MODULES = {
     "modes": ("mode_errors",),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
+    "review": ("Review",),
     "run": ("Run",),
     "sampling": ("draw", "monte_carlo", "quantiles"),
     "simulation": ("simulate",),
@@ -86,6 +88,7 @@ __all__ = [
     "MountedTank",
     "Plant",
     "Quantity",
+    "Review",
     "Run",
     "RunError",
     "Tank",

@@ -22,6 +22,7 @@ from .tanks import Tank, _from_z, _given, _toml, fill_table, solve
 if TYPE_CHECKING:
     import pandas as pd
 
+    from .review import Review
     from .viewing import View
 
 Vector = NDArray[np.float64]
@@ -467,6 +468,42 @@ class Craft:
         every = self.parameters(fill, rigid=rigid, mass_flow=mass_flow, between=between)
         every |= dict(parameters or {})
         return Loop(controller, period, self.model, every, measured, command, latency, delay)
+
+    def review(
+        self,
+        controller: Any,
+        period: float,
+        fills: Sequence[Fill] = tuple(f"{fill}%" for fill in range(5, 100, 10)),
+        *,
+        damping: Literal["interval", "nominal"] = "interval",
+        uncertain: Mapping[str, Any] | None = None,
+        draws: int = 200,
+        seed: int = 1,
+        measured: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
+        command: Sequence[str] | str = "torque",
+        latency: int = 0,
+        delay: float = 0.0,
+        parameters: Mapping[str, Quantity] | None = None,
+    ) -> "Review":
+        """Return the design review of a linear sampled controller over fills.
+
+        controller, period, measured, command, latency, delay, parameters: see `loop`.
+        fills: list of fills. damping: "interval" varies the damping of each tank over the interval
+        of its correlation; "nominal" does not. uncertain: ranges by name, for parameters of the FMU
+        and for "delay": (low, high) in SI units, or a share of the nominal value such as "5%". A
+        slosh mode's mass changes the mass of the craft.
+        draws: number of random points over all fills, uniform within the ranges. seed: of draws.
+
+        Each point is linearised in steady thrust, with the torque that balances the thrust's moment
+        about the centre of mass. `loop` does not apply this torque.
+        """
+        from .review import review
+
+        return review(
+            self, controller, period, fills, damping=damping, uncertain=uncertain, draws=draws,
+            seed=seed, measured=measured, command=command, latency=latency, delay=delay,
+            parameters=parameters,
+        )  # fmt: skip
 
     def columns(self, fill: Fill) -> list[str]:
         """Return the columns by which `view` draws craft and liquid, for ``outputs``."""

@@ -1,0 +1,149 @@
+"""Slosh in a loop: says whether each mode is stabilised by phase or by gain.
+
+Near a lightly damped pole p of the plant the loop gain is L(s) = R/(s - p) + L0. Closing the loop
+with u = -L u moves this pole by about -R/(1 + L0). The phase of R/(1 + L0) decides: near 0° the
+loop adds damping, near ±180° it removes damping. In the Nyquist plane the resonance is a circle
+from L0 in the direction of R: away from -1 at 0°, towards -1 at ±180°. The zero next to the pole is
+at about p - R/L0, so the order of pole and zero shows the sign of R/L0.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .linearization import LinearModel
+from .stability import LIGHT, MOVED, _broken_at
+
+SHOWN = 1e-2
+"""Size of a resonance circle in the loop gain below which a mode is left out (-40 dB)."""
+
+_TANK = re.compile(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]")
+
+
+def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """Return a row for each slosh mode that shows in a sampled loop gain, command by command.
+
+    gain: sampled loop gain with the names of its states, as `Loop.gain` returns it. tanks: names of
+    the tanks in the FMU's order.
+
+    ``loop``: the command at which the loop is broken while the others are closed. ``mode``: the
+    tanks and the number of the mode. ``frequency`` (Hz), ``zeta``: of the pole. ``zeta_closed``:
+    damping ratio when this loop is closed too. ``zero`` (Hz): frequency of the zero next to the
+    pole. ``order``: "zero first" if the zero has the lower frequency, otherwise "pole first".
+    ``peak`` (dB): loop gain at the pole's frequency. ``phase`` (deg): of R/(1 + L0), the direction
+    of the resonance circle; 0° is away from -1.
+    ``stabilised``: "unstable" if the closed loop's pole grows; "gain" if the peak is below 0 dB;
+    "gain and phase" if moreover the phase is within ±90°, so that the loop adds damping; otherwise
+    "phase".
+    """
+    found = []
+    for i in range(len(gain.D)):
+        one = _broken_at(gain, i)
+        for poles, residue, names in _groups(one):
+            row = _row(one, poles, residue)
+            if row:
+                mode = _name(names, tanks)
+                found.append({"loop": gain.inputs[i], "mode": mode} | row)
+    return sorted(found, key=lambda row: (row["loop"], row["frequency"]))
+
+
+Complex = NDArray[np.complex128]
+
+
+def _groups(one: LinearModel) -> list[tuple[complex, complex, set[str]]]:
+    """Return pole (z plane), residue and states of each slosh mode; equal poles go together."""
+    from scipy.linalg import eig
+
+    assert one.period is not None
+    poles, left, right = eig(one.A, left=True)
+    share = np.abs(left * right)
+    s = np.log(np.where(poles == 0, 1e-300, poles).astype(complex)) / one.period
+    light = (s.imag > 0) & (-s.real < LIGHT * np.abs(s)) & (s.imag * one.period < 3.14)
+    left_out = set(np.flatnonzero(~light))
+    found = []
+    for k in np.flatnonzero(light):
+        if k in left_out:
+            continue
+        same = np.flatnonzero(light & (np.abs(s - s[k]) < 1e-6 * np.abs(s[k])))
+        left_out |= set(same)
+        most = (share[:, same] > 0.2 * share[:, same].max(axis=0)).any(axis=1)
+        names = {one.states[i] for i in np.flatnonzero(most)}
+        if not any(_TANK.fullmatch(name) for name in names):
+            continue
+        L, R = left[:, same].conj().T, right[:, same]
+        residue = complex((one.C @ R @ np.linalg.lstsq(L @ R, L @ one.B, rcond=1e-12)[0])[0, 0])
+        if abs(residue) > MOVED * np.linalg.norm(one.C) * np.linalg.norm(one.B):
+            found.append((complex(poles[k]), residue, names))
+    return found
+
+
+def _row(one: LinearModel, pole: complex, residue: complex) -> dict[str, Any] | None:
+    T = one.period
+    assert T is not None
+    A, b, c, d = one.A, one.B[:, 0], one.C[0], one.D[0, 0]
+
+    def value(z: complex) -> complex:
+        return complex(c @ np.linalg.solve(z * np.eye(len(A)) - A, b) + d)
+
+    s = np.log(pole) / T
+    near = np.exp((1e-3 * abs(s) + 1j * s.imag) * T)  # where an undamped pole is finite too
+    rest = value(near) - residue / (near - pole)
+    height = np.exp(1j * s.imag * T) - pole
+    own = residue / height if abs(height) > 1e-12 else complex(np.inf)
+    if abs(own) < SHOWN:
+        return None
+    zero = np.log(_solved(value, pole, pole - residue / rest, 0.0)) / T
+    closed = np.log(_solved(value, pole, pole - residue / (1 + rest), 1.0)) / T
+    # R of the s plane is that of the z plane over T z
+    phase = float(np.degrees(np.angle(residue / (T * pole * (1 + rest)))))
+    peak = 20 * np.log10(abs(own + rest))
+    adds = abs(phase) < 90
+    if closed.real > 0:
+        how = "unstable"
+    elif peak < 0:
+        how = "gain and phase" if adds else "gain"
+    else:
+        how = "phase"
+    hertz = abs(zero) / (2 * np.pi)
+    frequency = abs(s) / (2 * np.pi)
+    return {
+        "frequency": frequency, "zeta": -s.real / abs(s),
+        "zeta_closed": -closed.real / abs(closed), "zero": hertz,
+        "order": "zero first" if hertz < frequency else "pole first", "peak": float(peak),
+        "phase": phase, "stabilised": how,
+    }  # fmt: skip
+
+
+def _solved(value: Any, pole: complex, start: complex, offset: float) -> complex:
+    """Return the root of offset + L(z) near a start, by the secant rule on (z - pole) times it."""
+
+    def smooth(z: complex) -> complex:
+        return complex((z - pole) * (offset + value(z)))
+
+    if start == pole:
+        return pole
+    a, b = start, start + 1e-4 * (start - pole)
+    at_a, at_b = smooth(a), smooth(b)
+    for _ in range(30):
+        if at_b == at_a or abs(b - a) <= 1e-14 * abs(b):
+            break
+        a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
+        if b == pole:
+            break
+        at_b = smooth(b)
+    # a root of something else than this resonance
+    return b if abs(b - pole) < 3 * abs(start - pole) else start
+
+
+def _name(states: set[str], tanks: Sequence[str]) -> str:
+    """Return tanks and number of a mode from the states that take part."""
+    found: dict[str, set[str]] = {}
+    for state in states:
+        if match := _TANK.fullmatch(state):
+            number = int(match[1])
+            tank = tanks[number - 1] if number <= len(tanks) else f"tank {number}"
+            found.setdefault(match[2], set()).add(tank)
+    return ", ".join(f"{' and '.join(sorted(of))} mode {n}" for n, of in sorted(found.items()))

@@ -1,0 +1,185 @@
+"""The design review against closed forms."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import option
+from scipy.optimize import brentq
+
+import hubslosh
+from hubslosh import Craft, FmuError, MountedTank
+
+SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
+DRY, INERTIA = 1000.0, 900.0
+PERIOD = 0.05
+
+# large tanks in low gravity: the damping of smaller ones was measured
+pytestmark = pytest.mark.filterwarnings("ignore:tank.*outside the measured")
+
+
+@pytest.fixture
+def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
+    """Return a craft with one sphere on the axis."""
+    return Craft(
+        DRY, (INERTIA, INERTIA, 700.0), (0, 0, 1.0),
+        {"ox": MountedTank(SPHERE, (0, 0, 0.2), modes=1, nu=3e-7)}, 400.0,
+        model=fmu.with_name("Spacecraft.fmu"), program=option(request, "--hubslosh"),
+    )  # fmt: skip
+
+
+def gains(kp: float = 40.0, kd: float = 400.0) -> np.ndarray:
+    """Return a PD controller of half angles and rates."""
+    return np.hstack([2 * kp * np.eye(3), kd * np.eye(3)])
+
+
+def test_margins_of_a_rigid_craft_are_those_of_a_double_integrator(craft: Craft) -> None:
+    """Full tank: L(z) = kp T² (z + 1)/(2 J (z - 1)²) + kd T/(J (z - 1)) about each axis."""
+    found = craft.review(gains(), PERIOD, ["100%"], damping="nominal")
+    J = craft.mass_properties("100%").inertia[0, 0]
+
+    def loop_gain(f: float) -> complex:
+        z, T = np.exp(2j * np.pi * f * PERIOD), PERIOD
+        return 40 * T**2 * (z + 1) / (2 * J * (z - 1) ** 2) + 400 * T / (J * (z - 1))
+
+    crossing = brentq(lambda f: abs(loop_gain(f)) - 1, 1e-3, 1.0, xtol=1e-15)
+    of_x = found.nominal[0].margins.crossings.query("loop == 'torque[1]' and crossing == 'gain'")
+    assert of_x["frequency"].to_numpy() == pytest.approx([crossing], rel=1e-7)
+    phase = np.degrees(np.angle(-loop_gain(crossing)))
+    assert of_x["phase_margin"].to_numpy() == pytest.approx([phase], rel=1e-7)
+    assert found.slosh.empty and "stable at all 1 fill" in found.answer
+    assert found.points["phase_margin"].tolist() == [found.nominal[0].margins.phase_margin]
+
+
+def closed_form(craft: Craft, fill: str) -> tuple[float, float, float, float]:
+    """Return heights of hinge and bob over the rigid part's centre (m), pole and zero (Hz).
+
+    One pendulum on the thrust axis, torque to angle: equation (8.1) of the craft's equations,
+    ω_p² = ω_0² (1 + m/M + m b²/I) + m b g/I and ω_z² = ω_0² (1 + m/M).
+    """
+    p = craft.parameters(fill)
+    m, length = p["tank[1].mass[1]"], p["tank[1].length[1]"]
+    z = p["tank[1].position[3]"]
+    hinge, fixed, m_0 = z + p["tank[1].hinge[1]"], z + p["tank[1].H_0"], p["tank[1].m_0"]
+    M = DRY + m_0
+    center = (DRY * 1.0 + m_0 * fixed) / M
+    inertia = INERTIA + DRY * (1.0 - center) ** 2 + p["tank[1].I_0"] + m_0 * (fixed - center) ** 2
+    h, b, g = hinge - center, hinge - length - center, 400 / (M + m)
+    w = g / length
+    pole = w * (1 + m / M + m * b**2 / inertia) + m * b * g / inertia
+    return h, b, *np.sqrt([pole, w * (1 + m / M)]) / (2 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("height", "order", "phase"),
+    [(1.1, "zero first", 0), (0.62, "pole first", 180), (-0.3, "zero first", 0)],
+)
+def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
+    craft: Craft, height: float, order: str, phase: float
+) -> None:
+    """Bob ahead of the centre of mass, hinge ahead and bob behind, both behind.
+
+    For a torque the pole moves by Kd (ω_z² - ω_p²)/(2 I ω_p²): phase-stable if the zero is lower.
+    """
+    tank = replace(craft.tanks["ox"], position=(0, 0, height), nu=None)
+    craft = replace(craft, tanks={"ox": tank})
+    h, b, pole, zero = closed_form(craft, "50%")
+    assert (h > 0, b > 0) == {1.1: (True, True), 0.62: (True, False), -0.3: (False, False)}[height]
+    undamped = {"tank[1].zeta[1]": 0.0}
+    found = craft.review(gains(4, 40), 0.01, ["50%"], damping="nominal", parameters=undamped)
+    rows = found.slosh.query("loop != 'torque[3]'")
+    assert len(rows) == 2 and set(rows["order"]) == {order}
+    assert rows["frequency"].to_numpy() == pytest.approx([pole, pole], rel=1e-6)
+    assert (rows["frequency"] - rows["zero"]).to_numpy() == pytest.approx(pole - zero, rel=0.02)
+    away = np.abs(np.abs(rows["phase"]) - phase)
+    assert (away < 60).all()
+    expected = {"gain and phase", "phase"} if phase == 0 else {"unstable"}
+    assert set(rows["stabilised"]) <= expected
+    # damping that the loop adds, to first order in its gains
+    growth = 40 * (zero**2 - pole**2) / (2 * INERTIA * pole**2)
+    assert np.sign(rows["zeta_closed"]).to_numpy() == pytest.approx([-np.sign(growth)] * 2)
+    assert found.points["stable"].all() == (phase == 0)
+
+
+def test_the_family_has_the_same_states_everywhere_and_the_plants_responses(craft: Craft) -> None:
+    """A full tank has no mode; its model keeps the states."""
+    found = craft.review(gains(), PERIOD, ["20%", "60%", "100%"], damping="nominal")
+    assert {model.states for model in found.family} == {found.family[0].states}
+    assert "tank[1].p[1,1]" in found.family[2].states
+    for point, model in zip(found.nominal, found.family, strict=True):
+        plant = point.loop.plant(point.steady)
+        f = np.array([0.003, 0.11, 0.7])
+        assert model.response(f) == pytest.approx(plant.response(f), rel=1e-9)
+        assert (model.inputs, model.outputs) == (plant.inputs, plant.outputs)
+
+
+def test_bands_hold_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
+    """One draw of each fill, both ends of each range; the mass scales the crossover."""
+    uncertain = {"craft.Jxx": "10%", "delay": (0.0, 0.2)}
+    found = craft.review(gains(), PERIOD, ["30%", "70%"], uncertain=uncertain, draws=6, delay=0.1)
+    names = [quantity.name for quantity in found.uncertain]
+    assert names == ["damping of ox", "craft.Jxx", "delay"]
+    kinds = found.points["kind"].value_counts()
+    assert dict(kinds) == {"one at a time": 12, "draw": 6, "nominal": 2}
+    late = found.points.query("kind == 'one at a time' and delay == 1 and fill == 0").iloc[0]
+    there = craft.loop(gains(), PERIOD, "30%", delay=0.2)
+    assert late["modulus_margin"] == pytest.approx(
+        hubslosh.margins(there, found.nominal[0].steady).modulus_margin, rel=1e-9
+    )
+    bands = found.bands()
+    for name in ("modulus_margin", "phase_margin", "delay_margin"):
+        assert (bands[f"{name}_low"] <= bands[f"{name}_nominal"]).all()
+        assert (bands[f"{name}_nominal"] <= bands[f"{name}_high"]).all()
+    assert len(str(found).splitlines()) <= 20
+
+
+def test_thrust_off_the_centre_of_mass_is_balanced(craft: Craft) -> None:
+    """The moment is that of 400 N about the centre of mass, with the sign that cancels it."""
+    craft = replace(craft, center_of_mass=(0.02, -0.01, 1.0))
+    found = craft.review(gains(), PERIOD, ["50%"], damping="nominal")
+    center = craft.mass_properties("50%").center_of_mass
+    steady = found.nominal[0].steady
+    assert [*steady.values()] == pytest.approx([400 * center[1], -400 * center[0], 0], rel=1e-9)
+    parameters = {**found.nominal[0].loop.parameters, **steady}
+    run = hubslosh.simulate(craft.model, parameters, stop=20, outputs=["omega", "tank[1].p[1,3]"])
+    assert run[["omega[1]", "omega[2]", "omega[3]"]].abs().to_numpy().max() < 1e-10
+
+
+def test_a_review_names_what_is_wrong(craft: Craft) -> None:
+    """Fills, ranges, names, controllers."""
+
+    def review(*, of: Craft = craft, law=None, fills=("50%",), **options) -> None:
+        of.review(gains() if law is None else law, PERIOD, fills, **options)
+
+    for fills, text in {
+        (): "fills is empty",
+        "50%": "fills must be a list",
+        ("50%", "120%"): r"fills\[1\] = '120%': tank ox",
+    }.items():
+        with pytest.raises(FmuError, match=text):
+            review(fills=fills)
+    for uncertain, text in {
+        "mass": "uncertain must be ranges by name",
+        ("craft.mas", "5%"): "did you mean craft.mass",
+        ("craft.mass", (1, 2)): "is nominally 1000, outside 1 to 2",
+        ("craft.mass", (2, 1)): "low < high",
+        ("craft.mass", "5"): 'such as "5%"',
+        ("craft.mass", 5): 'such as "5%"',
+        ("delay", "5%"): "is 0",
+        ("tank[1].mass[2]", "5%"): "exists at no fill",
+    }.items():
+        given = dict([uncertain]) if isinstance(uncertain, tuple) else uncertain
+        with pytest.raises(FmuError, match=text):
+            review(uncertain=given)
+    with pytest.raises(FmuError, match="has 2 inputs and 3 outputs"):
+        review(law=np.ones((3, 2)))
+    with pytest.raises(FmuError, match="needs a linear controller"):
+        review(law=lambda _t, _y: 0.0)
+    with pytest.raises(FmuError, match="needs the viscosity"):
+        bare = {"ox": replace(craft.tanks["ox"], nu=None)}
+        review(of=replace(craft, tanks=bare))
+    with pytest.raises(FmuError, match="draws must be a whole number"):
+        review(draws=-1)
+    with pytest.raises(FmuError, match='"interval" or "nominal"'):
+        review(damping="low")
