@@ -494,8 +494,10 @@ class Craft:
         slosh mode's mass changes the mass of the craft.
         draws: number of random points over all fills, uniform within the ranges. seed: of draws.
 
-        Each point is linearised in steady thrust, with the torque that balances the thrust's moment
-        about the centre of mass. `loop` does not apply this torque.
+        The thrust acts through the centre of mass, as after trimming, so that each point is a
+        steady state. `loop` leaves the thrust at O.
+        The worst case is found by search. There the nonlinear FMU is simulated at the gain margin,
+        or as it is if it is unstable.
         """
         from .review import review
 

@@ -1,7 +1,7 @@
 """A design review of a loop around a `Craft` over its fills: margins, slosh, worst case.
 
-Each point is linearised in steady thrust: the torque that balances the thrust's moment about the
-centre of mass acts too. Without that torque the craft turns faster and faster, and its tanks tilt.
+Each point is linearised in steady thrust: the thrust acts through the centre of mass, as after
+trimming. A thrust beside the centre of mass would turn the craft faster and faster.
 """
 
 import os
@@ -23,14 +23,15 @@ from .sampling import _not_whole, draw
 from .short import ShortTable
 from .stabilisation import resonances
 from .stability import Margins, _largest, margins_and_gain
+from .worst_case import Confirmation, confirm, search
 
 if TYPE_CHECKING:
     from .craft import Craft, Fill
 
 Vector = NDArray[np.float64]
 
-TORQUES = ("torque[1]", "torque[2]", "torque[3]")
-"""Inputs of Spacecraft that balance the thrust's moment."""
+_PLACE = re.compile(r"(?:craft\.r|tank\[\d\]\.position)\[(\d)\]$")
+"""Coordinates from O."""
 
 OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
 """Parameters that a tank without this mode does not have."""
@@ -57,11 +58,9 @@ class Point:
     shares: Vector
     """Position of each uncertain quantity: -1 low end, 0 nominal, 1 high end."""
     loop: Loop
-    """Loop at this point."""
-    steady: dict[str, float]
-    """Torques that balance the thrust's moment, N·m."""
+    """Loop at this point, its thrust through the centre of mass."""
     margins: Margins
-    """Margins of the loop with these torques."""
+    """Margins of the loop."""
     gain: LinearModel
     """Sampled loop gain."""
 
@@ -96,14 +95,18 @@ class Review:
     nominal: tuple[Point, ...]
     """Nominal point at each fill, with its margins and loop gain."""
     points: pd.DataFrame
-    """A row for each point: ``kind`` ("nominal", "one at a time" or "draw"), ``fill`` (index),
-    ``stable``, ``modulus_margin``, ``phase_margin`` (deg), ``gain_up`` and ``gain_down`` (dB),
-    ``delay_margin`` (s), ``growth`` (1/s, of the closed loop's least stable pole), ``distance``
-    (modulus margin, or minus the growth rate of an unstable loop), and the share of each uncertain
-    quantity: -1 low end, 0 nominal, 1 high end."""
+    """A row for each point: ``kind`` ("nominal", "one at a time", "draw" or "search"), ``fill``
+    (index), ``stable``, ``modulus_margin``, ``phase_margin`` (deg), ``gain_up`` and ``gain_down``
+    (dB), ``delay_margin`` (s), ``growth`` (1/s, of the closed loop's least stable pole),
+    ``distance`` (modulus margin, or minus the growth rate of an unstable loop), and the share of
+    each uncertain quantity: -1 low end, 0 nominal, 1 high end."""
     slosh: pd.DataFrame
     """A row for each nominal fill, loop and slosh mode that shows in the loop gain: see
     `hubslosh.stabilisation.resonances`."""
+    worst: Point
+    """Point with the least distance; a search has led to it."""
+    confirmation: Confirmation
+    """Simulation of the nonlinear FMU at the worst point."""
     warnings: tuple[str, ...] = field(default=())
     """Warnings about the tanks."""
 
@@ -163,6 +166,14 @@ class Review:
             f"margin at least {table['delay_margin'].min():.2g} s."
         )
 
+    def worst_values(self) -> dict[str, float]:
+        """Return the parameters at the worst point that differ from the nominal ones."""
+        found: dict[str, float] = {}
+        for quantity, share in zip(self.uncertain, self.worst.shares, strict=True):
+            if share:
+                found |= quantity.values(self.worst.fill, float(share))
+        return found
+
     def __str__(self) -> str:
         """Return the answer, then what it rests on."""
         table = self.points
@@ -170,11 +181,14 @@ class Review:
         for name, unit in (("phase_margin", "°"), ("gain_up", " dB"), ("delay_margin", " s")):
             low, high = table[name].min(), table[name].max()
             lines.append(f"{name.replace('_', ' ')}: {low:.3g} to {high:.3g}{unit}")
+        values = ", ".join(f"{name} = {x:.4g}" for name, x in self.worst_values().items())
+        where = f"fill {self.fills[self.worst.fill]}" + (f", {values}" if values else "")
+        lines += [f"worst case: {where}; {self.confirmation}"]
         if self.uncertain:
             lines += ["uncertain: " + "; ".join(f"{u.name} {u.text}" for u in self.uncertain)]
         if self.warnings:
             lines.append(f"{len(self.warnings)} warnings, see .warnings")
-        return "\n".join(line if len(line) < 200 else f"{line[:199]}…" for line in lines[:20])
+        return "\n".join(line if len(line) < 500 else f"{line[:499]}…" for line in lines[:20])
 
     def __repr__(self) -> str:
         """Return the answer."""
@@ -213,14 +227,18 @@ def review(
             shares = draw(ranges, run, seed).values()
             planned.append(("draw", run % len(space.loops), np.array([*shares])))
     points = space.evaluate((k, x) for _, k, x in planned)
+    searched = search(space.evaluate, points)
+    kinds = [kind for kind, _, _ in planned] + ["search"] * len(searched)
+    every = points + searched
     rows = [
         {"kind": kind} | row_of(point, space.uncertain)
-        for (kind, _, _), point in zip(planned, points, strict=True)
+        for kind, point in zip(kinds, every, strict=True)
     ]
+    worst = min(every, key=lambda point: point.distance)
     nominal = tuple(points[: len(space.loops)])
     slosh = []
     for k, point in enumerate(nominal):
-        named = point.loop.gain(point.steady)
+        named = point.loop.gain()
         slosh += [{"fill": k} | row for row in resonances(named, list(craft.tanks))]
     columns = [
         "fill", "loop", "mode", "frequency", "zeta", "zeta_closed", "zero", "order", "peak",
@@ -233,7 +251,7 @@ def review(
     }  # fmt: skip
     return Review(
         craft, space.names, space.at, space.unit, space.uncertain, _family(nominal), nominal,
-        ShortTable(rows), table, space.warnings,
+        ShortTable(rows), table, worst, confirm(worst), space.warnings,
     )  # fmt: skip
 
 
@@ -254,9 +272,9 @@ def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
     used: set[str] = set()
     for point in points:
         measured, command = point.loop.names
-        every = {**point.loop.parameters, **point.steady}  # type: ignore[dict-item]
-        model = linearize(point.loop.model, every, command, measured, all_states=True)
-        used |= set(point.loop.plant(point.steady).states)
+        loop = point.loop
+        model = linearize(loop.model, loop.parameters, command, measured, all_states=True)
+        used |= set(loop.plant().states)
         models.append(model)
     keep = [i for i, name in enumerate(models[0].states) if name in used]
     names = tuple(models[0].states[i] for i in keep)
@@ -332,10 +350,9 @@ class _Space:
                 values |= quantity.values(fill, float(share))
         delay = values.pop("delay", delay)
         every = {**loop.parameters, **values}  # type: ignore[dict-item]
-        loop = replace(loop, parameters=every, delay=delay)
-        steady = _steady(loop)
-        margins, gain = margins_and_gain(loop, steady)
-        return Point(fill, np.array(shares, float), loop, steady, margins, gain)
+        loop = trimmed(replace(loop, parameters=every, delay=delay))
+        margins, gain = margins_and_gain(loop)
+        return Point(fill, np.array(shares, float), loop, margins, gain)
 
     def evaluate(self, which: Iterable[tuple[int, Vector]]) -> list[Point]:
         """Evaluate points on all cores."""
@@ -353,19 +370,23 @@ def _list_of(fills: Any) -> list[Any]:
     return found
 
 
-def _steady(loop: Loop) -> dict[str, float]:
-    """Return the torques that balance the thrust's moment about the centre of mass."""
+def trimmed(loop: Loop) -> Loop:
+    """Return the loop with the thrust through the centre of mass: O moves across the thrust."""
     from .plant import Plant
 
-    fmu = Fmu.open(loop.model)
-    if any(name not in fmu.variables for name in TORQUES):
-        return {}
-    every: Mapping[str, Any] = loop.parameters  # type: ignore[assignment]
+    every: dict[str, Any] = dict(loop.parameters)  # type: ignore[arg-type]
+    if "craft.r[1]" not in Fmu.open(loop.model).variables:
+        return loop
     with Plant(loop.model, every) as plant:
-        center = plant.get([f"center_of_mass[{i}]" for i in (1, 2, 3)])
-        force = plant.get([f"force[{i}]" for i in (1, 2, 3)])
-    moment = np.cross(center, force)
-    return dict(zip(TORQUES, map(float, moment), strict=True))
+        center = np.array(plant.get([f"center_of_mass[{i}]" for i in (1, 2, 3)]))
+        force = np.array(plant.get([f"force[{i}]" for i in (1, 2, 3)]))
+    if not force.any():
+        return loop
+    shift = center - force * (force @ center) / (force @ force)
+    for name, value in every.items():
+        if match := _PLACE.match(name):
+            every[name] = float(value) - float(shift[int(match[1]) - 1])
+    return replace(loop, parameters=every)
 
 
 def _between(low: float, nominal: float, high: float, share: float) -> float:

@@ -70,7 +70,7 @@ def _groups(one: LinearModel) -> list[tuple[complex, complex, set[str]]]:
         same = np.flatnonzero(light & (np.abs(s - s[k]) < 1e-6 * np.abs(s[k])))
         left_out |= set(same)
         most = (share[:, same] > 0.2 * share[:, same].max(axis=0)).any(axis=1)
-        names = {one.states[i] for i in np.flatnonzero(most)}
+        names = {one.states[i] for i in np.flatnonzero(most) if i < len(one.states)}
         if not any(_TANK.fullmatch(name) for name in names):
             continue
         L, R = left[:, same].conj().T, right[:, same]

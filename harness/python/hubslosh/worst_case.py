@@ -1,0 +1,242 @@
+"""The worst point of a design review: found by search, confirmed by simulation."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .stability import _closed
+
+if TYPE_CHECKING:
+    from .review import Point
+
+Vector = NDArray[np.float64]
+Evaluate = Callable[[Iterable[tuple[int, Vector]]], "list[Point]"]
+
+STARTS = 2
+"""Number of points from which the search starts, at different fills."""
+
+SMALLEST = 0.25
+"""Least step of the search; the whole range of a quantity is 2."""
+
+ASIDE = 0.01
+"""Part by which the gain is simulated below and above the margin."""
+
+RATE = 1e-7
+"""Angular velocity about each axis at the start of a simulation, rad/s."""
+
+GROWTH = 9.0
+"""Logarithm of the largest growth in a simulation, which stays within small motions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Confirmation:
+    """Simulation of the nonlinear FMU at the worst point, compared with the linear prediction."""
+
+    command: str | None
+    """Command whose gain is scaled to the limit; None if the loop is unstable as it is."""
+    factor: float
+    """Predicted factor at the limit of stability; 1 if the loop is unstable as it is."""
+    simulated_factor: float
+    """Factor at which the simulated oscillation neither grows nor decays."""
+    frequency: float
+    """Predicted frequency of the critical oscillation, Hz."""
+    simulated_frequency: float
+    """Its frequency in the simulation, Hz."""
+    growth: float
+    """Predicted growth rate in the last run, 1/s."""
+    simulated_growth: float
+    """Growth rate in that simulation, 1/s."""
+    runs: dict[float, pd.DataFrame]
+    """Simulated runs by their factor."""
+
+    @property
+    def agrees(self) -> bool:
+        """True if factor (growth rate, if unstable) and frequency agree to 1 %."""
+        pairs = [(self.simulated_frequency, self.frequency)]
+        if self.command is None:
+            pairs.append((self.simulated_growth, self.growth))
+        else:
+            pairs.append((self.simulated_factor, self.factor))
+        return all(abs(found - expected) <= 0.01 * abs(expected) for found, expected in pairs)
+
+    def __str__(self) -> str:
+        """Return the comparison in a sentence."""
+        verdict = "confirms" if self.agrees else "does NOT confirm"
+        if self.command is None:
+            return (
+                f"the nonlinear simulation {verdict} it: growth {self.simulated_growth:.4g} 1/s at "
+                f"{self.simulated_frequency:.4g} Hz (predicted {self.growth:.4g} 1/s, "
+                f"{self.frequency:.4g} Hz)"
+            )
+        apart = abs(self.simulated_factor / self.factor - 1)
+        return (
+            f"the nonlinear simulation {verdict} its margin: {self.command} reaches the limit at "
+            f"{_decibel(self.simulated_factor)} dB and {self.simulated_frequency:.4g} Hz "
+            f"(predicted {_decibel(self.factor)} dB, {self.frequency:.4g} Hz; the gains differ by "
+            f"{100 * apart:.2g} %)"
+        )
+
+
+def _decibel(factor: float) -> str:
+    return f"{20 * np.log10(factor):+.2f}"
+
+
+def search(evaluate: Evaluate, points: "Sequence[Point]") -> "list[Point]":
+    """Return further points on the way to the worst one, the one with the least distance.
+
+    From the corner that the single ranges point to, and from the worst points so far, coordinates
+    change by a step that is halved when no change is worse. It finds a local minimum.
+    """
+    found: list[Point] = list(points)
+    count = len(points[0].shares)
+    if not count:
+        return []
+    corners = evaluate(_corners(points))
+    found += corners
+    starts: list[Point] = []
+    for point in sorted(found, key=lambda point: point.distance):
+        if point.fill not in [start.fill for start in starts]:
+            starts.append(point)
+    known = {(point.fill, *point.shares): point for point in found}
+    for here in starts[:STARTS]:
+        step = 1.0
+        while step >= SMALLEST:
+            moves = [sign * step * row for row in np.eye(count) for sign in (-1.0, 1.0)]
+            tried = [(here.fill, np.clip(here.shares + move, -1, 1)) for move in moves]
+            keys = {(fill, *shares): (fill, shares) for fill, shares in tried}
+            new = [key for key in keys if key not in known]
+            known |= zip(new, evaluate([keys[key] for key in new]), strict=True)
+            best = min((known[key] for key in keys), key=lambda point: point.distance)
+            if best.distance < here.distance - 1e-9:
+                here = best
+            else:
+                step /= 2
+    return list(known.values())[len(points) :]
+
+
+def _corners(points: "Sequence[Point]") -> list[tuple[int, Vector]]:
+    """Return for each of the worst fills the corner where each quantity has its worse end."""
+    estimates = []
+    for fill in {point.fill for point in points}:
+        here = [point for point in points if point.fill == fill]
+        nominal = next(point for point in here if not point.shares.any())
+        corner, losses = np.zeros(len(nominal.shares)), np.zeros(len(nominal.shares))
+        for point in here:
+            if np.count_nonzero(point.shares) == 1 and abs(point.shares).max() == 1:
+                (j,) = np.flatnonzero(point.shares)
+                loss = nominal.distance - point.distance
+                if loss > losses[j]:
+                    corner[j], losses[j] = point.shares[j], loss
+        estimates.append((nominal.distance - losses.sum(), fill, corner))
+    estimates.sort(key=lambda row: row[0])
+    return [(fill, corner) for _, fill, corner in estimates[: 2 * STARTS] if corner.any()]
+
+
+def confirm(point: "Point") -> Confirmation:
+    """Simulate the nonlinear FMU at a point, and compare its critical oscillation.
+
+    A stable loop is simulated with the gain of one command 1 % below and above its nearest gain
+    margin. The growth rates of both runs give the gain at the limit. An unstable loop is simulated
+    as it is.
+    """
+    rows = point.margins.crossings.query("crossing == 'phase' and frequency > 0")
+    if not point.margins.stable or rows.empty:  # without a gain margin, compare the slowest pole
+        command, factor, factors = None, 1.0, [1.0]
+    else:
+        row = rows.loc[rows["gain_margin"].abs().idxmin()]
+        command, factor = str(row["loop"]), float(10 ** (row["gain_margin"] / 20))
+        factors = [factor * (1 - ASIDE), factor * (1 + ASIDE)]
+    runs, expected, simulated = {}, [], []
+    for scale in factors:
+        runs[scale], pole, found = _compare(point, command, scale)
+        expected.append(pole)
+        simulated.append(found)
+    if command is None:
+        limit = 1.0
+    else:
+        (low, high), (a, b) = np.log(factors), (pole.real for pole in simulated)
+        limit = float(np.exp(low - a * (high - low) / (b - a)))
+
+    def hertz(poles: list[complex]) -> float:
+        return float(np.mean([abs(pole.imag) for pole in poles]) / (2 * np.pi))
+
+    return Confirmation(
+        command, factor, limit, hertz(expected), hertz(simulated), expected[-1].real,
+        simulated[-1].real, runs,
+    )  # fmt: skip
+
+
+def _compare(
+    point: "Point", command: str | None, factor: float
+) -> tuple[pd.DataFrame, complex, complex]:
+    """Return a run, and the predicted and the simulated pole that decides stability (1/s)."""
+    loop = point.loop
+    _, commands = loop.names
+    law = loop.linear()
+    assert law is not None
+    if command is not None:
+        scale = np.ones((len(commands), 1))
+        scale[commands.index(command)] = factor
+        law = replace(law, C=scale * law.C, D=scale * law.D)
+    loop = replace(loop, controller=law)
+    poles = _closed(loop.gain())
+    T = loop.period
+    # the fastest growing oscillation; a negative pole oscillates with half the sampling rate
+    moving = poles[(poles.imag > 0) | (poles.real < 0) & (poles.imag == 0)]
+    critical = moving[np.argmax(np.abs(moving))]
+    s = np.log(critical) / T
+    cycles = max(20 * 2 * np.pi / abs(s.imag), 1 / max(abs(s.real), 1e-9)) / T
+    cycles = float(np.clip(cycles, 500, 20000))
+    if s.real > 0:
+        cycles = min(cycles, max(GROWTH / (s.real * T), 20))
+    stop = int(cycles) * T
+    start = {f"init.omega[{i}]": RATE for i in (1, 2, 3)}
+    run = loop.simulate(stop, start, outputs="omega")
+    signals = run[[*commands, *(c for c in run if c.startswith("omega["))]].to_numpy()
+    # axes with the same inertia have the same pole, which a run of this length does not separate
+    apart = np.minimum(np.abs(poles - critical), np.abs(poles - critical.conjugate()))
+    rest = poles[apart * len(run) > 1]
+    return run, complex(s), complex(np.log(_fit(signals, rest, critical)) / T)
+
+
+def _fit(signals: Vector, known: NDArray[np.complex128], start: complex) -> complex:
+    """Return the pole that fits signals as a sum of powers of it and of known poles (z plane).
+
+    Variable projection: the amplitudes follow from linear least squares at each try of the pole.
+    """
+    from scipy.optimize import least_squares
+
+    skipped = len(signals) // 3
+    y = signals[skipped:] / np.maximum(np.abs(signals[skipped:]).max(axis=0), 1e-300)
+    k = np.arange(len(y))
+
+    def powers(poles: Any) -> Vector:
+        z = np.atleast_1d(poles)
+        table = np.exp(np.outer(k, np.log(z)))
+        # one that grows begins small
+        table /= np.abs(table).max(axis=0)
+        return np.hstack([table.real, table.imag[:, z.imag != 0]])
+
+    faded = (np.abs(known) / max(abs(start), 1.0)) ** skipped < 1e-7
+    lasting = known[~faded & (known.imag >= 0)]
+    left, sizes, _ = np.linalg.svd(powers([*lasting, 1.0]), full_matrices=False)
+    Q = left[:, sizes > 1e-9 * sizes[0]]
+    y = y - Q @ (Q.T @ y)
+
+    def pole(p: Any) -> complex:
+        moved = complex(p[0], p[1]) if start.imag else complex(p[0])
+        return complex(start * np.exp(moved / len(y)))
+
+    def residual(p: Any) -> Vector:
+        basis = powers(pole(p))
+        basis = basis - Q @ (Q.T @ basis)
+        return (y - basis @ np.linalg.lstsq(basis, y, rcond=None)[0]).ravel()
+
+    # it changes growth over the whole run by e^10, or the phase by 10 rad, at most
+    first = [0.0, 0.0] if start.imag else [0.0]
+    found = least_squares(residual, first, bounds=(-10, 10), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    return pole(found.x)
