@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -108,7 +109,7 @@ class Review:
     confirmation: Confirmation
     """Simulation of the nonlinear FMU at the worst point."""
     warnings: tuple[str, ...] = field(default=())
-    """Warnings about the tanks."""
+    """Warnings about the tanks, each for one of the fills where it applies."""
 
     def bands(self) -> pd.DataFrame:
         """Return the least and largest value of each margin at each fill, over all points.
@@ -173,6 +174,22 @@ class Review:
             if share:
                 found |= quantity.values(self.worst.fill, float(share))
         return found
+
+    def html(self) -> str:
+        """Return the page: answer, figures, tables. It needs no network, and prints on paper."""
+        from .review_page import page
+
+        return page(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the page, .html. Needs matplotlib (``pip install hubslosh[plot]``)."""
+        if Path(path).suffix.lower() != ".html":
+            raise FmuError(f"{path}: the name of the page must end in .html")
+        text = self.html()
+        try:
+            Path(path).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise FmuError(f"{path} cannot be written: {error}") from None
 
     def __str__(self) -> str:
         """Return the answer, then what it rests on."""
@@ -327,8 +344,10 @@ class _Space:
         if problems:
             raise FmuError("; ".join(problems))
         said = tuple(dict.fromkeys(str(w.message) for w in caught))
-        for text in {re.sub(r"[\d.e+-]+", "…", text): text for text in said}.values():
-            warnings.warn(f"{text} (one of the fills)", FmuWarning, stacklevel=4)
+        # the same warning with another number at another fill
+        said = tuple({re.sub(r"= [\d.e+-]+", "", text): text for text in said}.values())
+        for text in said:
+            warnings.warn(text, FmuWarning, stacklevel=4)
         found = _damping(craft, tanks) if damping == "interval" else []
         found += _given(loops, uncertain or {})
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
@@ -336,9 +355,8 @@ class _Space:
             at = [float(fill.strip()[:-1]) for fill in fills]
         else:
             at = [sum(tank.mass for tank in of.values()) for of in tanks]
-        words = tuple(f if isinstance(f, str) else f"{m:.4g} kg" if not percent else str(f)
-                      for f, m in zip(fills, at, strict=True))  # fmt: skip
         unit = "%" if percent else "kg"
+        words = tuple(f"{x:.3g}%" if percent else f"{x:.4g} kg" for x in at)
         return cls(words, np.array(at), unit, tuple(loops), tuple(found), said)
 
     def point(self, fill: int, shares: Vector) -> Point:

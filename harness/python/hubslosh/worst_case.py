@@ -25,7 +25,7 @@ SMALLEST = 0.25
 ASIDE = 0.01
 """Part by which the gain is simulated below and above the margin."""
 
-RATE = 1e-7
+RATE = 1e-8
 """Angular velocity about each axis at the start of a simulation, rad/s."""
 
 GROWTH = 9.0

@@ -1,5 +1,8 @@
 """The design review against closed forms."""
 
+import html
+import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -180,6 +183,33 @@ def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
     compared = found.confirmation
     assert compared.agrees and compared.growth > 0
     assert compared.frequency == pytest.approx(closed_form(craft, "50%")[2], rel=0.02)
+
+
+def test_the_page_answers_first_and_needs_no_network(
+    craft: Craft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every figure has a question as its title, axes with units, and the page's colours."""
+    found = craft.review(gains(), PERIOD, ["30%", "70%"], draws=4, delay=0.1)
+    path = tmp_path / "review.html"
+    found.save(path)
+    text = path.read_text(encoding="utf-8")
+    body = re.sub(r"<[^>]+>", " ", text[text.index("</h1>") :])
+    assert " ".join(body.split()).startswith(html.escape(found.answer))
+    titles = re.findall(r"<h2>(.*?)</h2>", text)
+    assert len(titles) == text.count("<figure>") + text.count("<section>")
+    assert text.count("<figure>") == text.count("<svg ") == 11
+    assert all("?" in title for title in titles)
+    for unit in ("(deg)", "(dB)", "(Hz)", "(s)", "(%)", "(N·m)"):
+        assert unit in text
+    addresses = set(re.findall(r"https?://[^\"' <)]+", text))
+    assert addresses <= {"http://www.w3.org/1999/xlink", "http://www.w3.org/2000/svg"}
+    assert "var(--ink)" in text and "<script" not in text and "NaN" not in text
+    assert text == found.html()
+    with pytest.raises(FmuError, match=r"must end in \.html"):
+        found.save(tmp_path / "review.pdf")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(FmuError, match=r"pip install hubslosh\[plot\]"):
+        found.html()
 
 
 def test_a_review_names_what_is_wrong(craft: Craft) -> None:

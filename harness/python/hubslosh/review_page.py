@@ -1,0 +1,469 @@
+"""The page of a design review: one file of HTML that needs no network and prints on paper."""
+
+import html
+import io
+import re
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .fmu import FmuError
+from .linearization import LinearModel
+from .plot import COLORS
+from .stability import LIGHT, _broken_at, _compiled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .review import Review
+
+WIDTH = 4.8
+"""Width of a figure, inches; it fits a telephone without shrinking much."""
+
+INK, SOFT, LINE = "#010203", "#595a5b", "#cfd0d1"
+"""Colours in figures that the page replaces by those of its light or dark mode."""
+
+MOST_CURVES = 12
+"""Number of fills that are drawn in Nichols and Bode diagrams."""
+
+GAINS = (-50.0, 40.0)
+"""Range of loop gain in diagrams, dB."""
+
+STYLE = """
+:root { color-scheme: light dark; --paper: #fff; --ink: #1b1f24; --soft: #59636e; --line: #d3d9df;
+  --card: #f5f7f9; --accent: #0b62a4; --bad: #b3261e; --good: #1a7f37;
+  --c0: #0072b2; --c1: #c05000; --c2: #00805c; --c3: #b04f8a; --c4: #9a6a00; --c5: #2c86bd; }
+@media (prefers-color-scheme: dark) { :root { --paper: #14181d; --ink: #e6eaee; --soft: #9aa5b1;
+  --line: #39424d; --card: #1c2229; --accent: #6cb6ff; --bad: #ff8a80; --good: #5fd38a;
+  --c0: #5db4ec; --c1: #ff9757; --c2: #3fcf9f; --c3: #e596c5; --c4: #f0b840; --c5: #8fd0f7; } }
+@media print { :root { color-scheme: light; --paper: #fff; --ink: #000; --soft: #444; --line: #ccc;
+  --card: #fff; --bad: #b3261e; --good: #1a7f37; --c0: #0072b2; --c1: #c05000; --c2: #00805c;
+  --c3: #b04f8a; --c4: #9a6a00; --c5: #2c86bd; } body { font-size: 10pt; } }
+* { box-sizing: border-box; }
+body { margin: 0 auto; padding: 1rem; max-width: 84rem; background: var(--paper); color: var(--ink);
+  font: 16px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; overflow-wrap: anywhere; }
+h1 { font-size: 1.5rem; line-height: 1.25; margin: .2rem 0 .6rem; }
+h2 { font-size: 1.1rem; line-height: 1.3; margin: 0 0 .4rem; }
+.answer { font-size: 1.15rem; border-left: 5px solid var(--good); padding: .3rem 0 .3rem .9rem; }
+.answer.bad { border-color: var(--bad); }
+.facts { color: var(--soft); }
+.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 26rem), 1fr));
+  gap: 1.2rem; margin: 1.2rem 0; align-items: start; }
+figure, section { margin: 0; min-width: 0; padding: .8rem; border: 1px solid var(--line);
+  border-radius: 8px; break-inside: avoid; }
+figure svg { width: 100%; height: auto; display: block; }
+figcaption { color: var(--soft); font-size: .9rem; }
+.tables { display: grid; gap: 1.2rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: right; padding: .2rem .6rem; border-bottom: 1px solid var(--line);
+  white-space: nowrap; }
+th:first-child, td:first-child, td.text { text-align: left; }
+td.text { white-space: normal; min-width: 9rem; }
+@page { margin: 14mm; }
+@media print { .figures { display: block; } figure, section { margin-bottom: 6mm; }
+  figure svg { max-width: 150mm; margin: 0 auto; } .scroll { overflow: visible; }
+  table { font-size: 8.5pt; } th, td { padding: .1rem .3rem; } }
+"""
+
+
+def page(review: "Review") -> str:
+    """Return the page."""
+    title = f"Design review: {len(review.fills)} fills, {len(review.points)} points"
+    bad = "" if review.points["stable"].all() else " bad"
+    figures = "\n".join(_figures(review))
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{html.escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
+        f'<h1>{html.escape(title)}</h1>\n<p class="answer{bad}">{html.escape(review.answer)}</p>\n'
+        f"{_facts(review)}\n"
+        f'<div class="figures">\n{figures}\n</div>\n{_tables(review)}\n</main>\n</body>\n</html>\n'
+    )
+
+
+def _facts(review: "Review") -> str:
+    by_how: dict[str, list[str]] = {}
+    for mode, how in review.modes().items():
+        by_how.setdefault(how, []).append(mode)
+    lines = [f"{', '.join(modes)}: {how}." for how, modes in by_how.items()]
+    if review.uncertain:
+        lines.append("Uncertain: " + "; ".join(f"{u.name} {u.text}" for u in review.uncertain))
+    lines.append(
+        "Each loop is broken at one command while the others are closed. The thrust acts through "
+        "the centre of mass."
+    )
+    items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
+    return f'<ul class="facts">{items}</ul>'
+
+
+def _figures(review: "Review") -> Iterator[str]:
+    """Yield the figures; each title is a question."""
+    from .fmu import Fmu
+
+    unit = "fill (% of the volume)" if review.unit == "%" else "liquid (kg)"
+    yield _figure(
+        "How do the margins change as the tanks empty?",
+        "Line: nominal. Band: all points within the uncertainty.",
+        5.6, lambda figure: _margins(figure, review, unit),
+    )  # fmt: skip
+    if len(review.slosh):
+        yield _figure(
+            "Is each slosh mode stabilised by phase or by gain?",
+            "A dot per nominal fill and command. Below 0 dB gain stabilises the mode; within ±90° "
+            "closing the loop adds damping. In the upper outer parts neither does.",
+            3.6, lambda figure: _stabilisation(figure, review),
+        )  # fmt: skip
+        yield _figure(
+            "Where are the slosh modes, and what does the loop do to their damping?",
+            "Dots: pole with this loop open. Crosses: damping ratio with all loops closed.",
+            4.4, lambda figure: _modes(figure, review, unit),
+        )  # fmt: skip
+    commands = review.nominal[0].gain.inputs
+    curves = _curves(review)
+    for i, name in enumerate(commands):
+        yield _figure(
+            f"How close does the loop of {name} come to −1?",
+            "Nichols diagram. Cross: −1. Closed contour: modulus margin 0.5.",
+            3.9, lambda figure, i=i: _nichols(figure, curves[i]),
+        )  # fmt: skip
+        yield _figure(
+            f"Which frequencies cross 0 dB in the loop of {name}?",
+            "Bode diagram of the sampled loop gain, delay included. Dashed: −180°.",
+            4.6, lambda figure, i=i: _bode(figure, curves[i]),
+        )  # fmt: skip
+    drawn = review.points.query("kind == 'draw'")
+    if len(drawn) > 1:
+        yield _figure(
+            "How likely is a small margin?",
+            f"{len(drawn)} random points, uniform within the ranges, over all fills.",
+            3.6, lambda figure: _draws(figure, drawn),
+        )  # fmt: skip
+    found = review.confirmation
+    unit_of = Fmu.open(review.craft.model).unit(commands[0]).replace(".", "·")
+    yield _figure(
+        "Does the nonlinear craft agree at the worst case?",
+        f"Largest command in each period of the oscillation, from a small rotation on. "
+        f"{str(found)[0].upper()}{str(found)[1:]}.",
+        3.0, lambda figure: _simulated(figure, review, unit_of),
+    )  # fmt: skip
+
+
+def _figure(title: str, caption: str, height: float, draw: "Callable[[Figure], None]") -> str:
+    """Return a figure as inline SVG in the page's colours."""
+    try:
+        import matplotlib
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError:
+        raise FmuError(
+            "the page of a review needs matplotlib: pip install hubslosh[plot]"
+        ) from None
+    style = {
+        "svg.fonttype": "none", "svg.hashsalt": title, "font.size": 10, "text.color": INK,
+        "axes.edgecolor": SOFT, "axes.labelcolor": INK, "xtick.color": SOFT, "ytick.color": SOFT,
+        "xtick.labelcolor": INK, "ytick.labelcolor": INK, "grid.color": LINE,
+        "grid.linewidth": 0.6, "axes.grid": True, "axes.spines.top": False,
+        "axes.spines.right": False, "legend.frameon": False, "legend.fontsize": 9,
+        "axes.facecolor": "none", "figure.facecolor": "none", "savefig.facecolor": "none",
+        "lines.linewidth": 1.2, "path.simplify_threshold": 0.3,
+    }  # fmt: skip
+    with matplotlib.rc_context(style):
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        draw(figure)
+        out = io.StringIO()
+        figure.savefig(out, format="svg", metadata={"Date": None})
+    svg = out.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.S)
+    svg = re.sub(r'<g id="[^"]*"', "<g", svg)
+    svg = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
+                 rf'<svg viewBox="\1" role="img" aria-label="{html.escape(title)}" '
+                 'xmlns:xlink="http://www.w3.org/1999/xlink">', svg, count=1)  # fmt: skip
+    names = {INK: "ink", SOFT: "soft", LINE: "line"}
+    names |= {color.lower(): f"c{k}" for k, color in enumerate(COLORS)}
+    for color, name in names.items():
+        svg = svg.replace(color, f"var(--{name})")
+    svg = re.sub(r"'DejaVu Sans'[^;\"]*", "system-ui, sans-serif", svg)
+    return (
+        f"<figure><h2>{html.escape(title)}</h2>{svg}"
+        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+    )
+
+
+def _margins(figure: "Figure", review: "Review", unit: str) -> None:
+    bands = review.bands().sort_values("at")
+    axes: Any = figure.subplots(4, sharex=True)
+    panels = (("modulus_margin",), ("phase_margin",), ("gain_up", "gain_down"), ("delay_margin",))
+    labels = ("modulus (1)", "phase (deg)", "gain (dB)", "delay (s)")
+    for ax, names, label in zip(axes, panels, labels, strict=True):
+        for name in names:
+            low, nominal, high = (
+                bands[f"{name}_{end}"].replace([np.inf, -np.inf], np.nan)
+                for end in ("low", "nominal", "high")
+            )
+            ax.fill_between(bands["at"], low, high, color=COLORS[0], alpha=0.25, linewidth=0)
+            ax.plot(bands["at"], nominal, ".-", color=COLORS[0], markersize=4)
+        ax.set_ylabel(label)
+        ax.margins(y=0.15)
+        low, high = ax.get_ylim()
+        if low < 0.5 * high or names == ("gain_up", "gain_down"):
+            ax.set_ylim(min(low, 0), max(high, 0))
+    axes[-1].set_xlabel(unit)
+    figure.align_ylabels(axes)
+
+
+def _by_mode(review: "Review") -> list[tuple[str, str, pd.DataFrame]]:
+    """Return colour, name and rows of each mode; beyond the palette they share one colour."""
+    groups = list(review.slosh.groupby("mode", sort=False))
+    last = len(COLORS) - 1
+    if len(groups) > len(COLORS):
+        rest = pd.concat([rows for _, rows in groups[last:]])
+        groups = [*groups[:last], ("other modes", rest)]
+    return [(COLORS[k], str(mode), rows) for k, (mode, rows) in enumerate(groups)]
+
+
+def _stabilisation(figure: "Figure", review: "Review") -> None:
+    ax = figure.subplots()
+    low, high = GAINS
+    ax.axhspan(0, high, xmin=0, xmax=0.25, color=COLORS[1], alpha=0.15, linewidth=0)
+    ax.axhspan(0, high, xmin=0.75, xmax=1, color=COLORS[1], alpha=0.15, linewidth=0)
+    ax.axhline(0, color=SOFT, linewidth=0.8)
+    for color, mode, rows in _by_mode(review):
+        y = rows["peak"].clip(low + 1, high - 1)
+        ax.plot(rows["phase"], y, "o", color=color, markersize=3.5, alpha=0.8, label=mode)
+    words = {"phase": (0, 34), "gain and phase": (0, -46)}
+    words |= {"gain alone": (135, -46), "neither": (135, 34)}
+    places = [(x * sign, y, text) for text, (x, y) in words.items() for sign in {1, -1 if x else 1}]
+    for x, y, text in places:
+        ax.text(x, y, text, ha="center", va="center", fontsize=9, color=SOFT)
+    ax.set(xlim=(-187, 187), ylim=GAINS, xticks=range(-180, 181, 90))
+    ax.set(xlabel="direction of the resonance, 0° away from −1 (deg)", ylabel="peak loop gain (dB)")
+    _legend(figure)
+
+
+def _legend(figure: "Figure") -> None:
+    """Put the legend below the axes, where it hides nothing."""
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+
+
+def _modes(figure: "Figure", review: "Review", unit: str) -> None:
+    axes: Any = figure.subplots(2, sharex=True)
+    for color, mode, rows in _by_mode(review):
+        at = review.at[rows["fill"].to_numpy(int)]
+        axes[0].plot(at, rows["frequency"], "o", color=color, markersize=3, label=mode)
+        axes[1].plot(at, 100 * rows["zeta"], "o", color=color, markersize=3)
+        axes[1].plot(at, 100 * rows["zeta_closed"], "x", color=color, markersize=5)
+    axes[0].set_ylabel("frequency (Hz)")
+    axes[1].set(ylabel="damping ratio (%)", xlabel=unit)
+    if (review.slosh[["zeta", "zeta_closed"]] > 0).all(axis=None):
+        axes[1].set_yscale("log")
+        axes[1].yaxis.set_major_formatter("{x:g}")
+        axes[1].yaxis.set_minor_formatter("")
+    figure.align_ylabels(axes)
+    _legend(figure)
+
+
+Curve = tuple[str, str, NDArray[np.float64], NDArray[np.complex128]]
+"""Name of the fill, colour, frequencies (Hz), loop gain."""
+
+
+def _curves(review: "Review") -> list[list[Curve]]:
+    """Return the loop gains to draw, by command: at fills in equal steps, and at the worst case."""
+    count = len(review.fills)
+    chosen = sorted(set(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int)))
+    points = [(review.fills[k], _shade(k / max(count - 1, 1)), review.nominal[k]) for k in chosen]
+    points.append(("worst case", INK, review.worst))
+    table = pd.concat([point.margins.crossings for _, _, point in points])
+    known = table.loc[table["frequency"] > 0, "frequency"]
+    period = review.worst.loop.period
+    high = 0.5 / period
+    low = min(known.min() / 3, high / 100) if len(known) else high / 1000
+    high = min(high, max(known.max() * 3, 10 * low)) if len(known) else high
+    found = []
+    for i in range(len(review.worst.gain.D)):
+        curves = []
+        for name, color, point in points:
+            one = _broken_at(point.gain, i)
+            f = _grid(one, low, high)
+            values = np.array(_compiled(one).response(2 * np.pi * f)).view(complex)
+            curves.append((name, color, f, values))
+        found.append(curves)
+    return found
+
+
+def _shade(share: float) -> str:
+    """Return a colour between the palette's first two, which both modes of the page show well."""
+    ends = np.array([[0x00, 0x82, 0xC8], [0xE0, 0x6A, 0x10]])
+    r, g, b = (ends[0] + share * (ends[1] - ends[0])).round().astype(int)
+    return f"#{r:02x}{g:02x}{b:02x}"
+
+
+def _grid(model: LinearModel, low: float, high: float) -> NDArray[np.float64]:
+    """Return frequencies that resolve each lightly damped pole, Hz."""
+    assert model.period is not None
+    lines = [np.geomspace(low, high * (1 - 1e-9), 200)]
+    poles = np.linalg.eigvals(model.A).astype(complex)
+    s = np.log(poles[np.abs(poles) > 0.1]) / model.period
+    for pole in s[(s.imag > 0) & (-s.real < LIGHT * np.abs(s))]:
+        width = max(abs(pole.real), 1e-6 * abs(pole))
+        around = width * np.concatenate([[0], np.geomspace(0.1, 60, 24)])
+        lines.append(np.abs(pole.imag + np.concatenate([-around, around])) / (2 * np.pi))
+    every = np.unique(np.concatenate(lines))
+    return every[(every >= low) & (every <= high)]
+
+
+def _decibels(curve: Curve) -> NDArray[np.float64]:
+    with np.errstate(divide="ignore"):
+        return 20 * np.log10(np.abs(curve[3]))
+
+
+def _phase(curve: Curve) -> NDArray[np.float64]:
+    """Return the unwrapped phase, deg; between -360° and 0° where the gain is last near 0 dB."""
+    phase = np.degrees(np.unwrap(np.angle(curve[3])))
+    above = np.flatnonzero(np.abs(curve[3]) >= 1)
+    return phase - 360 * (np.floor(phase[above[-1] if len(above) else 0] / 360) + 1)
+
+
+def _draw(ax: "Axes", x: Any, y: Any, curve: Curve, first: Curve) -> None:
+    worst = curve[0] == "worst case"
+    style: dict[str, Any] = {"linestyle": "--", "linewidth": 1.0} if worst else {"linewidth": 0.9}
+    ax.plot(x, y, color=curve[1], label=curve[0], **style)
+
+
+def _key(figure: "Figure", curves: list[Curve]) -> None:
+    """Name the first and the last fill, and the worst case."""
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    shown = sorted({0, (len(curves) - 2) // 2, len(curves) - 2, len(curves) - 1})
+    figure.legend([handles[k] for k in shown], [labels[k] for k in shown],
+                  loc="outside lower center", ncols=4)  # fmt: skip
+
+
+def _nichols(figure: "Figure", curves: list[Curve]) -> None:
+    ax = figure.subplots()
+    left, right = -270.0, -90.0
+    for curve in curves:
+        gain, phase = _decibels(curve), _phase(curve)
+        inside = (gain > GAINS[0]) & (gain < GAINS[1])
+        if inside.any():
+            left, right = min(left, phase[inside].min()), max(right, phase[inside].max())
+        _draw(ax, phase, gain, curve, curves[0])
+    left, right = max(90 * np.floor(left / 90), -720), min(90 * np.ceil(right / 90), 180)
+    circle = -1 + 0.5 * np.exp(1j * np.linspace(0, 2 * np.pi, 100))
+    for turn in (-720, -360, 0, 360):
+        ax.plot(np.degrees(np.angle(-circle)) - 180 + turn, 20 * np.log10(np.abs(circle)),
+                color=COLORS[1], linewidth=1)  # fmt: skip
+        ax.plot(-180 + turn, 0, "+", color=COLORS[1], markersize=9)
+    ticks = np.arange(left, right + 1, 90 if right - left <= 540 else 180)
+    ax.set(xlim=(left, right), ylim=GAINS, xticks=ticks)
+    ax.set(xlabel="phase (deg)", ylabel="loop gain (dB)")
+    ax.axhline(0, color=SOFT, linewidth=0.8)
+    _key(figure, curves)
+
+
+def _bode(figure: "Figure", curves: list[Curve]) -> None:
+    axes: Any = figure.subplots(2, sharex=True)
+    lows, highs = [], []
+    for curve in curves:
+        gain, phase = _decibels(curve), _phase(curve)
+        _draw(axes[0], curve[2], gain, curve, curves[0])
+        _draw(axes[1], curve[2], phase, curve, curves[0])
+        seen = phase[gain > GAINS[0]]
+        lows.append(seen.min(initial=-270))
+        highs.append(seen.max(initial=-90))
+    axes[0].axhline(0, color=SOFT, linewidth=0.8)
+    for turn in (-900, -540, -180, 180):
+        axes[1].axhline(turn, color=COLORS[1], linewidth=0.8, linestyle="--")
+    low, high = max(90 * np.floor(min(lows) / 90), -720), min(90 * np.ceil(max(highs) / 90), 180)
+    axes[0].set(xscale="log", ylim=GAINS, ylabel="loop gain (dB)")
+    axes[1].set(ylim=(low, high), ylabel="phase (deg)", xlabel="frequency (Hz)")
+    axes[1].set_yticks(np.arange(low, high + 1, 90 if high - low <= 540 else 180))
+    axes[1].set_xlim(curves[0][2][0], curves[0][2][-1])
+    figure.align_ylabels(axes)
+    _key(figure, curves)
+
+
+def _draws(figure: "Figure", drawn: pd.DataFrame) -> None:
+    axes: Any = figure.subplots(2)
+    labels = {"modulus_margin": "modulus margin (1)", "delay_margin": "delay margin (s)"}
+    for ax, (name, label) in zip(axes, labels.items(), strict=True):
+        values = np.sort(drawn[name].replace(np.inf, np.nan).dropna().to_numpy(float))
+        share = 100 * np.arange(1, len(values) + 1) / len(drawn)
+        ax.step(values, share, where="post", color=COLORS[0])
+        ax.set(xlabel=label, ylabel="points below (%)", ylim=(0, 102))
+
+
+def _simulated(figure: "Figure", review: "Review", unit: str) -> None:
+    found = review.confirmation
+    ax = figure.subplots()
+    for k, (factor, run) in enumerate(found.runs.items()):
+        name = found.command or review.worst.gain.inputs[0]
+        period = 1 / max(found.frequency, 1e-6)
+        time, signal = run["time"].to_numpy(), run[name].abs().to_numpy()
+        window = (time / period).astype(int)
+        peaks = pd.Series(signal).groupby(window).max().iloc[:-1]
+        times = pd.Series(time).groupby(window).mean().iloc[:-1]
+        text = f"gain × {factor:.4g}" if found.command else "as it is"
+        ax.plot(times, peaks, "-", color=COLORS[k], label=text)
+    ax.set(yscale="log", xlabel="time (s)", ylabel=f"{name} ({unit})")
+    _legend(figure)
+
+
+def _tables(review: "Review") -> str:
+    bands = review.bands()
+    head = ("fill", "modulus", "phase, deg", "gain up, dB", "gain down, dB", "delay, s")
+    names = ("modulus_margin", "phase_margin", "gain_up", "gain_down", "delay_margin")
+    rows = [
+        [fill, *(_range(row, name) for name in names)]
+        for fill, (_, row) in zip(review.fills, bands.iterrows(), strict=True)
+    ]
+    parts = [_table("What are the margins at each fill? Nominal (least to largest)", head, rows)]
+    if len(review.slosh):
+        head = ("mode", "frequency, Hz", "ζ open, %", "ζ closed, %", "peak, dB", "stabilised by")
+        rows = []
+        words = review.modes()
+        for mode, of in review.slosh.groupby("mode", sort=False):
+            columns = (of["frequency"], 100 * of["zeta"], 100 * of["zeta_closed"], of["peak"])
+            spans = [f"{c.min():.3g} to {c.max():.3g}" for c in columns]
+            rows.append([str(mode), *spans, words[str(mode)]])
+        parts.append(_table("What do the slosh modes look like over all fills?", head, rows))
+    values = review.worst_values()
+    given: Any = review.nominal[review.worst.fill].loop
+    rows = [["fill", review.fills[review.worst.fill], ""]]
+    for name, value in values.items():
+        nominal = given.delay if name == "delay" else given.parameters.get(name)
+        rows.append([name, f"{value:.5g}", "" if nominal is None else f"{nominal:.5g}"])
+    parts.append(_table("Where is the worst case?", ("quantity", "worst", "nominal"), rows))
+    if review.warnings:
+        items = "".join(f"<li>{html.escape(text)}</li>" for text in review.warnings[:8])
+        parts.append(f"<section><h2>What do the tanks warn of?</h2><ul>{items}</ul></section>")
+    return f'<div class="tables">{"".join(parts)}</div>'
+
+
+def _range(row: Any, name: str) -> str:
+    nominal, low, high = (row[f"{name}_{end}"] for end in ("nominal", "low", "high"))
+    if not np.isfinite([low, high]).all():
+        return f"{nominal:.3g}" if np.isfinite(nominal) else "none"
+    return f"{nominal:.3g} ({low:.3g} to {high:.3g})"
+
+
+def _table(title: str, head: tuple[str, ...], rows: list[list[str]]) -> str:
+    names = "".join(f"<th>{html.escape(name)}</th>" for name in head)
+    text = ' class="text"'
+    body = "".join(
+        "<tr>"
+        + "".join(
+            f"<td{text if k == len(row) - 1 and len(value) > 40 else ''}>{html.escape(value)}</td>"
+            for k, value in enumerate(row)
+        )
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        f'<section><h2>{html.escape(title)}</h2><div class="scroll"><table><thead><tr>{names}'
+        f"</tr></thead><tbody>{body}</tbody></table></div></section>"
+    )
