@@ -78,8 +78,8 @@ pub fn installed(file: &str) -> Option<PathBuf> {
 
 /// A folder of the Python package that came with this command.
 pub fn came_with(folder: &str) -> Option<PathBuf> {
-    let packages = folders().into_iter().filter_map(|fmus| fmus.parent().map(Path::to_path_buf));
-    packages.map(|package| package.join(folder)).find(|path| path.is_dir())
+    let packages = folders().into_iter().filter(|fmus| fmus.ends_with("hubslosh/fmus"));
+    packages.map(|fmus| fmus.with_file_name(folder)).find(|path| path.is_dir())
 }
 
 /// The folders that [`INSTALLED`] means.

@@ -3,22 +3,29 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
+use pack::archive;
 use pack::documentation::book;
 use pack::documentation::live;
 
-/// Writes the documentation as a book: a static site with search, to be opened from the disk.
+use crate::{fmu, terminal};
+
+/// Opens the documentation in the web browser: a static site with search that needs no network.
 ///
-/// Pages are Markdown files of this project; book/SUMMARY.md lists them.
+/// The Python package contains the book. From the project's source the command makes it of the Markdown files that
+/// book/SUMMARY.md lists.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  hubslosh book && xdg-open dist/book/index.html\n  hubslosh book --live"
+    after_help = "Examples:\n  hubslosh book\n  hubslosh book --no-open\n  hubslosh book --out site\n  hubslosh book --live"
 )]
 pub struct BookArgs {
-    /// Directory for the site.
-    #[arg(long, value_name = "DIRECTORY", default_value = "dist/book")]
-    out: PathBuf,
-    /// Adds running plants to the live pages: FMUs and tank solver as WebAssembly. harness/platforms/setup --wasm installs the
-    /// tools.
+    /// Writes the book to this directory, and opens no browser [default: the Python package's own book, or dist/book].
+    #[arg(long, value_name = "DIRECTORY")]
+    out: Option<PathBuf>,
+    /// Prints the path of the first page and opens no browser.
+    #[arg(long)]
+    no_open: bool,
+    /// Adds running plants to the live pages: FMUs and tank solver as WebAssembly. Needs the project's source;
+    /// harness/platforms/setup --wasm installs the tools.
     #[arg(long)]
     live: bool,
 }
@@ -26,10 +33,26 @@ pub struct BookArgs {
 impl BookArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        pack::needs_source("the book")?;
-        let modules = if self.live { live::build()? } else { Vec::new() };
-        let files = book::write(&pack::root(), &self.out, &modules)?;
-        done!("{} ({files} files)", self.out.join("index.html").display());
+        let shipped = fmu::came_with("book").filter(|_| !self.live);
+        let folder = match (shipped, &self.out) {
+            (Some(shipped), None) => shipped,
+            (Some(shipped), Some(out)) => {
+                book::write(&archive::below(&shipped)?, out)?;
+                out.clone()
+            }
+            (None, out) => {
+                pack::needs_source("the book")?;
+                let modules = if self.live { live::build()? } else { Vec::new() };
+                let out = out.clone().unwrap_or_else(|| "dist/book".into());
+                book::write(&book::render(&pack::root(), &modules)?, &out)?;
+                out
+            }
+        };
+        let page = folder.join("index.html");
+        println!("{}", page.display());
+        if self.out.is_none() && !self.no_open && open::that_detached(&page).is_err() {
+            terminal::note("no web browser was found: open the page above");
+        }
         Ok(())
     }
 }

@@ -615,6 +615,12 @@ fn an_installed_command_finds_the_fmus_that_came_with_it() {
     };
     let package = place("lib/python3.12/site-packages/hubslosh").canonicalize().unwrap();
     assert_eq!(Path::new(&said(&["fmus"])), package.join("fmus/HubSlosh.fmu"));
+    // the book as well
+    std::fs::create_dir(package.join("book")).unwrap();
+    std::fs::write(package.join("book/index.html"), "page").unwrap();
+    assert_eq!(Path::new(&said(&["book", "--no-open"])), package.join("book/index.html"));
+    assert_eq!(said(&["book", "--out", "copy"]), Path::new("copy/index.html").to_str().unwrap());
+    assert_eq!(std::fs::read(place("elsewhere/copy/index.html")).unwrap(), b"page");
 }
 
 #[test]

@@ -24,20 +24,19 @@ struct Part {
     pages: Vec<usize>,
 }
 
-/// Writes the book into a directory; with `modules`, for its live pages.
+/// Writes a rendered book into a directory.
 ///
 /// # Errors
-/// As [`render`], or if a file cannot be written.
-pub fn write(root: &Path, out: &Path, modules: &[Module]) -> Result<usize> {
-    let files = render(root, modules)?;
+/// If a file cannot be written.
+pub fn write(files: &Files, out: &Path) -> Result<()> {
     output::directory(out)?;
-    for (name, bytes) in &files {
+    for (name, bytes) in files {
         output::atomically(&out.join(name), |file| Ok(std::io::Write::write_all(file, bytes)?))?;
     }
-    Ok(files.len())
+    Ok(())
 }
 
-/// Renders the book.
+/// Renders the book; with `modules`, for its live pages.
 ///
 /// # Errors
 /// With every link that leads nowhere, every missing figure and every equation that is not LaTeX.
