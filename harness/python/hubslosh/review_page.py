@@ -65,8 +65,7 @@ th, td { text-align: right; padding: .2rem .6rem; border-bottom: 1px solid var(-
 th:first-child, td:first-child, td.text { text-align: left; }
 td.text { white-space: normal; min-width: 9rem; }
 @page { margin: 14mm; }
-@media print { .figures { display: block; } figure, section { margin-bottom: 6mm; }
-  figure svg { max-width: 150mm; margin: 0 auto; } .scroll { overflow: visible; }
+@media print { .figures { grid-template-columns: 1fr 1fr; gap: 4mm; } .scroll { overflow: visible; }
   table { font-size: 8.5pt; } th, td { padding: .1rem .3rem; } }
 """
 

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 import hubslosh
 from hubslosh import Craft, FmuError, MountedTank
+from hubslosh.review_plan import main, review_plan
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 DRY, INERTIA = 1000.0, 900.0
@@ -210,6 +211,73 @@ def test_the_page_answers_first_and_needs_no_network(
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(FmuError, match=r"pip install hubslosh\[plot\]"):
         found.html()
+
+
+PLAN = """
+controller = {controller}
+period = 0.05
+fills = ["50%"]
+damping = "nominal"
+uncertain = {{ "craft.Jxx" = [850.0, 950.0] }}
+draws = 2
+
+[craft]
+mass = 1000.0
+inertia = [900.0, 900.0, 700.0]
+center_of_mass = [0.0, 0.0, 1.0]
+thrust = 400.0
+model = {model}
+program = {program}
+
+[craft.tanks.ox]
+source = "ox.toml"
+position = [0.0, 0.0, 0.2]
+modes = 1
+nu = 3e-7
+"""
+
+
+def test_a_plan_is_the_same_call(craft: Craft, tmp_path: Path, capsys, monkeypatch) -> None:
+    """Gains, matrices and a function in a file; the page has the plan's name."""
+    (tmp_path / "ox.toml").write_text("density = 1440.0\nshape = { sphere = { radius = 0.5 } }\n")
+    law = (
+        "import numpy as np\ndef law():\n    return np.hstack([80 * np.eye(3), 400 * np.eye(3)])\n"
+    )
+    (tmp_path / "law.py").write_text(law)
+    rows = gains().tolist()
+    matrices = f"{{ A = [[0.0]], B = [{[0.0] * 6}], C = [[0.0], [0.0], [0.0]], D = {rows} }}"
+    options = {"damping": "nominal", "uncertain": {"craft.Jxx": (850, 950)}, "draws": 2}
+    direct = craft.review(gains(), PERIOD, ["50%"], **options)
+
+    def plan(controller: str, text: str = PLAN) -> Path:
+        names = {"model": f"'{craft.model}'", "program": f"'{craft.program}'"}
+        file = tmp_path / "plan.toml"
+        file.write_text(text.format(controller=controller, **names))
+        return file
+
+    for controller in (str(rows), matrices, '"law.py:law"'):
+        found = review_plan(plan(controller))
+        mine, theirs = (r.points.query("kind != 'search'") for r in (found, direct))
+        assert mine["modulus_margin"].to_numpy() == pytest.approx(
+            theirs["modulus_margin"].to_numpy(), rel=1e-9
+        )
+    monkeypatch.setattr(sys, "argv", ["review", str(tmp_path / "plan.toml")])
+    main()
+    assert found.answer in capsys.readouterr().out
+    assert found.answer in (tmp_path / "plan.html").read_text(encoding="utf-8")
+    for text, said in {
+        PLAN.replace("period", "peroid"): "did you mean period",
+        PLAN.replace("mass =", "maas ="): "craft has maas",
+        PLAN.replace("[craft.tanks.ox]", "[craft.tanks.ox]\nx = 1"): r"craft\.tanks\.ox has x",
+        PLAN.replace("fills", "fills = ["): r"plan\.toml: ",
+        "period = 0.1": r"the table \[craft\] is missing",
+    }.items():
+        with pytest.raises(FmuError, match=said):
+            review_plan(plan("1", text))
+    with pytest.raises(FmuError, match=r"must be \"FILE\.py:NAME\""):
+        review_plan(plan('"none.py:law"'))
+    with pytest.raises(FmuError, match="needs A, B, C and D"):
+        review_plan(plan("{ A = [[0.0]] }"))
 
 
 def test_a_review_names_what_is_wrong(craft: Craft) -> None:
