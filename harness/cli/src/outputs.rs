@@ -10,7 +10,7 @@ use files::input;
 
 /// Options whose values are files or directories that a command writes: command, option, and the endings of files that
 /// it writes there. Every other value that names a file is an input.
-const OUTPUTS: [(&str, &str, &[&str]); 21] = [
+const OUTPUTS: [(&str, &str, &[&str]); 22] = [
     ("analyse", "out", &[]),
     ("book", "out", &[]),
     ("campaign", "out", &[]),
@@ -25,6 +25,7 @@ const OUTPUTS: [(&str, &str, &[&str]); 21] = [
     ("pack", "out", &["fmu"]),
     ("release", "out", &[]),
     ("release", "wheels", &[]),
+    ("review", "out", &["html"]),
     ("run", "out", &["csv", "parquet"]),
     ("tank", "out", &["json", "csv"]),
     ("tank", "parameters", &["toml", "ssv"]),

@@ -24,6 +24,7 @@ from .sampling import _not_whole, draw
 from .short import ShortTable
 from .stabilisation import resonances
 from .stability import Margins, _largest, margins_and_gain
+from .suggestion import Suggestion, suggest
 from .worst_case import Confirmation, confirm, search
 
 if TYPE_CHECKING:
@@ -108,6 +109,8 @@ class Review:
     """Point with the least distance; a search has led to it."""
     confirmation: Confirmation
     """Simulation of the nonlinear FMU at the worst point."""
+    suggestion: Suggestion
+    """A notch or roll-off that raises the smallest margin, with its cost in phase."""
     warnings: tuple[str, ...] = field(default=())
     """Warnings about the tanks, each for one of the fills where it applies."""
 
@@ -149,19 +152,21 @@ class Review:
         """The answer in a sentence."""
         table = self.points
         unstable = table[~table["stable"]]
-        count = f"{len(self.fills)} fill" + ("s" if len(self.fills) > 1 else "")
+        count = _count(len(self.fills), "fill")
+        all_of = f"all {count}" if len(self.fills) > 1 else count
+        points = _count(len(table), "point")
         if len(unstable):
             nominal = unstable[unstable["kind"] == "nominal"]
             if len(nominal):
                 fills = ", ".join(self.fills[k] for k in nominal["fill"])
                 return f"The nominal loop is UNSTABLE at {len(nominal)} of {count}: {fills}."
             return (
-                f"The nominal loop is stable at all {count}, but UNSTABLE at {len(unstable)} of "
-                f"{len(table)} points within the uncertainty."
+                f"The nominal loop is stable at {all_of}, but UNSTABLE at {len(unstable)} of "
+                f"{points} within the uncertainty."
             )
         worst = table.loc[table["distance"].idxmin()]
         return (
-            f"The loop is stable at all {count} and {len(table)} points; its smallest modulus "
+            f"The loop is stable at {all_of} and {points}; its smallest modulus "
             f"margin is {worst['modulus_margin']:.2f} (fill {self.fills[int(worst['fill'])]}), "
             f"its phase margin at least {table['phase_margin'].abs().min():.0f}°, its delay "
             f"margin at least {table['delay_margin'].min():.2g} s."
@@ -201,15 +206,20 @@ class Review:
         values = ", ".join(f"{name} = {x:.4g}" for name, x in self.worst_values().items())
         where = f"fill {self.fills[self.worst.fill]}" + (f", {values}" if values else "")
         lines += [f"worst case: {where}; {self.confirmation}"]
+        lines.append(self.suggestion.text)
         if self.uncertain:
             lines += ["uncertain: " + "; ".join(f"{u.name} {u.text}" for u in self.uncertain)]
         if self.warnings:
-            lines.append(f"{len(self.warnings)} warnings, see .warnings")
+            lines.append(f"{_count(len(self.warnings), 'warning')}, see .warnings")
         return "\n".join(line if len(line) < 500 else f"{line[:499]}…" for line in lines[:20])
 
     def __repr__(self) -> str:
         """Return the answer."""
         return f"Review({self.answer})"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")
 
 
 def _stabilised(how: str) -> str:
@@ -268,7 +278,8 @@ def review(
     }  # fmt: skip
     return Review(
         craft, space.names, space.at, space.unit, space.uncertain, _family(nominal), nominal,
-        ShortTable(rows), table, worst, confirm(worst), space.warnings,
+        ShortTable(rows), table, worst, confirm(worst),
+        suggest(nominal, every, table), space.warnings,
     )  # fmt: skip
 
 

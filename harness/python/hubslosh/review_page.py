@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .fmu import FmuError
-from .linearization import LinearModel
 from .plot import COLORS
-from .stability import LIGHT, _broken_at, _compiled
+from .stability import _broken_at, _compiled
+from .suggestion import frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +72,7 @@ td.text { white-space: normal; min-width: 9rem; }
 
 def page(review: "Review") -> str:
     """Return the page."""
-    title = f"Design review: {len(review.fills)} fills, {len(review.points)} points"
+    title = f"Design review over {len(review.fills)} fills and {len(review.points)} points"
     bad = "" if review.points["stable"].all() else " bad"
     figures = "\n".join(_figures(review))
     return (
@@ -92,6 +92,7 @@ def _facts(review: "Review") -> str:
     lines = [f"{', '.join(modes)}: {how}." for how, modes in by_how.items()]
     if review.uncertain:
         lines.append("Uncertain: " + "; ".join(f"{u.name} {u.text}" for u in review.uncertain))
+    lines.append(review.suggestion.text)
     lines.append(
         "Each loop is broken at one command while the others are closed. The thrust acts through "
         "the centre of mass."
@@ -288,7 +289,7 @@ def _curves(review: "Review") -> list[list[Curve]]:
         curves = []
         for name, color, point in points:
             one = _broken_at(point.gain, i)
-            f = _grid(one, low, high)
+            f = frequencies(one, low, high)
             values = np.array(_compiled(one).response(2 * np.pi * f)).view(complex)
             curves.append((name, color, f, values))
         found.append(curves)
@@ -300,20 +301,6 @@ def _shade(share: float) -> str:
     ends = np.array([[0x00, 0x82, 0xC8], [0xE0, 0x6A, 0x10]])
     r, g, b = (ends[0] + share * (ends[1] - ends[0])).round().astype(int)
     return f"#{r:02x}{g:02x}{b:02x}"
-
-
-def _grid(model: LinearModel, low: float, high: float) -> NDArray[np.float64]:
-    """Return frequencies that resolve each lightly damped pole, Hz."""
-    assert model.period is not None
-    lines = [np.geomspace(low, high * (1 - 1e-9), 200)]
-    poles = np.linalg.eigvals(model.A).astype(complex)
-    s = np.log(poles[np.abs(poles) > 0.1]) / model.period
-    for pole in s[(s.imag > 0) & (-s.real < LIGHT * np.abs(s))]:
-        width = max(abs(pole.real), 1e-6 * abs(pole))
-        around = width * np.concatenate([[0], np.geomspace(0.1, 60, 24)])
-        lines.append(np.abs(pole.imag + np.concatenate([-around, around])) / (2 * np.pi))
-    every = np.unique(np.concatenate(lines))
-    return every[(every >= low) & (every <= high)]
 
 
 def _decibels(curve: Curve) -> NDArray[np.float64]:

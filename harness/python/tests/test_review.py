@@ -52,7 +52,7 @@ def test_margins_of_a_rigid_craft_are_those_of_a_double_integrator(craft: Craft)
     assert of_x["frequency"].to_numpy() == pytest.approx([crossing], rel=1e-7)
     phase = np.degrees(np.angle(-loop_gain(crossing)))
     assert of_x["phase_margin"].to_numpy() == pytest.approx([phase], rel=1e-7)
-    assert found.slosh.empty and "stable at all 1 fill" in found.answer
+    assert found.slosh.empty and "stable at 1 fill and 1 point;" in found.answer
     assert found.points["phase_margin"].tolist() == [found.nominal[0].margins.phase_margin]
 
 
@@ -211,6 +211,25 @@ def test_the_page_answers_first_and_needs_no_network(
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(FmuError, match=r"pip install hubslosh\[plot\]"):
         found.html()
+
+
+def test_the_suggested_filter_does_what_it_says(craft: Craft) -> None:
+    """Slosh between hinge and bob: stable with the filter, as `margins` of its controller says."""
+    craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
+    lightly = {"tank[1].zeta[1]": 5e-4}
+    found = craft.review(gains(25, 300), PERIOD, ["50%"], damping="nominal", parameters=lightly)
+    of = found.suggestion
+    assert found.worst.distance == of.before < 0 < of.after
+    loop = found.nominal[0].loop
+    there = hubslosh.margins(replace(loop, controller=of.controller))
+    assert there.stable and there.modulus_margin == pytest.approx(of.after, rel=0.01)
+    # phase of the filter at the rigid crossover
+    rows = found.nominal[0].margins.crossings.query("crossing == 'gain' and near == ''")
+    phases = np.degrees(np.angle(of.filter.response(rows["frequency"])[:, 0, 0]))
+    assert of.cost == pytest.approx(-phases.min(), rel=1e-9) and 0 < of.cost <= 15
+    # no slosh, no filter
+    full = craft.review(gains(), PERIOD, ["100%"], damping="nominal").suggestion
+    assert full.controller is None and full.before == full.after
 
 
 PLAN = """

@@ -24,6 +24,7 @@ pub mod gyro;
 pub mod identify;
 pub mod pack;
 pub mod release;
+pub mod review;
 pub mod run;
 pub mod scale;
 pub mod step_cost;

@@ -1,0 +1,62 @@
+//! `hubslosh review`: the Python package computes it.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+/// Reviews a controller around a craft over its fills, and writes one page: margins, slosh modes, worst case.
+///
+/// Needs a Python with the package hubslosh and matplotlib.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  hubslosh review plan.toml\n  \
+                  hubslosh review plan.toml --out review.html --python /usr/bin/python3")]
+pub struct ReviewArgs {
+    /// Plan with craft, controller, fills and ranges, .toml.
+    #[arg(value_name = "PLAN")]
+    plan: PathBuf,
+    /// Page to write, .html; by default the plan's name with this ending.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Python that has the package; by default that next to this command, then python3 and python on PATH.
+    #[arg(long, value_name = "PROGRAM")]
+    python: Option<PathBuf>,
+}
+
+impl ReviewArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let own = std::env::current_exe().context("this program cannot find itself")?;
+        let out = self.out.unwrap_or_else(|| self.plan.with_extension("html"));
+        let mut arguments = vec![OsString::from("-m"), "hubslosh.review_plan".into()];
+        arguments.extend([self.plan.into_os_string(), "--out".into(), out.into_os_string()]);
+        let pythons = match self.python {
+            Some(python) => vec![python],
+            None => pythons(&own),
+        };
+        for python in &pythons {
+            let mut command = Command::new(python);
+            command.args(&arguments).env("HUBSLOSH", &own);
+            match command.status() {
+                Ok(status) if status.success() => return Ok(()),
+                Ok(_) => bail!("{} has not made the review, see above", python.display()),
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+                Err(error) => {
+                    return Err(error).with_context(|| format!("{} did not start", python.display()));
+                }
+            }
+        }
+        let names: Vec<_> = pythons.iter().map(|python| python.display().to_string()).collect();
+        bail!(
+            "no Python was found (tried: {}); --python names one that has the package hubslosh",
+            names.join(", ")
+        )
+    }
+}
+
+/// Where a Python may be: in the environment of this command, or on PATH.
+fn pythons(own: &Path) -> Vec<PathBuf> {
+    let near = own.with_file_name(if cfg!(windows) { "python.exe" } else { "python3" });
+    [near, "python3".into(), "python".into()].to_vec()
+}

@@ -1,0 +1,172 @@
+"""A notch or roll-off that a review suggests, and its cost in phase."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .linearization import LinearModel
+from .loop import _tustin
+from .stability import LIGHT, _closed, _compiled, _largest
+
+if TYPE_CHECKING:
+    from .review import Point
+
+DEAREST = 15.0
+"""Largest loss of phase at the rigid crossover that a suggestion may cost, deg."""
+
+WORTH = 0.02
+"""Least gain in modulus margin that is worth a filter."""
+
+WORST = 5
+"""Number of worst points that a filter is tried on, besides the nominal ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestion:
+    """The filter, on all commands, that raises the least distance most; or that there is none."""
+
+    text: str
+    """The suggestion in a sentence."""
+    filter: LinearModel | None
+    """Sampled filter of one command; None if no filter is worth it."""
+    controller: LinearModel | None
+    """Sampled controller with this filter on each command."""
+    before: float
+    """Least distance without the filter over the points tried; see `Review.points`."""
+    after: float
+    """Least distance with the filter."""
+    cost: float
+    """Phase that the filter loses at the rigid crossover, deg; the most over all commands."""
+
+
+def suggest(
+    nominal: "Sequence[Point]", every: "Sequence[Point]", slosh: pd.DataFrame
+) -> Suggestion:
+    """Return the best of some notches at the mode that shows most, and of some roll-offs."""
+    worst = sorted(every, key=lambda point: point.distance)[:WORST]
+    points = list({id(point): point for point in [*nominal, *worst]}.values())
+    grids = [_sampled(point) for point in points]
+    before = min(point.distance for point in points)
+    loop = nominal[0].loop
+    rigid = pd.concat([point.margins.crossings for point in nominal])
+    rigid = rigid[(rigid["crossing"] == "gain") & (rigid["near"] == "")]
+    best = None
+    for words, law in _candidates(slosh, rigid["frequency"], loop.period):
+        at = np.exp(2j * np.pi * rigid["frequency"].to_numpy() * loop.period)
+        cost = float(-np.degrees(np.angle(_value(law, at))).min(initial=0.0))
+        if cost > DEAREST:
+            continue
+        after = min(_distance(p, w, L, law) for p, (w, L) in zip(points, grids, strict=True))
+        if best is None or after > best[0] + 1e-3 or (after > best[0] - 1e-3 and cost < best[1]):
+            best = (after, cost, words, law)
+    controller = loop.linear()
+    if best is None or best[0] < before + WORTH or controller is None:
+        text = (
+            f"No notch or roll-off that was tried raises the smallest modulus margin by {WORTH:g} "
+            f"and costs at most {DEAREST:.0f}° of phase at the rigid crossover."
+        )
+        return Suggestion(text, None, None, before, before, 0.0)
+    after, cost, words, law = best
+    if before > 0:
+        change = f"raises the smallest modulus margin from {before:.2f} to {after:.2f}"
+    elif after > 0:
+        change = f"stabilises every point tried (modulus margin {after:.2f})"
+    else:
+        change = f"slows the growth from {-before:.2g} to {-after:.2g} 1/s"
+    text = (
+        f"{words} on each command {change}; it costs {cost:.1f}° of phase at the rigid crossover."
+    )
+    return Suggestion(text, law, _series(controller, law), before, after, cost)
+
+
+def _candidates(
+    slosh: pd.DataFrame, rigid: "pd.Series[float]", period: float
+) -> list[tuple[str, LinearModel]]:
+    """Return filters with their names: at the slosh mode that is unstable or shows most."""
+    if slosh.empty:
+        return []
+    unstable = slosh["stabilised"] == "unstable"
+    shown = slosh[unstable] if unstable.any() else slosh
+    mode = shown.loc[shown["peak"].idxmax(), "mode"]
+    f = float(slosh.loc[slosh["mode"] == mode, "frequency"].mean())
+    found = []
+    for zeta in (0.3, 0.6, 1.0):
+        for depth in (6, 12, 20):
+            words = f"A notch at {f:.3g} Hz ({depth} dB deep, damping ratio {zeta:g})"
+            found.append((words, _second_order(f, zeta, period, 10 ** (-depth / 20))))
+    crossover = rigid.max() if len(rigid) else 0.0
+    for share in (0.35, 0.5, 0.7, 1.0, 1.5):
+        if share * f > crossover:
+            words = f"A second-order roll-off at {share * f:.3g} Hz (damping ratio 0.7)"
+            found.append((words, _second_order(share * f, 0.7, period, None)))
+    return [(words, law) for words, law in found if 2 * f * period < 0.9]
+
+
+def _second_order(f: float, zeta: float, period: float, notch: float | None) -> LinearModel:
+    """Return w²/(s² + 2 ζ w s + w²), or a notch with that denominator, prewarped and sampled."""
+    w = 2 / period * np.tan(np.pi * f * period)
+    A, B = np.array([[0.0, 1.0], [-w * w, -2 * zeta * w]]), np.array([[0.0], [1.0]])
+    if notch is None:
+        C, D = np.array([[w * w, 0.0]]), np.zeros((1, 1))
+    else:
+        C, D = np.array([[0.0, -2 * zeta * w * (1 - notch)]]), np.ones((1, 1))
+    return _tustin(LinearModel(A, B, C, D, ("f[1]", "f[2]"), ("u",), ("y",)), period)
+
+
+def _value(law: LinearModel, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return the filter's transfer function in the z plane."""
+    states = np.linalg.solve(z[:, None, None] * np.eye(len(law.A)) - law.A, law.B)
+    return np.asarray((law.C @ states + law.D)[:, 0, 0])
+
+
+def _series(first: LinearModel, law: LinearModel) -> LinearModel:
+    """Return a system with the filter on each of its outputs."""
+    count = len(first.D)
+    A, B, C, D = (np.kron(np.eye(count), matrix) for matrix in law)
+    n, m = len(first.A), len(A)
+    return replace(
+        first,
+        A=np.block([[first.A, np.zeros((n, m))], [B @ first.C, A]]),
+        B=np.vstack([first.B, B @ first.D]),
+        C=np.hstack([D @ first.C, C]),
+        D=D @ first.D,
+        states=(*first.states, *(f"filter[{i + 1}]" for i in range(m))),
+    )
+
+
+def frequencies(model: LinearModel, low: float, high: float) -> NDArray[np.float64]:
+    """Return frequencies that resolve each lightly damped pole of a sampled model, Hz."""
+    assert model.period is not None
+    lines = [np.geomspace(low, high * (1 - 1e-9), 200)]
+    poles = np.linalg.eigvals(model.A).astype(complex)
+    s = np.log(poles[np.abs(poles) > 0.1]) / model.period
+    for pole in s[(s.imag > 0) & (-s.real < LIGHT * np.abs(s))]:
+        width = max(abs(pole.real), 1e-6 * abs(pole))
+        around = width * np.concatenate([[0], np.geomspace(0.1, 60, 24)])
+        lines.append(np.abs(pole.imag + np.concatenate([-around, around])) / (2 * np.pi))
+    every = np.unique(np.concatenate(lines))
+    return every[(every >= low) & (every <= high)]
+
+
+def _sampled(point: "Point") -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Return points on the unit circle, and the loop gain's matrices there."""
+    high = 0.5 / point.loop.period
+    f = frequencies(point.gain, high / 1e4, high)
+    count = len(point.gain.D)
+    values = np.array(_compiled(point.gain).response(2 * np.pi * f)).view(complex)
+    return np.exp(2j * np.pi * f * point.loop.period), values.reshape(-1, count, count)
+
+
+def _distance(
+    point: "Point", z: NDArray[np.complex128], L: NDArray[np.complex128], law: LinearModel
+) -> float:
+    """Return the distance of a point with a filter; each loop broken with the others closed."""
+    size = _largest(_closed(_series(point.gain, law)), point.gain.period)
+    if size >= 1:
+        return -float(np.log(size) / point.loop.period)
+    sensitivity = np.linalg.inv(np.eye(L.shape[1]) + _value(law, z)[:, None, None] * L)
+    return float(1 / np.abs(np.diagonal(sensitivity, axis1=1, axis2=2)).max())
