@@ -307,5 +307,5 @@ fn everything() -> Result<()> {
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();
     let campaign = Campaign { plan, force: false, jobs: 0, compare: None, out };
-    campaign::drive(&open(Path::new(DEFAULT_FMU))?, &campaign, campaign.take()?)
+    campaign::drive(&open(Path::new(DEFAULT_FMU))?, &campaign, campaign.take()?, Vec::new())
 }

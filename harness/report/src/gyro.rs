@@ -51,11 +51,15 @@ fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Se
     Series { points, color: color.into(), style, title: title.into() }
 }
 
-/// The pictures of a recording at rest, each with its file's name.
-pub fn rest(rest: &Rest) -> [(&'static str, String); 4] {
-    let chart = |title: &str, x: Axis, y: Axis, series: Vec<Series>, legend: bool| {
-        let chart = Chart { title: title.into(), size: (640.0, 400.0), x, y, series, legend };
-        chart.file()
+/// The charts of a recording at rest, each with its file's name.
+pub fn rest(rest: &Rest) -> [(&'static str, Chart); 4] {
+    let chart = |title: &str, x: Axis, y: Axis, series: Vec<Series>, legend: bool| Chart {
+        title: title.into(),
+        size: (640.0, 400.0),
+        x,
+        y,
+        series,
+        legend,
     };
     // the frame that goes round what noise allows
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];

@@ -76,7 +76,7 @@ impl AnalyseArgs {
             "{} holds the results of another plan: --out DIRECTORY puts these elsewhere",
             campaign.out.display()
         );
-        campaign::drive(&fmu, &campaign, folder)
+        campaign::drive(&fmu, &campaign, folder, Vec::new())
     }
 
     /// The plan of the command line: every recording as a run with its torque's amplitude, simulated with every model.

@@ -10,6 +10,7 @@ use host::causality::Causality;
 use host::fmu::Fmu;
 use host::guard;
 use names::hubslosh::{TAU_CMD, slosh, tank};
+use report::campaign::Chapter;
 
 use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting, view};
 use crate::{progress, terminal};
@@ -123,7 +124,7 @@ impl CampaignArgs {
                 "{out} held the campaign of another plan; its tables and report are replaced"
             ));
         }
-        drive(&fmu, &campaign, folder)
+        drive(&fmu, &campaign, folder, Vec::new())
     }
 
     /// The directory for these flags: that of the default campaign, or one named by what differs.
@@ -177,8 +178,8 @@ impl CampaignArgs {
     }
 }
 
-/// Carries a campaign out and leaves tables and report.
-pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
+/// Carries a campaign out and leaves tables and report, which begins with `chapters`.
+pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapter>) -> Result<()> {
     let cases = campaign.plan.cases(fmu.description())?;
     let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();
     drop(cases);
@@ -202,7 +203,10 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
         None => None,
     };
     let view = telling.map(|run| ("view.html", run));
-    files.push(("report.html", report::campaign::page(campaign, fmu, &results, view).into_bytes()));
+    files.push((
+        "report.html",
+        report::campaign::page(campaign, fmu, &results, view, chapters).into_bytes(),
+    ));
     files.extend(shown.map(|page| ("view.html", page.into_bytes())));
     folder.publish(files)?;
     let (all, reused) = results.counts();

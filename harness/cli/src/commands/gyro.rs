@@ -132,7 +132,7 @@ impl GyroArgs {
         }
         for (name, picture) in report::gyro::rest(&rest) {
             output::atomically(&self.out.join(name), |file| {
-                Ok(file.write_all(picture.as_bytes())?)
+                Ok(file.write_all(picture.file().as_bytes())?)
             })?;
         }
         print!("{}", text(&rest));

@@ -101,6 +101,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
             "Thin and dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from the part of the rate that no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
             (list_of("Invalid, and not drawn", &untrusted))
         },
+        thesis: "7.1 and 7.2",
         height: 460,
         panels: vec![Panel::new(&axis.label, "frequency / Hz")],
         traces,
@@ -174,7 +175,7 @@ pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
 }
 
 pub(super) fn features(page: &Page, axis: &Axis) -> Figure {
-    small(
+    let figure = small(
         page,
         axis,
         "Separation and notch depth",
@@ -187,7 +188,8 @@ pub(super) fn features(page: &Page, axis: &Axis) -> Figure {
             quantity("notch, swept / dB", &|run| run.passing.as_ref()?.rate.features.notch_db),
             quantity("notch, spa / dB", &|run| run.spa_features().notch_db),
         ],
-    )
+    );
+    Figure { thesis: "7.1 and 7.2", ..figure }
 }
 
 pub(super) fn bearing_and_liquid(page: &Page, axis: &Axis) -> Figure {
@@ -220,7 +222,7 @@ pub(super) fn bearing_and_liquid(page: &Page, axis: &Axis) -> Figure {
 }
 
 pub(super) fn linear_fit(page: &Page, axis: &Axis) -> Figure {
-    small(
+    let figure = small(
         page,
         axis,
         "Validity of a linear fit",
@@ -231,10 +233,30 @@ pub(super) fn linear_fit(page: &Page, axis: &Axis) -> Figure {
             quantity("residual coherence", &|run| run.fit()?.coherence),
             quantity("SNR at antiresonance / dB", &|run| Some(run.record.as_ref()?.snr_db?[1])),
         ],
-    )
+    );
+    Figure { thesis: "7.3, 7.4 and 7.7 to 7.10", ..figure }
+}
+
+/// Cross-axis energy fraction and leakage of recordings, from the rates about three axes.
+pub(super) fn cross_axis(page: &Page, axis: &Axis) -> Figure {
+    let of = |run: &Outcome| run.off_axis().filter(|_| run.is_recording());
+    let figure = small(
+        page,
+        axis,
+        "Cross-axis energy fraction and leakage of the recordings",
+        html! { "Share of the squared rates that is not about the hub's axis, each rate without its mean: the median over the samples and the fraction of the whole record. Near 2/3 the three rates are noise of one size. Leakage: root mean square over the frequencies of √(|H_x|²+|H_y|²)/|H|." },
+        [
+            quantity("CEF, median", &|run| Some(of(run)?.median)),
+            quantity("CEF, whole record", &|run| Some(of(run)?.energy)),
+            quantity("leakage, rms", &|run| Some(of(run)?.leakage)),
+        ],
+    );
+    Figure { columns: 3, thesis: "7.15", ..figure }
 }
 
 pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
+    // of a recording these figures come from rates, which `cross_axis` draws
+    let of = |run: &Outcome| run.off_axis().filter(|_| !run.is_recording());
     small(
         page,
         axis,
@@ -246,8 +268,8 @@ pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
                 ..quantity("largest |swirl|", &|run| Some(run.rotary()?.swirl.abs()))
             },
             quantity("time in rotary slosh / s", &|run| Some(run.rotary()?.time)),
-            quantity("off-axis energy", &|run| Some(run.off_axis()?.energy)),
-            quantity("leakage", &|run| Some(run.off_axis()?.leakage)),
+            quantity("off-axis energy", &|run| Some(of(run)?.energy)),
+            quantity("leakage", &|run| Some(of(run)?.leakage)),
         ],
     )
 }

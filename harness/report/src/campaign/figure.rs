@@ -13,6 +13,8 @@ pub(super) struct Figure {
     pub title: String,
     /// Caption: the point that the figure makes.
     pub caption: Markup,
+    /// Figures of Rubaga's thesis that show the same of its bench, such as `7.1 and 7.2`.
+    pub thesis: &'static str,
     /// Number of panels in a row on a wide screen.
     pub columns: usize,
     /// Height of a row of panels, px.
@@ -58,6 +60,7 @@ impl Default for Figure {
         Figure {
             title: String::new(),
             caption: html! {},
+            thesis: "",
             columns: 1,
             height: 330,
             half: false,
@@ -74,9 +77,16 @@ impl Default for Figure {
 pub(super) struct Figures {
     specifications: Vec<Value>,
     titles: Vec<String>,
+    /// Captions name the thesis's figures.
+    of_the_thesis: bool,
 }
 
 impl Figures {
+    /// No figures yet; captions name the thesis's figures if `of_the_thesis`.
+    pub fn new(of_the_thesis: bool) -> Self {
+        Figures { of_the_thesis, ..Figures::default() }
+    }
+
     /// Takes a figure and gives the HTML of its place; nothing if it has nothing to show.
     pub fn add(&mut self, figure: Figure) -> Markup {
         let none = |axis: &Value| axis.as_array().is_some_and(Vec::is_empty);
@@ -113,6 +123,9 @@ impl Figures {
                 figcaption {
                     a href={ "#figure-" (number) } { "Figure " (number) } " "
                     b { (figure.title) "." } " " (figure.caption)
+                    @if self.of_the_thesis && !figure.thesis.is_empty() {
+                        " Thesis: figure" @if figure.thesis.contains(' ') { "s" } " " (figure.thesis) "."
+                    }
                 }
             }
             "\n" // the space between two halves

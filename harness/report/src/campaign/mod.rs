@@ -1,6 +1,7 @@
 //! `report.html`: one self-contained page on a campaign.
 
 mod along;
+mod chapter;
 mod colors;
 mod compare;
 mod draws;
@@ -21,6 +22,7 @@ use experiments::rounding::thousandths;
 use host::fmu::Fmu;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+pub use self::chapter::{Chapter, Illustration};
 use self::figure::{Figure, Figures};
 pub(crate) use self::page::printed;
 use self::page::{Group, Page, Varied, axis, best, groups, manoeuvre, runs};
@@ -49,13 +51,15 @@ pub fn telling(results: &Results) -> Option<&Outcome> {
     largest(radial).or_else(|| largest(tangential))
 }
 
-/// Returns the report. `view` is the separate page that shows a named run.
+/// Returns the report. `view` is the separate page that shows a named run; `chapters` precede the sections on the runs.
 pub fn page(
     campaign: &Campaign,
     fmu: &Fmu,
     results: &Results,
     view: Option<(&str, &Outcome)>,
+    chapters: Vec<Chapter>,
 ) -> String {
+    let has_chapters = !chapters.is_empty();
     let plan = &campaign.plan;
     let page = Page {
         plan,
@@ -63,11 +67,16 @@ pub fn page(
         axis: axis(plan, fmu, &results.outcomes),
         varied: plan.varied().iter().map(|n| Varied::of(n, fmu, &results.outcomes)).collect(),
     };
-    let mut figures = Figures::default();
-    let mut sections = match results.unanalysed.is_empty() {
+    let axis = page.axis.as_ref().map(|axis| axis.name.as_str());
+    let of_the_thesis = axis == Some("torque amplitude") || has_chapters;
+    let mut figures = Figures::new(of_the_thesis);
+    let mut sections: Vec<(String, Markup)> =
+        chapters.into_iter().map(|chapter| chapter.section(&mut figures)).collect();
+    let of_runs = match results.unanalysed.is_empty() {
         true => bench_sections(&page, campaign, results, &mut figures),
         false => general_sections(fmu, results, &mut figures),
     };
+    sections.extend(of_runs.into_iter().map(|(title, content)| (title.to_string(), content)));
     sections.retain(|(_, content)| !content.0.is_empty());
     let page = html! {
         (DOCTYPE)
@@ -98,7 +107,7 @@ pub fn page(
                         h2 id=(anchor(title)) { (title) }
                         (content)
                     }
-                    (notes::provenance(campaign, fmu, results))
+                    (notes::provenance(campaign, fmu, results, has_chapters))
                 }
                 script type="application/json" id="figures" { (PreEscaped(figures.json())) }
                 script {
@@ -160,6 +169,8 @@ fn bench_sections<'a>(
         if axis.is_some() || results.outcomes.iter().any(|run| run.is_recording()) {
             all.extend(responses::models(page));
         }
+        let recorded = few.iter().filter(|group| group.runs[0].is_recording());
+        all.extend(recorded.map(|group| responses::fitted(page, group)));
         sections.push(("Frequency responses", add(all)));
     }
     sections.push(("Comparison of models with recordings", recordings::beside(results)));
@@ -179,6 +190,7 @@ fn bench_sections<'a>(
             all.push(along::linear_fit(page, axis));
         }
         if swept {
+            all.push(along::cross_axis(page, axis));
             all.push(along::out_of_the_plane(page, axis));
         }
         sections.push((title, add(all)));

@@ -217,7 +217,12 @@ fn shortened(text: &str, scale: f64) -> String {
     }
 }
 
-pub(super) fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> Markup {
+pub(super) fn provenance(
+    campaign: &Campaign,
+    fmu: &Fmu,
+    results: &Results,
+    has_chapters: bool,
+) -> Markup {
     let description = fmu.description();
     let analysed = results.outcomes.first().map(|run| &run.case);
     let first = analysed.or_else(|| results.unanalysed.first().map(|run| &run.case));
@@ -255,7 +260,7 @@ pub(super) fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> M
             }
         }
         p {
-            "Each run is in " code { "runs/" } " as Parquet, with what it was made from in its metadata. " code { "features.csv" } " holds the columns of the table above for every run, " code { "features_spa.csv" } " and " code { "features_h1.csv" } " those of the other estimators in the same columns, " code { "runs.csv" } " all of them with everything that was varied, " code { "plan.toml" } " the plan. This command reproduces everything here:"
+            "Each run is in " code { "runs/" } " as Parquet, with what it was made from in its metadata. " code { "features.csv" } " holds the columns of the table above for every run, " code { "features_spa.csv" } " and " code { "features_h1.csv" } " those of the other estimators in the same columns, " code { "runs.csv" } " all of them with everything that was varied, " code { "plan.toml" } " the plan. This command reproduces " @if has_chapters { "the tables and the figures on runs:" } @else { "everything here:" }
         }
         p { code { (campaign.command(fmu)) } }
     }

@@ -44,6 +44,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
         caption: html! {
             "Hub rate over torque (" (names.join(", ")) "). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals of the first and the last run, where they are wider than a line. At first around the two: a double click shows the whole band."
         },
+        thesis: "6.6",
         height: 235,
         half: true,
         shared: true,
@@ -109,6 +110,40 @@ fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Va
     sides.into_iter().enumerate().map(area).collect()
 }
 
+/// The linear model fitted to the first and to the last recording of a group, and the coherence of its residual with the
+/// torque.
+pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
+    let ends = [group.drawn.first(), group.drawn.last()];
+    let ends = distinct(ends.into_iter().flatten().map(|run| run.case.name.as_str()));
+    let runs = group.drawn.iter().filter(|run| ends.contains(&run.case.name.as_str()));
+    let mut traces = Vec::new();
+    for (i, run) in runs.enumerate() {
+        let Some(record) = &run.record else { continue };
+        let Some((fit, coherence)) = &record.fit else { continue };
+        let (name, color) = (page.name(run), colors::category(i));
+        let frequency = record.spa.response.frequency.clone();
+        let response = frequency.iter().map(|f| fit.model.response(*f)).collect();
+        let model = FrequencyResponse { frequency, response };
+        traces.extend(bode(&format!("{name}, measured"), color, "solid", &record.spa.response));
+        traces.extend(bode(&format!("{name}, fitted"), color, "dash", &model));
+        let coherence = thinned(coherence, true);
+        traces.push(line(2, &format!("{name}, measured"), color, "solid", &coherence));
+    }
+    let panel =
+        |y: &str| Panel { log_x: true, range: near(group), ..Panel::new("frequency / Hz", y) };
+    Figure {
+        title: format!("Fitted transfer function and residual coherence, {}", group.title()),
+        caption: html! { "A transfer function with three poles and two zeros (dashed) over the measured response of the smallest and the largest torque, and the coherence of what it leaves with the torque: 1 where the rest still follows the torque." },
+        thesis: "6.4, 6.5 and 6.7",
+        height: 235,
+        half: true,
+        shared: true,
+        panels: vec![panel("|H| / dB"), panel("phase / deg"), panel("residual coherence γ²")],
+        traces,
+        ..Figure::default()
+    }
+}
+
 /// For each fill, the responses of all models at the smallest and at the largest torque (thesis
 /// figures 7.5 and 7.6); nothing where there is one model only.
 pub(super) fn models(page: &Page) -> Vec<Figure> {
@@ -140,6 +175,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
             Figure {
                 title: format!("Models overlaid, {what}"),
                 caption: html! { "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike. At first around the two: a double click shows the whole band." },
+                thesis: "7.5 and 7.6",
                 height: 340,
                 half: true,
                 panels: vec![Panel { log_x: true, range: near(groups[0]), ..Panel::new("frequency / Hz", "|H| / dB") }],
@@ -222,6 +258,7 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
         caption: html! { "One row of cells for each run. Residual coherence: bright where what the linear fit leaves still follows the torque steadily. Leakage: "
         @if group.runs[0].is_recording() { "the rates about the other axes over that about the hub's (thesis 6.3.6)." }
         @else { "the radial force times the tank's arm over the torque; bright in rotary slosh." } },
+        thesis: "7.11 to 7.14 and 7.16",
         columns: 4,
         height: 250,
         panels,
