@@ -171,6 +171,21 @@ pub struct Braking {
     pub r_squared: f64,
     /// Rows.
     pub rows: usize,
+    /// Angle (rad) and acceleration (rad/s²) of each row.
+    #[serde(skip)]
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Braking {
+    /// Returns the fitted acceleration at an angle, rad/s².
+    pub fn at(&self, angle: f64) -> f64 {
+        let [mean, harmonics @ ..] = &self.coefficients[..] else { return 0.0 };
+        let each = harmonics.chunks(2).zip(1..).map(|(pair, h)| {
+            let (sin, cos) = (f64::from(h) * angle).sin_cos();
+            pair[0] * cos + pair[1] * sin
+        });
+        mean + each.sum::<f64>()
+    }
 }
 
 /// Length of the windows over which the residual's scores are summed, s: the difference makes neighbouring rows
@@ -961,9 +976,9 @@ const MOVING: f64 = 0.05;
 /// `None` without angle or free decay.
 fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking> {
     let harmonics = 2;
-    let (mut rows, mut accelerations) = (Vec::new(), Vec::new());
+    let (mut rows, mut accelerations, mut angles) = (Vec::new(), Vec::new(), Vec::new());
     for (recording, bias) in recordings.iter().zip(biases) {
-        let angle = recording.angle.as_ref()?;
+        let Some(angle) = &recording.angle else { continue };
         let rate: Vec<f64> = recording.rate.iter().map(|w| w - bias).collect();
         let (torque, t) = (&recording.torque, &recording.time);
         let (still, slow) = (FREE * peak(torque), MOVING * peak(&rate));
@@ -976,6 +991,7 @@ fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking
                     row.extend([cos, sin]);
                 }
                 rows.extend(row);
+                angles.push(angle[k]);
                 accelerations.push((rate[k + 1] - rate[k - 1]) / (t[k + 1] - t[k - 1]));
             }
         }
@@ -989,6 +1005,7 @@ fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking
     let inverse = a.tr_mul(&a).try_inverse()?;
     let found = &inverse * a.tr_mul(&y);
     let residual = &y - &a * &found;
+    let points = angles.into_iter().zip(y.iter().copied()).collect();
     let variance = residual.norm_squared() / (count - width) as f64;
     let mean = y.mean();
     Some(Braking {
@@ -999,6 +1016,7 @@ fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking
         r_squared: 1.0
             - residual.norm_squared() / y.iter().map(|v| (v - mean).powi(2)).sum::<f64>(),
         rows: count,
+        points,
     })
 }
 
