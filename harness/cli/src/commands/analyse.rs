@@ -9,7 +9,7 @@ use experiments::profile::{Torque, Written};
 use names::hubslosh::TAU_CMD;
 use signals::recording::Columns;
 
-use super::{DEFAULT_FMU, campaign, open, setting};
+use super::{DEFAULT_FMU, bench_day, campaign, open, setting};
 
 /// Analyses recordings of a bench as `campaign` analyses its runs, and compares them with the model's runs under the same torque.
 ///
@@ -19,11 +19,12 @@ use super::{DEFAULT_FMU, campaign, open, setting};
 #[command(after_help = "Examples:\n  \
     hubslosh analyse bench_050.csv bench_100.csv --columns time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s\n  \
     hubslosh analyse up.mat --profile lin-sweep:f0=1,f1=4,duration=600 --set tank.h=0.08 --model spherical\n  \
-    hubslosh analyse --plan bench.toml\n\n\
+    hubslosh analyse --plan bench.toml\n  \
+    hubslosh analyse --bench-day tuesday --out dist/tuesday\n\n\
     In a plan a [[run]] with recording = \"FILE\" (and columns = \"…\") is read; it is simulated too.")]
 pub struct AnalyseArgs {
     /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
-    #[arg(value_name = "RECORDING", required_unless_present = "plan")]
+    #[arg(value_name = "RECORDING", required_unless_present_any = ["plan", "bench_day"])]
     recordings: Vec<PathBuf>,
     /// Columns of the recordings for the signals, with units.
     #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
@@ -40,6 +41,10 @@ pub struct AnalyseArgs {
     /// A plan with recordings instead.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["recordings", "columns", "profile", "model", "settings"])]
     plan: Option<String>,
+    /// Directory of a day's recordings with their list, day.toml: friction runs, free decays, gyro at rest and sweeps in
+    /// one report.
+    #[arg(long, value_name = "DIRECTORY", conflicts_with_all = ["recordings", "columns", "profile", "model", "settings", "plan"])]
+    bench_day: Option<PathBuf>,
     /// Runs at once [default: as many as the machine has cores].
     #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
     jobs: usize,
@@ -54,6 +59,9 @@ pub struct AnalyseArgs {
 impl AnalyseArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        if let Some(directory) = &self.bench_day {
+            return bench_day::run(directory, &self.fmu, self.jobs, self.out.clone());
+        }
         let first =
             self.plan.as_ref().map(Path::new).or(self.recordings.first().map(PathBuf::as_path));
         let stem = first.and_then(Path::file_stem).context("no recording")?;

@@ -11,6 +11,7 @@ use crate::terminal;
 
 pub mod analyse;
 pub mod any_fmu;
+pub mod bench_day;
 pub mod book;
 pub mod campaign;
 pub mod check;

@@ -1,0 +1,497 @@
+//! Chapters of the report on a day that do not come from sweeps: Bond number, friction, preferential direction, gyro.
+
+use std::f64::consts::{PI, TAU};
+
+use analysis::rest::Rest;
+use anyhow::{Context, Result};
+use host::fmu::Fmu;
+use identify::estimate::{Estimated, prose};
+use identify::methods::acceleration::{self, Braking, Weights};
+use identify::nominal;
+use identify::reading::{self, Source};
+use identify::recording::Recording;
+use names::hubslosh::{fluid, friction, hub, tank};
+use report::campaign::{Chapter, Illustration};
+use report::svg::{Axis, Chart, Series, Style};
+use signals::recording::{self, Between, Signal, Wanted};
+
+use super::{Day, Item, Kind};
+use crate::terminal;
+
+/// Parameters of Table 5.5 of Rubaga's thesis.
+const THESIS: [(&str, f64); 5] = [
+    (friction::B, 0.03793),
+    (friction::C, 0.003498),
+    (friction::D, 0.002423),
+    (friction::OMEGA_S, 0.08581),
+    (hub::I, 0.322414),
+];
+/// Surface tension of water at 25 °C, N/m, and its density, kg/m³ (thesis 5.1).
+const WATER: (f64, f64) = (0.072, 997.0);
+/// The same of liquid oxygen at −200 °C (thesis 7.2.1).
+const OXYGEN: (f64, f64) = (13.2e-3, 1141.0);
+/// Radius of Centaur's oxygen tank, m (thesis 7.2.1).
+const CENTAUR: f64 = 2.0425;
+/// Standard gravity as in the thesis, m/s².
+const GRAVITY: f64 = 9.81;
+/// Points of a cloud in a figure.
+const POINTS: usize = 1500;
+/// Points of the measured friction curve.
+const BINS: usize = 240;
+/// Largest rate of the friction curve near zero, in Stribeck speeds.
+const NEAR: f64 = 5.0;
+/// Rate over the gyro's noise beyond which the hub slips.
+const SLIPS: f64 = 5.0;
+/// Longest lag of the gyro's autocorrelation, s; length of a chunk as in the thesis, s, and the least number of chunks.
+const LAG: f64 = 10.0;
+const CHUNK: f64 = 900.0;
+const CHUNKS: f64 = 8.0;
+
+/// Returns the chapters, and the fit of friction and inertia. `problems` receives one message for each recording that cannot be used, `found` the parameters
+/// of hub and bearing.
+pub fn of(
+    day: &Day,
+    fmu: &Fmu,
+    problems: &mut Vec<String>,
+    found: &mut Vec<(String, String)>,
+) -> Result<(Vec<Chapter>, Option<acceleration::Found>)> {
+    let mut chapters = vec![bond_number(day, fmu)?];
+    let friction = bench_recordings(day, Kind::Friction, problems);
+    let decays = bench_recordings(day, Kind::Decay, problems);
+    let has_friction = !friction.is_empty();
+    let all: Vec<Recording> = friction.into_iter().chain(decays).collect();
+    let mut settings = nominal::with_damping(day.settings.clone());
+    // the least that the FMU takes: the tank is empty
+    settings.push((fluid::RHO.into(), "1e-6".into()));
+    let options = acceleration::Options {
+        weights: Weights::Uniform,
+        bounds: Vec::new(),
+        starts: Vec::new(),
+        harmonics: 0,
+        settings,
+        held: false,
+    };
+    let fitted = match all.is_empty() {
+        true => None,
+        false => match acceleration::identify(fmu, &all, &options) {
+            Ok(fitted) => Some(fitted),
+            Err(error) => {
+                problems.push(format!("friction runs and decays: {error:#}"));
+                None
+            }
+        },
+    };
+    let usable = fitted.as_ref().filter(|fitted| fitted.fits == Some(true));
+    if let (Some(fitted), true) = (usable, has_friction) {
+        found.extend(fitted.parameters.iter().map(|(name, p)| (name.clone(), p.value.to_string())));
+    }
+    chapters.push(match &fitted {
+        Some(fitted) => bearing(&all, fitted, usable.is_some() && has_friction),
+        None => none("Friction and inertia (thesis 5.2)", Kind::Friction, problems),
+    });
+    let braking = fitted.as_ref().map_or(&[][..], |fitted| &fitted.details.braking);
+    chapters.push(match braking {
+        [ahead, back] => {
+            let fitted = fitted.as_ref();
+            let asymmetry = fitted.and_then(|fitted| fitted.parameters.get(friction::ASYMMETRY));
+            preferential_direction(ahead, back, asymmetry)
+        }
+        _ => none("Preferential direction (thesis 5.4)", Kind::Decay, problems),
+    });
+    chapters.push(gyro(day, problems));
+    Ok((chapters, fitted))
+}
+
+/// A chapter without recordings.
+fn none(title: &str, kind: Kind, problems: &[String]) -> Chapter {
+    let (word, needs) = match kind {
+        Kind::Friction => ("friction", "ramps, steps and sweeps of the torque with the tank empty"),
+        Kind::Decay => (
+            "decay",
+            "a push forwards and one backwards with the tank empty, each with its free decay and the encoder's angle (theta)",
+        ),
+        Kind::Rest => ("rest", "the gyro of a hub that stands still, for an hour or more"),
+        Kind::Sweep => ("sweep", "sine sweeps"),
+    };
+    let why = if problems.is_empty() {
+        ""
+    } else {
+        " The messages of the command say which recordings could not be used."
+    };
+    Chapter {
+        title: title.into(),
+        text: vec![format!(
+            "No usable recordings with kind = \"{word}\" in day.toml. They are: {needs}.{why}"
+        )],
+        ..Chapter::default()
+    }
+}
+
+/// Reads recordings with torque and rate.
+fn bench_recordings(day: &Day, kind: Kind, problems: &mut Vec<String>) -> Vec<Recording> {
+    let mut all = Vec::new();
+    for item in day.of(kind) {
+        let source = Source { columns: item.recorded.columns.clone(), trim: None };
+        match reading::read(&item.recorded.path, &source, f64::INFINITY, &mut |line| {
+            terminal::note(line)
+        }) {
+            Ok(recordings) => all.extend(recordings),
+            Err(error) => problems.push(format!("{error:#}")),
+        }
+    }
+    all
+}
+
+fn chart(title: &str, x: &str, y: &str, series: Vec<Series>) -> Chart {
+    let points = || series.iter().flat_map(|s| &s.points);
+    Chart {
+        title: title.into(),
+        size: (640.0, 400.0),
+        x: Axis::linear(x, points().map(|p| p.0), 0.0, 8),
+        y: Axis::linear(y, points().map(|p| p.1), 0.0, 6),
+        series,
+        legend: true,
+    }
+}
+
+fn series(title: &str, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
+    Series {
+        title: title.into(),
+        style,
+        color: String::new(),
+        points: points.into_iter().collect(),
+    }
+}
+
+fn illustration(chart: Chart, thesis: &'static str, caption: impl Into<String>) -> Illustration {
+    Illustration { chart, thesis, caption: caption.into(), equal: false }
+}
+
+/// A value of the FMU, as set or by default.
+fn value(day: &Day, fmu: &Fmu, name: &str) -> Result<f64> {
+    let set = day.settings.iter().find(|(other, _)| other == name).map(|(_, value)| value.clone());
+    let start = fmu.description().variable(name)?.attributes().start.clone();
+    let text = set.or(start).with_context(|| format!("{name} has no value"))?;
+    text.parse().with_context(|| format!("{name} = {text}: a number in SI units is needed"))
+}
+
+/// Bond number against the diameter, and the tank in space with the same one.
+fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
+    let radius = value(day, fmu, tank::D)? / 2.0;
+    let (sigma, density) = WATER;
+    let bond = |radius: f64| density * GRAVITY * radius * radius / sigma;
+    let own = bond(radius);
+    let diameters = (1..=50).map(|k| f64::from(k) * radius / 20.0);
+    let against = chart(
+        "Bond number against the tank's diameter",
+        "diameter / mm",
+        "Bond number",
+        vec![
+            series("water at 25 °C", Style::Line, diameters.map(|r| (2e3 * r, bond(r)))),
+            series("this tank", Style::Dots, [(2e3 * radius, own)]),
+        ],
+    );
+    let (sigma, density) = OXYGEN;
+    let acceleration = |radius: f64| own * sigma / (density * radius * radius);
+    let radii = || (1..=100).map(|k| 0.05 * f64::from(k));
+    let space = chart(
+        "Acceleration of an oxygen tank with this tank's Bond number",
+        "tank radius / m",
+        "acceleration / (m/s²)",
+        vec![
+            series("liquid oxygen at −200 °C", Style::Line, radii().map(|r| (r, acceleration(r)))),
+            series("Centaur's radius", Style::Dots, [(CENTAUR, acceleration(CENTAUR))]),
+        ],
+    );
+    let space = Chart { y: Axis::decades(&space.y.label, radii().map(acceleration)), ..space };
+    Ok(Chapter {
+        title: "Bond number (thesis 5.1 and 7.2)".into(),
+        text: vec![format!(
+            "The tank has the Bond number {own:.1}: ρ g R²/σ with R = {:.1} mm, ρ = 997 kg/m³, σ = 0.072 N/m.",
+            1e3 * radius
+        )],
+        illustrations: vec![
+            illustration(against, "5.6", "The Bond number grows with the square of the diameter."),
+            illustration(
+                space,
+                "7.17",
+                format!(
+                    "An oxygen tank as wide as Centaur's has this Bond number at {:.5} m/s².",
+                    acceleration(CENTAUR)
+                ),
+            ),
+        ],
+        ..Chapter::default()
+    })
+}
+
+/// Every so many points that a figure shows.
+fn some(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
+    points.iter().copied().step_by(points.len().div_ceil(POINTS).max(1))
+}
+
+/// Mean friction torque over rows of similar rate in which the hub slips: τ − I ω', with rates about their bias.
+fn friction_points(
+    all: &[Recording],
+    fitted: &acceleration::Found,
+    inertia: f64,
+) -> Vec<(f64, f64)> {
+    let mut rows: Vec<(f64, f64)> = Vec::new();
+    for (i, recording) in all.iter().enumerate() {
+        let name = format!("gyro_bias[{}]", i + 1);
+        let bias = fitted.measurement.get(&name).map_or(0.0, |p| p.value);
+        let slow = SLIPS * fitted.details.fit.noise[i];
+        let Recording { time, torque, rate, .. } = recording;
+        // over a fifth of a second
+        let half = ((0.1 / recording.step()).round() as usize).max(1);
+        let slips = |k: usize| {
+            let way = (rate[k] - bias).signum();
+            rate[k - half..=k + half].iter().all(|w| way * (w - bias) > slow)
+        };
+        let inner = half..time.len().saturating_sub(half);
+        rows.extend(inner.filter(|k| slips(*k)).map(|k| {
+            let acceleration =
+                (rate[k + half] - rate[k - half]) / (time[k + half] - time[k - half]);
+            let part = &torque[k - half..=k + half];
+            let mean = part.iter().sum::<f64>() / part.len() as f64;
+            (rate[k] - bias, mean - inertia * acceleration)
+        }));
+    }
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mean = |part: &[(f64, f64)]| {
+        let n = part.len() as f64;
+        (part.iter().map(|p| p.0).sum::<f64>() / n, part.iter().map(|p| p.1).sum::<f64>() / n)
+    };
+    rows.chunks(rows.len().div_ceil(BINS).max(1)).map(mean).collect()
+}
+
+fn bearing(all: &[Recording], fitted: &acceleration::Found, is_used: bool) -> Chapter {
+    let number = |name: &str| fitted.parameters.get(name).map_or(0.0, |p| p.value);
+    let [b, c, d, speed, asymmetry] =
+        [friction::B, friction::C, friction::D, friction::OMEGA_S, friction::ASYMMETRY].map(number);
+    let points = friction_points(all, fitted, number(hub::I));
+    let curve = |w: f64| {
+        let sign = w.signum();
+        b * w + sign * (1.0 + asymmetry * sign) * (c + d * (-(w / speed).powi(2)).exp())
+    };
+    let most = points.iter().fold(0.0_f64, |most, p| most.max(p.0.abs()));
+    let friction_chart = |title: &str, most: f64| {
+        let rates = (-200..=200).map(|k| most * f64::from(k) / 200.0);
+        // the law jumps at zero: a gap parts its two sides
+        let law = rates.map(|w| (w, if w == 0.0 { f64::NAN } else { 1e3 * curve(w) }));
+        let within = points.iter().filter(|(w, _)| w.abs() <= most);
+        let measured = within.map(|(w, torque)| (*w, 1e3 * torque));
+        chart(
+            title,
+            "rate / (rad/s)",
+            "friction torque / mN·m",
+            vec![
+                series("measured", Style::Cloud, measured),
+                series("fitted law", Style::Line, law),
+            ],
+        )
+    };
+    let whole = friction_chart("Friction torque against the rate", most);
+    let near = friction_chart("Friction torque near zero rate", most.min(NEAR * speed));
+    let head =
+        ["parameter", "value", "95 % interval", "unit", "Table 5.5"].map(String::from).to_vec();
+    let row = |(name, p): (&String, &Estimated)| {
+        let thesis = THESIS.iter().find(|(other, _)| other == name);
+        let [low, high] = p.interval;
+        vec![
+            name.clone(),
+            format!("{:.4e}", p.value),
+            format!("{low:.4e} to {high:.4e}"),
+            prose(&p.unit),
+            thesis.map_or(String::new(), |(_, value)| format!("{value}")),
+        ]
+    };
+    let rows = fitted.parameters.iter().chain(&fitted.measurement).map(row);
+    let mut text = fitted.verdict.clone();
+    text.push(match is_used {
+        true => "The models below use these parameters, except those that day.toml sets.".into(),
+        false => "The models below do not use these parameters: they have the FMU's values, or those of day.toml.".to_string(),
+    });
+    Chapter {
+        title: "Friction and inertia (thesis 5.2)".into(),
+        text,
+        table: [head].into_iter().chain(rows).collect(),
+        illustrations: vec![
+            illustration(
+                whole,
+                "5.8 and 5.9",
+                "Torque less inertia times acceleration, averaged over rows of similar rate, and the law with the parameters of the table.",
+            ),
+            illustration(
+                near,
+                "5.8",
+                "The same where the hub is slow: dry friction is largest when the hub begins to slip.",
+            ),
+        ],
+    }
+}
+
+fn preferential_direction(
+    ahead: &Braking,
+    back: &Braking,
+    asymmetry: Option<&Estimated>,
+) -> Chapter {
+    let wrapped = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
+    let degrees = |points: &[(f64, f64)], sign: f64| -> Vec<(f64, f64)> {
+        some(points).map(|(angle, a)| (wrapped(angle).to_degrees(), sign * a)).collect()
+    };
+    let angles = || (-90..=90).map(|k| 2.0 * f64::from(k));
+    let braking = |of: &Braking, sign: f64, degrees: f64| sign * of.at(degrees.to_radians());
+    let [ccw, cw] = [(ahead, -1.0), (back, 1.0)];
+    let fit = |(of, sign): (&Braking, f64)| -> Vec<(f64, f64)> {
+        angles().map(|angle| (angle, braking(of, sign, angle))).collect()
+    };
+    let differences: Vec<(f64, f64)> =
+        fit(ccw).into_iter().zip(fit(cw)).map(|((angle, a), (_, b))| (angle, a - b)).collect();
+    let (x, y) = ("angle / deg", "deceleration / (rad/s²)");
+    let scatter = chart(
+        "Deceleration in free decay against the angle",
+        x,
+        y,
+        vec![
+            series("counter-clockwise", Style::Cloud, degrees(&ahead.points, -1.0)),
+            series("clockwise", Style::Cloud, degrees(&back.points, 1.0)),
+            series("counter-clockwise, fitted", Style::Line, fit(ccw)),
+            series("clockwise, fitted", Style::Line, fit(cw)),
+        ],
+    );
+    let difference = chart(
+        "Directional asymmetry against the angle",
+        x,
+        "counter-clockwise less clockwise / (rad/s²)",
+        vec![series("difference of the fits", Style::Line, differences)],
+    );
+    let round = |points: Vec<(f64, f64)>| {
+        points.into_iter().map(|(angle, a)| {
+            let (sin, cos) = angle.to_radians().sin_cos();
+            (a * cos, a * sin)
+        })
+    };
+    let polar = chart(
+        "Deceleration around the revolution",
+        "deceleration · cos θ / (rad/s²)",
+        "deceleration · sin θ / (rad/s²)",
+        vec![
+            series("counter-clockwise", Style::Line, round(fit(ccw))),
+            series("clockwise", Style::Line, round(fit(cw))),
+        ],
+    );
+    let verdict = match asymmetry {
+        Some(p) if p.determined => {
+            let [low, high] = p.interval.map(|end| 100.0 * end);
+            let size = format!(
+                "Counter-clockwise dry friction is {:+.1} % from the mean of both directions (95 %: {low:.1} to {high:.1} %)",
+                100.0 * p.value
+            );
+            match () {
+                () if low > 0.0 => format!("{size}: the hub turns more easily clockwise."),
+                () if high < 0.0 => format!("{size}: the hub turns more easily counter-clockwise."),
+                () => format!("{size}: no preferential direction is seen."),
+            }
+        }
+        _ => "The recordings do not determine a preferential direction.".to_string(),
+    };
+    Chapter {
+        title: "Preferential direction (thesis 5.4)".into(),
+        text: vec![
+            verdict,
+            "The figures show the thesis's fits, deceleration against the angle alone. Deceleration also falls with the rate: the \
+             fits describe the bearing only if the decays pass each angle at many rates."
+                .into(),
+        ],
+        illustrations: vec![
+            illustration(
+                scatter,
+                "5.10",
+                "One point for each row without torque, and the fit with two harmonics of the angle.",
+            ),
+            illustration(
+                difference,
+                "5.11",
+                "Positive where the fit has stronger deceleration counter-clockwise.",
+            ),
+            Illustration {
+                equal: true,
+                ..illustration(
+                    polar,
+                    "5.12",
+                    "Distance from the origin: the fitted deceleration at the angle θ.",
+                )
+            },
+        ],
+        ..Chapter::default()
+    }
+}
+
+/// Statistics of one recording at rest.
+fn at_rest(item: &Item) -> Result<Rest> {
+    let signals = [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
+    let wanted = Wanted { signals: &signals, columns: &item.recorded.columns };
+    let table = recording::read(&item.recorded.path, &wanted, &mut |line| terminal::note(line))?;
+    let (step, table) = recording::even(table, &mut |line| terminal::note(line))
+        .with_context(|| format!("{} cannot be used", item.recorded.path.display()))?;
+    let omega = table.column("omega").unwrap_or_default();
+    let seconds = step * omega.len() as f64;
+    anyhow::ensure!(
+        seconds > 20.0 * LAG && omega.iter().any(|w| *w != omega[0]),
+        "{}: it lasts {seconds:.0} s (allowed: at least {:.0} s, in which omega changes)",
+        item.recorded.path.display(),
+        20.0 * LAG
+    );
+    Ok(Rest::of(step, omega, CHUNK.min(seconds / CHUNKS), LAG))
+}
+
+fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
+    let title = "Gyro at rest (thesis 5.5)";
+    let mut found = Vec::new();
+    for item in day.of(Kind::Rest) {
+        match at_rest(item) {
+            Ok(rest) => found.push((item.recorded.path.display().to_string(), rest)),
+            Err(error) => problems.push(format!("{error:#}")),
+        }
+    }
+    if found.is_empty() {
+        return none(title, Kind::Rest, problems);
+    }
+    let mut chapter = Chapter { title: title.into(), ..Chapter::default() };
+    for (name, rest) in &found {
+        let noise = match &rest.noise {
+            Some(noise) if noise.bias_instability > 0.0 => format!(
+                "angle random walk N = {:.3e} rad/s/√Hz, bias instability B = {:.2e} rad/s",
+                noise.arw, noise.bias_instability
+            ),
+            Some(noise) => format!(
+                "angle random walk N = {:.3e} rad/s/√Hz, no bias instability within this duration",
+                noise.arw
+            ),
+            None => "its Allan deviation fits no noise model".into(),
+        };
+        chapter.text.push(format!(
+            "{name}: bias {:.4e} rad/s, standard deviation of a sample {:.3e} rad/s, {noise} (thesis: N = 5.75e-5, B = 5.21e-5). \
+             {:.1} % of the autocorrelations are outside the 95 % interval of white noise.",
+            rest.mean,
+            rest.deviation,
+            100.0 * rest.outside()
+        ));
+        for (file, chart) in report::gyro::rest(rest) {
+            let (thesis, caption) = match file {
+                "allan.svg" => (
+                    "5.19",
+                    "The white noise has the slope −1/2; the bias instability is the level part.",
+                ),
+                "quantiles.svg" => ("5.14 and 5.15", "Normal noise lies on the dashed line."),
+                "autocorrelation.svg" => {
+                    ("5.18", "White noise stays within the frame 95 % of the time.")
+                }
+                _ => ("5.16 and 5.17", "A gyro with steady noise stays within the frames."),
+            };
+            chapter.illustrations.push(illustration(chart, thesis, caption));
+        }
+    }
+    chapter
+}

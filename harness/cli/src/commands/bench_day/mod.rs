@@ -1,0 +1,220 @@
+//! `hubslosh analyse --bench-day`: the recordings of a day at the bench as one report.
+//!
+//! The sine sweeps become a plan whose runs are recordings, so a campaign analyses them and simulates the models under the
+//! same torque. Friction runs, free decays and the gyro at rest become chapters of the campaign's page.
+
+mod chapters;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use experiments::campaign::{Campaign, recorded};
+use experiments::plan::{Plan, Recorded};
+use files::{input, output};
+use serde::Deserialize;
+use signals::recording::Columns;
+
+use super::campaign::drive;
+use super::open;
+use crate::terminal;
+
+/// Name of the manifest.
+const MANIFEST: &str = "day.toml";
+
+/// Kind of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    /// A ramp, step or sweep of the torque with the tank empty (thesis 5.2).
+    Friction,
+    /// A push and the free decay after it with the tank empty and an encoder (thesis 5.4).
+    Decay,
+    /// The gyro of a hub that stands still (thesis 5.5).
+    Rest,
+    /// A sine sweep with liquid (thesis 6 and 7).
+    Sweep,
+}
+
+/// `day.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Manifest {
+    #[serde(default = "title")]
+    title: String,
+    /// Columns of recordings without their own.
+    #[serde(default)]
+    columns: String,
+    #[serde(default = "profile")]
+    profile: String,
+    #[serde(default = "models")]
+    models: Vec<String>,
+    #[serde(default)]
+    set: toml::Table,
+    recording: Vec<Entry>,
+}
+
+fn title() -> String {
+    "A day at the bench".into()
+}
+
+fn profile() -> String {
+    "exp-sweep:f0=1.25,f1=3.5,duration=2700".into()
+}
+
+fn models() -> Vec<String> {
+    vec!["linear".into(), "spherical".into()]
+}
+
+/// `[[recording]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    kind: Kind,
+    file: PathBuf,
+    columns: Option<String>,
+    fill: Option<toml::Value>,
+    amplitude: Option<toml::Value>,
+}
+
+/// A recording of the manifest.
+struct Item {
+    kind: Kind,
+    recorded: Recorded,
+    fill: Option<toml::Value>,
+    amplitude: Option<toml::Value>,
+}
+
+/// A day at the bench.
+struct Day {
+    manifest: Manifest,
+    items: Vec<Item>,
+    /// Values that are known, by FMU name.
+    settings: Vec<(String, String)>,
+}
+
+impl Day {
+    /// Reads the manifest of a directory.
+    fn read(directory: &Path) -> Result<Day> {
+        let path = directory.join(MANIFEST);
+        let text = input::text(&path).with_context(|| {
+            format!(
+                "{} is needed: it lists the recordings, their kinds, fills and torques",
+                path.display()
+            )
+        })?;
+        let name = path.display().to_string();
+        let mut manifest: Manifest = toml::from_str(&text).with_context(|| name.clone())?;
+        let items =
+            std::mem::take(&mut manifest.recording).into_iter().enumerate().map(|(i, entry)| {
+                let Entry { kind, file, columns, fill, amplitude } = entry;
+                let place = format!("{name}: [[recording]] {} ({})", i + 1, file.display());
+                let is_sweep = kind == Kind::Sweep;
+                for (key, value) in [("fill", &fill), ("amplitude", &amplitude)] {
+                    ensure!(
+                        value.is_some() == is_sweep,
+                        "{place}: {key} {} (it belongs to kind = \"sweep\")",
+                        if is_sweep { "is missing" } else { "is not allowed here" }
+                    );
+                }
+                let columns: Columns =
+                    columns.as_ref().unwrap_or(&manifest.columns).parse().with_context(|| place)?;
+                Ok(Item {
+                    kind,
+                    recorded: Recorded { path: directory.join(file), columns },
+                    fill,
+                    amplitude,
+                })
+            });
+        let items = items.collect::<Result<Vec<Item>>>()?;
+        ensure!(
+            items.iter().any(|item| item.kind == Kind::Sweep),
+            "{name}: no [[recording]] has kind = \"sweep\"; friction runs alone: hubslosh identify --method acceleration"
+        );
+        let mut settings = Vec::new();
+        flatten("", &manifest.set, &mut settings);
+        Ok(Day { manifest, items, settings })
+    }
+
+    fn of(&self, kind: Kind) -> impl Iterator<Item = &Item> {
+        self.items.iter().filter(move |item| item.kind == kind)
+    }
+
+    /// The plan: every sweep as a recording, simulated with every model. `found` are parameters from the friction runs.
+    fn plan(&self, found: &[(String, String)]) -> Result<String> {
+        let text = |value: &str| toml::Value::from(value).to_string();
+        let mut plan = format!(
+            "title = {}\nprofile = {}\n",
+            text(&self.manifest.title),
+            text(&self.manifest.profile)
+        );
+        let mut sweeps = self.of(Kind::Sweep);
+        let step = sweeps.find_map(|item| recorded::read(&item.recorded, &mut |_| {}).ok());
+        let Some((step, _)) = step else { bail!("no sweep of {MANIFEST} can be read") };
+        plan.push_str(&format!("step = {:?}\n[set]\n", (step * 1e9).round() / 1e9));
+        let known = |name: &str| self.settings.iter().any(|(other, _)| other == name);
+        for (name, value) in self.settings.iter().chain(found.iter().filter(|(n, _)| !known(n))) {
+            let plain = value.parse::<f64>().is_ok() || value.parse::<bool>().is_ok();
+            let value = if plain { value.clone() } else { text(value) };
+            plan.push_str(&format!("{name} = {value}\n"));
+        }
+        for item in self.of(Kind::Sweep) {
+            let recording = text(&item.recorded.path.display().to_string());
+            plan.push_str(&format!("[[run]]\nrecording = {recording}\n"));
+            let columns = item.recorded.columns.to_string();
+            if !columns.is_empty() {
+                plan.push_str(&format!("columns = {}\n", text(&columns)));
+            }
+            for (key, value) in [("tank.h", &item.fill), ("profile.amplitude", &item.amplitude)] {
+                plan.extend(value.iter().map(|value| format!("{key} = {value}\n")));
+            }
+        }
+        let models: Vec<String> = self.manifest.models.iter().map(|model| text(model)).collect();
+        plan.push_str(&format!("[vary]\nslosh.model = [{}]\n", models.join(", ")));
+        Ok(plan)
+    }
+}
+
+/// Lists the values of nested tables by their dotted names.
+fn flatten(prefix: &str, table: &toml::Table, values: &mut Vec<(String, String)>) {
+    for (key, value) in table {
+        let name = format!("{prefix}{key}");
+        match value {
+            toml::Value::Table(inner) => flatten(&format!("{name}."), inner, values),
+            toml::Value::String(text) => values.push((name, text.clone())),
+            other => values.push((name, other.to_string())),
+        }
+    }
+}
+
+/// Writes tables and report of a day into `out`.
+pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> Result<()> {
+    let day = Day::read(directory)?;
+    let fmu = open(fmu)?;
+    let (mut problems, mut found) = (Vec::new(), Vec::new());
+    let (chapters, bearing) = chapters::of(&day, &fmu, &mut problems, &mut found)?;
+    for problem in &problems {
+        terminal::error(problem);
+    }
+    let mut plan = Plan::parse(&day.plan(&found)?)?;
+    plan.convert_units(fmu.description());
+    plan.cases(fmu.description())?;
+    let stem = directory.canonicalize()?;
+    let stem = stem.file_name().unwrap_or_default();
+    let out = out.unwrap_or_else(|| Path::new("dist").join(stem));
+    let campaign = Campaign { plan, force: false, jobs, compare: None, out };
+    let folder = campaign.take()?;
+    if let Some(bearing) = bearing {
+        let text = bearing.json()?;
+        output::atomically(&campaign.out.join("friction.json"), |file| {
+            Ok(file.write_all(text.as_bytes())?)
+        })?;
+    }
+    drive(&fmu, &campaign, folder, chapters)?;
+    ensure!(
+        problems.is_empty(),
+        "{} recordings could not be used; the report says why",
+        problems.len()
+    );
+    Ok(())
+}
