@@ -178,7 +178,7 @@ impl Version for Fmi2 {
     }
 
     fn resources(directory: &Path) -> Option<String> {
-        Some(format!("file://{}/resources", directory.display()))
+        Some(file_uri(&directory.join("resources")))
     }
 
     fn instantiate<'fmu>(fmu: &'fmu Fmu, name: &str) -> Called<Instance<'fmu>> {
@@ -303,6 +303,21 @@ macro_rules! answers {
             Status::from(($table.$function.call)($component $(, $argument)*)),
         )),*]
     };
+}
+
+/// Returns the URI of a folder, percent-encoded (RFC 3986).
+pub fn file_uri(folder: &Path) -> String {
+    let path = folder.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
+    let mut uri = String::from(if path.starts_with('/') { "file://" } else { "file:///" });
+    for byte in path.bytes() {
+        match byte {
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' | b':' => {
+                uri.push(byte.into());
+            }
+            _ => uri.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    uri
 }
 
 impl Fmu {
@@ -756,5 +771,17 @@ impl<'fmu> Instance<'fmu> {
         // SAFETY: see get_real_null.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, null_mut()) })?;
         self.free_state(FmuState(null_mut()))
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_location_is_percent_encoded() {
+        let uri = file_uri(Path::new("/tmp/a b%41/größe"));
+        assert_eq!(uri, "file:///tmp/a%20b%2541/gr%C3%B6%C3%9Fe");
+        assert_eq!(file_uri(Path::new("/x-1_2.~/A9")), "file:///x-1_2.~/A9");
     }
 }

@@ -24,5 +24,5 @@ void hubslosh_logger(void *environment, const char *instance, int status,
     if (vsnprintf(text, sizeof text, format, arguments) < 0)
         text[0] = 0;
     va_end(arguments);
-    hubslosh_log_message(environment, status, category ? category : "", text);
+    hubslosh_log_message(environment, status, category, text);
 }
