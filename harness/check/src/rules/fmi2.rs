@@ -29,7 +29,7 @@ pub static RULES: &[Rule] = &[
 
     rule("xml.well_formed", Error, "modelDescription.xml is well-formed XML in UTF-8", "2.2", Archive(definitions::well_formed)),
     rule("xml.encoding", Error, "the first line of modelDescription.xml declares UTF-8", "2.2", Archive(reading::utf8)),
-    rule("xml.size", Error, "modelDescription.xml has at most 24 MiB, 300,000 elements in 256 levels, 700,000 attributes (200 of one element, 1 MiB each), 100 namespaces, and names of 1000 bytes", "hosts that read the tree by recursion", Archive(reading::size)),
+    rule("xml.size", Error, "modelDescription.xml has at most 32 MiB, 400,000 elements in 256 levels, 1,000,000 attributes (200 of one element, 1 MiB each), 100 namespaces, and names of 1000 bytes", "hosts that read the tree by recursion", Archive(reading::size)),
     rule("xml.doctype", Error, "modelDescription.xml has no document type declaration and no entities of its own", "parsers refuse it, expand entities without bound or open other files", Archive(reading::doctype)),
     rule("xml.schema", Error, "elements and attributes are those of the schema, in its order, none missing", "2.2, fmi2ModelDescription.xsd", Description(schema::structure)),
     rule("xml.values", Error, "attributes are written as the schema says: whole numbers (exponents of BaseUnit too), decimal points, known words", "2.2, fmi2ModelDescription.xsd", Description(schema::values)),
