@@ -49,12 +49,21 @@ pub struct Findings {
     pub skipped: Option<String>,
     /// The rule that must tell the fault for which this one could not be looked at.
     pub(crate) told_by: Option<String>,
+    /// The call at which the rule had to stop, if a crash or a refused call ended it: its last finding.
+    pub(crate) stopped_at: Option<String>,
 }
 
 impl Findings {
     /// Nothing found yet; what will be found is this bad.
     pub fn new(severity: Severity) -> Findings {
-        Findings { severity, list: Vec::new(), more: 0, skipped: None, told_by: None }
+        Findings {
+            severity,
+            list: Vec::new(),
+            more: 0,
+            skipped: None,
+            told_by: None,
+            stopped_at: None,
+        }
     }
 
     /// The rule is broken.
@@ -93,6 +102,15 @@ impl Findings {
     /// The rule does not apply.
     pub fn skip(&mut self, why: impl Into<String>) {
         self.skipped = Some(why.into());
+    }
+
+    /// Returns why the rule was not checked, with the rule that names the cause.
+    pub fn reason(&self) -> Option<String> {
+        let why = self.skipped.as_deref()?;
+        Some(match self.told_by.as_deref() {
+            None | Some("") => why.into(),
+            Some(rule) => format!("because of {rule}: {why}"),
+        })
     }
 
     /// The rule cannot be looked at, for a fault that another rule tells.

@@ -30,7 +30,7 @@ struct Rule<'r> {
     source: &'static str,
     findings: &'r [Finding],
     /// Reason why it was not checked; null if it was.
-    skipped: Option<&'r str>,
+    skipped: Option<String>,
     seconds: f64,
 }
 
@@ -41,7 +41,7 @@ impl<'r> Rule<'r> {
             title: outcome.rule.title,
             source: outcome.rule.source,
             findings: &outcome.findings.list,
-            skipped: outcome.findings.skipped.as_deref(),
+            skipped: outcome.findings.reason(),
             seconds: outcome.time.as_secs_f64(),
         }
     }

@@ -93,10 +93,9 @@ fn case(outcome: &Outcome) -> TestCase {
         error: None,
         skipped: outcome
             .findings
-            .skipped
-            .as_ref()
+            .reason()
             .filter(|_| !failed)
-            .map(|why| Text { message: legal(why), text: None }),
+            .map(|why| Text { message: legal(&why), text: None }),
         failure: failed.then(|| Text {
             message: format!("{} [{}]", rule.title, rule.source),
             text: Some(errors),

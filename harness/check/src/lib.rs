@@ -188,6 +188,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         Outcome { rule, findings, time: started.elapsed() }
     };
     let mut outcomes: Vec<Outcome> = selected.par_iter().map(one).collect();
+    name_each_cause_once(&mut outcomes);
     tell_what_nobody_tells(&mut outcomes);
     let unchecked = unchecked(&outcomes, &options.only);
     let unopened = archive.refusal().or(description.as_ref().err().cloned());
@@ -230,6 +231,46 @@ fn unchecked(outcomes: &[Outcome], only: &[String]) -> Option<String> {
              that apply, or check all of them without --only)"
         ),
     })
+}
+
+/// Begin of a call, and the rule that makes it in an ordinary life: its fault stops the other rules at the same call.
+const OWNERS: [(&str, &str); 6] = [
+    ("fmi2Instantiate", "load.instance"),
+    ("fmi2SetupExperiment", "load.initialises"),
+    ("fmi2EnterInitializationMode", "load.initialises"),
+    ("fmi2ExitInitializationMode", "load.initialises"),
+    ("a step from", "steps.run"),
+    ("a step from", "exchange.run"),
+];
+
+/// A call that crashes or is refused stops every rule that makes it. The rule that owns the call names the fault; the
+/// others are skipped because of it. Without an owner, the first rule that stops at the very same call names it.
+fn name_each_cause_once(outcomes: &mut [Outcome]) {
+    let alike = |text: &str| text.replace(|c: char| c.is_ascii_digit() || ".-+e".contains(c), "");
+    // rules that found nothing but that they had to stop, by table place
+    let stopped: Vec<(usize, String, String)> = (outcomes.iter().enumerate())
+        .filter_map(|(n, outcome)| {
+            let [finding] = &outcome.findings.list[..] else { return None };
+            let at = outcome.findings.stopped_at.as_deref()?;
+            (finding.severity == Severity::Error).then(|| (n, at.into(), finding.text.clone()))
+        })
+        .collect();
+    for (n, at, text) in &stopped {
+        let owner = stopped.iter().find(|(other, place, why)| {
+            let rule = outcomes[*other].rule.id;
+            OWNERS.iter().any(|(begin, owner)| *owner == rule && at.starts_with(begin))
+                && (alike(place), alike(why)) == (alike(at), alike(text))
+        });
+        let first = || stopped.iter().find(|(_, place, why)| (place, why) == (at, text));
+        if let Some((cause, ..)) = owner.or_else(first)
+            && cause != n
+        {
+            let rule = outcomes[*cause].rule.id;
+            let findings = &mut outcomes[*n].findings;
+            findings.list.clear();
+            findings.skip_for(rule, format!("{at}: {text}"));
+        }
+    }
 }
 
 /// A rule that was skipped for a fault that another rule tells becomes a finding if that rule was

@@ -90,11 +90,12 @@ fn run(
         file: FILE,
     };
     let (mut doing, mut crash) = (LOADING.to_string(), Crash::Error);
-    let mut done = None;
+    let (mut done, mut is_damaged) = (None, false);
     let hear = |answer: &[u8]| match serde_json::from_slice(answer) {
         Ok(Answer::Doing(what, then)) => (doing, crash) = (what, then),
         Ok(Answer::Done(found)) => done = Some(found),
-        Err(_) => {} // our own process sends nothing else
+        // our own process sends nothing else, unless the FMU has overwritten what it was to send
+        Err(_) => is_damaged = true,
     };
     let ended = guard::run(&options.program, arguments, &limits, Output::Kept, hear)?;
     let [stdout, stderr] = &ended.printed;
@@ -106,6 +107,10 @@ fn run(
         )
     };
     let (why, was_ended) = match &ended.cause {
+        Cause::Done(_) if is_damaged => {
+            let why = "its findings cannot be read: it has written into the memory of the host";
+            (format!("{why} (allowed: memory of its own)"), false)
+        }
         Cause::Done(_) => ("the process ended without a result".into(), false),
         Cause::Ended(status) => {
             (format!("the process ended ({status}{last}); allowed: every call returns"), false)
@@ -160,7 +165,10 @@ fn run(
 
 fn tell_crash(findings: &mut Findings, doing: String, text: String, crash: Crash) {
     match crash {
-        Crash::Error => findings.fail(doing, text),
+        Crash::Error => {
+            findings.stopped_at = Some(doing.clone());
+            findings.fail(doing, text);
+        }
         Crash::Open => findings.add(doing, text),
         Crash::ToldBy(rule) => findings.skip_for(&rule, format!("{doing}: {text}")),
     }
@@ -187,7 +195,10 @@ pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Resul
         Some(unusable) if unusable.rule != rule.id => {
             findings.skip_for(unusable.rule, unusable.to_string());
         }
-        _ => findings.add(now, format!("{error:#}")),
+        _ => {
+            findings.stopped_at = Some(now.clone());
+            findings.add(now, format!("{error:#}"));
+        }
     };
     let lost = |error: anyhow::Error, findings: &mut Findings| match rule.id == OPENS {
         true => findings.add("the binary", format!("{error:#}")),

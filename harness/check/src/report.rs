@@ -68,9 +68,9 @@ impl Report {
                 let _ = writeln!(text, "  rule: {} [{}]", rule.title, rule.source);
             }
         }
-        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+        let mut reasons: Vec<(String, Vec<&str>)> = Vec::new();
         for outcome in &self.outcomes {
-            let Some(why) = outcome.findings.skipped.as_deref() else { continue };
+            let Some(why) = outcome.findings.reason() else { continue };
             match reasons.iter_mut().find(|(known, _)| *known == why) {
                 Some((_, rules)) => rules.push(outcome.rule.id),
                 None => reasons.push((why, vec![outcome.rule.id])),
