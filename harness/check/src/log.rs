@@ -4,12 +4,12 @@ use anyhow::Result;
 
 use super::Findings;
 use super::life::first;
-use super::under_test::{FmuUnderTest, Interface, STEPS};
+use super::under_test::{FmuUnderTest, Interface, STEPS, Unusable};
 use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
 
-/// Messages of an FMU about several mistakes.
-fn complaints(fmu: &FmuUnderTest) -> Result<Vec<Message>> {
+/// Messages of an FMU about several mistakes, and how many of its ordinary instance have the category NULL.
+fn complaints(fmu: &FmuUnderTest) -> Result<(Vec<Message>, usize)> {
     let interface = first(fmu)?;
     let mut all = Vec::new();
     fmu.doing("fmi2Instantiate with another GUID");
@@ -23,14 +23,23 @@ fn complaints(fmu: &FmuUnderTest) -> Result<Vec<Message>> {
     }
     let mut session = fmu.session(interface)?;
     fmu.doing("fmi2SetDebugLogging");
-    session.instance.set_debug_logging(true, &[])?;
-    let _ = session.instance.exit_initialization_mode();
+    session
+        .instance
+        .set_debug_logging(true, &[])
+        .map_err(|error| Unusable { rule: "log.switch", why: error.to_string() })?;
+    fmu.told_by("life.order", || {
+        fmu.doing("fmi2ExitInitializationMode in state \"instantiated\"");
+        let _ = session.instance.exit_initialization_mode();
+    });
     if session.initialise().is_ok() {
-        let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
-        session.advance(STEPS)?;
+        fmu.told_by("values.unknown", || {
+            fmu.doing("fmi2GetReal of an unknown value reference");
+            let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
+        });
+        let _ = session.advance(STEPS); // after an error an FMU may refuse all calls
     }
     all.extend(session.instance.take_messages());
-    Ok(all)
+    Ok((all, session.instance.uncategorised()))
 }
 
 /// `log.percent`
@@ -79,10 +88,15 @@ pub fn categories(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.skip("no categories are declared");
         return Ok(());
     }
-    let mut unknown: Vec<String> = complaints(fmu)?
+    let (messages, uncategorised) = complaints(fmu)?;
+    if uncategorised > 0 {
+        let all = declared.join(", ");
+        findings.add("a message", format!("its category is NULL (declared: {all})"));
+    }
+    let mut unknown: Vec<String> = messages
         .into_iter()
         .map(|message| message.category)
-        .filter(|category| !declared.contains(&category.as_str()))
+        .filter(|category| !category.is_empty() && !declared.contains(&category.as_str()))
         .collect();
     unknown.sort();
     unknown.dedup();
@@ -95,7 +109,7 @@ pub fn categories(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `log.text`
 pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let messages = complaints(fmu)?;
+    let (messages, _) = complaints(fmu)?;
     if messages.is_empty() {
         findings.skip("it logs nothing");
     }
@@ -157,7 +171,7 @@ pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let runs = fmu.interfaces().into_iter().map(|interface| ordinary(fmu, interface, true));
     let runs: Result<Vec<_>> = runs.collect();
     match foreign_environments() {
-        0 if complaints?.is_empty() & runs?.iter().all(Vec::is_empty) => {
+        0 if complaints?.0.is_empty() & runs?.iter().all(Vec::is_empty) => {
             findings.skip("it logs nothing");
         }
         0 => {}

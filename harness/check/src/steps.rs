@@ -275,6 +275,86 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
+/// `steps.lag`
+pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    /// Change of a value with the step, relative to its size, that is more than rounding.
+    const SEEN: f64 = 1e-6;
+    /// Steps after which an FMU that delays constant inputs by a step or two shows them.
+    const SETTLED: usize = 4;
+    /// Share of that change by which a value may miss the one of a step earlier.
+    const SAME: f64 = 0.02;
+    let Some(session) = able(fmu, findings)? else { return Ok(()) };
+    let usual = session.step;
+    drop(session);
+    let states: Vec<&Variable> = fmu.states().into_iter().map(|(_, state)| state).collect();
+    let is_state = |v: &Variable| states.iter().any(|state| state.index == v.index);
+    let is_watched = |v: &&Variable| {
+        let shows = matches!(v.causality, Causality::Output | Causality::Independent);
+        v.is_continuous() && (shows || is_state(v))
+    };
+    let watched: Vec<&Variable> = fmu.variables().iter().filter(is_watched).collect();
+    // what the FMU does by itself: that it delays its inputs by a step may be its purpose
+    let run = |step: f64, count: usize| -> Result<Vec<Vec<f64>>> {
+        let mut session = fmu.running(Interface::CoSimulation)?;
+        session.stimulate()?;
+        let (start, mut all) = (session.time, Vec::new());
+        for n in 1..=count {
+            let end = start + n as f64 * step;
+            session.go(end - session.time)?;
+            if session.is_ended() {
+                break;
+            }
+            session.time = end;
+            let read = |v: &&Variable| match session.read(v)? {
+                Reading::Real(x) => Ok(x),
+                _ => Ok(f64::NAN),
+            };
+            all.push(watched.iter().map(read).collect::<Result<_>>()?);
+        }
+        Ok(all)
+    };
+    // an FMU may take none but its own step, or multiples of that
+    let pair = |step: f64, count: usize| -> Result<_> {
+        Ok((run(step, count)?, run(step / 2.0, 2 * count)?, step))
+    };
+    let (long, short, step) = match pair(usual, STEPS).or_else(|_| pair(2.0 * usual, STEPS / 2)) {
+        Ok(runs) => runs,
+        Err(error) => match error.downcast::<Unusable>() {
+            Ok(unusable) => return Err(unusable.into()),
+            Err(_) => {
+                findings.skip("it refuses steps of half and of twice the usual size");
+                return Ok(());
+            }
+        },
+    };
+    let points = long.len().min(short.len() / 2);
+    for (i, v) in watched.iter().enumerate() {
+        // short[2k + 1] is at the time of long[k], and short[2k] half a long step before
+        let off = |k: usize| (long[k][i] - short[2 * k + 1][i]).abs();
+        let largest = |of: &dyn Fn(usize) -> f64| (SETTLED..points).map(of).fold(0.0, f64::max);
+        let size = largest(&|k| long[k][i].abs()).max(1e-3 * v.nominal());
+        let (apart, missed) = (largest(&off), largest(&|k| (long[k][i] - short[2 * k][i]).abs()));
+        // NaN is the business of another rule
+        let lags = points > 2 * SETTLED && apart > SEEN * size && missed <= SAME * apart;
+        if let Some(k) = (SETTLED..points).find(|k| off(*k) == apart).filter(|_| lags) {
+            let time = fmu.experiment().start + (k + 1) as f64 * step;
+            let text = format!(
+                "{} after the step of {step:?} s to {time:?} s; with steps half as long {} then, and {} at {:?} s already: \
+                 it lags by one step (allowed: the value at the end of the step)",
+                long[k][i],
+                short[2 * k + 1][i],
+                short[2 * k][i],
+                time - 0.5 * step
+            );
+            match is_state(v) || v.causality == Causality::Independent {
+                true => findings.fail(v.place(), text),
+                false => findings.add(v.place(), text),
+            }
+        }
+    }
+    Ok(())
+}
+
 /// `steps.inputs`
 pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = able(fmu, findings)? else { return Ok(()) };

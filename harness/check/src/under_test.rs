@@ -199,6 +199,11 @@ impl FmuUnderTest {
         FmuUnderTest::open(directory, &self.path, root, self.deadline)
     }
 
+    /// The folder of the unpacked FMU.
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
     /// Announces the next call: a crash or a hang is then reported at this place.
     pub fn doing(&self, what: impl Into<String>) {
         let what = what.into();
@@ -239,6 +244,12 @@ impl FmuUnderTest {
         });
         drop(returned);
         answer
+    }
+
+    /// From here on parameters have values that the check has chosen: with them a model may have no solution. A crash
+    /// or a call without end then ends the rule, and is not a finding.
+    pub fn chose_values(&self) {
+        *self.crash.borrow_mut() = Crash::ToldBy(String::new());
     }
 
     fn with_crash<T>(&self, crash: Crash, calls: impl FnOnce() -> T) -> T {
@@ -846,7 +857,7 @@ pub fn start_value(v: &Variable) -> Option<Reading> {
     })
 }
 
-fn copy_files(from: &Path, to: &Path) -> Result<()> {
+pub(super) fn copy_files(from: &Path, to: &Path) -> Result<()> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from)? {
         let (path, name) = entry.map(|e| (e.path(), e.file_name()))?;

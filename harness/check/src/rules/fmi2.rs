@@ -89,6 +89,7 @@ pub static RULES: &[Rule] = &[
 
     rule("instantiate.guid", Error, "another GUID is refused with NULL and a message", "2.1.5", Calls(life::guid)),
     rule("instantiate.arguments", Warning, "a missing resource location is fine, a missing name or GUID is refused with a message", "2.1.5; hosts that pass NULL", Calls(life::arguments_null)),
+    rule("instantiate.resources", Error, "the resource location is a URI: percent-encoded characters are decoded, file:/ means the same as file:///", "2.1.5, RFC 3986; folders with a space", Calls(life::resources)),
     rule("instantiate.callbacks", Warning, "memory functions may be NULL if canNotUseMemoryManagementFunctions is declared; without a logger nothing crashes", "2.1.5, 3.3.1, 4.3.1", Calls(life::callbacks)),
     rule("instantiate.copies", Error, "the callbacks' struct may go after fmi2Instantiate", "2.1.5, clarified in 2.0.5", Calls(life::copies)),
     rule("instantiate.free_null", Error, "fmi2FreeInstance(NULL) does nothing", "2.1.5", Calls(life::free_null)),
@@ -108,7 +109,7 @@ pub static RULES: &[Rule] = &[
 
     rule("log.environment", Error, "the logger is given the componentEnvironment of fmi2Instantiate", "2.1.5; hosts follow that pointer and crash", Calls(log::environment)),
     rule("log.percent", Error, "percent signs arrive unchanged: the text is not a format string", "2.1.5; five exporters get it wrong, hosts crash", Calls(log::percent)),
-    rule("log.categories", Error, "messages have declared categories", "2.1.5, 2.2.4", Calls(log::categories)),
+    rule("log.categories", Error, "messages have declared categories, not NULL", "2.1.5, 2.2.4", Calls(log::categories)),
     rule("log.text", Warning, "messages are UTF-8, not empty, without a line break at the end", "2.1.5; hosts that add their own", Calls(log::text)),
     rule("log.quiet", Warning, "an ordinary run logs nothing", "OMSimulator switches logging on for everybody", Calls(log::quiet)),
     rule("log.switch", Error, "fmi2SetDebugLogging takes no categories, for all, and each declared one", "2.1.5", Calls(log::switch)),
@@ -140,6 +141,7 @@ pub static RULES: &[Rule] = &[
     rule("steps.stop_time", Warning, "the stop time is reached with rounding, and not passed", "2.1.6", Calls(steps::stop_time)),
     rule("steps.tolerance", Error, "a tolerance may be given or not", "2.1.6; OMSimulator gives one", Calls(steps::tolerance)),
     rule("steps.cut", Warning, "results do not depend on the choice of communication step, within the tolerance", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::cut)),
+    rule("steps.lag", Warning, "values after fmi2DoStep are those at the end of the step, not one step earlier; of a state or of time that is an error", "4.2.1; couplings that lag", Calls(steps::lag)),
     rule("steps.small", Error, "many small steps (0.4 ms, 10 us) lead where few usual ones do", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::small)),
     rule("steps.inputs", Warning, "inputs that are NaN are refused; derivatives of inputs are taken if declared", "4.2.1", Calls(steps::inputs)),
     rule("steps.input_derivatives", Error, "derivatives of inputs act on the step", "4.3.1, canInterpolateInputs", Calls(steps::input_derivatives)),

@@ -1,6 +1,21 @@
 /* A small FMU without a fault, for the tests of `hubslosh check`: x' = -k (x - u), solved exactly in
  * Co-Simulation. Compiled with -DRATE=… for k, -DCO_SIMULATION, -DMODEL_EXCHANGE or both, and -DBLOWS_UP
- * for x' = k x^2, which has no solution after t = 1/(k x(0)). */
+ * for x' = k x^2, which has no solution after t = 1/(k x(0)). Further definitions give it one fault or one habit each:
+ * STALE        x is the value before the last step
+ * DELAY        x is that of 0.25 s before
+ * UNIT_DELAY   x is the input of the last step but one
+ * EULER        steps of Euler's method
+ * CRASHES      every step crashes
+ * NO_CATEGORY  messages have the category NULL
+ * RESOURCES    k is read from resources/rate.txt
+ * RAW_LOCATION, NEEDS_AUTHORITY, TRUSTS: of that location, %20 is not decoded; only file:/// is known; NULL crashes
+ * UNKNOWN      an unknown value reference crashes
+ * SILENT       no messages
+ * GIVES_UP     no steps after an error
+ * NOISE        no two runs are the same
+ * FORGETS      a state that is set changes nothing
+ * SINGULAR     no initialisation with another k than the declared one
+ * MOVED        steps with another k than the declared one crash */
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,20 +36,34 @@ struct state {
     enum mode mode;
     int setup;
     double t, stop, x, k, u;
+    double shown, held; /* of x and u */
     unsigned long long check; /* of the above, so that noise is refused */
 };
 
 typedef struct {
     int type;
     char name[100];
+    int gave_up; /* a call was refused */
     struct callbacks host;
     struct state s;
 } Model, *Component;
 
+#ifdef NO_CATEGORY
+#define CATEGORY NULL
+#else
+#define CATEGORY "logStatusError"
+#endif
+
 static Status refuse(Component m, String call, String why)
 {
+    if (m)
+        m->gave_up = 1;
+#ifdef SILENT
+    (void)m, (void)call, (void)why;
+    return ERROR;
+#endif
     if (m && m->host.logger)
-        m->host.logger(m->host.environment, m->name, ERROR, "logStatusError", "%s: %s", call, why);
+        m->host.logger(m->host.environment, m->name, ERROR, CATEGORY, "%s: %s", call, why);
     return ERROR;
 }
 
@@ -60,9 +89,48 @@ static void begin(struct state *s)
     memset(s, 0, sizeof *s);
     s->magic = MAGIC;
     s->stop = INFINITY;
-    s->x = 1;
+    s->x = s->shown = 1;
     s->k = RATE;
 }
+
+#ifdef RESOURCES
+/* Reads rate.txt from the folder of a URI; 0 if it is not there. */
+static double rate_at(const char *uri)
+{
+    char path[4096];
+    double rate = 0;
+    size_t n = 0;
+    FILE *file;
+#ifdef NEEDS_AUTHORITY
+    if (strncmp(uri, "file://", 7) != 0)
+        return 0;
+#endif
+    uri += strlen("file:");
+    if (strncmp(uri, "//", 2) == 0)
+        uri += 2;
+    for (; *uri && n + strlen("/rate.txt") + 1 < sizeof path; uri++) {
+        unsigned code;
+        path[n] = *uri;
+#ifndef RAW_LOCATION
+        if (*uri == '%' && sscanf(uri + 1, "%2x", &code) == 1) {
+            path[n] = (char)code;
+            uri += 2;
+        }
+#else
+        (void)code;
+#endif
+        n++;
+    }
+    memcpy(path + n, "/rate.txt", sizeof "/rate.txt");
+    file = fopen(path, "r");
+    if (!file)
+        return 0;
+    if (fscanf(file, "%lf", &rate) != 1)
+        rate = 0;
+    fclose(file);
+    return rate;
+}
+#endif
 
 String fmi2GetTypesPlatform(void) { return "default"; }
 String fmi2GetVersion(void) { return "2.0"; }
@@ -87,10 +155,18 @@ Component fmi2Instantiate(String name, int type, String guid, String resources,
     else if (type == 0)
         why = "no Model Exchange";
 #endif
+#ifdef RESOURCES
+#ifdef TRUSTS
+    else if (rate_at(resources) == 0)
+#else
+    else if (!resources || rate_at(resources) == 0)
+#endif
+        why = "rate.txt cannot be read";
+#endif
     m = why ? NULL : calloc(1, sizeof *m);
     if (!m) {
         if (host && host->logger)
-            host->logger(host->environment, name ? name : "", ERROR, "logStatusError", "%s",
+            host->logger(host->environment, name ? name : "", ERROR, CATEGORY, "%s",
                          why ? why : "no memory");
         return NULL;
     }
@@ -99,6 +175,9 @@ Component fmi2Instantiate(String name, int type, String guid, String resources,
     if (host)
         m->host = *host;
     begin(&m->s);
+#ifdef RESOURCES
+    m->s.k = rate_at(resources);
+#endif
     return m;
 }
 
@@ -124,6 +203,10 @@ Status fmi2SetupExperiment(Component m, int tolerant, double tolerance, double s
 Status fmi2EnterInitializationMode(Component m)
 {
     ALLOW(m->s.mode == INSTANTIATED && m->s.setup, "fmi2EnterInitializationMode");
+#ifdef SINGULAR
+    if (m->s.k != RATE)
+        return refuse(m, "fmi2EnterInitializationMode", "there is no solution");
+#endif
     m->s.mode = INITIALIZATION;
     return OK;
 }
@@ -156,9 +239,13 @@ Status fmi2GetReal(Component m, const unsigned *r, size_t n, double *x)
     ALLOW(m->s.mode != INSTANTIATED, "fmi2GetReal");
     for (i = 0; i < n; i++)
         if (r[i] >= COUNT)
+#ifdef UNKNOWN
+            abort();
+#else
             return refuse(m, "fmi2GetReal", "an unknown value reference");
+#endif
     for (i = 0; i < n; i++)
-        x[i] = r[i] == X ? m->s.x : r[i] == DER_X ? rate(&m->s) : r[i] == K ? m->s.k : m->s.u;
+        x[i] = r[i] == X ? m->s.shown : r[i] == DER_X ? rate(&m->s) : r[i] == K ? m->s.k : m->s.u;
     return OK;
 }
 
@@ -177,6 +264,8 @@ Status fmi2SetReal(Component m, const unsigned *r, size_t n, const double *x)
     }
     for (i = 0; i < n; i++)
         *(r[i] == U ? &m->s.u : r[i] == K ? &m->s.k : &m->s.x) = x[i];
+    if (m->s.mode == INSTANTIATED || m->s.mode == INITIALIZATION)
+        m->s.shown = m->s.x;
     return OK;
 }
 
@@ -223,7 +312,9 @@ Status fmi2SetFMUstate(Component m, void *state)
         return ERROR;
     if (!state)
         return refuse(m, "fmi2SetFMUstate", "no state");
+#ifndef FORGETS
     memcpy(&m->s, state, sizeof m->s);
+#endif
     return OK;
 }
 Status fmi2FreeFMUstate(Component m, void **state)
@@ -295,8 +386,38 @@ Status fmi2DoStep(Component m, double t, double h, int forget)
         return refuse(m, "fmi2DoStep", "the last step ended elsewhere");
     if (t + h > m->s.stop + 1e-9 * (fabs(t) + h))
         return refuse(m, "fmi2DoStep", "it leads past the stop time");
+#ifdef CRASHES
+    abort();
+#endif
+#ifdef GIVES_UP
+    if (m->gave_up)
+        return ERROR;
+#endif
+#ifdef MOVED
+    if (m->s.k != RATE)
+        abort();
+#endif
+#ifdef NOISE
+    static double noise;
+    m->s.x += noise += 1e-6;
+#endif
+#ifdef STALE
+    m->s.shown = m->s.x;
+#endif
+#ifdef EULER
+    m->s.x += h * rate(&m->s);
+#else
     m->s.x = m->s.u + (m->s.x - m->s.u) * exp(-m->s.k * h);
+#endif
     m->s.t = t + h;
+#ifdef DELAY
+    m->s.shown = m->s.t < 0.25 ? 1 : exp(-m->s.k * (m->s.t - 0.25));
+#elif defined UNIT_DELAY
+    m->s.shown = m->s.held;
+    m->s.held = m->s.u;
+#elif !defined STALE
+    m->s.shown = m->s.x;
+#endif
     return OK;
 }
 Status fmi2CancelStep(Component m) { return refuse(m, "fmi2CancelStep", "no step is pending"); }
@@ -348,7 +469,7 @@ Status fmi2SetTime(Component m, double t)
 Status fmi2SetContinuousStates(Component m, const double *x, size_t n)
 {
     ALLOW(m->s.mode == CONTINUOUS && n == 1, "fmi2SetContinuousStates");
-    m->s.x = x[0];
+    m->s.x = m->s.shown = x[0];
     return OK;
 }
 Status fmi2GetDerivatives(Component m, double *x, size_t n)

@@ -38,6 +38,13 @@ impl Small<'_> {
             ),
             false => String::new(),
         };
+        let derivatives = match self.offers("-DHIDDEN_STATE") {
+            true => "",
+            false => {
+                "<Derivatives><Unknown index=\"2\" dependencies=\"1 4\" \
+                 dependenciesKind=\"fixed fixed\"/></Derivatives>"
+            }
+        };
         let Small { rate, experiment, .. } = self;
         format!(
             r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -54,7 +61,7 @@ impl Small<'_> {
   </ModelVariables>
   <ModelStructure>
     <Outputs><Unknown index="1" dependencies="1" dependenciesKind="constant"/></Outputs>
-    <Derivatives><Unknown index="2" dependencies="1 4" dependenciesKind="fixed fixed"/></Derivatives>
+    {derivatives}
     <InitialUnknowns><Unknown index="2" dependencies="1 3 4"/></InitialUnknowns>
   </ModelStructure>
 </fmiModelDescription>
@@ -65,9 +72,11 @@ impl Small<'_> {
     fn packed(&self) -> Vec<u8> {
         let rate = format!("-DRATE={:e}", self.rate);
         let library = compiled("model.c", &[&[rate.as_str()], self.definitions].concat());
+        let resources = ("resources/rate.txt".into(), format!("{}", self.rate).into_bytes());
         let files: Files = vec![
             (XML.into(), self.xml().into_bytes()),
             (format!("binaries/{PLATFORM}/model.so"), library),
+            resources,
             ("documentation/index.html".into(), b"<html></html>".to_vec()),
             ("documentation/licenses/license.txt".into(), b"MIT".to_vec()),
         ];
@@ -117,6 +126,73 @@ fn a_model_without_a_solution_is_told_as_that_and_by_one_rule() {
     assert_eq!(broken(&report), BTreeSet::from(["exchange.run"]), "{}", report.text());
     let text = report.text();
     assert!(text.contains("cannot be followed past t = 0.1"), "{text}");
+}
+
+/// Report of some rules on an FMU for Co-Simulation with these definitions besides.
+#[cfg(target_os = "linux")]
+fn stepped(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
+    let definitions = [&BOTH[..1], definitions].concat();
+    look(&Small { definitions: &definitions, rate: 1.0, experiment }.packed(), only)
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn outputs_that_lag_by_one_step_are_told_and_delays_are_not() {
+    // x after 1.5 s is 11 % too large
+    let experiment = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.1\"";
+    for (habit, severity) in [
+        (&["-DSTALE"][..], Some(Severity::Error)),
+        // of an output one cannot be sure
+        (&["-DSTALE", "-DHIDDEN_STATE"], Some(Severity::Warning)),
+        (&["-DDELAY"], None),
+        (&["-DUNIT_DELAY"], None),
+        (&["-DEULER"], None),
+        (&[], None),
+    ] {
+        let report = stepped(habit, experiment, &["steps.lag"]);
+        let found: Vec<_> = report.all().map(|(_, finding)| finding.severity).collect();
+        assert_eq!(found, Vec::from_iter(severity), "{habit:?}: {}", report.text());
+        assert_eq!(report.outcomes[0].findings.skipped, None, "{}", report.text());
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn resources_are_found_by_any_file_uri() {
+    for (fault, told) in [
+        (&["-DRESOURCES"][..], &[][..]),
+        (&["-DRESOURCES", "-DRAW_LOCATION"], &["a%20b%2541c"]),
+        (&["-DRESOURCES", "-DNEEDS_AUTHORITY"], &["location file:/"]),
+        (&["-DRESOURCES", "-DRAW_LOCATION", "-DNEEDS_AUTHORITY"], &["%20b", "location file:/"]),
+    ] {
+        let report = stepped(fault, USUAL, &["instantiate.resources"]);
+        let places: Vec<_> = report.all().map(|(_, finding)| finding.place.as_str()).collect();
+        assert_eq!(places.len(), told.len(), "{fault:?}: {}", report.text());
+        for (place, part) in places.iter().zip(told) {
+            assert!(place.contains(part), "{fault:?}: {place}");
+        }
+        assert_eq!(report.count(Severity::Error), told.len());
+        assert_eq!(report.outcomes[0].findings.skipped, None, "{}", report.text());
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_message_of_no_category_is_told() {
+    let report = stepped(&["-DNO_CATEGORY"], USUAL, &["log"]);
+    assert_eq!(broken(&report), BTreeSet::from(["log.categories"]), "{}", report.text());
+    assert!(report.text().contains("its category is NULL"), "{}", report.text());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_crash_in_every_step_is_one_finding() {
+    let report = stepped(&["-DCRASHES"], USUAL, &["life", "host", "values", "states", "steps"]);
+    let all: Vec<_> = report.all().map(|(rule, _)| rule.id).collect();
+    assert_eq!(all, ["steps.run"], "{}", report.text());
+    let reasons = report.outcomes.iter().filter_map(|outcome| outcome.findings.reason());
+    let because = reasons.filter(|why| why.starts_with("because of steps.run: a step from"));
+    assert!(because.count() > 15, "{}", report.text());
 }
 
 #[cfg(target_os = "linux")]
