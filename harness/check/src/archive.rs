@@ -151,7 +151,10 @@ fn name_faults(name: &str) -> Vec<&'static str> {
     if name.split(['/', '\\']).any(|part| part == "..") {
         faults.push("leads out of the archive by \"..\"");
     }
-    if name.trim_end_matches('/').split('/').any(|part| part.is_empty() || part == ".") {
+    // an entry for the folder itself, which some tools write, is unpacked everywhere
+    if name != "./"
+        && name.trim_end_matches('/').split('/').any(|part| part.is_empty() || part == ".")
+    {
         faults.push("has an empty part or \".\"");
     }
     if name.chars().any(char::is_control) || name.contains('\u{fffd}') {

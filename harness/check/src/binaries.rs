@@ -129,7 +129,12 @@ impl Binaries {
             };
             let names: Vec<String> =
                 identifiers.iter().map(|identifier| format!("{identifier}{ending}")).collect();
-            if let Some(n) = names.iter().position(|n| n == file) {
+            // Windows takes capitals for small letters
+            let is_file = |name: &String| match ending {
+                ".dll" => name.eq_ignore_ascii_case(file),
+                _ => name == file,
+            };
+            if let Some(n) = names.iter().position(is_file) {
                 let bytes = archive.file(name).unwrap_or_default();
                 let binary = Binary::read(bytes).map_err(|error| format!("{error:#}"));
                 let identifier = identifiers[n].clone();

@@ -31,6 +31,7 @@ pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> R
     if attempt == 0 {
         return Ok(session);
     }
+    fmu.chose_values();
     let mut random = fastrand::Rng::with_seed(attempt);
     let parameters = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     for v in parameters {
@@ -292,8 +293,11 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut seen = Seen::nothing();
     for attempt in 0..AT_LEAST {
         let mut session = moved(fmu, interface, attempt)?;
-        session.instance.setup_experiment(None, session.time, None)?;
-        session.instance.enter_initialization_mode()?;
+        let begun = session.instance.setup_experiment(None, session.time, None);
+        match begun.and_then(|()| session.instance.enter_initialization_mode()) {
+            Err(_) if attempt > 0 => continue, // these parameters may have no solution
+            done => done?,
+        }
         fmu.doing(format!("moving inputs and parameters in initialization mode, try {attempt}"));
         let Ok(before) = read(&mut session, &unknowns) else { continue };
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };

@@ -161,7 +161,9 @@ impl Description {
 
     /// Returns true for a description of FMI 3.
     pub fn is_fmi3(&self) -> bool {
-        self.root.get("fmiVersion").is_some_and(|version| version.starts_with("3."))
+        let version = self.root.get("fmiVersion").map(str::trim);
+        // a draft, such as 3.0-beta.3, has rules of its own
+        version.is_some_and(|version| version.starts_with("3.") && !version.contains('-'))
     }
 
     /// The version of FMI, 1.0 or 3.0, that it is of in place of 2.0.

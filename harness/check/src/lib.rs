@@ -147,6 +147,9 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         {
             Err("it offers neither Co-Simulation nor Model Exchange, which alone are called".into())
         }
+        (_, Some(d)) if d.has_clocks() && d.interface("ModelExchange").is_none() => {
+            Err("it has clocks, with which Co-Simulation is not called".into())
+        }
         (_, Some(_)) if !libraries.is_callable() => {
             Err(format!("it has no library for this platform, {}", host::fmi3::PLATFORM))
         }

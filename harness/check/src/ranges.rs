@@ -128,6 +128,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.skip("it has no enumerations");
         return Ok(());
     }
+    fmu.chose_values();
     for v in all.iter().filter(|v| v.is_set_by_hosts() && start_value(v).is_some()) {
         let known = items(fmu, v);
         let (Some(first), Some(last)) = (known.iter().min(), known.iter().max()) else { continue };

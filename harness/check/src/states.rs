@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::under_test::{FmuUnderTest, Interface, Mark, Reading, STEPS, Session, Stage};
+use super::under_test::{FmuUnderTest, Interface, Mark, Reading, STEPS, Session, Stage, Unusable};
 
 /// Interfaces that declare a capability; none is a reason to skip.
 fn with(fmu: &FmuUnderTest, flag: &str, findings: &mut Findings) -> Vec<Interface> {
@@ -23,6 +23,21 @@ fn continued(session: &mut Session, from: &Mark) -> Result<Vec<Reading>> {
     session.go_back(from);
     session.advance(STEPS)?;
     session.readings()
+}
+
+/// Fails if a run from a saved state differs in the instance that has saved it: `states.rollback` reports that.
+fn rolls_back(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
+    let mut session = fmu.running(interface)?;
+    session.advance(3)?;
+    let (state, here) = (session.instance.get_state()?, session.mark());
+    let first = continued(&mut session, &here)?;
+    session.instance.set_state(&state)?;
+    let second = continued(&mut session, &here)?;
+    session.instance.free_state(state)?;
+    match session.difference(&second, &first) {
+        None => Ok(()),
+        Some(why) => Err(Unusable { rule: "states.rollback", why }.into()),
+    }
 }
 
 /// `states.rollback`
@@ -65,6 +80,7 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.instance.set_state(&state)?;
         let second = continued(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
+            rolls_back(fmu, interface)?;
             findings.add(format!("a handle used again ({})", interface.name()), text);
         }
         session.instance.free_state(state)?;
@@ -107,7 +123,9 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             other.instance.set_state(&state)?;
             let second = continued(&mut other, &here)?;
             if let Some(text) = other.difference(&second, &first) {
-                findings.add(format!("{} ({})", fmu.now(), interface.name()), text);
+                let place = format!("{} ({})", fmu.now(), interface.name());
+                rolls_back(fmu, interface)?;
+                findings.add(place, text);
             }
             other.instance.free_state(state)?;
         }

@@ -580,8 +580,10 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
     let n = session.instance.number_of_states()?;
     let nz = session.instance.number_of_indicators()?;
     let (mut x, mut dx, mut z) = (vec![0.0; n], vec![0.0; n], vec![0.0; nz]);
-    session.instance.continuous_states(&mut x)?;
-    session.instance.derivatives(&mut dx)?;
+    if n > 0 {
+        session.instance.continuous_states(&mut x)?;
+        session.instance.derivatives(&mut dx)?;
+    }
     session.instance.event_indicators(&mut z)?;
     for (call, vector, references) in [
         ("fmi3GetContinuousStates", x, d.states()),
@@ -613,6 +615,10 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     }
     let mut session = subject.running(Use::EXCHANGE)?;
     let n = session.instance.number_of_states()?;
+    if n == 0 {
+        findings.skip("it has no continuous states");
+        return Ok(());
+    }
     let mut x = vec![0.0; n];
     session.instance.continuous_states(&mut x)?;
     let moved: Vec<f64> = x.iter().map(|x| x + 1e-3 * x.abs().max(1e-3)).collect();

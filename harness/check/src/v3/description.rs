@@ -133,6 +133,11 @@ pub(crate) fn initials(
 }
 
 impl Description {
+    /// Returns true if it has clocks: then `eventModeUsed` must be true in Co-Simulation (section 2.3.1).
+    pub fn has_clocks(&self) -> bool {
+        self.variables.iter().any(|v| v.kind == Type::Clock)
+    }
+
     /// Reads the file, whose tree is `root`.
     pub fn new(root: Element) -> Description {
         let types: BTreeMap<&str, &Element> =

@@ -218,7 +218,7 @@ fn the_attribute_derivative_alone_makes_no_state() {
 
 #[test]
 fn an_fmu_of_another_version_of_fmi_gets_one_finding() {
-    for version in ["1.0", "1.5"] {
+    for version in ["1.0", "1.5", "3.0-beta.3"] {
         let fmu = changed(
             "<fmiModelDescription",
             "fmiVersion=\"2.0\"",

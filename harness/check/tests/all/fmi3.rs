@@ -103,6 +103,20 @@ fn a_wrong_word_in_the_description_of_an_fmu_3_is_told() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// An FMU with clocks may refuse an instance without event mode (section 2.3.1).
+#[test]
+fn co_simulation_of_an_fmu_with_clocks_is_not_called() {
+    let clock = "<Clock name=\"tick\" valueReference=\"90\" causality=\"input\" \
+                 variability=\"discrete\" intervalVariability=\"triggered\"/>\n  </ModelVariables>";
+    let mut files = files(0);
+    files[0].1 = XML.replace("</ModelVariables>", clock).into_bytes();
+    let report = report(&files, &["load", "steps.answers"]);
+    assert_eq!(broken(&report), BTreeSet::new(), "{}", report.text());
+    let skipped = report.outcomes.iter().filter(|o| o.findings.skipped.is_some());
+    let skipped: Vec<_> = skipped.map(|o| o.rule.id).collect();
+    assert_eq!(skipped, ["steps.answers"], "{}", report.text());
+}
+
 #[test]
 fn a_wrong_archive_of_an_fmu_3_is_told() {
     let without_fault = files(0);

@@ -195,6 +195,51 @@ fn a_crash_in_every_step_is_one_finding() {
     assert!(because.count() > 15, "{}", report.text());
 }
 
+/// What public FMUs showed: a fault of theirs that several rules stumbled over, or a value of ours that they could refuse.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_fault_is_told_by_its_own_rule_and_as_severe_as_it_is() {
+    let mut wrong = Vec::new();
+    for (fault, groups, errors, warnings) in [
+        (
+            &["-DUNKNOWN"][..],
+            &["instantiate", "life", "log", "host", "values.unknown"][..],
+            &["values.unknown"][..],
+            &[][..],
+        ),
+        (&["-DSILENT"], &["values.unknown", "instantiate.copies"], &[], &["values.unknown"]),
+        (&["-DGIVES_UP"], &["log"], &[], &[]),
+        (&["-DNOISE"], &["load", "life", "instantiate"], &["life.deterministic"], &[]),
+        (&["-DFORGETS"], &["states"], &["states.rollback"], &[]),
+        (&["-DRESOURCES", "-DTRUSTS"], &["instantiate"], &[], &["instantiate.arguments"]),
+        (&["-DSINGULAR"], &["dependencies", "load"], &[], &[]),
+        (&["-DMOVED"], &["dependencies", "values.tunable"], &[], &[]),
+    ] {
+        let report = stepped(fault, USUAL, groups);
+        let told = |severity| -> BTreeSet<&str> {
+            let of = report.all().filter(|(_, finding)| finding.severity == severity);
+            of.map(|(rule, _)| rule.id).collect()
+        };
+        let found = (told(Severity::Error), told(Severity::Warning));
+        if found != (errors.iter().copied().collect(), warnings.iter().copied().collect()) {
+            wrong.push(format!("{fault:?}: {}", report.text()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn windows_finds_a_library_in_other_capitals() {
+    let small = Small { definitions: BOTH, rate: 1.0, experiment: USUAL };
+    let with = |library: &str| {
+        let files: Files =
+            vec![(XML.into(), small.xml().into_bytes()), (library.into(), b"MZ".to_vec())];
+        broken(&look(&zipped(&files, CompressionMethod::Stored), &["bin.name", "bin.present"]))
+    };
+    assert_eq!(with("binaries/win64/Model.dll"), BTreeSet::new());
+    assert!(with("binaries/linux64/Model.so").contains("bin.name"));
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn each_interface_is_called_in_the_binary_that_it_names() {
