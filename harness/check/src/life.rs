@@ -410,7 +410,10 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         ] {
             let mut session = fmu.session_in(interface, stage)?;
             if stage == Stage::Initialised {
-                let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
+                fmu.told_by("values.unknown", || {
+                    fmu.doing("fmi2GetReal of an unknown value reference");
+                    let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
+                });
             }
             let place = format!("fmi2Reset, {from} ({})", interface.name());
             fmu.doing(&place);

@@ -509,7 +509,7 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
         for (((name, right), (_, held)), (_, along)) in fine.iter().zip(&held).zip(&along) {
             // direct feedthrough shows the input as it was set last, whatever was meant by it
             let effect = (held - right).abs();
-            if effect > 1e-9 * right.abs().max(1e-9) && (along - right).abs() > 0.95 * effect {
+            if effect > 1e-9 * right.abs().max(1e-9) && (along - right).abs() > 0.6 * effect {
                 findings.add(
                     v.place(),
                     format!(
