@@ -188,10 +188,10 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
             described([HEAD.as_bytes(), &vec![b'\n'; 60 << 20]].concat()),
             "bytes (allowed",
         ),
-        ("elements", described(xml(&"<a/>".repeat(300_001))), "more elements"),
+        ("elements", described(xml(&"<a/>".repeat(400_001))), "more elements"),
         (
             "attributes",
-            described(xml(&format!("<a{attributes}/>").repeat(3600))),
+            described(xml(&format!("<a{attributes}/>").repeat(5100))),
             "more attributes",
         ),
         (
