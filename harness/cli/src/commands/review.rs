@@ -43,7 +43,8 @@ impl ReviewArgs {
                 Ok(_) => bail!("{} has not made the review, see above", python.display()),
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
                 Err(error) => {
-                    return Err(error).with_context(|| format!("{} did not start", python.display()));
+                    return Err(error)
+                        .with_context(|| format!("{} did not start", python.display()));
                 }
             }
         }

@@ -262,7 +262,9 @@ fn friction_points(
         let n = part.len() as f64;
         (part.iter().map(|p| p.0).sum::<f64>() / n, part.iter().map(|p| p.1).sum::<f64>() / n)
     };
-    rows.chunks(rows.len().div_ceil(BINS).max(1)).map(mean).collect()
+    let size = rows.len().div_ceil(BINS).max(1);
+    let sides = rows.chunk_by(|a, b| (a.0 > 0.0) == (b.0 > 0.0));
+    sides.flat_map(|side| side.chunks(size).map(mean)).collect()
 }
 
 fn bearing(all: &[Recording], fitted: &acceleration::Found, is_used: bool) -> Chapter {
@@ -400,7 +402,7 @@ fn preferential_direction(
         title: "Preferential direction (thesis 5.4)".into(),
         text: vec![
             verdict,
-            "The figures show the thesis's fits, deceleration against the angle alone. Deceleration also falls with the rate: the \
+            "The figures show the thesis's fits, deceleration against the angle alone. Deceleration also depends on the rate: the \
              fits describe the bearing only if the decays pass each angle at many rates."
                 .into(),
         ],
