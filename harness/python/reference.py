@@ -37,7 +37,7 @@ class Reference:
         self.undocumented: list[str] = []
         self.types: dict[str, griffe.Attribute] = {}
         exported = {str(name) for name in package.exports or ()}
-        for name in sorted(exported, key=str.lower):
+        for name in sorted(exported, key=lambda name: (name.lower(), name)):
             found = package[name]
             self.add(name, found.final_target if found.is_alias else found, 2)
         self.parts.append(("", "## Types\n\nNames of types in the signatures above.\n"))
