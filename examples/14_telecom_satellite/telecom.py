@@ -27,6 +27,7 @@ craft = hubslosh.Craft(
 )  # fmt: skip
 FILLS = [f"{fill:g}%" for fill in np.linspace(4, 97, 20)]
 PERIOD, DELAY = 0.1, 0.12  # s
+MEASURED = ["q[2]", "omega[1]", "q[3]", "omega[2]", "q[4]", "omega[3]"]
 
 
 def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpace:
@@ -45,8 +46,7 @@ def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpa
 
 def loop(fill: str) -> hubslosh.Loop:
     """Return the three-axis loop at a fill of both tanks."""
-    measured = ["q[2]", "omega[1]", "q[3]", "omega[2]", "q[4]", "omega[3]"]
-    return craft.loop(controller(), PERIOD, fill, measured=measured, delay=DELAY)
+    return craft.loop(controller(), PERIOD, fill, measured=MEASURED, delay=DELAY)
 
 
 def over_fills() -> pd.DataFrame:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import design_review
 import numpy as np
 import pytest
 import telecom
@@ -70,3 +71,17 @@ def test_the_numbers_of_the_readme() -> None:
     at = telecom.craft.mass_properties("60%")
     assert at.mass == pytest.approx(2503.1, abs=0.1)
     assert at.inertia[0] == pytest.approx([1580.0, -45.3, 24.8], abs=0.1)
+
+
+def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
+    spacecraft: str, monkeypatch
+) -> None:
+    """At three fills: slosh is stabilised by gain, the simulated margin differs by 1 % at most."""
+    monkeypatch.setattr(telecom, "craft", replace(telecom.craft, model=spacecraft))
+    found = design_review.review(["10%", "50%", "90%"], draws=6)
+    assert found.points["stable"].all()
+    assert set(found.slosh["stabilised"]) <= {"gain", "gain and phase"}
+    assert found.worst.distance == found.points["distance"].min()
+    assert found.confirmation.agrees
+    off = found.confirmation.simulated_factor / found.confirmation.factor
+    assert off == pytest.approx(1, abs=0.01)

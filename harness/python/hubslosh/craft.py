@@ -487,12 +487,16 @@ class Craft:
     ) -> "Review":
         """Return the design review of a linear sampled controller over fills.
 
-        controller, period, measured, command, latency, delay, parameters: see `loop`.
-        fills: list of fills. damping: "interval" varies the damping of each tank over the interval
-        of its correlation; "nominal" does not. uncertain: ranges by name, for parameters of the FMU
-        and for "delay": (low, high) in SI units, or a share of the nominal value such as "5%". A
-        slosh mode's mass changes the mass of the craft.
-        draws: number of random points over all fills, uniform within the ranges. seed: of draws.
+        * ``controller``, ``period``, ``measured``, ``command``, ``latency``, ``delay``,
+          ``parameters``: See `loop`.
+        * ``fills``: List of fills.
+        * ``damping``: "interval" varies the damping of each tank over the interval of its
+          correlation; "nominal" does not.
+        * ``uncertain``: Ranges by name, for parameters of the FMU and for "delay": (low, high) in
+          SI units, or a share of the nominal value such as "5%". A slosh mode's mass changes the
+          mass of the craft.
+        * ``draws``: Number of random points over all fills, uniform within the ranges.
+        * ``seed``: Seed of the draws.
 
         The thrust acts through the centre of mass, as after trimming, so that each point is a
         steady state. `loop` leaves the thrust at O.

@@ -1,7 +1,7 @@
 """A design review of a loop around a `Craft` over its fills: margins, slosh, worst case.
 
 Each point is linearised in steady thrust: the thrust acts through the centre of mass, as after
-trimming. A thrust beside the centre of mass would turn the craft faster and faster.
+trimming. Otherwise the craft would turn faster and faster.
 """
 
 import os
@@ -83,6 +83,7 @@ class Review:
     """Result of `Craft.review`; ``print`` gives the answer in at most 20 lines."""
 
     craft: "Craft"
+    """The craft that was reviewed."""
     fills: tuple[str, ...]
     """Fills in words."""
     at: Vector

@@ -66,7 +66,7 @@ th:first-child, td:first-child, td.text { text-align: left; }
 td.text { white-space: normal; min-width: 9rem; }
 @page { margin: 14mm; }
 @media print { .figures { grid-template-columns: 1fr 1fr; gap: 4mm; } .scroll { overflow: visible; }
-  table { font-size: 8.5pt; } th, td { padding: .1rem .3rem; } }
+  table { font-size: 7.5pt; } th, td { padding: .1rem .25rem; } td.text { min-width: 0; } }
 """
 
 

@@ -1,0 +1,23 @@
+"""The design review of the satellite: a page, and its answer."""
+
+import warnings
+
+import telecom
+
+import hubslosh
+
+
+def review(fills: list[str] = telecom.FILLS, draws: int = 200) -> hubslosh.Review:
+    """Return the review with 5 % of inertia, 10 mm of a tank's place and 50 ms of delay open."""
+    return telecom.craft.review(
+        telecom.controller(), telecom.PERIOD, fills, measured=telecom.MEASURED,
+        delay=telecom.DELAY, draws=draws,
+        uncertain={"craft.Jxx": "5%", "tank[1].position[3]": (0.19, 0.21), "delay": (0.1, 0.15)},
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    warnings.filterwarnings("ignore", "tank NTO: damping", hubslosh.FmuWarning)
+    found = review()
+    found.save("review.html")
+    print(found)
