@@ -637,6 +637,22 @@ fn without_arguments_an_installed_command_prints_help_and_writes_nothing() {
 }
 
 #[test]
+fn a_review_is_made_by_the_python_package() {
+    let directory = tempfile::tempdir().unwrap();
+    let review =
+        |python: &str| hubslosh(directory.path(), &["review", "plan.toml", "--python", python]);
+    refuses(
+        directory.path(),
+        || review("no-such-python"),
+        &["no Python was found", "no-such-python"],
+    );
+    if cfg!(unix) {
+        let said = String::from_utf8(review("echo").stdout).unwrap();
+        assert_eq!(said, "-m hubslosh.review_plan plan.toml --out plan.html\n");
+    }
+}
+
+#[test]
 fn examples_are_listed_and_copied_to_a_new_folder() {
     let directory = tempfile::tempdir().unwrap();
     let listed = hubslosh(directory.path(), &["examples"]);
