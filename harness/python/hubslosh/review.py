@@ -148,6 +148,13 @@ class Review:
             found[str(mode)] = ", ".join(parts)
         return found
 
+    def stabilisation(self) -> list[str]:
+        """Return how the slosh modes are stabilised, a line for modes with the same words."""
+        modes: dict[str, list[str]] = {}
+        for mode, how in self.modes().items():
+            modes.setdefault(how, []).append(mode)
+        return [f"{', '.join(of)}: {how}." for how, of in modes.items()]
+
     @property
     def answer(self) -> str:
         """The answer in a sentence."""
@@ -200,7 +207,7 @@ class Review:
     def __str__(self) -> str:
         """Return the answer, then what it rests on."""
         table = self.points
-        lines = [self.answer, *(f"{mode}: {how}" for mode, how in self.modes().items())]
+        lines = [self.answer, *self.stabilisation()[:8]]
         for name, unit in (("phase_margin", "°"), ("gain_up", " dB"), ("delay_margin", " s")):
             low, high = table[name].min(), table[name].max()
             lines.append(f"{name.replace('_', ' ')}: {low:.3g} to {high:.3g}{unit}")
@@ -212,7 +219,7 @@ class Review:
             lines += ["uncertain: " + "; ".join(f"{u.name} {u.text}" for u in self.uncertain)]
         if self.warnings:
             lines.append(f"{_count(len(self.warnings), 'warning')}, see .warnings")
-        return "\n".join(line if len(line) < 500 else f"{line[:499]}…" for line in lines[:20])
+        return "\n".join(line if len(line) < 500 else f"{line[:499]}…" for line in lines)
 
     def __repr__(self) -> str:
         """Return the answer."""

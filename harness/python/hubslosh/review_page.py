@@ -86,10 +86,7 @@ def page(review: "Review") -> str:
 
 
 def _facts(review: "Review") -> str:
-    by_how: dict[str, list[str]] = {}
-    for mode, how in review.modes().items():
-        by_how.setdefault(how, []).append(mode)
-    lines = [f"{', '.join(modes)}: {how}." for how, modes in by_how.items()]
+    lines = review.stabilisation()
     if review.uncertain:
         lines.append("Uncertain: " + "; ".join(f"{u.name} {u.text}" for u in review.uncertain))
     lines.append(review.suggestion.text)

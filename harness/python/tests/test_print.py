@@ -26,7 +26,8 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
     craft = hubslosh.Craft(650.0, (95, 80, 90), (0, 0, 0), tanks, 44.0, (1, 2, 3), 0.05, model,
                            program)  # fmt: skip
     fill = ("60%", "60%", "60%", "60%")
-    loop = craft.loop(np.hstack([2 * np.eye(3), 40 * np.eye(3)]), 0.1, fill, delay=0.15)
+    gains = np.hstack([2 * np.eye(3), 40 * np.eye(3)])
+    loop = craft.loop(gains, 0.1, fill, delay=0.15)
     rng = np.random.default_rng(1)
     weak = [LinearModel(np.array([[0, 1], [-w * w, -1e-3 * w]]), np.eye(2)[:, 1:], np.eye(2)[1:],
                         np.zeros((1, 1)), ("x", "v"), ("u",), ("y",))
@@ -48,6 +49,7 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
         "Tank": lambda: hubslosh.tank(SPHERE, "50%", modes=20, program=program),
         "Loop": lambda: loop,
         "LinearModel": lambda: many,
+        "Review": lambda: craft.review(gains, 0.1, [fill], damping="nominal"),
         "Margins": lambda: hubslosh.margins(many),
         "Run": lambda: run,
         "TransferFunction": lambda: hubslosh.TransferFunction(rng.random(30), rng.random(31), 99.0),
