@@ -7,11 +7,12 @@
 
 `simulate` returns a table of time histories, `closed_loop` one under a sampled controller,
 `margins` how far that loop is from instability, `monte_carlo` many runs with drawn parameters,
-`linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
-function through such an estimate; `analyse`, `campaign`, `identify` and `tank` call the program
-``hubslosh``, `liquid_modes` finds slosh modes in three dimensions, `mode_errors` says how many a
-model needs, `posterior` samples what `identify` states. `view` shows a run in 3-D, `plot` draws.
-`Plant` and `drive` are for those who step an instance themselves.
+`linearize` a state-space model, `uncertain` one with uncertain parameters, `frequency_response` an
+estimate from a history, `fit` a transfer function through such an estimate; `analyse`, `campaign`,
+`identify` and `tank` call the program ``hubslosh``, `liquid_modes` finds slosh modes in three
+dimensions, `mode_errors` says how many a model needs, `posterior` samples what `identify` states.
+`view` shows a run in 3-D, `plot` draws. `Plant` and `drive` are for those who step an instance
+themselves.
 """
 
 from importlib import import_module
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from .stability import Margins, margins
     from .tables import read_parameters, read_table, setting, write_table
     from .tanks import Tank, tank
+    from .uncertainty import UncertainModel, WorstCase, uncertain
     from .viewing import View, view
 
     __version__: str
@@ -66,6 +68,7 @@ _MODULES = {
     "stability": ("Margins", "margins"),
     "tables": ("read_parameters", "read_table", "setting", "write_table"),
     "tanks": ("Tank", "tank"),
+    "uncertainty": ("UncertainModel", "WorstCase", "uncertain"),
     "viewing": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
@@ -93,8 +96,10 @@ __all__ = [
     "RunError",
     "Tank",
     "TransferFunction",
+    "UncertainModel",
     "Value",
     "View",
+    "WorstCase",
     "analyse",
     "attitude",
     "bottom_up",
@@ -122,6 +127,7 @@ __all__ = [
     "to_csv",
     "to_mat",
     "to_parquet",
+    "uncertain",
     "view",
     "write_table",
 ]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from .review import Review
+    from .uncertainty import UncertainModel
     from .viewing import View
 
 Vector = NDArray[np.float64]
@@ -510,6 +511,38 @@ class Craft:
             seed=seed, measured=measured, command=command, latency=latency, delay=delay,
             parameters=parameters,
         )  # fmt: skip
+
+    def uncertain(
+        self,
+        fill: Fill,
+        ranges: Mapping[str, Sequence[float] | str],
+        *,
+        outputs: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
+        parameters: Mapping[str, Quantity] | None = None,
+        **options: Any,
+    ) -> "UncertainModel":
+        """Return the craft at a fill with uncertain parameters, (M, Δ); see `hubslosh.uncertain`.
+
+        ranges: a tank goes by its name, ``NTO.frequency[1]``. The range of a damping ratio may be
+        ``"interval"``, that of its correlation, if the tank has ``nu``.
+        """
+        from .uncertainty import uncertain
+
+        tanks, numbers = self.tank_at(fill), {name: k for k, name in enumerate(self.tanks, 1)}
+        named: dict[str, Sequence[float] | str] = {}
+        for name, of in ranges.items():
+            tank, _, rest = name.rpartition(".")
+            full = f"tank[{numbers[tank]}].{rest}" if tank in numbers else name
+            if of == "interval":
+                mode = re.fullmatch(r"zeta\[(\d)\]", rest)
+                table = tanks[tank].modes if tank in tanks else None
+                if table is None or mode is None or "zeta_low" not in table:
+                    raise FmuError(f'{name}: "interval" is for zeta[n] of a tank with nu=')
+                row = table.iloc[int(mode[1]) - 1]
+                of = (float(row["zeta_low"]), float(row["zeta_high"]))
+            named[full] = of
+        every = self.parameters(fill) | dict(parameters or {})
+        return uncertain(every, named, outputs=outputs, model=self.model, **options)
 
     def columns(self, fill: Fill) -> list[str]:
         """Return the columns by which `view` draws craft and liquid, for ``outputs``."""

@@ -1,8 +1,8 @@
-"""Tables as files for other programs: the table first, then the file, as pandas has it."""
+"""Tables and models as files for other programs: the table first, then the file."""
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,9 @@ from .tables import write_table
 if TYPE_CHECKING:
     import pandas as pd
 
+    from .linearization import LinearModel
+    from .uncertainty import UncertainModel
+
 
 def _checked(table: Any, path: Any, ending: str) -> Path:
     import pandas as pd
@@ -22,6 +25,10 @@ def _checked(table: Any, path: Any, ending: str) -> Path:
         raise FmuError(f"the table comes first, then the file: (table, {str(table)!r})")
     if not isinstance(table, pd.DataFrame):
         raise FmuError(f"a pandas.DataFrame is expected, not {type(table).__name__}")
+    return _named(path, ending)
+
+
+def _named(path: Any, ending: str) -> Path:
     if not isinstance(path, str | os.PathLike):
         raise FmuError(f"the file's name is expected, not {path!r}")
     path = Path(path)
@@ -60,21 +67,91 @@ def to_parquet(table: "pd.DataFrame", path: str | Path) -> None:
     write_table(path, _columns(table), units)
 
 
-def to_mat(table: "pd.DataFrame", path: str | Path) -> None:
-    """Write a table as .mat for MATLAB and Octave: one column vector per column.
+def to_mat(
+    table: "pd.DataFrame | LinearModel | Sequence[LinearModel] | UncertainModel | Mapping",
+    path: str | Path,
+) -> None:
+    """Write a table or a model as .mat (version 5) for MATLAB and Octave.
 
-    Brackets and dots of names become underscores (``q[1]`` is ``q_1``); ``units`` is a struct of
-    the units under the same names.
+    * A table: one column vector per column, and ``units``, a struct of the units.
+    * Parameters by name, as `Craft.parameters` returns them: a variable for each.
+    * A `LinearModel`: ``A``, ``B``, ``C``, ``D``, the names ``states``, ``inputs`` and ``outputs``,
+      and ``period`` (s; 0: continuous time).
+    * A family: several models in a sequence, or by name, which `ss` takes as an array. Each matrix
+      has a third dimension; ``points`` are the names.
+    * An `UncertainModel`: see `UncertainModel.as_dict`.
+
+    Brackets, commas and dots of names become underscores (``q[1]`` is ``q_1``).
     """
-    path = _checked(table, path, ".mat")
+    from .linearization import LinearModel
+    from .uncertainty import UncertainModel
+
+    if isinstance(table, LinearModel):
+        arrays = _family([table])
+    elif isinstance(table, UncertainModel):
+        arrays = _in_mat(table.as_dict())
+    elif isinstance(table, Mapping):
+        if all(isinstance(model, LinearModel) for model in table.values()):
+            arrays = _family([*table.values()]) | _in_mat({"points": [*map(str, table)]})
+        else:
+            values = {name: of[0] if isinstance(of, tuple) else of for name, of in table.items()}
+            units = {name: of[1] for name, of in table.items() if isinstance(of, tuple)}
+            arrays = _apart(values, units)
+    elif (
+        isinstance(table, list | tuple)
+        and table
+        and all(isinstance(model, LinearModel) for model in table)
+    ):
+        arrays = _family(table)
+    else:
+        path = _checked(table, path, ".mat")
+        arrays = _apart(_columns(table), table.attrs.get("units", {}))
     from scipy.io import savemat
 
-    names = {name: re.sub(r"\W+", "_", name).strip("_") for name in _columns(table)}
+    with _beside(_named(path, ".mat")) as new:
+        savemat(new, arrays, oned_as="column", do_compression=False)
+
+
+def _apart(values: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
+    """Return values and units under MATLAB's names."""
+    names = {name: re.sub(r"\W+", "_", name).strip("_") for name in values}
     twice = [name for name in names if list(names.values()).count(names[name]) > 1]
     if twice or any(not re.fullmatch(r"[A-Za-z]\w{0,62}", name) for name in names.values()):
         wrong = twice or [n for n, m in names.items() if not re.fullmatch(r"[A-Za-z]\w{0,62}", m)]
         raise FmuError(f"columns cannot be named apart in MATLAB: {', '.join(wrong)}")
-    units = {names[n]: u for n, u in table.attrs.get("units", {}).items() if n in names}
-    arrays = {names[name]: values for name, values in _columns(table).items()}
-    with _beside(path) as new:
-        savemat(new, arrays | ({"units": units} if units else {}), oned_as="column")
+    units = {names[n]: u for n, u in units.items() if n in names}
+    arrays = {names[name]: of for name, of in values.items()}
+    return arrays | ({"units": units} if units else {})
+
+
+def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
+    """Return models of one size as MATLAB has them."""
+    import numpy as np
+
+    first = models[0]
+    same = ("states", "inputs", "outputs", "period")
+    for model in models:
+        if wrong := [name for name in same if getattr(model, name) != getattr(first, name)]:
+            raise FmuError(f"the models of a family differ in {', '.join(wrong)}")
+    matrices = {name: np.stack([getattr(model, name) for model in models], axis=-1)
+                for name in "ABCD"}  # fmt: skip
+    if len(models) == 1:
+        matrices = {name: matrix[..., 0] for name, matrix in matrices.items()}
+    names = {name: list(getattr(first, name)) for name in ("states", "inputs", "outputs")}
+    return matrices | _in_mat(names) | {"period": float(first.period or 0.0)}
+
+
+def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return lists of texts as cell arrays."""
+    import numpy as np
+
+    return {
+        key: np.array(of, object) if isinstance(of, list) and of and isinstance(of[0], str) else of
+        for key, of in values.items()
+    }
+
+
+def write_file(path: str | Path, ending: str, text: str) -> None:
+    """Write a text; the file appears complete or not at all."""
+    with _beside(_named(path, ending)) as new:
+        new.write_text(text, encoding="utf-8")

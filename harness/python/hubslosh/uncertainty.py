@@ -1,0 +1,834 @@
+r"""Uncertain models of Spacecraft for robust control: a linear fractional transformation (M, Δ).
+
+Derivation, at rest, in body axes. X = [a; w']: specific force at O and angular acceleration. h_w is
+the wheels' momentum. A tank has its origin at d, the axis e and E = (x, y) across it; e × E = E S
+with S = [0 -1; 1 0]. A mode has the mass m, natural frequency ω (tank held, under the thrust that
+acts), damping ratio ζ, and its bob at rest at r = d + b e. X_0 is the acceleration at the point,
+g = e·(a_0 + w_0' × d).
+
+The liquid's mass, centre and inertia are known: a mass m that sloshes is one that the rigid liquid
+lacks at the bob (SP-106). Compared with rigid liquid a mode is then, with s = m · displacement:
+
+    α   = E^T (δa + δw' × d) + b S^T E^T δw'           acceleration of the bob across e
+    s'' = -m α - ν - γ w_e S s,    ν = ω (ω s + 2 ζ s')    w_e = e·w_0', γ: factor of X_0
+    M_tot δX = [δf; δτ - δw × h_w] + Σ [E R + e p; d × (E R + e p) + E S (b R + g γ s)]
+    R   = m α + ν                                       force of the bob beyond rigid liquid
+    p   = (ω² - k/m)(β + b κ)·s/g + γ κ·s               from the rod's tension T = m γ g
+    β   = E^T (a_0 + w_0' × d),  κ = S^T E^T w_0'       both 0 if the surface is at rest
+
+It is Newton's law of the bob with the rod eliminated, linearised (book, Spacecraft: equations); m
+scales the state, so it multiplies α alone. M_tot X = m_b [A; r_b × A] + [0; J w'] + liquid, with
+A = a + w' × r_b. The products give the repetitions: m 2, ζ 2, ω 4, b 4 of each mode, γ 2 for each
+mode, dry mass 3, a moment of inertia 1, a product of inertia 2, a coordinate of r_b 4. With a
+surface that is not at rest ω and b may have 1 or 2 more. What the loop does not need goes: each
+repeated block is reduced to its controllable and observable part, exactly.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arguments import names_of
+from .fmu import FmuError, Quantity, did_you_mean
+from .linearization import LinearModel
+from .loop import Loop
+from .plant import Plant
+from .simulation import parameters_of
+from .stability import _closed, minimal
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Matrix = NDArray[np.float64]
+
+TURN = 2 * np.pi
+S = np.array([[0.0, -1.0], [1.0, 0.0]])
+OUTPUTS = (*(f"q[{i}]" for i in (2, 3, 4)), *(f"omega[{i}]" for i in (1, 2, 3)))
+INPUTS = (*(f"force[{i}]" for i in (1, 2, 3)), *(f"torque[{i}]" for i in (1, 2, 3)))
+AXES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+KINDS = ("frequency", "zeta", "mass", "bob")
+"""Parameters of a mode: Hz, 1, kg, and height of the bob on the tank's axis, m."""
+FACTOR = "acceleration"
+"""Factor of the acceleration at the point; 1 is that of the parameters."""
+UNITS = {"frequency": "Hz", "zeta": "1", "mass": "kg", "bob": "m", FACTOR: "1"}
+ALONE = 1e-12
+"""A coefficient below this, relative to others of its kind, is rounding."""
+
+
+@dataclass(frozen=True)
+class _Bob:
+    """A mode: where it is, and its stiffness over mass, 1/s²."""
+
+    tank: int
+    mode: int
+    length: float
+    stiffness: float
+
+    def name(self, kind: str) -> str:
+        return f"tank[{self.tank}].{kind}[{self.mode}]"
+
+
+@dataclass(frozen=True)
+class _Tank:
+    """A tank: origin, axes (columns x, y, e), rigid liquid and acceleration for damping ratios."""
+
+    number: int
+    origin: Matrix
+    axes: Matrix
+    m_0: float
+    H_0: float
+    I_0: float
+    more_y: float
+    """dI_y"""
+    g_ref: float
+
+
+@dataclass(frozen=True)
+class _Craft:
+    """Spacecraft at rest: what the equations need that is not uncertain, and all other values."""
+
+    values: dict[str, float]
+    tanks: dict[int, _Tank]
+    bobs: tuple[_Bob, ...]
+    liquid: Matrix
+    """Mass matrix of all liquid, rigid, about O."""
+    wrench: Matrix
+    wheels: Matrix
+
+    def dry(self, values: Mapping[str, float]) -> tuple[float, Matrix, Matrix]:
+        """Return mass, centre of mass and inertia of the dry craft."""
+        J = np.zeros((3, 3))
+        for name, (i, j) in AXES.items():
+            J[i, j] = J[j, i] = values[f"craft.J{name}"]
+        return values["craft.mass"], np.array([values[f"craft.r[{i}]"] for i in (1, 2, 3)]), J
+
+    def mass_matrix(self, values: Mapping[str, float]) -> Matrix:
+        """Return M: all but the bobs' motion across their axes."""
+        M = _rigid(*self.dry(values)) + self.liquid
+        for bob in self.bobs:
+            tank = self.tanks[bob.tank]
+            E, b = tank.axes[:, :2], values[bob.name("bob")]
+            arm = np.vstack([E, _cross(tank.origin + b * tank.axes[:, 2]) @ E])
+            M = M - values[bob.name("mass")] * arm @ arm.T
+        return M
+
+
+def _cross(v: ArrayLike) -> Matrix:
+    """Return the matrix of a cross product."""
+    x, y, z = np.asarray(v, float)
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def _rigid(mass: float, center: Matrix, own: Matrix) -> Matrix:
+    """Return the mass matrix of a rigid body about O."""
+    C = mass * _cross(center)
+    return np.block([[mass * np.eye(3), -C], [C, own - C @ _cross(center)]])
+
+
+def _read(model: str | Path, parameters: Mapping[str, Quantity]) -> _Craft:
+    """Return the craft as its FMU has it."""
+    with Plant(model, parameters) as plant:
+
+        def get(*names: str) -> Matrix:
+            return np.array(plant.get(names))
+
+        def vector(name: str, count: int = 3) -> Matrix:
+            return get(*(f"{name}[{i}]" for i in range(1, count + 1)))
+
+        if plant.fmu.name != "Spacecraft":
+            raise FmuError(f"an uncertain model is one of Spacecraft, not of {plant.fmu.name}")
+        free = (get("mount_kind")[0] or get("mount")[0]) == 1
+        problems = [] if free else ["the craft is on a pivot: mount must be free"]
+        if vector("omega").any() or vector("q", 4)[1:].any():
+            problems.append("the craft must be at rest: init.omega 0, init.q 1, 0, 0, 0")
+        values = dict(zip(
+            names := ["craft.mass", *(f"craft.r[{i}]" for i in (1, 2, 3)),
+                      *(f"craft.J{axes}" for axes in AXES)],
+            get(*names).tolist(), strict=True,
+        ))  # fmt: skip
+        values[FACTOR] = 1.0
+        liquid, tanks, bobs = np.zeros((6, 6)), {}, []
+        drags: list[tuple[_Bob, float, float, int]] = []
+        for number in range(1, int(get("tanks")[0]) + 1):
+            of = f"tank[{number}]"
+            modes = int(get(f"{of}.modes")[0])
+            each = [f"{of}.p[{n},{i}]" for n in range(1, modes + 1) for i in (1, 2)]
+            each += [f"{of}.p_dot[{n},{i}]" for n in range(1, modes + 1) for i in (1, 2, 3)]
+            each += [f"{of}.direction[{n},{i}]" for n in range(1, modes + 1) for i in (1, 2)]
+            each += [f"{of}.{law}[{n}]" for n in range(1, modes + 1)
+                     for law in ("zeta_amplitude", "zeta_breaking")]  # fmt: skip
+            if (
+                get(f"{of}.diameter", f"{of}.fill.points", *each).any()
+                or vector(f"{of}.r_0", 2).any()
+            ):
+                problems.append(
+                    f"{of} must be axially symmetric and at rest: no diameter, fill table, planar "
+                    "modes, r_0, or damping that grows with the amplitude"
+                )
+                continue
+            w, *v = vector(f"{of}.q", 4) / np.linalg.norm(vector(f"{of}.q", 4))
+            axes = np.eye(3) + 2 * w * _cross(v) + 2 * _cross(v) @ _cross(v)
+            m_0, H_0, I_0, I_z, dI_y, xy, xz, yz, g_ref, floor, law, kind = get(*(
+                f"{of}.{name}" for name in ("m_0", "H_0", "I_0", "I_z", "dI_y", "I_xy", "I_xz",
+                                            "I_yz", "g_ref", "g_floor", "damping_law",
+                                            "damping_law_kind")
+            )).tolist()  # fmt: skip
+            tank = _Tank(number, vector(f"{of}.position"), axes, m_0, H_0, I_0, dI_y, g_ref)
+            tanks[number] = tank
+            own = axes @ np.array([[I_0, xy, xz], [xy, I_0 + dI_y, yz], [xz, yz, I_z]]) @ axes.T
+            liquid += _rigid(m_0, tank.origin + H_0 * axes[:, 2], own)
+            for n in range(1, modes + 1):
+                m, length, f, hinge, k, zeta = get(*(
+                    f"{of}.{name}[{n}]"
+                    for name in ("mass", "length", "frequency", "hinge", "k", "zeta")
+                )).tolist()  # fmt: skip
+                if f > 0:
+                    length = g_ref / ((TURN * f) ** 2 - k / m)
+                bob = _Bob(number, n, length, k / m)
+                bobs.append(bob)
+                values |= {bob.name("mass"): m, bob.name("bob"): hinge - length}
+                at = tank.origin + (hinge - length) * axes[:, 2]
+                liquid += _rigid(m, at, np.zeros((3, 3)))
+                drags.append((bob, zeta, floor or 1e-4 * g_ref, int(kind or law)))
+        if problems:
+            raise FmuError("; ".join(problems))
+        wrench = np.concatenate([vector("force"), vector("torque")])
+        found = _Craft(values, tanks, tuple(bobs), liquid, wrench, vector("h_wheels"))
+    # the drag follows the acceleration of craft and liquid as one rigid body (damping.rs)
+    whole = np.linalg.solve(_rigid(*found.dry(values)) + liquid, wrench)
+    moving = np.linalg.solve(found.mass_matrix(values), wrench)
+    for bob, zeta, floor, law in drags:
+        tank = tanks[bob.tank]
+        rest, g = (float(tank.axes[:, 2] @ (X[:3] + np.cross(X[3:], tank.origin)))
+                   for X in (whole, moving))  # fmt: skip
+        above = (rest + np.hypot(rest, floor)) / 2
+        reference = tank.g_ref / bob.length + bob.stiffness
+        w2 = g / bob.length + bob.stiffness
+        if not w2 > 0 or g < -ALONE * tank.g_ref:
+            raise FmuError(
+                f"tank[{bob.tank}]: {g:.3g} m/s² along its axis does not hold liquid at its bottom"
+            )
+        power = {1: 0.25, 2: 0.5, 3: 0.0}[law]
+        c_m = 2 * zeta * np.sqrt(reference)
+        c_m *= ((above / bob.length + bob.stiffness) / reference) ** power
+        values[bob.name("frequency")] = float(np.sqrt(w2)) / TURN
+        values[bob.name("zeta")] = float(c_m / (2 * np.sqrt(w2)))
+    return found
+
+
+class _Equations:
+    """Signals as rows over states, inputs, X and the channels of Δ; products by parameters."""
+
+    def __init__(self, width: int, values: Mapping[str, float], spread: "pd.DataFrame") -> None:
+        self.values, self.spread = values, spread.to_numpy()
+        self.index = {name: i for i, name in enumerate(spread.index)}
+        self.width, self.channels = width, [(0, np.zeros(0))][:0]
+        self.most = width + 12 * max(np.count_nonzero(self.spread), 1) * (1 + len(values) // 4)
+
+    def unit(self, first: int, count: int) -> Matrix:
+        """Return signals by themselves, from number ``first`` on."""
+        return np.eye(count, self.most, first)
+
+    def times(self, name: str, signal: Matrix) -> Matrix:
+        """Return a parameter times signals: each that is not 0 becomes a channel of Δ."""
+        product = self.values[name] * signal
+        if name in self.index:
+            for j in np.flatnonzero(self.spread[self.index[name]]):
+                for row, of in zip(product, signal, strict=True):
+                    if of.any():
+                        row[self.width + len(self.channels)] += self.spread[self.index[name], j]
+                        self.channels.append((int(j), of))
+        return product
+
+
+def _partitioned(
+    craft: _Craft, values: Mapping[str, float], spread: "pd.DataFrame", X_0: Matrix
+) -> tuple[Matrix, list[int], tuple[str, ...]]:
+    """Return M from (states, channels, all inputs) to (rates, channels, all outputs).
+
+    Also how many channels each column of ``spread`` has, and the states' names.
+    """
+    states = [*OUTPUTS, *(
+        f"tank[{bob.tank}].{of}[{bob.mode},{i}]"
+        for bob in craft.bobs for of in ("p", "p_dot") for i in (1, 2)
+    )]  # fmt: skip
+    n, m = len(states), len(INPUTS)
+    eq = _Equations(n + m + 6, values, spread)
+    x, u, X = eq.unit(0, n), eq.unit(n, m), eq.unit(n + m, 6)
+    a, w_d = X[:3], X[3:]
+    rates = [x[3:6] / 2, w_d]
+    load = u.copy()
+    load[3:] += _cross(craft.wheels) @ x[3:6]
+    for k, bob in enumerate(craft.bobs):
+        tank = craft.tanks[bob.tank]
+        E, e, d = tank.axes[:, :2], tank.axes[:, 2], _cross(tank.origin)
+        s, s_d = x[6 + 4 * k : 8 + 4 * k], x[8 + 4 * k : 10 + 4 * k]
+        at_origin = X_0[:3] - d @ X_0[3:]
+        g, beta = e @ at_origin, E.T @ at_origin
+        kappa, w_e = S.T @ E.T @ X_0[3:], e @ X_0[3:]
+        mass, frequency, zeta, height = (bob.name(kind) for kind in ("mass", *KINDS[:2], "bob"))
+        turned = eq.times(height, S.T @ E.T @ w_d)
+        drive = eq.times(mass, E.T @ (a - d @ w_d) + turned)
+        first = TURN * eq.times(frequency, s)
+        nu = TURN * eq.times(frequency, first + 2 * eq.times(zeta, s_d))
+        scaled = eq.times(FACTOR, s)
+        R = drive + nu
+        rates += [s_d, -R - w_e * S @ scaled]
+        tension = np.zeros((1, eq.most))
+        if g > 0 and max(np.abs(beta).max(), np.abs(kappa).max()) > ALONE * g:
+            along, tilt = beta[None] / g, kappa[None] / g
+            bend = along @ first + eq.times(height, tilt @ first)
+            tension = TURN * eq.times(frequency, bend) + kappa[None] @ scaled
+            tension -= bob.stiffness * (along @ s + eq.times(height, tilt @ s))
+        force = E @ R + e[:, None] @ tension
+        load[:3] += force
+        load[3:] += d @ force + E @ S @ (eq.times(height, R) + g * scaled)
+    wet = craft.liquid @ X
+    # the dry craft: one product for each way in which a parameter acts
+    accelerated = a.copy()
+    turn = [_cross(np.eye(3)[i]) for i in range(3)]
+    for i in range(3):
+        accelerated += eq.times(f"craft.r[{i + 1}]", -turn[i] @ w_d)
+    weight = eq.times("craft.mass", accelerated)
+    wet[:3] += weight
+    for i in range(3):
+        wet[3:] += eq.times(f"craft.r[{i + 1}]", turn[i] @ weight)
+    for axes, (i, j) in AXES.items():
+        for row, column in {(i, j), (j, i)}:
+            wet[3 + row] += eq.times(f"craft.J{axes}", w_d[column][None])[0]
+    # X from its six equations
+    balance = load - wet
+    at = slice(n + m, n + m + 6)
+    solved = np.linalg.solve(-balance[:, at], balance)
+    order = np.argsort([j for j, _ in eq.channels], kind="stable")
+    z = [eq.channels[i][1] for i in order]
+    rows = np.vstack([*rates, *(row[None] for row in z), x[:6]])
+    rows = rows + rows[:, at] @ (solved - eq.unit(n + m, 6))
+    columns = [*range(n), *(eq.width + order), *range(n, n + m)]
+    counts = [sum(j == of for j, _ in eq.channels) for of in range(spread.shape[1])]
+    return rows[:, columns], counts, tuple(states)
+
+
+def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
+    """Return which of the first ``inside`` rows and columns inputs reach and outputs see."""
+    size = np.abs(M).max(axis=1, keepdims=True)
+    joined = np.abs(M) > 1e-14 * size
+    reached = joined[:inside, inside:].any(axis=1)
+    seen = joined[inside:, :inside].any(axis=0)
+    for _ in range(inside):
+        reached |= joined[:inside, :inside][:, reached].any(axis=1)
+        seen |= joined[:inside, :inside][seen].any(axis=0)
+    found: NDArray[np.bool_] = reached & seen
+    return found
+
+
+def _reduced(M: Matrix, first: int, counts: list[int]) -> tuple[Matrix, list[int]]:
+    """Return M with each block of channels in the least number of copies that it alone needs.
+
+    A repeated real block is like an integrator: what the rest does not move or see of it goes.
+    """
+    counts = list(counts)
+    for k in range(len(counts)):
+        at = first + sum(counts[:k])
+        of = np.zeros(len(M), bool), np.zeros(M.shape[1], bool)
+        for axis in of:
+            axis[at : at + counts[k]] = True
+        z, w = of
+        model = LinearModel(M[np.ix_(z, w)], M[np.ix_(z, ~w)], M[np.ix_(~z, w)],
+                            M[np.ix_(~z, ~w)], (), (), ())  # fmt: skip
+        A, B, C, D = minimal(model)
+        counts[k] = len(A)
+        upper = np.hstack([B[:, :at], A, B[:, at:]])
+        rest = np.hstack([D[:, :at], C, D[:, at:]])
+        M = np.vstack([rest[:at], upper, rest[at:]])
+    return M, counts
+
+
+@dataclass(frozen=True, eq=False)
+class WorstCase:
+    """Smallest real Δ found that takes a loop to the limit of stability; see `worst_case`."""
+
+    delta: "dict[str, float]"
+    """Δ by name; ±1 is the end of a range."""
+    size: float
+    """Largest magnitude in Δ; inf if none was found."""
+    frequency: float
+    """Frequency of the oscillation that neither grows nor decays, Hz."""
+    parameters: "dict[str, float]"
+    """The uncertain parameters there, by name."""
+
+    @property
+    def mu(self) -> float:
+        """Lower bound of the structured singular value µ: 1 over the size of Δ."""
+        return 1 / self.size
+
+    def __repr__(self) -> str:
+        """Return size and frequency, then the parameters."""
+        if not np.isfinite(self.size):
+            return "WorstCase: none was found, the lower bound of µ is 0"
+        values = "".join(f"\n  {name} = {x:.6g}" for name, x in self.parameters.items())
+        first = f"WorstCase: unstable from {self.size:.4g} times the ranges on, µ ≥ {self.mu:.4g}"
+        return f"{first}, at {self.frequency:.5g} Hz{values}"
+
+
+@dataclass(frozen=True, eq=False)
+class UncertainModel:
+    """A linear fractional transformation y = F_u(M, Δ) u of Spacecraft; see `uncertain`.
+
+    Δ is diagonal and real: each of ``deltas`` in ``counts`` copies, |δ| ≤ 1. The parameters are
+    ``center`` + ``spread`` · δ.
+    """
+
+    M: LinearModel
+    """Inputs: those of Δ, then u. Outputs: those to Δ, then y."""
+    spread: "pd.DataFrame"
+    """Change of each parameter (rows) with each δ (columns), SI units."""
+    center: "dict[str, float]"
+    """Parameters at Δ = 0."""
+    counts: tuple[int, ...]
+    """Number of copies of each δ in Δ."""
+    model: str | Path
+    given: "dict[str, Quantity]"
+    """Parameters of the FMU at its point."""
+    _craft: _Craft
+    _values: "dict[str, float]"
+    _X_0: Matrix
+
+    @property
+    def deltas(self) -> tuple[str, ...]:
+        """Names in Δ: those of parameters, or principal axes of a covariance."""
+        return tuple(str(name) for name in self.spread.columns)
+
+    @property
+    def order(self) -> int:
+        """Size of Δ."""
+        return sum(self.counts)
+
+    def __repr__(self) -> str:
+        """Return sizes, then each block of Δ."""
+        from .short import names
+
+        M, width = self.M, self.order
+        copies = ", ".join(f"{n} × {c}" for n, c in zip(self.deltas, self.counts, strict=True))
+        return (
+            f"UncertainModel, {len(M.A)} states, Δ of {width}: {copies}\n"
+            f"  inputs: {names(M.inputs[width:])}\n  outputs: {names(M.outputs[width:])}"
+        )
+
+    def delta(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
+        """Return Δ as a vector, from numbers by name (others are 0) or in their order."""
+        if isinstance(delta, Mapping):
+            if unknown := [name for name in delta if name not in self.deltas]:
+                hint = did_you_mean(unknown[0], self.deltas)
+                raise FmuError(f"Δ has no {', '.join(unknown)}{hint}")
+            return np.array([float(delta.get(name, 0.0)) for name in self.deltas])
+        found = np.asarray(delta, float)
+        if found.shape != (len(self.counts),) or not np.isfinite(found).all():
+            raise FmuError(f"Δ must be {len(self.counts)} finite numbers, not {delta!r}")
+        return found
+
+    def values(self, delta: Mapping[str, float] | ArrayLike) -> "dict[str, float]":
+        """Return the uncertain parameters at Δ, by name."""
+        change = self.spread.to_numpy() @ self.delta(delta)
+        return {name: self.center[name] + float(x)
+                for name, x in zip(self.spread.index, change, strict=True)}  # fmt: skip
+
+    def at(self, delta: Mapping[str, float] | ArrayLike) -> LinearModel:
+        """Return the model at Δ, in the FMU's states without those that norms determine.
+
+        It equals `linearize` with `parameters` but for rounding.
+        """
+        width, (A, B, C, D) = self.order, self.M
+        D_x = np.repeat(self.delta(delta), self.counts)
+        closing = np.linalg.solve(np.eye(width) - D[:width, :width] * D_x,
+                                  np.hstack([C[:width], D[:width, width:]]))  # fmt: skip
+        through = D_x[:, None] * closing
+        n = len(A)
+        every = np.block([[A, B[:, width:]], [C[width:], D[width:, width:]]])
+        every += np.vstack([B[:, :width], D[width:, :width]]) @ through
+        scale = self._scale(delta)
+        return LinearModel(
+            every[:n, :n] * scale / scale[:, None], every[:n, n:] / scale[:, None],
+            every[n:, :n] * scale, every[n:, n:], self.M.states, self.M.inputs[width:],
+            self.M.outputs[width:],
+        )  # fmt: skip
+
+    def _scale(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
+        """Return the states of M over those of the FMU: m l of the bobs."""
+        values = self._values | self.values(delta)
+        sizes = {
+            (bob.tank, bob.mode): values[bob.name("mass")] * length
+            for bob, length in zip(self._craft.bobs, self._lengths(values), strict=True)
+        }
+        found = [re.fullmatch(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]", state)
+                 for state in self.M.states]  # fmt: skip
+        return np.array([sizes[int(of[1]), int(of[2])] if of else 1.0 for of in found])
+
+    def _lengths(self, values: Mapping[str, float]) -> list[float]:
+        """Return the lengths of the pendulums, m."""
+        found = []
+        for bob in self._craft.bobs:
+            tank = self._craft.tanks[bob.tank]
+            at_origin = self._X_0[:3] + np.cross(self._X_0[3:], tank.origin)
+            g = values[FACTOR] * float(tank.axes[:, 2] @ at_origin)
+            by_gravity = (TURN * values[bob.name("frequency")]) ** 2 - bob.stiffness
+            if g > ALONE * tank.g_ref and not by_gravity > 0:
+                raise FmuError(f"{bob.name('frequency')} is below that of its stiffness alone")
+            found.append(g / by_gravity if g > ALONE * tank.g_ref else bob.length)
+        return found
+
+    def parameters(
+        self, delta: Mapping[str, float] | ArrayLike, *, commanded: bool = False
+    ) -> "dict[str, Quantity]":
+        """Return the parameters of Spacecraft at Δ, for `linearize` and `simulate`.
+
+        commanded: without torque, for a `Loop` that commands it.
+
+        Force and torque give the acceleration of the point; the drag keeps its value there. The
+        rigid liquid changes with masses and heights of the bobs; where its own inertia would be
+        negative, as in a sphere, the dry craft's is less instead.
+        """
+        craft, values = self._craft, self._values | self.values(delta)
+        new: dict[str, Quantity] = dict(self.given)
+        new |= {name: values[name] for name in craft.values if name.startswith("craft.")}
+        wrench, J = values[FACTOR] * craft.mass_matrix(values) @ self._X_0, craft.dry(values)[2]
+        new |= {name: float(x) for name, x in zip(INPUTS, wrench, strict=True)}
+        if commanded:
+            new = {name: x for name, x in new.items() if not name.startswith("torque[")}
+        for number, tank in craft.tanks.items():
+            of = f"tank[{number}]"
+            m_0, moment = tank.m_0, tank.m_0 * tank.H_0
+            inertia = tank.I_0 + moment * tank.H_0
+            for bob in (bob for bob in craft.bobs if bob.tank == number):
+                for sign, known in ((1, craft.values), (-1, values)):
+                    m, b = known[bob.name("mass")], known[bob.name("bob")]
+                    m_0, moment = m_0 + sign * m, moment + sign * m * b
+                    inertia += sign * m * b * b
+            H_0 = moment / m_0 if m_0 > 0 else 0.0
+            I_0 = inertia - moment * H_0
+            lent = min(0.0, I_0, I_0 + tank.more_y)  # of the dry craft: both are rigid
+            J += lent * tank.axes[:, :2] @ tank.axes[:, :2].T
+            new |= {f"{of}.m_0": m_0, f"{of}.H_0": H_0, f"{of}.I_0": I_0 - lent}
+            new |= {f"{of}.damping_law": "constant", f"{of}.damping_law_kind": 0}
+        new |= {f"craft.J{axes}": float(J[at]) for axes, at in AXES.items()}
+        for bob, length in zip(craft.bobs, self._lengths(values), strict=True):
+            tank, m = craft.tanks[bob.tank], values[bob.name("mass")]
+            w = TURN * values[bob.name("frequency")]
+            hangs = tank.axes[:, 2] @ (self._X_0[:3] + np.cross(self._X_0[3:], tank.origin))
+            k = bob.stiffness if hangs > ALONE * tank.g_ref else w * w
+            zeta = values[bob.name("zeta")] * w / np.sqrt(tank.g_ref / length + k)
+            new |= {
+                bob.name("mass"): m, bob.name("length"): length, bob.name("frequency"): 0.0,
+                bob.name("hinge"): values[bob.name("bob")] + length, bob.name("k"): k * m,
+                bob.name("zeta"): float(zeta),
+            }  # fmt: skip
+        return new
+
+    def closed(self, loop: Loop, frequency: ArrayLike) -> NDArray[np.complex128]:
+        """Return what Δ sees of the closed loop at frequencies in Hz: frequencies × Δ × Δ.
+
+        The hold's images around the sampling rate are left out.
+        """
+        K = loop._must_be_linear()
+        if loop.names != (list(self.M.outputs[self.order :]), list(self.M.inputs[self.order :])):
+            raise FmuError("the loop must measure the model's outputs and command its inputs")
+        w = TURN * np.atleast_1d(np.asarray(frequency, float))
+        late = loop.delay + loop.latency * loop.period
+        hold = np.sinc(w * loop.period / TURN) * np.exp(-1j * w * (loop.period / 2 + late))
+        gains = K.response(w / TURN) * hold[:, None, None]
+        n, P = self.order, self.M.response(w / TURN)
+        across = np.eye(gains.shape[1]) + gains @ P[:, n:, n:]
+        found: NDArray[np.complex128] = P[:, :n, :n] - P[:, :n, n:] @ np.linalg.solve(
+            across, gains @ P[:, n:, :n]
+        )
+        return found
+
+    def mu_upper(self, loop: Loop, frequency: ArrayLike) -> Matrix:
+        """Return an upper bound of µ of the closed loop at each frequency in Hz.
+
+        By D and G scalings (Fan, Tits and Doyle 1991), diagonal, with each copy as a real number
+        of its own: a superset of Δ. A grid may miss a narrow peak.
+        """
+        return np.array([mu_upper(N) for N in self.closed(loop, frequency)])
+
+    def worst_case(self, loop: Loop, largest: float = 3.0) -> WorstCase:
+        """Return the smallest real Δ that a search finds at the limit of stability of a loop.
+
+        The sampled loop is exact, delay included. From each lightly damped pole the search follows
+        the sign of the pole's derivatives by δ, up to |δ| = ``largest``, until the signs repeat.
+        Damping ratios stay at 0 or above. Any Δ found is a lower bound of µ; one that is not found
+        is no proof.
+        """
+        K = loop._must_be_linear()
+        if loop.names != (list(self.M.outputs[self.order :]), list(self.M.inputs[self.order :])):
+            raise FmuError("the loop must measure the model's outputs and command its inputs")
+
+        def poles(delta: Matrix) -> NDArray[np.complex128]:
+            return _closed(loop._gain(self.at(delta), K))
+
+        def signs(at: Matrix, pole: complex) -> Matrix:
+            """Return the direction in which a pole's magnitude grows."""
+            slopes = []
+            for k in range(len(at)):
+                step = np.zeros(len(at))
+                step[k] = 1e-4
+                ends = [self._nearest(poles(at + way * step), pole) for way in (1, -1)]
+                slopes.append(abs(ends[0]) - abs(ends[1]))
+            size = max(np.abs(slopes), default=0.0)
+            return np.where(np.abs(slopes) > 1e-6 * size, np.sign(slopes), 0.0)
+
+        # a damping ratio below 0 is not a tank's
+        least = np.array([
+            -self.center[name] / self.spread.loc[name, name]
+            if ".zeta[" in name and name in self.spread.index else -np.inf
+            for name in self.deltas
+        ])  # fmt: skip
+
+        def outside(size: float, way: Matrix) -> bool:
+            # 1e-9: modes that no input moves have no damping there
+            return bool(np.abs(poles(np.maximum(size * way, least))).max() > 1 + 1e-9)
+
+        def limit(way: Matrix) -> float:
+            """Return the size of Δ along a direction at which the loop becomes unstable."""
+            low = 0.0
+            for high in np.linspace(0, largest, 25)[1:]:
+                try:
+                    if outside(high, way):
+                        break
+                except FmuError:
+                    return np.inf  # no craft any more
+                low = float(high)
+            else:
+                return np.inf
+            for _ in range(50):
+                middle = (low + high) / 2
+                low, high = (low, middle) if outside(middle, way) else (middle, high)
+            return float(high)
+
+        zero = np.zeros(len(self.counts))
+        start = poles(zero)
+        if np.abs(start).max() >= 1:
+            raise FmuError("the loop is unstable at Δ = 0")
+        light = start[(start.imag > 0) & (np.abs(start) > np.exp(-0.3 * np.abs(np.angle(start))))]
+        best, at, seen = np.inf, zero, set()
+        for pole in light[np.argsort(-np.abs(light))]:
+            here, follow = zero, complex(pole)
+            for _ in range(6):
+                way = signs(here, follow)
+                if tuple(way) in seen or not way.any():
+                    break
+                seen.add(tuple(way))
+                size = limit(way)
+                if not np.isfinite(size):
+                    break
+                here = np.maximum(size * way, least)
+                if size < best:
+                    best, at = size, here
+                every = poles(here)
+                follow = complex(every[np.argmax(np.abs(every))])
+        if not np.isfinite(best):
+            return WorstCase({}, np.inf, np.nan, {})
+        every = poles(at)
+        critical = every[np.argmax(np.abs(every))]
+        named = dict(zip(self.deltas, at.tolist(), strict=True))
+        frequency = abs(float(np.angle(critical))) / (TURN * loop.period)
+        return WorstCase(named, float(best), frequency, self.values(at))
+
+    @staticmethod
+    def _nearest(poles: NDArray[np.complex128], pole: complex) -> complex:
+        return complex(poles[np.argmin(np.abs(poles - pole))])
+
+    def as_dict(self) -> "dict[str, Any]":
+        """Return matrices, names, block structure and ranges, as `to_mat` and `to_json` write."""
+        M, width = self.M, self.order
+        ends = {name: [self.center[name] - x, self.center[name] + x]
+                for name, x in zip(self.spread.index, np.abs(self.spread).sum(axis=1),
+                                   strict=True)}  # fmt: skip
+        alone = self.spread.columns.isin(self.spread.index)
+        middle = [self.center.get(name, 0.0) if own else 0.0
+                  for name, own in zip(self.deltas, alone, strict=True)]  # fmt: skip
+        radius = [float(self.spread.loc[name, name]) if own else 1.0
+                  for name, own in zip(self.deltas, alone, strict=True)]  # fmt: skip
+        return {
+            "A": M.A, "B": M.B, "C": M.C, "D": M.D, "size_of_delta": width,
+            "states": list(M.states), "inputs": list(M.inputs[width:]),
+            "outputs": list(M.outputs[width:]),
+            "deltas": list(self.deltas), "repetition": list(self.counts), "middle": middle,
+            "radius": radius, "parameters": list(self.spread.index),
+            "center": [self.center[name] for name in self.spread.index],
+            "low": [low for low, _ in ends.values()], "high": [high for _, high in ends.values()],
+            "spread": self.spread.to_numpy(),
+        }  # fmt: skip
+
+    def to_mat(self, path: str | Path) -> None:
+        """Write M, the blocks of Δ, names and ranges as .mat (version 5); see `read_lft.m`."""
+        from .files import to_mat
+
+        to_mat(self, path)
+
+    def to_json(self, path: str | Path) -> None:
+        """Write the same as `to_mat` as .json."""
+        from .files import write_file
+
+        every = {key: value.tolist() if hasattr(value, "tolist") else value
+                 for key, value in self.as_dict().items()}  # fmt: skip
+        write_file(path, ".json", json.dumps(every, indent=1, ensure_ascii=False) + "\n")
+
+    def to_control(self) -> Any:
+        """Return M as ``control.StateSpace``, signals of Δ first; needs the package control.
+
+        Dots of names become underscores.
+        """
+        M = self.M
+        named = [tuple(name.replace(".", "_") for name in of)
+                 for of in (M.states, M.inputs, M.outputs)]  # fmt: skip
+        return LinearModel(*M, *named).to_control()
+
+
+def mu_upper(N: NDArray[np.complex128]) -> float:
+    """Return an upper bound of µ of a matrix for a diagonal Δ of real numbers.
+
+    µ² is at most the largest eigenvalue of N^H N + j (G N - N^H G), N scaled by a diagonal D and G
+    diagonal and real. Any D and G give a bound; a quasi-Newton search lowers it.
+    """
+    from scipy.linalg import matrix_balance
+    from scipy.optimize import minimize
+
+    n, size = len(N), float(np.linalg.norm(N))
+    if size == 0:
+        return 0.0
+    N = N / size
+    _, (start, _) = matrix_balance(np.abs(N), permute=False, separate=True)
+
+    def largest(x: Matrix) -> tuple[float, Matrix]:
+        """Return the largest eigenvalue and its derivatives by log D and G."""
+        d, g = np.exp(x[:n]), x[n:]
+        scaled = d[:, None] * N / d
+        turned = 1j * g[:, None] * scaled
+        values, vectors = np.linalg.eigh(scaled.conj().T @ scaled + turned + turned.conj().T)
+        v = vectors[:, -1]
+        y = scaled @ v
+        left = y.conj() + 1j * v.conj() * g
+        by_d = 2 * (left * y - (left @ scaled) * v).real
+        return float(values[-1]), np.concatenate([by_d, -2 * (v.conj() * y).imag])
+
+    x = np.concatenate([-np.log(start), np.zeros(n)])
+    best = minimize(largest, x, jac=True, method="L-BFGS-B", options={"maxiter": 500})
+    return size * float(np.sqrt(max(best.fun, 0.0)))
+
+
+def uncertain(
+    parameters: Mapping[str, Quantity] | str | Path | None,
+    ranges: Mapping[str, Sequence[float] | str] | None = None,
+    inputs: Sequence[str] | str = "torque",
+    outputs: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
+    *,
+    covariance: "pd.DataFrame | None" = None,
+    sigmas: float = 2.0,
+    model: str | Path = "Spacecraft",
+) -> UncertainModel:
+    """Return Spacecraft at rest with uncertain parameters, as (M, Δ); exact, not fitted.
+
+    * ``parameters``: Those of the FMU, as for `linearize`: craft, tanks, force. The craft must be
+      free and at rest, its tanks axially symmetric.
+    * ``ranges``: (low, high) in SI units, or ``"5%"`` of the value on both sides, by name:
+      ``tank[1].frequency[1]`` (Hz, tank held, under the thrust that acts; the bob's height stays),
+      ``.zeta[1]``, ``.mass[1]`` and ``.bob[1]`` (its height on the axis; the liquid's mass, centre
+      and inertia stay), ``craft.mass``, ``craft.Jxx``, … and ``craft.r[1]``, … of the dry craft,
+      and ``acceleration``, a factor of the acceleration at which force and torque hold the craft,
+      1 as it is. Dry mass and inertia change at that acceleration.
+    * ``covariance``: A table with parameters as index and columns, as `identify` estimates it.
+      Δ then has its principal axes, ±``sigmas`` standard deviations long.
+    * ``inputs``, ``outputs``: Of force and torque; of q and omega.
+    """
+    import pandas as pd
+
+    given = dict(parameters_of(parameters))
+    # the point is at rest unless the caller says otherwise, which is refused below
+    given = {f"init.omega[{i}]": 0.0 for i in (1, 2, 3)} | given
+    craft = _read(model, given)
+    values = dict(craft.values)
+    ranges = dict(ranges or {})
+    problems: list[str] = []
+    of_axes = [str(name) for name in covariance.index] if covariance is not None else []
+    for name in [*ranges, *of_axes]:
+        if name not in values:
+            problems.append(f"there is no uncertain {name}{did_you_mean(name, values)}")
+        elif [*ranges, *of_axes].count(name) > 1:
+            problems.append(f"{name} has a range and a covariance")
+    columns: dict[str, Matrix] = {}
+    every = [*ranges, *of_axes]
+    if not every:
+        problems.append("nothing is uncertain: give ranges or covariance")
+    for k, (name, of) in enumerate(ranges.items()):
+        if name not in values:
+            continue
+        try:
+            if isinstance(of, str):
+                share = abs(values[name]) * float(of.strip().removesuffix("%")) / 100
+                low, high = values[name] - share, values[name] + share
+            else:
+                low, high = (float(x) for x in of)
+        except (TypeError, ValueError):
+            low = high = np.nan
+        if not (np.isfinite([low, high]).all() and low < high):
+            problems.append(f'{name} must be (low, high) with low < high or "5%", not {of!r}')
+            continue
+        kind = name.split(".")[-1].split("[")[0]
+        if low <= 0 and (kind in ("frequency", "mass") or name == FACTOR):
+            problems.append(f"{name} = {low:g} is not above 0")
+        if low < 0 and kind == "zeta":
+            problems.append(f"{name} = {low:g} is below 0")
+        values[name] = (low + high) / 2
+        columns[name] = np.zeros(len(every))
+        columns[name][k] = (high - low) / 2
+    if covariance is not None and not problems:
+        try:
+            matrix = covariance[of_axes].to_numpy(float)
+            lengths, axes = np.linalg.eigh((matrix + matrix.T) / 2)
+        except (KeyError, ValueError, TypeError, np.linalg.LinAlgError):
+            lengths, axes = np.array([-1.0]), np.zeros((0, 1))
+        if lengths.min() < -1e-12 * np.abs(lengths).max() or not np.isfinite(lengths).all():
+            problems.append("covariance must be a positive semidefinite table of the same names")
+        else:
+            for k in np.flatnonzero(lengths > 1e-15 * lengths.max()):
+                column = np.zeros(len(every))
+                column[len(ranges) :] = sigmas * np.sqrt(lengths[k]) * axes[:, k]
+                columns[f"axis[{len(columns) - len(ranges) + 1}]"] = column
+    chosen = []
+    for names, allowed, what in ((inputs, INPUTS, "inputs"), (outputs, OUTPUTS, "outputs")):
+        listed = names_of(names, what, problems)
+        parts = {name: [a for a in allowed if a.startswith(f"{name}[")] for name in listed}
+        listed = [part for name in listed for part in parts[name] or [name]]
+        problems += [f"{name} is not among the {what} ({', '.join(allowed)})"
+                     for name in listed if name not in allowed]  # fmt: skip
+        chosen.append(listed)
+    if problems:
+        raise FmuError("; ".join(problems))
+    spread = pd.DataFrame(columns, index=every)
+    X_0 = np.linalg.solve(craft.mass_matrix(values), craft.wrench)
+    M, counts, states = _partitioned(craft, values, spread, X_0)
+    n = len(states)
+    rows = [*range(n + sum(counts)), *(n + sum(counts) + OUTPUTS.index(name) for name in chosen[1])]
+    M = M[rows][:, [*range(n + sum(counts)),
+                    *(n + sum(counts) + INPUTS.index(name) for name in chosen[0])]]  # fmt: skip
+    kept = _connected(M, n + sum(counts))
+    blocks = np.repeat(np.arange(len(counts)), counts)[kept[n:]]
+    states = tuple(name for name, here in zip(states, kept[:n], strict=True) if here)
+    n = len(states)
+    M = M[np.pad(kept, (0, len(chosen[1])), constant_values=True)]
+    M = M[:, np.pad(kept, (0, len(chosen[0])), constant_values=True)]
+    M, counts = _reduced(M, n, [int((blocks == k).sum()) for k in range(len(counts))])
+    signals = [f"{name}#{k}" for name, c in zip(columns, counts, strict=True)
+               for k in range(1, c + 1)]  # fmt: skip
+    whole = LinearModel(M[:n, :n], M[:n, n:], M[n:, :n], M[n:, n:], states,
+                        (*(f"w:{name}" for name in signals), *chosen[0]),
+                        (*(f"z:{name}" for name in signals), *chosen[1]))  # fmt: skip
+    center = {name: values[name] for name in every}
+    return UncertainModel(whole, spread, center, tuple(counts), model, given, craft, values, X_0)
