@@ -221,11 +221,39 @@ class LinearModel:
 @lru_cache(maxsize=32)
 def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
     """Return exp(A t) and what a unit input does within the time t."""
-    from scipy.linalg import expm
-
     n, m = model.B.shape
-    whole = expm(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
+    whole = exponential(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
     return whole[:n, :n], whole[:n, n:]
+
+
+def exponential(A: Matrix) -> Matrix:
+    """Return the exponential of a matrix, by Padé's approximant of order 13 and squaring.
+
+    Higham 2005. On two cores scipy's takes 30 times the CPU time for 25 states: its threads wait.
+    """
+    size = float(np.linalg.norm(A, 1))
+    squarings = max(0, int(np.ceil(np.log2(size / 5.37)))) if size > 0 else 0
+    A = A / 2.0**squarings
+    one, A2 = np.eye(len(A)), A @ A
+    A4 = A2 @ A2
+    A6 = A4 @ A2
+    b = _PADE
+    odd = A6 @ (b[13] * A6 + b[11] * A4 + b[9] * A2) + b[7] * A6 + b[5] * A4 + b[3] * A2
+    odd = A @ (odd + b[1] * one)
+    even = A6 @ (b[12] * A6 + b[10] * A4 + b[8] * A2) + b[6] * A6 + b[4] * A4 + b[2] * A2
+    even += b[0] * one
+    found = np.linalg.solve(even - odd, even + odd)
+    for _ in range(squarings):
+        found = found @ found
+    return found
+
+
+_PADE = [
+    64764752532480000.0, 32382376266240000.0, 7771770303897600.0, 1187353796428800.0,
+    129060195264000.0, 10559470521600.0, 670442572800.0, 33522128640.0, 1323241920.0, 40840800.0,
+    960960.0, 16380.0, 182.0, 1.0,
+]  # fmt: skip
+"""Coefficients of the approximant of order 13."""
 
 
 def linearize(

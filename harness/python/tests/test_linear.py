@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.linalg import expm
 
 from hubslosh import FmuError, Plant, fit, frequency_response, linearize, simulate
+from hubslosh.linearization import exponential
 
 VISCOUS = {"friction.model": "viscous"}
 FRICTION_B = 0.03793  # N·m·s/rad, the default of friction.b
@@ -37,6 +39,16 @@ def test_unused_states_leave_no_trace(fmu: Path) -> None:
     assert len(few.states) < len(every.states)
     frequency = [0.1, 2.3, 2.5, 10.0]
     assert np.allclose(few.response(frequency), every.response(frequency), rtol=1e-9, atol=1e-12)
+
+
+def test_the_exponential_is_that_of_scipy() -> None:
+    """Also of stiff, of large and of defective matrices; 1e-12 of the largest element."""
+    random = np.random.default_rng(5)
+    cases = [random.normal(size=(n, n)) * size for n in (1, 6, 25) for size in (1e-6, 0.3, 8.0)]
+    cases += [np.diag(np.ones(5), 1), np.zeros((3, 3)), np.diag([-300.0, -1.0, 0.0])]
+    for matrix in cases:
+        exact = expm(matrix)
+        assert np.abs(exponential(matrix) - exact).max() < 1e-12 * np.abs(exact).max()
 
 
 def test_it_can_be_had_for_control(fmu: Path) -> None:
