@@ -4,10 +4,13 @@ Studies that run as a whole within seconds have their own files: `test_measured`
 `test_analysis`.
 """
 
+import json
 import os
 import re
 import shutil
+import subprocess
 import sys
+import tomllib
 from decimal import Decimal
 from pathlib import Path
 
@@ -23,6 +26,7 @@ import damping_over_fill
 import flight_twin
 import identify_twins
 import mode_errors
+import planar_stability
 import reversal
 import rotary_branch
 import tilted_tank
@@ -58,6 +62,26 @@ def test_rotary_slosh_of_the_readme(fmu: Path, monkeypatch: pytest.MonkeyPatch) 
     """The picture of two sweeps of 2700 s."""
     monkeypatch.setattr(rotary_branch, "FMU", fmu)
     same_picture(rotary_branch.draw(), rotary_branch.PICTURE)
+
+
+def test_rotary_slosh_begins_where_planar_slosh_is_unstable(
+    fmu: Path, program: Path, tmp_path: Path
+) -> None:
+    """The onset that the plan t5_near_resonance finds for the spherical model."""
+    text = (ROOT / "harness" / "campaigns" / "t5_near_resonance.toml").read_text(encoding="utf-8")
+    plan = re.sub(r"slosh.model = \[.*\]", 'slosh.model = ["spherical"]', text)
+    path = tmp_path / "spherical.toml"
+    path.write_text(plan, encoding="utf-8")
+    command = [program, "campaign", "--plan", path, "--fmu", fmu, "--list"]
+    runs = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)["runs"]
+    dwells = [run["varied"] for run in runs]
+    torques = {float(dwell["profile.amplitude"]) for dwell in dwells}
+    low, high = sorted(torques - set(tomllib.loads(text)["onset"]["amplitude"]))
+    frequency, torque = planar_stability.onset()
+    assert torque == pytest.approx((low + high) / 2, abs=0.005)
+    assert [float(dwell["profile.frequency"]) for dwell in dwells] == pytest.approx(
+        [frequency] * 6, abs=0.005
+    )
 
 
 @pytest.mark.parametrize(("study", "model"), [(mode_errors, "HubSlosh"), (reversal, "Spacecraft")])

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! is 0 for motion in a plane and ±1 for a circle, + counter-clockwise seen from above (from
-//! outwards towards +θ).
+//! outwards towards +θ). Under any other torque the same number follows from the angles in windows
+//! of time, by their angular momentum.
 
 use crate::{Complex64, FrequencyResponse};
 
@@ -17,16 +18,19 @@ pub const ROTARY: f64 = 0.5;
 /// swirl number meaningless.
 pub const LEAST: f64 = 0.02;
 
-/// Rotary motion in a sweep.
+/// Length of the windows of time, in slosh periods.
+const PERIODS: f64 = 10.0;
+
+/// Rotary motion in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rotary {
-    /// First frequency with rotary slosh, Hz.
+    /// First frequency of a sweep with rotary slosh, Hz; `None` under any other torque.
     pub from: Option<f64>,
-    /// Last frequency with rotary slosh, Hz.
+    /// Last frequency of a sweep with rotary slosh, Hz; `None` under any other torque.
     pub to: Option<f64>,
     /// Time in rotary slosh, s.
     pub time: f64,
-    /// Swirl number with the largest magnitude in the sweep.
+    /// Swirl number with the largest magnitude in the run.
     pub swirl: f64,
 }
 
@@ -52,13 +56,47 @@ impl Rotary {
             from: turning.first().map(|&i| frequency[i]),
             to: turning.last().map(|&i| frequency[i]),
             time: turning.iter().fold(0.0, |sum, &i| sum + share(i)),
-            swirl: swirl.iter().fold(0.0, |m: f64, s| if s.abs() > m.abs() { *s } else { m }),
+            swirl: largest(swirl),
+        }
+    }
+
+    /// Evaluates slosh angles (rad) at equal steps (s) of a liquid with this frequency (Hz), without knowledge of the torque.
+    /// In a window with the position q and the velocity v the swirl number is Σ q × v / √(Σ q² Σ v²).
+    pub fn in_time(step: f64, frequency: f64, radial: &[f64], tangential: &[f64]) -> Self {
+        let length = (PERIODS / frequency / step).ceil() as usize;
+        let window = |(x, y): (&[f64], &[f64])| {
+            let (mut turned, mut position, mut velocity) = (0.0, 0.0, 0.0);
+            for (x, y) in x.windows(3).zip(y.windows(3)) {
+                let (vx, vy) = (x[2] - x[0], y[2] - y[0]);
+                turned += x[1] * vy - y[1] * vx;
+                position += x[1] * x[1] + y[1] * y[1];
+                velocity += vx * vx + vy * vy;
+            }
+            // an ellipse with the semi-axes a and b has the mean square (a² + b²)/2
+            let amplitude = (2.0 * position / (x.len() - 2) as f64).sqrt();
+            if amplitude < LEAST { 0.0 } else { turned / (position * velocity).sqrt() }
+        };
+        let length = length.max(3);
+        let windows = radial.chunks_exact(length).zip(tangential.chunks_exact(length));
+        let swirl: Vec<f64> = windows.map(window).collect();
+        let turning = swirl.iter().filter(|s| s.abs() > ROTARY).count();
+        Rotary {
+            time: turning as f64 * length as f64 * step,
+            swirl: largest(&swirl),
+            ..Rotary::default()
         }
     }
 }
 
+/// Returns the number with the largest magnitude.
+fn largest(swirl: &[f64]) -> f64 {
+    swirl.iter().fold(0.0, |m: f64, s| if s.abs() > m.abs() { *s } else { m })
+}
+
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::{Rotary, swirl};
     use crate::Complex64;
     use crate::FrequencyResponse;
@@ -79,5 +117,26 @@ mod tests {
         let rotary = Rotary::of(&[1.0, 2.0, 3.0], &[0.0, 10.0, 20.0], &numbers);
         assert_eq!((rotary.from, rotary.to, rotary.swirl), (Some(1.0), Some(1.0), 1.0));
         assert_eq!(rotary.time, 5.0);
+    }
+
+    #[test]
+    fn angles_in_time_have_the_swirl_number_of_their_ellipse() {
+        let step = 0.02;
+        let run = |a: f64, b: f64| {
+            let phase = |i: usize| 2.0 * PI * 2.3 * step * i as f64;
+            let radial: Vec<f64> = (0..5000).map(|i| a * phase(i).cos()).collect();
+            let tangential: Vec<f64> = (0..5000).map(|i| b * phase(i).sin()).collect();
+            Rotary::in_time(step, 2.3, &radial, &tangential)
+        };
+        // 22 windows of 218 steps in 100 s
+        let circle = run(0.1, 0.1);
+        assert!((circle.swirl - 1.0).abs() < 1e-3, "{circle:?}");
+        assert!((circle.time - 22.0 * 218.0 * step).abs() < 1e-9, "{circle:?}");
+        let flat = run(0.02, -0.2);
+        // 2ab/(a² + b²), clockwise
+        assert!((flat.swirl + 0.198).abs() < 1e-3, "{flat:?}");
+        assert_eq!((flat.time, flat.from), (0.0, None));
+        assert_eq!(run(0.01, 0.01).swirl, 0.0, "too small");
+        assert_eq!(run(0.0, 0.1).swirl, 0.0, "in a plane");
     }
 }

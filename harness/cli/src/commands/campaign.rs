@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use experiments::campaign::{CURVES, Campaign, Folder};
+use experiments::campaign::{CURVES, Campaign, Folder, seek_onset};
 use experiments::plan::{self, Plan, Sweeps};
+use experiments::progress::Progress;
 use files::budget;
 use host::causality::Causality;
 use host::fmu::Fmu;
@@ -100,6 +101,11 @@ impl CampaignArgs {
         let mut campaign = Campaign { plan, force: self.force, jobs: self.jobs, compare, out };
         let fmu = open(&self.fmu)?;
         campaign.plan.convert_units(fmu.description());
+        seek_onset(&mut campaign.plan, &fmu, self.jobs, &|news| {
+            if let Progress::Note(line) = news {
+                terminal::note(format_args!("{line}"));
+            }
+        })?;
         if self.list {
             println!("{:#}", campaign.list(&fmu)?);
             return Ok(());

@@ -10,6 +10,7 @@
 //! outputs are stored, and `runs.csv` has the settings of each run.
 
 mod folder;
+mod onset;
 mod outcome;
 pub mod recorded;
 mod rows;
@@ -34,6 +35,7 @@ use serde_json::json;
 use signals::table;
 
 pub use self::folder::{Folder, MANIFEST};
+pub use self::onset::seek_onset;
 pub use self::outcome::{
     Curve, Doubt, Ending, Estimate, History, Outcome, Passing, Range, Record, SloshPath, Totals,
     WAVE,

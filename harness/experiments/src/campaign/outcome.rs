@@ -341,6 +341,8 @@ pub struct Outcome {
     pub record: Option<Record>,
     /// Estimates along the sweep; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
+    /// Rotary slosh; `None` for a recording, which has no angles of the liquid.
+    pub rotary: Option<Rotary>,
     /// Torque, rate, slosh angles, and the residual: the rate minus its bias and minus that of the exact linear plant
     /// under the same torque.
     pub history: History,
@@ -475,8 +477,6 @@ pub struct Record {
 pub struct Passing {
     /// Response of the rate.
     pub rate: Estimate,
-    /// Part of the sweep with rotary slosh; `None` for a recording, which has no angles of the liquid.
-    pub rotary: Option<Rotary>,
     /// Share of the liquid's force off the axis; for a recording, of the hub's rates, if it has more than one.
     pub off_axis: Option<OffAxis>,
     /// The leakage at the frequencies of `rate`; empty where it is not known.
@@ -560,7 +560,13 @@ impl Record {
 
 impl Passing {
     /// `unexplained`: as for [`Record`].
-    fn of(sweep: &Sweep, table: &Table, rates: &Rates, arm: f64, unexplained: &[f64]) -> Passing {
+    fn of(
+        sweep: &Sweep,
+        table: &Table,
+        rates: &Rates,
+        arm: f64,
+        unexplained: &[f64],
+    ) -> (Passing, Option<Rotary>) {
         let column = |name| table.column(name).unwrap_or_default();
         let is_recording = table.column(F_RADIAL).is_none();
         let about_axis = &rates.about_axis[..];
@@ -625,8 +631,14 @@ impl Passing {
         })
         .with(deviation, |f| demodulation::slope(sweep, f));
         rate.resolution = moves(rate.features.f_res.unwrap_or((middle.0 * middle.1).sqrt()));
-        Passing { rate, rotary, off_axis, leakage }
+        (Passing { rate, off_axis, leakage }, rotary)
     }
+}
+
+/// Returns the rotary slosh of a stored run whose torque is not a sweep; `frequency` is the liquid's, Hz.
+pub(super) fn rotary_in_time(step: f64, frequency: f64, table: &Table) -> Rotary {
+    let column = |name| table.column(name).unwrap_or_default();
+    Rotary::in_time(step, frequency, column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE))
 }
 
 impl Outcome {
@@ -650,7 +662,7 @@ impl Outcome {
             Torque::Rows { .. } => false,
         };
         let rates = Rates::of(table, alternates, is_recording);
-        let (record, passing) = match &run.torque {
+        let (record, swept) = match &run.torque {
             Torque::Rows { .. } => (None, None),
             Torque::Profile(profile) => {
                 let (tau, omega) = (column(TAU_CMD), &rates.about_axis[..]);
@@ -661,11 +673,12 @@ impl Outcome {
                     let power = noise::power(run.step, tau, omega, &some);
                     power.into_iter().flat_map(|power| [power; 4]).collect()
                 });
-                let passing = profile
+                let swept = profile
                     .sweep()
                     .map(|sweep| Passing::of(sweep, table, &rates, linear.arm, &unexplained));
-                let enough = passing.as_ref().is_some_and(|passing| passing.rate.doubt.is_none());
-                (Record::of(profile, run.step, tau, omega, &unexplained, enough), passing)
+                let enough =
+                    swept.as_ref().is_some_and(|(passing, _)| passing.rate.doubt.is_none());
+                (Record::of(profile, run.step, tau, omega, &unexplained, enough), swept)
             }
         };
         // of a recording, the true rate at the start is the measured one less the bias
@@ -687,11 +700,15 @@ impl Outcome {
         let signals = [TAU_CMD, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, "omega_x", "omega_y"];
         let signals = signals.into_iter().filter_map(|name| Some((name, table.column(name)?)));
         let all: Vec<(&str, &[f64])> = signals.chain([("residual", &residual[..])]).collect();
-        let onset = passing.as_ref().and_then(|passing| {
-            let Torque::Profile(profile) = &run.torque else { return None };
-            profile.sweep()?.time_of(passing.rotary?.from?)
-        });
         let frequency = linear.modes.first().map_or(1.0, |mode| mode.frequency);
+        let (passing, rotary) = match swept {
+            Some((passing, rotary)) => (Some(passing), rotary),
+            None => (None, (!is_recording).then(|| rotary_in_time(run.step, frequency, table))),
+        };
+        let onset = rotary.and_then(|rotary| {
+            let Torque::Profile(profile) = &run.torque else { return None };
+            profile.sweep()?.time_of(rotary.from?)
+        });
         let history = History::of(column("time"), &all);
         Ok(Outcome {
             ending: Ending::of(&history),
@@ -711,6 +728,7 @@ impl Outcome {
             linear,
             record,
             passing,
+            rotary,
             reused,
         })
     }
@@ -779,11 +797,6 @@ impl Outcome {
     /// The fitted linear model.
     pub fn fit(&self) -> Option<ModelFit> {
         Some(self.record.as_ref()?.fit.as_ref()?.0)
-    }
-
-    /// Part of the sweep with rotary slosh.
-    pub fn rotary(&self) -> Option<Rotary> {
-        self.passing.as_ref()?.rotary
     }
 
     /// Share of the liquid's force off the axis.

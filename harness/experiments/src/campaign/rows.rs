@@ -73,7 +73,7 @@ impl FeatureRow {
     ) -> FeatureRow {
         let features = estimate.map_or(Features::default(), |(estimate, _)| estimate.features);
         let totals = &run.totals;
-        let (fit, rotary, off_axis) = (run.fit(), run.rotary(), run.off_axis());
+        let (fit, rotary, off_axis) = (run.fit(), run.rotary, run.off_axis());
         let snr_db = run.record.as_ref().and_then(|record| record.snr_db);
         FeatureRow {
             f_res_hz: features.f_res,

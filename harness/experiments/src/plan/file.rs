@@ -12,7 +12,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::problems::{Lines, Problems};
 use super::random::{Distribution, Draws, Family};
-use super::{Listed, Named, Plan, Recorded, STEP};
+use super::{Listed, Named, Onset, Plan, Recorded, STEP};
 use crate::profile::Written;
 use crate::sensors::Sensor;
 use signals::recording::Columns;
@@ -46,7 +46,7 @@ impl fmt::Display for Scalar {
 }
 
 /// Keys of the file.
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "title",
     "profile",
     "input",
@@ -59,6 +59,7 @@ const KEYS: [&str; 13] = [
     "run",
     "random",
     "count",
+    "onset",
     "sensor",
 ];
 
@@ -110,6 +111,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let count =
         reader.named("[count] ", count, &expected, |first: &i64| (0..=most).contains(first));
     let (listed, draws) = (reader.listed(table), reader.draws(table));
+    let onset = reader.onset(table, profile.as_ref());
     let sensors = reader.sensors(table);
     Some(Plan {
         title: title.map_or(String::new(), |title| title.value),
@@ -125,6 +127,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
         listed,
         count,
         draws,
+        onset,
         sensors,
     })
 }
@@ -299,6 +302,41 @@ impl Reader<'_> {
             problems.take(&one.lines, Sensor::new(&one.name, &one.value))
         };
         texts.iter().filter_map(|one| new(one, self.problems)).collect()
+    }
+
+    /// Reads the range in which the plan seeks the onset of rotary slosh.
+    fn onset(&mut self, table: &DeTable, profile: Option<&Named<Written>>) -> Option<Onset> {
+        let (header, value) = table.get_key_value("onset")?;
+        let Some(inner) = value.get_ref().as_table() else {
+            self.other(value, "[onset] must be a table");
+            return None;
+        };
+        self.known("[onset] ", inner, &["frequency", "amplitude"]);
+        for key in ["frequency", "amplitude"].iter().filter(|key| !inner.contains_key(**key)) {
+            self.add(header.span(), format!("[onset] has no {key}"));
+        }
+        let ascend =
+            |list: &[f64]| list.is_sorted_by(|a, b| a < b) && list.iter().all(|v| *v > 0.0);
+        let two = "two frequencies in Hz, such as [2.3, 2.5]";
+        let frequency =
+            self.take("[onset] ", inner, "frequency", two, |list: &[f64; 2]| ascend(list));
+        let several = "ascending torques in N·m, at least two, such as [0.03, 0.1]";
+        let amplitude = self.take("[onset] ", inner, "amplitude", several, |list: &Vec<f64>| {
+            list.len() > 1 && ascend(list)
+        });
+        if profile.is_some_and(|profile| profile.value.kind() != "sine") {
+            self.add(header.span(), "[onset] expects a profile of one frequency, sine".into());
+        }
+        if table.contains_key("random") {
+            self.add(header.span(), "[onset] is not allowed with [random]".into());
+        }
+        let lines = self.lines(header.span());
+        Some(Onset {
+            frequency: frequency?.value,
+            amplitude: amplitude?.value,
+            found: false,
+            lines,
+        })
     }
 
     fn draws(&mut self, table: &DeTable) -> Option<Draws> {

@@ -91,7 +91,20 @@ pub struct Plan {
     listed: Vec<Listed>,
     count: Vec<Named<i64>>,
     draws: Option<Draws>,
+    onset: Option<Onset>,
     sensors: Vec<Sensor>,
+}
+
+/// Range in which a plan seeks the onset of rotary slosh, and further torques of its dwells there.
+#[derive(Clone, Debug)]
+pub(crate) struct Onset {
+    /// Smallest and largest frequency, Hz.
+    pub frequency: [f64; 2],
+    /// Torques in ascending order, at least two; the search is between the first and the last, N·m.
+    pub amplitude: Vec<f64>,
+    /// True if the plan has the dwells already.
+    found: bool,
+    lines: Lines,
 }
 
 /// Sweeps of the bench from 1.25 to 3.5 Hz in 2700 s.
@@ -244,6 +257,7 @@ impl Plan {
             listed: Vec::new(),
             count: Vec::new(),
             draws: None,
+            onset: None,
             sensors: Vec::new(),
         };
         let mut problems = Problems::default();
@@ -282,7 +296,10 @@ impl Plan {
             .chain(all(&self.vary, "[vary]"))
             .chain(listed)
             .chain(all(&self.count, "[count]"))
-            .chain(self.draws.iter().flat_map(|draws| all(&draws.draw, "[random.draw]")));
+            .chain(self.draws.iter().flat_map(|draws| all(&draws.draw, "[random.draw]")))
+            .chain(self.onset.iter().flat_map(|onset| {
+                ["profile.frequency", "profile.amplitude"].map(|n| (n, "[onset]", &onset.lines))
+            }));
         for (name, place, lines) in named {
             match owner.insert(name, (place, lines)) {
                 Some((other, others)) if other != place => {
@@ -318,12 +335,13 @@ impl Plan {
     /// Returns the number with the most values in the plan, which is the axis of figures; of
     /// several the last. Returns `None` without one, or if values are drawn at random.
     pub fn axis(&self) -> Option<&str> {
-        self.axis_of_vary().or_else(|| self.axis_of_recordings())
+        self.axis_of_vary().or_else(|| self.axis_of_listed())
     }
 
-    /// Returns the number in which recordings differ most.
-    fn axis_of_recordings(&self) -> Option<&str> {
-        let runs = self.listed.iter().filter(|run| run.recording.is_some());
+    /// Returns the number in which recordings differ most, or dwells at the onset of rotary slosh.
+    fn axis_of_listed(&self) -> Option<&str> {
+        let along = |run: &&Listed| run.recording.is_some() || self.onset.is_some();
+        let runs = self.listed.iter().filter(along);
         let mut values: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
         for one in runs.flat_map(|run| &run.values).filter(|one| one.value.parse::<f64>().is_ok()) {
             values.entry(&one.name).or_default().insert(&one.value);
@@ -365,6 +383,37 @@ impl Plan {
         self.set.iter().map(|set| (set.name.as_str(), set.value.as_str()))
     }
 
+    /// Returns the onset that the plan still seeks.
+    pub(crate) fn sought(&self) -> Option<Onset> {
+        self.onset.clone().filter(|onset| !onset.found)
+    }
+
+    /// Returns a case for each onset that the plan seeks.
+    pub(crate) fn seeking(&self, description: &ModelDescription) -> Result<Vec<Case>> {
+        Plan { onset: None, ..self.clone() }.cases(description)
+    }
+
+    /// Replaces the cases of [`Plan::seeking`] by dwells at a frequency (Hz) with several torques (N·m).
+    pub(crate) fn dwell(&mut self, dwells: Vec<(Case, f64, Vec<f64>)>) {
+        let names: Vec<String> = self.grouping().into_iter().map(String::from).collect();
+        let lines = self.onset.as_ref().map_or(Lines::default(), |onset| onset.lines.clone());
+        let named =
+            |name: &str, value: String| Named { name: name.into(), value, lines: lines.clone() };
+        let mut listed = Vec::new();
+        for (case, frequency, torques) in dwells {
+            for torque in torques {
+                let values = names.iter().zip(&case.varied).filter(|(_, value)| !value.is_empty());
+                let mut values: Vec<_> =
+                    values.map(|(name, value)| named(name, value.clone())).collect();
+                values.push(named("profile.frequency", frequency.to_string()));
+                values.push(named("profile.amplitude", torque.to_string()));
+                listed.push(Listed { values, ..Listed::default() });
+            }
+        }
+        (self.listed, self.vary) = (listed, Vec::new());
+        self.onset.iter_mut().for_each(|onset| onset.found = true);
+    }
+
     /// Returns true if values are drawn at random.
     pub fn is_random(&self) -> bool {
         self.draws.is_some()
@@ -374,6 +423,7 @@ impl Plan {
     /// `[vary]` (the last varies fastest) and every draw. The error lists all problems of the plan. The FMU
     /// checks the values only when it runs.
     pub fn cases(&self, description: &ModelDescription) -> Result<Vec<Case>> {
+        ensure!(self.sought().is_none(), "only `hubslosh campaign` runs a plan with [onset]");
         let draws = self.draws.as_ref().map_or(1, |d| d.runs);
         let count = self
             .vary
@@ -665,8 +715,12 @@ mod tests {
         let counts: Vec<(&str, usize)> = BUILT_IN
             .iter()
             .map(|(name, text)| {
-                let plan = Plan::parse(text).unwrap();
+                let mut plan = Plan::parse(text).unwrap();
                 assert!(!plan.title.is_empty(), "{name}");
+                if let Some(onset) = plan.sought() {
+                    let seeking = plan.seeking(&description()).unwrap().into_iter();
+                    plan.dwell(seeking.map(|case| (case, 2.4, onset.amplitude.clone())).collect());
+                }
                 (*name, plan.cases(&description()).unwrap().len())
             })
             .collect();
@@ -677,9 +731,9 @@ mod tests {
             ("t2_mass", 5),
             ("t3_diameter", 5),
             ("t4_distance", 5),
-            ("t5_near_resonance", 27),
-            ("t6_high_amplitude", 27),
-            ("t7_on_the_axis", 3),
+            ("t5_near_resonance", 20),
+            ("t6_high_amplitude", 36),
+            ("t7_on_the_axis", 6),
             ("fills", 20),
             ("amplitudes", 30),
             ("bench_damping", 84),
@@ -689,6 +743,58 @@ mod tests {
             ("slew", 27),
         ];
         assert_eq!(counts, expected);
+    }
+
+    #[test]
+    fn dwells_at_an_onset_have_its_frequency_and_all_torques() {
+        let text = "profile = \"sine:duration=10\"\n[vary]\nslosh.model = [\"planar\", \"spherical\"]\n\
+                    [onset]\nfrequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n";
+        let mut plan = Plan::parse(text).unwrap();
+        let error = plan.cases(&description()).unwrap_err().to_string();
+        assert!(error.contains("`hubslosh campaign`"), "{error}");
+        let seeking = plan.seeking(&description()).unwrap();
+        let models: Vec<_> = seeking.iter().map(|case| case.model.as_deref().unwrap()).collect();
+        assert_eq!(models, ["planar", "spherical"]);
+        let dwells = seeking.into_iter().zip([2.45, 2.4]);
+        plan.dwell(dwells.map(|(case, f)| (case, f, vec![0.05, 0.1])).collect());
+        assert_eq!(plan.axis(), Some("profile.amplitude"));
+        let cases = plan.cases(&description()).unwrap();
+        let expected = [
+            "planar_frequency_2.45_amplitude_0.05",
+            "planar_frequency_2.45_amplitude_0.1",
+            "spherical_frequency_2.4_amplitude_0.05",
+            "spherical_frequency_2.4_amplitude_0.1",
+        ];
+        assert_eq!(names(&cases), expected);
+        assert!(cases[2].profile.contains("frequency=2.4"), "{}", cases[2].profile);
+        let wrong = [
+            ("frequency = [2.3]\namplitude = [0.03, 0.1]", "frequency expects two frequencies"),
+            ("frequency = [2.3, 2.5]\namplitude = [0.1, 0.03]", "amplitude expects ascending"),
+            ("frequency = [2.3, 2.5]", "[onset] has no amplitude"),
+            (
+                "frequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n[vary]\nprofile.amplitude = [1]",
+                "profile.amplitude stands in [vary] and in [onset]",
+            ),
+        ];
+        for (table, words) in wrong {
+            let text = format!("profile = \"sine:duration=10\"\n[onset]\n{table}\n");
+            let error = Plan::parse(&text).unwrap_err().to_string();
+            assert!(error.contains(words), "{words}: {error}");
+        }
+        for (profile, other, words) in [
+            ("exp-sweep:amplitude=0.1", "", "a profile of one frequency, sine"),
+            (
+                "sine",
+                "[random]\nruns = 2\nseed = 1\n[random.draw]\ntank.h = { distribution = \"uniform\", from = 0.05, to = 0.1 }\n",
+                "[random]",
+            ),
+        ] {
+            let text = format!(
+                "profile = \"{profile}\"\n[onset]\nfrequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n{other}"
+            );
+            let error = Plan::parse(&text).unwrap_err().to_string();
+            assert!(error.contains(words), "{words}: {error}");
+        }
     }
 
     #[test]

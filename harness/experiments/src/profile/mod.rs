@@ -150,6 +150,11 @@ impl fmt::Display for Written {
 }
 
 impl Written {
+    /// Name of its kind: `sine`.
+    pub(crate) fn kind(&self) -> &str {
+        &self.name
+    }
+
     /// Gives a parameter another value.
     pub fn set(&mut self, key: &str, value: &str) {
         self.pairs.retain(|(k, _)| k != key);
@@ -280,6 +285,11 @@ impl Profile {
     /// Returns the parameter `amplitude`, N·m, if it has one.
     pub fn amplitude(&self) -> Option<f64> {
         self.get("amplitude")
+    }
+
+    /// Returns the parameter `frequency`, Hz, if it has one.
+    pub fn frequency(&self) -> Option<f64> {
+        self.get("frequency")
     }
 
     /// The sweep, if its frequency sweeps.

@@ -265,9 +265,9 @@ pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
         [
             Quantity {
                 level: Some((rotary::ROTARY, "counts as rotary")),
-                ..quantity("largest |swirl|", &|run| Some(run.rotary()?.swirl.abs()))
+                ..quantity("largest |swirl|", &|run| Some(run.rotary?.swirl.abs()))
             },
-            quantity("time in rotary slosh / s", &|run| Some(run.rotary()?.time)),
+            quantity("time in rotary slosh / s", &|run| Some(run.rotary?.time)),
             quantity("off-axis energy", &|run| Some(of(run)?.energy)),
             quantity("leakage", &|run| Some(of(run)?.leakage)),
         ],

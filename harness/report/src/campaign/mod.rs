@@ -33,8 +33,11 @@ pub(crate) const PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
 /// Licence of Plotly, which every page with Plotly contains.
 pub(crate) const PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 
-/// Most groups that get figures of their own; more would be a book.
-const MOST_GROUPS: usize = 6;
+/// Most groups that get figures of their own; the page states which ones do not.
+const MOST_GROUPS: usize = 24;
+
+/// Most runs of another FMU that get figures.
+const MOST_RUNS: usize = 6;
 
 /// The campaign's most telling run: that with the largest radial slosh angle, which is rotary slosh; where none leaves its
 /// plane, that with the largest slosh angle. No recording.
@@ -225,15 +228,15 @@ fn general_sections<'a>(
     let runs = &results.unanalysed;
     let drawn = runs.iter().filter(|run| !run.history.time.is_empty());
     let content = html! {
-        @for run in drawn.take(MOST_GROUPS) {
+        @for run in drawn.take(MOST_RUNS) {
             @for figure in general::run(fmu, &run.case.name, &run.history, &run.tail) {
                 (figures.add(figure))
             }
         }
-        @if runs.len() > MOST_GROUPS {
+        @if runs.len() > MOST_RUNS {
             p {
                 @if runs.iter().all(|run| !run.history.time.is_empty()) { "The first " }
-                (MOST_GROUPS) " of " (runs.len()) " runs."
+                (MOST_RUNS) " of " (runs.len()) " runs."
             }
         }
     };
@@ -272,7 +275,14 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
                 (runs(results.outcomes.len())) ". Figures of numbers and the CSV tables have all of them."
             }
         }
-        div .cards { @for group in groups.take(2 * MOST_GROUPS) { (card(page, group)) } }
+        @if let Some(one) = page.groups.get(MOST_GROUPS) {
+            p {
+                "Only the first " (MOST_GROUPS) " of " (page.groups.len())
+                " groups of runs have figures of their own; none from " (one.title())
+                " on. The results table has all runs."
+            }
+        }
+        div .cards { @for group in groups.take(MOST_GROUPS) { (card(page, group)) } }
         @if !failures.is_empty() {
             div .failed {
                 p { b { (runs(failures.len())) " failed:" } }

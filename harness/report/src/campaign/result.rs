@@ -1,10 +1,11 @@
 //! The sentence with which a page begins: what the runs show, from their own numbers.
 
 use experiments::campaign::{Outcome, Results};
+use experiments::profile::Torque;
 use names::hubslosh::SloshModel;
 
 use super::draws::moments;
-use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre};
+use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre, torque_of};
 use super::recordings;
 
 /// Features of one run's frequency response.
@@ -45,7 +46,7 @@ impl Series {
                 antiresonance: features.f_dip,
                 resonance: features.f_res,
                 exact: [exact.f_dip, exact.f_res],
-                swirls: run.rotary().is_some_and(|rotary| rotary.time > 0.0),
+                swirls: run.rotary.is_some_and(|rotary| rotary.time > 0.0),
             })
         };
         let mut points: Vec<Point> = group.runs.iter().filter_map(point).collect();
@@ -87,7 +88,7 @@ pub(super) fn sentence(page: &Page, results: &Results) -> String {
         }
         return match (axis, manoeuvre(first.runs[0])) {
             (_, Some(_)) => left_behind(page),
-            _ => largest_angle(page),
+            _ => format!("{} {}", rotation(page), largest_angle(page)).trim().into(),
         };
     }
     elsewhere(results)
@@ -243,7 +244,7 @@ fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String
             capital(&format!("{} ({name} from {from} to {to}{unit}{with})", parts.join(", ")))
         })
     };
-    these.iter().take(3).filter_map(sentence).collect()
+    few(these.iter().filter_map(sentence).collect(), 3)
 }
 
 /// Runs with a response and nothing to draw them along.
@@ -267,7 +268,7 @@ fn alone(series: &[Series]) -> String {
             ),
         })
     };
-    finished(&series.iter().take(3).filter_map(of).collect::<Vec<_>>())
+    finished(&few(series.iter().filter_map(of).collect(), 3))
 }
 
 impl Series {
@@ -304,7 +305,7 @@ fn scatter(page: &Page) -> String {
         (!parts.is_empty())
             .then(|| format!("In {count} draws{title} {parts_text}{}", most.unwrap_or_default()))
     };
-    finished(&page.groups.iter().take(3).filter_map(of).collect::<Vec<_>>())
+    finished(&few(page.groups.iter().filter_map(of).collect(), 3))
 }
 
 /// Short names of the groups: the model, and further differences if there are any.
@@ -329,7 +330,7 @@ fn left_behind(page: &Page) -> String {
         let least = rates.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some((most, least))
     };
-    let named = page.groups.iter().zip(names(page)).take(4);
+    let named = page.groups.iter().zip(names(page));
     let all: Vec<_> = named
         .filter_map(|(group, name)| of(group).map(|(most, least)| (name, most, least)))
         .collect();
@@ -349,8 +350,55 @@ fn left_behind(page: &Page) -> String {
         }
     });
     let along = if name.is_empty() { String::new() } else { format!(", over {name}") };
-    let parts: Vec<String> = parts.collect();
+    let parts = few(parts.collect(), 4);
     finished(&[format!("Largest rate that the manoeuvre leaves{along}: {}", parts.join("; "))])
+}
+
+/// States for each model in how many runs the slosh was rotary, and which of them has the smallest torque. Empty if no
+/// model can leave its plane.
+fn rotation(page: &Page) -> String {
+    let count = |model: &str| {
+        let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
+        let rotary = runs.clone().filter(|run| run.rotary.is_some_and(|rotary| rotary.time > 0.0));
+        let first = rotary.clone().min_by(|a, b| torque_of(a).total_cmp(&torque_of(b)));
+        let which = first.map(|run| match (&run.case.listed, &*run.case.torque) {
+            (None, Torque::Profile(profile)) => {
+                let at = profile.frequency().map(|f| format!(" at {f} Hz"));
+                format!("smallest torque {} N·m{}", torque_of(run), at.unwrap_or_default())
+            }
+            (name, _) => format!("run {}", name.as_deref().unwrap_or(&run.case.name)),
+        });
+        Swirling { model: model.into(), runs: runs.count(), rotary: rotary.count(), which }
+    };
+    let models = distinct(page.groups.iter().map(|group| group.model));
+    let planar = [SloshModel::Frozen, SloshModel::Linear, SloshModel::Planar].map(|m| m.name());
+    let models = models.into_iter().filter(|model| !planar.contains(model));
+    swirling(&models.map(count).collect::<Vec<_>>())
+}
+
+/// Number of runs of a model with rotary slosh.
+struct Swirling {
+    model: String,
+    runs: usize,
+    rotary: usize,
+    /// Description of the run with rotary slosh and the smallest torque.
+    which: Option<String>,
+}
+
+fn swirling(models: &[Swirling]) -> String {
+    let part = |one: &Swirling| match &one.which {
+        Some(which) => {
+            format!("in {} of {} runs with {} ({which})", one.rotary, one.runs, one.model)
+        }
+        None => format!("in none of {} runs with {}", one.runs, one.model),
+    };
+    match models {
+        [] => String::new(),
+        all => finished(&[format!(
+            "Rotary slosh {}",
+            all.iter().map(part).collect::<Vec<_>>().join(", ")
+        )]),
+    }
 }
 
 /// The largest slosh angles of runs without a frequency response, by model.
@@ -369,7 +417,7 @@ fn largest_angle(page: &Page) -> String {
         format!("{}° with {model}{across}", digits(tangential))
     };
     let models = distinct(page.groups.iter().map(|group| group.model));
-    let parts: Vec<String> = models.into_iter().take(4).map(part).collect();
+    let parts: Vec<String> = models.into_iter().map(part).collect();
     finished(&[format!("Largest slosh angle: {}", parts.join("; "))])
 }
 
@@ -386,6 +434,16 @@ fn elsewhere(results: &Results) -> String {
         )]),
         _ => String::new(),
     }
+}
+
+/// Returns at most `most` parts of a text; further ones are replaced by their number.
+fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
+    let further = parts.len().saturating_sub(most);
+    if further > 0 {
+        parts.truncate(most);
+        parts.push(format!("{further} more in the results table"));
+    }
+    parts
 }
 
 /// A number with two significant digits.
@@ -408,7 +466,7 @@ fn finished(sentences: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Point, Series, alone, along, digits};
+    use super::{Point, Series, Swirling, alone, along, digits, swirling};
 
     /// A series with exact responses at 2 and 3 Hz: (x, antiresonance, resonance, rotary).
     fn series(model: &str, plant: &str, points: &[(f64, f64, f64, bool)]) -> Series {
@@ -506,6 +564,25 @@ mod tests {
         assert_eq!(along(&[series("spherical", "", &[])], TORQUE, ""), "");
         let alone = alone(&none);
         assert!(alone.starts_with("No antiresonance and resonance that can be trusted"), "{alone}");
+    }
+
+    #[test]
+    fn dwells_state_for_each_model_whether_the_slosh_was_rotary() {
+        let of = |model: &str, rotary: usize, which: Option<&str>| Swirling {
+            model: model.into(),
+            runs: 6,
+            rotary,
+            which: which.map(String::from),
+        };
+        let all = [
+            of("spherical", 4, Some("smallest torque 0.0625 N·m at 2.4 Hz")),
+            of("liquid", 0, None),
+        ];
+        assert_eq!(
+            swirling(&all),
+            "Rotary slosh in 4 of 6 runs with spherical (smallest torque 0.0625 N·m at 2.4 Hz), in none of 6 runs with liquid."
+        );
+        assert_eq!(swirling(&[]), "");
     }
 
     #[test]

@@ -109,7 +109,7 @@ fn snr(run: &Outcome) -> Option<f64> {
 
 /// The smallest torque with rotary slosh, N·m.
 fn onset(group: &Group) -> Option<f64> {
-    let turns = |run: &&&Outcome| run.rotary().is_some_and(|rotary| rotary.from.is_some());
+    let turns = |run: &&&Outcome| run.rotary.is_some_and(|rotary| rotary.from.is_some());
     group.runs.iter().find(turns).map(|run| torque_of(run))
 }
 
@@ -414,7 +414,7 @@ const STATEMENTS: &[Statement] = &[
         says: "Up to 0.05 N·m the slosh stays planar.",
         rule: "no rotary slosh at 0.05 N·m or below",
         shows: |group| {
-            at(group, 0.05)?.rotary()?;
+            at(group, 0.05)?.rotary?;
             Some((turning_from(group), onset(group).is_none_or(|torque| torque > 0.05)))
         },
         why: "",
@@ -425,7 +425,7 @@ const STATEMENTS: &[Statement] = &[
         says: "Rotary slosh is visible from 0.1 N·m on, weak and intermittent at 0.075.",
         rule: "rotary slosh from 0.075 or 0.1 N·m on",
         shows: |group| {
-            at(group, 0.1)?.rotary()?;
+            at(group, 0.1)?.rotary?;
             let there = onset(group).is_some_and(|torque| (0.074..0.101).contains(&torque));
             Some((turning_from(group), there))
         },
@@ -437,11 +437,9 @@ const STATEMENTS: &[Statement] = &[
         says: "In every run from 0.1 N·m on with rotary slosh the motion is planar first, then rotary.",
         rule: "rotary slosh begins above the antiresonance",
         shows: |group| {
-            group.runs.first()?.rotary()?;
-            let turning = group
-                .runs
-                .iter()
-                .filter_map(|run| Some(run.rotary()?.from? - run.features().f_dip?));
+            group.runs.first()?.rotary?;
+            let turning =
+                group.runs.iter().filter_map(|run| Some(run.rotary?.from? - run.features().f_dip?));
             let least = turning.fold(f64::MAX, f64::min);
             let never = "no rotary slosh".to_string();
             Some(if least < f64::MAX {
@@ -459,7 +457,7 @@ const STATEMENTS: &[Statement] = &[
         rule: "at 0.2 N·m the slosh is rotary for less than 90 % of the time between first and last",
         shows: |group| {
             let run = at(group, 0.2)?;
-            let rotary = run.rotary()?;
+            let rotary = run.rotary?;
             let Some(between) = rotary.from.zip(rotary.to) else {
                 return Some(("no rotary slosh".into(), false));
             };

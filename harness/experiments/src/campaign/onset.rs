@@ -1,0 +1,165 @@
+//! Search for the onset of rotary slosh: the smallest torque at which a dwell at some frequency becomes rotary.
+//!
+//! At each torque the search dwells at all frequencies of a grid, and it bisects the torque. The dwells are those of the
+//! plan: same settings, same duration, from the same start.
+
+use anyhow::{Result, ensure};
+use files::budget;
+use host::fmu::Fmu;
+use names::hubslosh::{SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, slosh};
+use rayon::prelude::*;
+
+use super::{is_bench, outcome};
+use crate::plan::{Case, Plan};
+use crate::profile::Written;
+use crate::progress::Progress;
+
+/// Distance of the frequencies, Hz.
+const APART: f64 = 0.0025;
+/// Largest distance of a torque without rotary slosh from the onset, N·m.
+const WITHIN: f64 = 0.0025;
+/// Steps of the grid by which the frequencies of a smaller torque may lie outside those of a larger one.
+const MARGIN: usize = 3;
+
+/// Result of one dwell.
+#[derive(Clone, Copy)]
+struct Dwell {
+    rotary: bool,
+    /// Largest slosh angle, rad.
+    angle: f64,
+}
+
+/// Result of a search.
+#[derive(Debug, PartialEq)]
+struct Found {
+    /// Frequency of the onset; without one, that of the largest slosh angle, Hz.
+    frequency: f64,
+    /// Largest torque without and smallest torque with rotary slosh, N·m; `None` without rotary slosh.
+    torques: Option<[f64; 2]>,
+}
+
+/// Replaces the `[onset]` of a plan by dwells at the onset; does nothing for a plan without it. `jobs` dwells are
+/// simulated in parallel; 0 for the number of cores.
+pub fn seek_onset(
+    plan: &mut Plan,
+    fmu: &Fmu,
+    jobs: usize,
+    watch: &(dyn Fn(Progress) + Sync),
+) -> Result<()> {
+    let Some(onset) = plan.sought() else { return Ok(()) };
+    ensure!(is_bench(fmu.description()), "[onset] is possible only with HubSlosh (the bench)");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(budget::jobs(jobs, 0)?).build()?;
+    let ends = [onset.amplitude[0], onset.amplitude[onset.amplitude.len() - 1]];
+    let mut dwells = Vec::new();
+    for case in plan.seeking(fmu.description())? {
+        let dwell = |frequency: f64, torque: f64| dwell(fmu, &case, frequency, torque);
+        let found = pool.install(|| search(onset.frequency, ends, &dwell))?;
+        let varied = plan.varied().into_iter().zip(&case.varied);
+        let name: Vec<String> = varied.map(|(name, value)| format!("{name} = {value}, ")).collect();
+        let name = name.concat();
+        watch(Progress::Note(match found.torques {
+            Some([low, high]) => format!(
+                "{name}onset of rotary slosh between {low} and {high} N·m, at {} Hz",
+                found.frequency
+            ),
+            None => format!(
+                "{name}no rotary slosh up to {} N·m; largest slosh angle at {} Hz",
+                ends[1], found.frequency
+            ),
+        }));
+        let mut torques = onset.amplitude.clone();
+        torques.extend(found.torques.iter().flatten());
+        torques.sort_by(f64::total_cmp);
+        torques.dedup();
+        dwells.push((case, found.frequency, torques));
+    }
+    plan.dwell(dwells);
+    Ok(())
+}
+
+fn dwell(fmu: &Fmu, case: &Case, frequency: f64, torque: f64) -> Result<Dwell> {
+    let mut profile: Written = case.profile.parse()?;
+    profile.set("frequency", &frequency.to_string());
+    profile.set("amplitude", &torque.to_string());
+    let mut run = case.run();
+    run.torque = profile.torque()?;
+    let mut instance = run.initialise(fmu)?;
+    let natural = instance.real(&slosh::FREQUENCY.at([1]))?;
+    let table = run.drive(&mut instance, &[SLOSH_ANGLE_RADIAL, SLOSH_ANGLE], |_| {})?;
+    table.all_finite()?;
+    let angles = table.column(SLOSH_ANGLE).unwrap_or_default();
+    Ok(Dwell {
+        rotary: outcome::rotary_in_time(run.step, natural, &table).time > 0.0,
+        angle: angles.iter().fold(0.0, |most: f64, angle| most.max(angle.abs())),
+    })
+}
+
+/// Seeks the onset between two frequencies (Hz) and two torques (N·m).
+fn search(
+    band: [f64; 2],
+    [mut low, mut high]: [f64; 2],
+    dwell: &(dyn Fn(f64, f64) -> Result<Dwell> + Sync),
+) -> Result<Found> {
+    // without the dust of binary fractions
+    let rounded = |value: f64| (value * 1e6).round() / 1e6;
+    let steps = ((band[1] - band[0]) / APART).round() as usize;
+    let grid: Vec<f64> = (0..=steps).map(|k| rounded(band[0] + k as f64 * APART)).collect();
+    let scan = |from: usize, to: usize, torque: f64| -> Result<Vec<Dwell>> {
+        grid[from..=to].par_iter().map(|frequency| dwell(*frequency, torque)).collect()
+    };
+    let rotary = |from: usize, dwells: &[Dwell]| -> Vec<usize> {
+        (0..dwells.len()).filter(|k| dwells[*k].rotary).map(|k| from + k).collect()
+    };
+    let all = scan(0, steps, high)?;
+    let mut those = rotary(0, &all);
+    if those.is_empty() {
+        let largest = (0..=steps).max_by(|a, b| all[*a].angle.total_cmp(&all[*b].angle));
+        let frequency = grid[largest.unwrap_or(0)];
+        return Ok(Found { frequency, torques: None });
+    }
+    ensure!(
+        rotary(0, &scan(0, steps, low)?).is_empty(),
+        "[onset] amplitude: the slosh is rotary at the smallest torque already, {low} N·m; add a smaller one"
+    );
+    while high - low > WITHIN {
+        let middle = rounded((low + high) / 2.0);
+        let from = those[0].saturating_sub(MARGIN);
+        let to = (those[those.len() - 1] + MARGIN).min(steps);
+        match rotary(from, &scan(from, to, middle)?) {
+            none if none.is_empty() => low = middle,
+            some => (high, those) = (middle, some),
+        }
+    }
+    let at = those[those.len() / 2];
+    ensure!(
+        (1..steps).contains(&at),
+        "[onset] frequency: rotary slosh begins at the end of the range, {} Hz; widen the range",
+        grid[at]
+    );
+    Ok(Found { frequency: grid[at], torques: Some([low, high]) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Dwell, Found, WITHIN, search};
+
+    #[test]
+    fn the_onset_is_the_tip_of_the_range_of_rotary_slosh() {
+        // a leaning tongue: from 0.06 N·m at 2.4 Hz, wider with the torque
+        let dwell = |frequency: f64, torque: f64| {
+            let (low, high) = (2.4 - 0.8 * (torque - 0.06), 2.4 + 0.3 * (torque - 0.06));
+            let rotary = torque >= 0.06 && (low - 1e-9..high + 1e-9).contains(&frequency);
+            Ok(Dwell { rotary, angle: torque / (0.01 + (frequency - 2.42).abs()) })
+        };
+        let found = search([2.3, 2.5], [0.03, 0.14], &dwell).unwrap();
+        let [low, high] = found.torques.unwrap();
+        assert!(low < 0.06 && high >= 0.06 && high - low <= WITHIN, "{found:?}");
+        assert_eq!(found.frequency, 2.4);
+        let beyond = search([2.3, 2.5], [0.07, 0.14], &dwell).unwrap_err().to_string();
+        assert!(beyond.contains("at the smallest torque already, 0.07 N·m"), "{beyond}");
+        let aside = search([2.4, 2.5], [0.03, 0.14], &dwell).unwrap_err().to_string();
+        assert!(aside.contains("widen the range"), "{aside}");
+        let none = search([2.3, 2.5], [0.03, 0.05], &dwell).unwrap();
+        assert_eq!(none, Found { frequency: 2.42, torques: None });
+    }
+}
