@@ -84,6 +84,18 @@ def test_rotary_slosh_begins_where_planar_slosh_is_unstable(
     )
 
 
+def test_the_ledger_of_the_book_is_that_of_the_runs(
+    fmu: Path, program: Path, tmp_path: Path
+) -> None:
+    """Every verdict and every count of book/ledger.md, from the 88 sweeps of `thesis_models`."""
+    out = tmp_path / "models"
+    command = [program, "campaign", "--plan", "thesis_models", "--fmu", fmu, "--out", out]
+    subprocess.run(command, check=True)
+    ledger = (out / "ledger.md").read_text(encoding="utf-8")
+    shutil.rmtree(out)  # 800 MB
+    assert (BOOK / "ledger.md").read_text(encoding="utf-8").endswith(f"\n\n{ledger}")
+
+
 @pytest.mark.parametrize(("study", "model"), [(mode_errors, "HubSlosh"), (reversal, "Spacecraft")])
 def test_a_picture_of_the_book(
     study, model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

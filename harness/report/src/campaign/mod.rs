@@ -64,12 +64,7 @@ pub fn page(
 ) -> String {
     let has_chapters = !chapters.is_empty();
     let plan = &campaign.plan;
-    let page = Page {
-        plan,
-        groups: groups(plan, fmu, results),
-        axis: axis(plan, fmu, &results.outcomes),
-        varied: plan.varied().iter().map(|n| Varied::of(n, fmu, &results.outcomes)).collect(),
-    };
+    let page = data(campaign, fmu, results);
     let axis = page.axis.as_ref().map(|axis| axis.name.as_str());
     let of_the_thesis = axis == Some("torque amplitude") || has_chapters;
     let mut figures = Figures::new(of_the_thesis);
@@ -122,6 +117,28 @@ pub fn page(
         }
     };
     page.into_string()
+}
+
+/// Returns the ledger of the thesis's statements as Markdown; empty for a campaign that does not repeat its sweeps.
+pub fn ledger(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
+    let page = data(campaign, fmu, results);
+    if repeats_the_thesis(&page) { thesis::ledger(&page.groups) } else { String::new() }
+}
+
+fn data<'a>(campaign: &'a Campaign, fmu: &Fmu, results: &'a Results) -> Page<'a> {
+    let plan = &campaign.plan;
+    Page {
+        plan,
+        groups: groups(plan, fmu, results),
+        axis: axis(plan, fmu, &results.outcomes),
+        varied: plan.varied().iter().map(|n| Varied::of(n, fmu, &results.outcomes)).collect(),
+    }
+}
+
+/// Returns true if the runs are sweeps over the thesis's band with several torques.
+fn repeats_the_thesis(page: &Page) -> bool {
+    let band = !page.groups.is_empty() && page.groups.iter().all(|g| g.band() == Some(BAND));
+    band && page.axis.as_ref().is_some_and(|axis| axis.name == "torque amplitude")
 }
 
 /// An element's name in a link.
@@ -208,8 +225,7 @@ fn bench_sections<'a>(
             compare::compare(other, page, results, &mut add),
         ));
     }
-    let thesis = groups.iter().all(|group| group.band() == Some(BAND));
-    if thesis && axis.is_some_and(|axis| axis.name == "torque amplitude") {
+    if repeats_the_thesis(page) {
         sections.push(("Comparison with the thesis", thesis::statements(groups)));
     }
     sections.push(("Results table", notes::table(page, results)));
