@@ -64,6 +64,8 @@ pub struct FreeDecay {
     pub amplitudes: Vec<[f64; 2]>,
     /// Periods of each record.
     pub periods: Vec<f64>,
+    /// Residual of each record, U.
+    pub residuals: Vec<Vec<f64>>,
     /// Root mean square of the residual, U.
     pub residual: f64,
     /// Root mean square of the residual with constant ζ, U.
@@ -165,10 +167,11 @@ impl FreeDecay {
         let free = (count.saturating_sub(x.len())).max(1) as f64;
         let white = left.iter().map(|r| r * r).sum::<f64>() / free;
         let mut from = 0;
-        let (mut power, mut other) = (Vec::new(), (0.0, 0.0));
+        let (mut power, mut other, mut parts) = (Vec::new(), (0.0, 0.0), Vec::new());
         for record in records {
             let part = &left[from..from + record.time.len()];
             from += record.time.len();
+            parts.push(part.iter().map(|r| size * r).collect());
             let beside = beside(record.time, part, found.x[0]);
             power.push(beside.power);
             if beside.other.1 > other.1 {
@@ -197,6 +200,7 @@ impl FreeDecay {
             constant: constant.x[1],
             amplitudes: amplitudes.collect(),
             periods: starts.iter().map(|start| start.periods).collect(),
+            residuals: parts,
             residual: size * (left.iter().map(|r| r * r).sum::<f64>() / count as f64).sqrt(),
             residual_constant: size * (constant.cost / count as f64).sqrt(),
             other: (other.0, size * other.1),

@@ -141,8 +141,8 @@ impl Rest {
     }
 }
 
-/// Returns the autocorrelation of a zero-mean signal at 0 to `lags` steps, Σ x_k x_{k+m} / Σ x².
-fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
+/// Returns the autocorrelation of a zero-mean signal at 0 to `lags` steps, Σ x_k x_{k+m} / Σ x²; 0 of a signal that is zero.
+pub fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     let lags = lags.clamp(1, signal.len() - 1);
     let length = (signal.len() + lags + 1).next_power_of_two();
     let mut padded = signal.to_vec();
@@ -152,7 +152,8 @@ fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
         *line = (line.norm_sqr()).into();
     }
     let sums = Inverse::new(length).of(spectrum);
-    sums[..=lags].iter().map(|sum| sum / sums[0]).collect()
+    let power = sums[0].max(f64::MIN_POSITIVE);
+    sums[..=lags].iter().map(|sum| sum / power).collect()
 }
 
 /// Returns the value below which a standard normal variable lies with this probability, by Newton's method on erfc.

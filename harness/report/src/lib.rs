@@ -2,5 +2,6 @@
 
 pub mod campaign;
 pub mod gyro;
+pub mod page;
 pub mod svg;
 pub mod view;

@@ -355,10 +355,6 @@ impl IdentifyArgs {
             self.validate.is_empty() || M::NEEDS.validation,
             "--validate is for --method output-error and black-box alone"
         );
-        ensure!(
-            self.report.is_none() || M::HAS_PAGE,
-            "--report is for --method output-error alone"
-        );
         let fmu = if M::NEEDS.fmu { Some(open(&self.fmu)?) } else { None };
         let nominal = fmu.as_ref().map(|fmu| self.options().nominal(fmu)).transpose()?;
         let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
@@ -392,10 +388,7 @@ impl IdentifyArgs {
 
     /// Reads free decays, which are of one signal, and identifies.
     fn decay(&self, trim: Option<(f64, f64)>) -> Result<()> {
-        ensure!(
-            self.validate.is_empty() && self.report.is_none(),
-            "--validate and --report are not for --method free-decay"
-        );
+        ensure!(self.validate.is_empty(), "--validate is not for --method free-decay");
         let (source, mut notes) = (self.source(trim)?, Vec::new());
         let (mut signals, mut recordings) = (Vec::new(), Vec::new());
         for path in &self.data {
@@ -443,7 +436,8 @@ impl IdentifyArgs {
         if found.fits == Some(false) || !found.converged {
             terminal::warn("the result cannot be trusted; its verdict says why");
         }
-        if let (Some(path), Some(page)) = (&self.report, M::page(&found)) {
+        if let Some(path) = &self.report {
+            let page = M::page(&found);
             atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
             done!("{}", path.display());
         }

@@ -177,7 +177,9 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
     let angle = limited["slosh_angle"].as_f64().unwrap();
     assert!((0.09..=0.1).contains(&angle), "{limited}");
     let asked = ["identify", "data.csv", "--method", "multisine", "--out", "levels.json"];
-    let said = hubslosh(folder, &asked).unwrap();
+    let said = hubslosh(folder, &[&asked[..], &["--report", "levels.html"]].concat()).unwrap();
+    let page = std::fs::read_to_string(folder.join("levels.html")).unwrap();
+    assert!(page.contains("Response at the excited lines"), "{page}");
     // dry friction is odd; the linear liquid adds nothing
     assert!(said.contains("Odd nonlinear distortion is"), "{said}");
     assert!(said.contains("Even nonlinear distortion is not seen"), "{said}");

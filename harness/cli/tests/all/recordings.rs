@@ -246,9 +246,12 @@ fn a_free_decay_of_30_s_tells_frequency_damping_and_its_growth() {
     }
     std::fs::write(directory.join("decay.txt"), text.replace('.', ",")).unwrap();
     let of = ["identify", "decay.txt", "--method", "free-decay", "--out", "d.json"];
+    let of = [&of[..], &["--report", "d.html"]].concat();
     let said =
         hubslosh(directory, &[&of[..], &["--columns", "wave_height=probe"]].concat()).unwrap();
     assert!(said.contains("Damping depends on the amplitude"), "{said}");
+    let page = std::fs::read_to_string(directory.join("d.html")).unwrap();
+    assert!(page.contains("Residual over time") && page.contains("wave_height, m"));
     let found: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(directory.join("d.json")).unwrap()).unwrap();
     for (name, truth, unit) in

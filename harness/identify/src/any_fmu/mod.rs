@@ -415,11 +415,17 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
                 let there = values.iter().zip(&channel.sampled).filter(|(_, sampled)| **sampled);
                 there.map(|(value, _)| *value).collect()
             };
+            let name = &question.outputs[channel.output];
+            let description = problem.model.description();
+            let unit = description.variable(name).map_or("1", |v| description.unit(v));
             Residual {
-                name: format!("{}, {}", record.name, question.outputs[channel.output]),
+                name: format!("{}, {name}", record.name),
+                label: prose(if unit.is_empty() { "1" } else { unit }),
                 time: picked(&record.time),
                 measured: picked(&record.outputs[channel.output]),
                 residual: picked(residual),
+                noise: Some(channel.noise.white),
+                torque: None,
             }
         })
         .collect();

@@ -8,10 +8,13 @@ use analysis::armax::{Model, armax, arx};
 use analysis::statistics::mean;
 use analysis::transfer_function::fit_time;
 use anyhow::{Result, ensure};
+use maud::html;
 use rayon::prelude::*;
+use report::page::table;
 use serde::Serialize;
 
-use super::{Identified, Method, Needs, Task};
+use super::page::{RATE, Sections};
+use super::{Identified, Method, Needs, Residual, Task};
 use crate::news::News;
 use crate::recording::Recording;
 
@@ -83,6 +86,41 @@ impl Method for BlackBox {
         }));
         lines
     }
+
+    fn sections(found: &Found) -> Sections {
+        let Details { models, poles, held_out_from, .. } = &found.details;
+        let head = [
+            "model",
+            "order",
+            "one step ahead, %",
+            "simulated, %",
+            "held back, %",
+            "poles, Hz",
+            "damping ratio",
+        ];
+        let rows = models.iter().zip(poles).map(|(m, poles)| {
+            let [f, z] = poles.map_or([String::new(), String::new()], |(f, z)| {
+                [format!("{f:.4}"), format!("{z:.4}")]
+            });
+            vec![
+                m.model.kind.into(),
+                m.model.order.to_string(),
+                format!("{:.2}", m.one_step_pct),
+                format!("{:.2}", m.simulated_pct),
+                format!("{:.2}", m.held_out_pct),
+                f,
+                z,
+            ]
+        });
+        let figures = html! {
+            h2 { "Models" }
+            @if held_out_from.is_finite() {
+                p { (format!("Rows from {held_out_from:.1} s on were not fitted. The charts show simulations of the whole recording.")) }
+            }
+            (table(head, rows))
+        };
+        Sections { figures, ..Sections::default() }
+    }
 }
 
 /// Fits models of growing order to the first two thirds of a recording, or to all of it if another one is held back.
@@ -148,8 +186,23 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
     let verdict = vec![line(&models[arx]), line(&models[armax])];
     let held_out_from =
         if cut < u.len() { recording.time[0] + cut as f64 * step } else { f64::NAN };
+    let time: Vec<f64> = (0..u.len()).map(|k| recording.time[0] + k as f64 * step).collect();
+    let residual = |index: usize| {
+        let Model { kind, order, .. } = models[index].model;
+        let simulated = models[index].model.simulate(&u);
+        Residual {
+            name: format!("{}, {kind} of order {order}", recording.name),
+            label: RATE.into(),
+            time: time.clone(),
+            measured: y.clone(),
+            residual: y.iter().zip(&simulated).map(|(y, model)| y - model).collect(),
+            noise: None,
+            torque: Some(u.clone()),
+        }
+    };
+    let residuals = vec![residual(arx), residual(armax)];
     let details = Details { models, arx, armax, poles, held_out_from };
-    Ok(Found { verdict, ..Found::new(details) })
+    Ok(Found { verdict, residuals, ..Found::new(details) })
 }
 
 #[cfg(test)]
@@ -191,6 +244,10 @@ mod tests {
         // ω_p² = ω²(1 + m r²/I0), within what friction and noise leave
         let (f, _) = found.details.poles[at("ARMAX", 3)].unwrap();
         assert!((f / 2.456 - 1.0).abs() < 2e-3, "{f}");
+        let page = BlackBox::page(&found);
+        for of in ["ARX of order", "ARMAX of order", "Gain from torque to rate"] {
+            assert!(page.contains(of), "{of}");
+        }
         // one step ahead both look good
         assert!(simple.one_step_pct > 80.0 && moving.one_step_pct > 80.0, "{simple:?}");
         assert!(found.details.models[found.details.arx].held_out_pct > simple.held_out_pct);

@@ -6,9 +6,10 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use signals::recording::{Quantity, quantity};
 
-use super::{Identified, Method, Needs, Task};
+use super::{Identified, Method, Needs, Residual, Task};
 use crate::estimate::Estimated;
 use crate::news::News;
+use crate::recording::Recording;
 use analysis::statistics::noise_level;
 
 /// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.
@@ -95,6 +96,16 @@ impl Method for FreeDecay {
             answer.measurement.insert(name.into(), Estimated::normal(value, std, unit));
         }
         answer.converged = found.converged;
+        let residual = |(recording, residual): (&Recording, &Vec<f64>)| Residual {
+            name: recording.name.clone(),
+            label: format!("{}, {unit}", self.signal),
+            time: recording.time.clone(),
+            measured: recording.rate.clone(),
+            residual: residual.clone(),
+            noise: Some(noise),
+            torque: None,
+        };
+        answer.residuals = task.recordings.iter().zip(&found.residuals).map(residual).collect();
         let fits = found.residual < MOST_RESIDUAL * noise.max(1e-9 * found.amplitudes[0][0]);
         answer.fits = Some(fits);
         let all = found.amplitudes.iter().flatten();

@@ -22,9 +22,10 @@ use analysis::statistics::{mean, noise_level};
 use analysis::transfer_function::TransferFunction;
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
-use signals::fourier::Forward;
+use signals::fourier::{Forward, Inverse};
 
-use super::{Identified, Method, Needs, Task};
+use super::page::{RATE, Sections};
+use super::{Identified, Method, Needs, Residual, Task};
 use crate::estimate::Estimated;
 use crate::news::News;
 use crate::nominal::{Bench, Nominal};
@@ -83,6 +84,10 @@ impl Method for Frequency {
             "{lines} lines from {:.3} to {:.3} Hz, condition number {condition:.0}",
             band.0, band.1
         )]
+    }
+
+    fn sections(found: &Found) -> Sections {
+        Sections { condition: Some(found.details.fit.condition), ..Sections::default() }
     }
 }
 
@@ -156,6 +161,13 @@ fn spectrum(signal: &[f64], bins: &std::ops::RangeInclusive<usize>) -> Vec<Compl
     let mean = mean(signal);
     let spectrum = Forward::new(signal.len()).of(signal.iter().map(|v| v - mean).collect());
     spectrum[bins.clone()].to_vec()
+}
+
+/// The signal of a spectrum that has lines in `bins` alone.
+fn signal(lines: &[Complex64], bins: &std::ops::RangeInclusive<usize>, count: usize) -> Vec<f64> {
+    let mut all = vec![Complex64::default(); count / 2 + 1];
+    all[bins.clone()].copy_from_slice(lines);
+    Inverse::new(count).of(all).iter().map(|value| value / count as f64).collect()
 }
 
 /// Fits a recording of a hub with slosh.
@@ -253,6 +265,18 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         condition: covariance.condition,
     };
     let fits = over_noise < MISFIT && structure.abs() < 3.3;
+    let time = (0..count).map(|k| recording.time[0] + k as f64 * step).collect();
+    // within the band: the noise has that part of its power
+    let share = problem.s.len() as f64 / (0.5 * count as f64);
+    let residual = Residual {
+        name: format!("{}, {:.3} to {:.3} Hz", recording.name, band.0, band.1),
+        label: RATE.into(),
+        time,
+        measured: signal(&problem.y, &bins, count),
+        residual: signal(&problem.residual(&x), &bins, count),
+        noise: Some(noise * share.sqrt()),
+        torque: Some(torque),
+    };
     let verdict = words(&fit, fits, converged);
     Ok(Found {
         parameters,
@@ -267,6 +291,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         converged,
         fits: Some(fits),
         verdict,
+        residuals: vec![residual],
         ..Found::new(Details { fit })
     })
 }
@@ -370,6 +395,12 @@ mod tests {
             one.rate.iter_mut().for_each(|w| *w += 4.07e-4 * random.normal());
             let found = identify(&one, BENCH, Intersample::FirstOrderHold).unwrap();
             assert!(found.converged && found.fits == Some(true), "{seed}: {:?}", found.verdict);
+            if seed == 0 {
+                let page = Frequency::page(&found);
+                for of in ["Residual over time", "Autocorrelation", "Phase from torque to rate"] {
+                    assert!(page.contains(of), "{of}");
+                }
+            }
             for (k, (name, value)) in truth.iter().enumerate() {
                 let p = found.measurement.get(*name).or(found.parameters.get(*name)).unwrap();
                 inside[k] += u64::from(p.interval[0] <= *value && *value <= p.interval[1]);

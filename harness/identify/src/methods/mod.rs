@@ -7,7 +7,7 @@ pub mod frequency;
 pub mod identification;
 pub mod multisine;
 pub mod output_error;
-pub(crate) mod page;
+pub mod page;
 
 use std::collections::BTreeMap;
 
@@ -20,6 +20,7 @@ use crate::news::News;
 use crate::nominal::Nominal;
 use crate::recording::Recording;
 use crate::{plausible, start};
+use page::Sections;
 
 /// Input of a method.
 #[derive(Clone, Copy)]
@@ -86,7 +87,7 @@ pub struct Identified<D> {
     pub verdict: Vec<String>,
     /// Log of the steps.
     pub done: Vec<String>,
-    /// Measured rates and residuals, of methods that have them in time.
+    /// Measured signals and residuals, of methods that have them in time.
     #[serde(skip)]
     pub residuals: Vec<Residual>,
     /// Results that only this method has.
@@ -94,17 +95,23 @@ pub struct Identified<D> {
     pub details: D,
 }
 
-/// Measured rate and residual of one recording.
+/// A measured signal of one recording and its residual, for the page.
 #[derive(Clone, Debug, Default)]
 pub struct Residual {
     /// The recording's name.
     pub name: String,
+    /// Name and unit of the signal, as on an axis.
+    pub label: String,
     /// s.
     pub time: Vec<f64>,
-    /// Measured rate, rad/s.
+    /// Measured signal.
     pub measured: Vec<f64>,
-    /// Measured less modelled rate, rad/s.
+    /// Measured less modelled signal.
     pub residual: Vec<f64>,
+    /// Standard deviation of its white noise, if known.
+    pub noise: Option<f64>,
+    /// Torque at the same times, N·m, if the signal is the rate that answers to it.
+    pub torque: Option<Vec<f64>>,
 }
 
 impl<D: Serialize> Identified<D> {
@@ -148,11 +155,13 @@ pub trait Method {
     /// Lines for a terminal, below the table of estimates.
     fn lines(found: &Identified<Self::Details>) -> Vec<String>;
 
-    /// True if the method writes an HTML page.
-    const HAS_PAGE: bool = false;
+    /// Sections of the page that only this method has.
+    fn sections(_found: &Identified<Self::Details>) -> Sections {
+        Sections::default()
+    }
 
     /// The page, in HTML.
-    fn page(_found: &Identified<Self::Details>) -> Option<String> {
-        None
+    fn page(found: &Identified<Self::Details>) -> String {
+        page::of(found, &Self::sections(found))
     }
 }

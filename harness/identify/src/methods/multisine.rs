@@ -12,9 +12,13 @@
 
 use analysis::Complex64;
 use anyhow::{Result, ensure};
+use maud::html;
+use report::page::{axis_chart, drawn, series};
+use report::svg::Style;
 use serde::Serialize;
 use signals::fourier::Forward;
 
+use super::page::Sections;
 use super::{Identified, Method, Needs, Task};
 use crate::news::News;
 use crate::recording::Recording;
@@ -96,6 +100,31 @@ impl Method for Multisine {
             levels.odd,
             levels.even
         )]
+    }
+
+    fn sections(found: &Found) -> Sections {
+        let lines = &found.details.lines;
+        let of = |value: &dyn Fn(&Line) -> f64| -> Vec<(f64, f64)> {
+            lines.iter().map(|line| (line.frequency, value(line))).collect()
+        };
+        let gains = vec![
+            series(of(&|line| line.gain), "a", Style::Dots, "response"),
+            series(of(&|line| line.std_noise), "soft", Style::Cloud, "standard deviation by noise"),
+            series(
+                of(&|line| line.std_distortion),
+                "b",
+                Style::Cloud,
+                "standard deviation by odd distortion",
+            ),
+        ];
+        let phases = vec![series(of(&|line| line.phase), "a", Style::Dots, "response")];
+        let frequency = "frequency, Hz";
+        let figures = html! {
+            h2 { "Response at the excited lines" }
+            (drawn(&axis_chart("Gain from torque to rate", frequency, "rad/s/(N·m)", gains, true)))
+            (drawn(&axis_chart("Phase from torque to rate", frequency, "degrees", phases, false)))
+        };
+        Sections { figures, ..Sections::default() }
     }
 }
 

@@ -1,6 +1,8 @@
 //! Output-error fit of the FMU in the time domain: the whole way from recordings to parameters with their uncertainty,
 //! and to words.
 
+mod page;
+
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -13,7 +15,8 @@ use names::hubslosh::SloshModel::{self, Frozen, Linear, Paraboloid, Planar, Sphe
 use names::hubslosh::{self, FrictionModel};
 
 use super::identification::{Details, Identification};
-use super::{Identified, Method, Needs, Residual, Task, page};
+use super::page::{RATE, Sections};
+use super::{Identified, Method, Needs, Residual, Task};
 use crate::between::{self, Others};
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
@@ -58,10 +61,8 @@ impl Method for OutputError {
         )]
     }
 
-    const HAS_PAGE: bool = true;
-
-    fn page(found: &Identification) -> Option<String> {
-        Some(page::of(found))
+    fn sections(found: &Identification) -> Sections {
+        page::sections(found)
     }
 }
 
@@ -639,9 +640,12 @@ fn residuals(problem: &Problem, answer: &Answer) -> Vec<Residual> {
             let recording = &problem.recordings[channel.recording];
             Residual {
                 name: recording.name.clone(),
+                label: RATE.into(),
                 time: recording.time.clone(),
                 measured: recording.rate.clone(),
                 residual: residual.clone(),
+                noise: Some(channel.noise.white),
+                torque: Some(recording.torque.clone()),
             }
         })
         .collect()
