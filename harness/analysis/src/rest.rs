@@ -1,6 +1,6 @@
 //! Statistics of a gyro's record at rest: Allan variances, and checks of their assumption of normal, white and
-//! stationary noise (thesis 5.5.3). The checks are quantiles compared with the normal distribution, autocorrelation,
-//! and statistics of chunks.
+//! stationary noise (thesis 5.5.3). The checks are quantiles, histogram and Kolmogorov and Smirnov's distance compared with the
+//! normal distribution, autocorrelation, and statistics of chunks.
 
 use signals::fourier::{Forward, Inverse};
 
@@ -11,6 +11,11 @@ use crate::statistics::{deviation, mean, variance};
 const QUANTILES: usize = 200;
 /// Largest number of chunks.
 const CHUNKS: usize = 1000;
+/// Largest number of bins of the histogram on either side of 0, and their usual width in standard deviations.
+const BINS: (f64, f64) = (5.0, 0.1);
+/// Limit of [`Chunk::kolmogorov`] that normal noise exceeds with a probability of 5 % (Stephens, J. Am. Stat. Assoc. 69, 1974, table 1A,
+/// case 3: mean and variance estimated).
+pub const KOLMOGOROV: f64 = 0.895;
 
 /// Statistics of a record at rest.
 #[derive(Clone, Debug)]
@@ -31,6 +36,8 @@ pub struct Rest {
     pub kurtosis: f64,
     /// Smallest change of the reading, rad/s: its quantisation.
     pub quantum: f64,
+    /// Density of the samples without the line over their standard deviation: middle of the bin and density.
+    pub histogram: Vec<(f64, f64)>,
     /// Allan variances of the samples, (rad/s)².
     pub allan: Vec<Point>,
     /// The noise that fits them.
@@ -52,6 +59,12 @@ pub struct Chunk {
     pub mean: f64,
     /// Variance of the samples without the record's line, (rad/s)².
     pub variance: f64,
+    /// Kolmogorov and Smirnov's distance of the readings from the normal distribution of their mean and variance, times
+    /// √n − 0.01 + 0.85/√n (Stephens). Quantisation alone makes it Δ √n/(2σ√(2π)).
+    pub kolmogorov: f64,
+    /// The same distance between the levels of the readings, where quantisation has no effect; the variance is without the
+    /// quantisation's Δ²/12 (Sheppard).
+    pub between_levels: f64,
 }
 
 impl Rest {
@@ -75,6 +88,7 @@ impl Rest {
             |power: i32| detrended.iter().map(|x| (x / sigma).powi(power)).sum::<f64>() / n;
         let changes = samples.windows(2).map(|y| (y[1] - y[0]).abs()).filter(|d| *d > 0.0);
         let quantum = changes.fold(f64::INFINITY, f64::min);
+        let quantum = if quantum.is_finite() { quantum } else { 0.0 };
         let mut sorted = detrended.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let count = QUANTILES.min(samples.len());
@@ -90,6 +104,8 @@ impl Rest {
                 from: (k * length) as f64 * step,
                 mean: mean(part),
                 variance: variance(part),
+                kolmogorov: kolmogorov(&samples[k * length..(k + 1) * length]),
+                between_levels: between_levels(&samples[k * length..(k + 1) * length], quantum),
             })
             .collect();
         let allan = allan::variances(step, samples);
@@ -101,13 +117,26 @@ impl Rest {
             deviation: sigma,
             skewness: moment(3),
             kurtosis: moment(4) - 3.0,
-            quantum: if quantum.is_finite() { quantum } else { 0.0 },
+            quantum,
+            histogram: histogram(&sorted, sigma, quantum),
             noise: Noise::fitted(&allan),
             allan,
             quantiles,
             autocorrelation: autocorrelation(&detrended, (lag / step).round() as usize),
             chunks,
         }
+    }
+
+    /// Returns the ratio of the variance of the samples to that of their quantisation, Δ²/12; infinite without quantisation.
+    pub fn quantisation_ratio(&self) -> f64 {
+        12.0 * (self.deviation / self.quantum).powi(2)
+    }
+
+    /// Returns how many chunks are not normal by [`KOLMOGOROV`], as they were read and between the levels.
+    pub fn not_normal(&self) -> [usize; 2] {
+        let count =
+            |of: fn(&Chunk) -> f64| self.chunks.iter().filter(|c| of(c) > KOLMOGOROV).count();
+        [count(|chunk| chunk.kolmogorov), count(|chunk| chunk.between_levels)]
     }
 
     /// Returns half of the 95 % interval of the autocorrelation of white noise, 1.96/√n.
@@ -156,11 +185,62 @@ pub fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     sums[..=lags].iter().map(|sum| sum / power).collect()
 }
 
+/// Returns the probability that a standard normal variable is below x.
+fn normal(x: f64) -> f64 {
+    0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
+}
+
+/// Returns Stephens's modification of a distance of n samples.
+fn modified(distance: f64, n: f64) -> f64 {
+    distance * (n.sqrt() - 0.01 + 0.85 / n.sqrt())
+}
+
+/// See [`Chunk::kolmogorov`].
+fn kolmogorov(samples: &[f64]) -> f64 {
+    let mut sorted = samples.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let (n, level, sigma) = (samples.len() as f64, mean(samples), deviation(samples));
+    let distance = sorted.iter().enumerate().map(|(k, sample)| {
+        let below = normal((sample - level) / sigma);
+        (below - k as f64 / n).max((k + 1) as f64 / n - below)
+    });
+    modified(distance.fold(0.0, f64::max), n)
+}
+
+/// See [`Chunk::between_levels`].
+fn between_levels(samples: &[f64], quantum: f64) -> f64 {
+    let mut sorted = samples.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let (n, level) = (samples.len() as f64, mean(samples));
+    let sigma = (variance(samples) - quantum * quantum / 12.0).max(0.0).sqrt();
+    let distance =
+        sorted.windows(2).enumerate().filter(|(_, pair)| pair[1] > pair[0]).map(|(k, pair)| {
+            (normal((0.5 * (pair[0] + pair[1]) - level) / sigma) - (k + 1) as f64 / n).abs()
+        });
+    modified(distance.fold(0.0, f64::max), n)
+}
+
+/// See [`Rest::histogram`]; bins are as wide as whole levels if these are coarse.
+fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
+    let (most, usual) = BINS;
+    let step = quantum / sigma;
+    let width = if step > 0.01 { step * (usual / step).ceil() } else { usual };
+    let bins = (most / width).ceil() as i64;
+    let n = sorted.len() as f64;
+    let below = |x: f64| sorted.partition_point(|sample| sample / sigma < x) as f64;
+    (-bins..=bins)
+        .map(|k| {
+            let middle = k as f64 * width;
+            (middle, (below(middle + 0.5 * width) - below(middle - 0.5 * width)) / n / width)
+        })
+        .collect()
+}
+
 /// Returns the value below which a standard normal variable lies with this probability, by Newton's method on erfc.
 pub fn normal_quantile(part: f64) -> f64 {
     let mut x = 0.0;
     for _ in 0..60 {
-        let error = 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2) - part;
+        let error = normal(x) - part;
         let density = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
         // steps of at most one standard deviation, because the tangent is flat far out
         let by = (error / density).clamp(-1.0, 1.0);
@@ -196,6 +276,35 @@ mod tests {
         // quantiles between ±2 scatter by 5e-3 or less
         let off = rest.quantiles.iter().filter(|(x, _)| x.abs() < 2.0).map(|(x, y)| (x - y).abs());
         assert!(off.fold(0.0, f64::max) < 0.03);
+    }
+
+    /// Noise of 0.4 mrad/s in steps of 0.15 mrad/s, as the thesis's gyro has it: the readings are not normal, the noise is.
+    #[test]
+    fn quantised_normal_noise_is_normal_between_its_levels() {
+        let mut random = Random::new(3, 0);
+        let step = 1.53e-4;
+        let samples: Vec<f64> =
+            (0..90_000).map(|_| (4.066e-4 * random.normal() / step).round() * step).collect();
+        let rest = Rest::of(0.02, &samples, 180.0, 1.0);
+        assert!((rest.quantum / step - 1.0).abs() < 1e-9);
+        // (σ² + Δ²/12)/(Δ²/12), known to √(2/n) = 0.5 %
+        let expected = 1.0 + 12.0 * (4.066e-4_f64 / step).powi(2);
+        assert!((rest.quantisation_ratio() / expected - 1.0).abs() < 0.02);
+        // at most 1 of 10 by chance with a probability of 0.91, at most 3 with 0.999
+        let [read, between] = rest.not_normal();
+        assert!(read == 10 && between <= 3, "{read} {between}: {:?}", rest.chunks);
+        // Δ √n/(2σ√(2π)) with n = 9,000, and chance of less than one
+        let jump = 9000f64.sqrt() * step / (2.0 * 4.066e-4 * std::f64::consts::TAU.sqrt());
+        assert!(
+            rest.chunks.iter().all(|c| (c.kolmogorov - jump).abs() < 1.0),
+            "{jump} {:?}",
+            rest.chunks
+        );
+        let sum: f64 = rest.histogram.windows(2).map(|b| (b[1].0 - b[0].0) * b[1].1).sum();
+        assert!((sum - 1.0).abs() < 0.01, "{sum}");
+        // of an exponential distribution both say that it is not
+        let skew: Vec<f64> = samples.iter().map(|x| (x / 4e-4).exp() * 1e-4).collect();
+        assert_eq!(Rest::of(0.02, &skew, 180.0, 1.0).not_normal(), [10, 10]);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use files::input;
 
 /// Options whose values are files or directories that a command writes: command, option, and the endings of files that
 /// it writes there. Every other value that names a file is an input.
-const OUTPUTS: [(&str, &str, &[&str]); 22] = [
+const OUTPUTS: [(&str, &str, &[&str]); 23] = [
     ("analyse", "out", &[]),
     ("book", "out", &[]),
     ("campaign", "out", &[]),
@@ -20,6 +20,7 @@ const OUTPUTS: [(&str, &str, &[&str]); 22] = [
     ("design", "out", &["csv", "parquet"]),
     ("examples", "copy", &[]),
     ("gyro", "out", &[]),
+    ("gyro", "report", &["html"]),
     ("identify", "out", &["json"]),
     ("identify", "report", &["html"]),
     ("pack", "out", &["fmu"]),

@@ -1,9 +1,11 @@
 //! Pictures of a gyro at rest: its Allan deviation, and the noise tests of a recording.
 
 use analysis::allan::Point;
-use analysis::rest::Rest;
+use analysis::rest::{Chunk, KOLMOGOROV, Rest};
 use experiments::gyro::Characteristics;
+use maud::html;
 
+use crate::page::{document, drawn, table};
 use crate::svg::{Axis, Chart, Series, Style};
 
 /// The Allan deviations, as a file of its own.
@@ -51,8 +53,17 @@ fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Se
     Series { points, color: color.into(), style, title: title.into() }
 }
 
+/// The page about a recording at rest: these rows of text, and the charts.
+pub fn page(rows: &[(String, String)], found: &Rest) -> String {
+    let body = html! {
+        (table(["statistic", "value"], rows.iter().map(|(name, value)| vec![name.clone(), value.clone()])))
+        @for (_, chart) in rest(found) { (drawn(&chart)) }
+    };
+    document("Gyro at rest", &body)
+}
+
 /// The charts of a recording at rest, each with its file's name.
-pub fn rest(rest: &Rest) -> [(&'static str, Chart); 4] {
+pub fn rest(rest: &Rest) -> [(&'static str, Chart); 6] {
     let chart = |title: &str, x: Axis, y: Axis, series: Vec<Series>, legend: bool| Chart {
         title: title.into(),
         size: (640.0, 400.0),
@@ -135,10 +146,45 @@ pub fn rest(rest: &Rest) -> [(&'static str, Chart); 4] {
         all,
         true,
     );
+    let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
+    let normal = (-50..=50).map(|k| (0.1 * f64::from(k), density(0.1 * f64::from(k)))).collect();
+    let histogram = chart(
+        "Histogram of the readings",
+        Axis::linear("reading without its line / standard deviation", [-5.0, 5.0], 0.0, 8),
+        Axis::linear("density", rest.histogram.iter().map(|bin| bin.1).chain([0.0, 0.4]), 0.0, 5),
+        vec![
+            series(normal, EXPECTED, Style::Dashed, "normal"),
+            series(rest.histogram.clone(), MEASURED, Style::Dots, "recorded"),
+        ],
+        true,
+    );
+    let of = |value: &dyn Fn(&Chunk) -> f64| -> Vec<(f64, f64)> {
+        rest.chunks.iter().map(|chunk| (minutes(chunk.from), value(chunk))).collect()
+    };
+    let limit = vec![(0.0, KOLMOGOROV), (end, KOLMOGOROV)];
+    let read = of(&|chunk| chunk.kolmogorov);
+    let kolmogorov = chart(
+        "Kolmogorov and Smirnov's distance of the chunks from the normal distribution",
+        Axis::linear("time / min", [0.0, end], 0.0, 8),
+        Axis::decades("distance times √n", read.iter().map(|p| p.1).chain([0.1, KOLMOGOROV])),
+        vec![
+            series(read.clone(), MEASURED, Style::Dots, "of the readings"),
+            series(
+                of(&|chunk| chunk.between_levels),
+                FITTED,
+                Style::Dots,
+                "between the levels of the readings",
+            ),
+            series(limit, EXPECTED, Style::Dashed, "5 % limit of normal noise"),
+        ],
+        true,
+    );
     [
         ("allan.svg", allan),
+        ("histogram.svg", histogram),
         ("quantiles.svg", quantiles),
         ("autocorrelation.svg", autocorrelation),
         ("chunks.svg", chunks),
+        ("kolmogorov.svg", kolmogorov),
     ]
 }

@@ -44,6 +44,9 @@ pub struct GyroArgs {
     /// Length of the recording's chunks, s: the thesis's 15 min.
     #[arg(long, value_name = "SECONDS", default_value_t = 900.0, requires = "recording")]
     chunk: f64,
+    /// File for a report on the recording, .html.
+    #[arg(long, value_name = "FILE", requires = "recording")]
+    report: Option<PathBuf>,
     /// Length of each record, h.
     #[arg(long, value_name = "HOURS", default_value_t = 6.0)]
     hours: f64,
@@ -135,7 +138,15 @@ impl GyroArgs {
                 Ok(file.write_all(picture.file().as_bytes())?)
             })?;
         }
-        print!("{}", text(&rest));
+        let rows = rows(&rest);
+        for (name, value) in &rows {
+            println!("{name:34}{value}");
+        }
+        if let Some(path) = &self.report {
+            let page = report::gyro::page(&rows, &rest);
+            output::atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
+            done!("{}", path.display());
+        }
         done!("{}", self.out.display());
         Ok(())
     }
@@ -159,6 +170,9 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
         rest.chunks.iter().map(|chunk| chunk.from).collect(),
         rest.chunks.iter().map(|chunk| chunk.mean).collect(),
         rest.chunks.iter().map(|chunk| chunk.variance).collect(),
+        rest.chunks.iter().map(|chunk| chunk.kolmogorov).collect(),
+        rest.chunks.iter().map(|chunk| chunk.between_levels).collect(),
+        rest.chunks.iter().map(|c| 12.0 * c.variance / rest.quantum.powi(2)).collect(),
     ];
     [
         ("allan.csv", table(&allan.0, allan.1)),
@@ -167,49 +181,59 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
             "autocorrelation.csv",
             table(&["lag_s", "autocorrelation"], vec![lags, rest.autocorrelation.clone()]),
         ),
-        ("chunks.csv", table(&["from_s", "mean", "variance"], chunks.to_vec())),
+        (
+            "chunks.csv",
+            table(
+                &["from_s", "mean", "variance", "kolmogorov", "kolmogorov_between_levels", "qnr"],
+                chunks.to_vec(),
+            ),
+        ),
     ]
 }
 
-/// Statistics of a recording at rest, as lines of text.
-fn text(rest: &Rest) -> String {
+/// Statistics of a recording at rest: name and value.
+fn rows(rest: &Rest) -> Vec<(String, String)> {
     let hours = rest.count as f64 * rest.step / 3600.0;
-    let mut text = format!(
-        "{} samples in {hours:.2} h\n\
-         {:34}{:>12.4e} rad/s\n{:34}{:>12.4e} rad/s per hour\n{:34}{:>12.4e} rad/s\n",
-        rest.count,
-        "mean (bias)",
-        rest.mean,
-        "trend",
-        rest.trend * 3600.0,
-        "standard deviation without it",
-        rest.deviation
+    let chunks = rest.chunks.len();
+    let mut rows = Vec::new();
+    let mut row = |name: &str, value: String| rows.push((name.to_string(), value));
+    row("length", format!("{} samples in {hours:.2} h", rest.count));
+    row("mean (bias)", format!("{:.4e} rad/s", rest.mean));
+    row("trend", format!("{:.4e} rad/s per hour", rest.trend * 3600.0));
+    row("standard deviation without it", format!("{:.4e} rad/s", rest.deviation));
+    row("smallest change of a reading", format!("{:.4e} rad/s", rest.quantum));
+    row(
+        "noise over quantisation (QNR)",
+        format!("{:.1} (variance over Δ²/12, Δ the smallest change)", rest.quantisation_ratio()),
     );
-    let mut line = |name: &str, value: String| text.push_str(&format!("{name:34}{value}\n"));
-    line("smallest change of a reading", format!("{:>12.4e} rad/s", rest.quantum));
     if let Some(Noise { arw, bias_instability, bias_time }) = rest.noise {
-        line("angle random walk N", format!("{arw:>12.4e} rad/s/sqrt(Hz)"));
-        line(
-            "bias instability B",
-            format!("{bias_instability:>12.4e} rad/s, time {bias_time:.0} s"),
-        );
+        row("angle random walk N", format!("{arw:.4e} rad/s/sqrt(Hz)"));
+        row("bias instability B", format!("{bias_instability:.4e} rad/s, time {bias_time:.0} s"));
     }
-    line(
+    row(
         "skewness, excess kurtosis",
-        format!("{:>12.3} {:.3} (normal: 0, 0)", rest.skewness, rest.kurtosis),
+        format!("{:.3}, {:.3} (normal: 0, 0)", rest.skewness, rest.kurtosis),
     );
-    line(
+    let [read, between] = rest.not_normal();
+    row(
+        "Kolmogorov and Smirnov's test",
+        format!(
+            "{read} of {chunks} chunks are not normal as they are read, {between} between the levels of the readings (by chance: \
+             {:.1})",
+            0.05 * chunks as f64
+        ),
+    );
+    row(
         "autocorrelation outside ±1.96/√n",
-        format!("{:>12.1} % of the lags up to {LAG} s (white: 5 %)", 100.0 * rest.outside()),
+        format!("{:.1} % of the lags up to {LAG} s (white: 5 %)", 100.0 * rest.outside()),
     );
     let [means, variances] = rest.scatter(rest.chunk_length());
-    line(
+    row(
         "scatter of the chunks",
         format!(
-            "{means:>12.2} of the means, {variances:.2} of the variances, {} chunks of {:.0} s (white, steady: 1, 1)",
-            rest.chunks.len(),
+            "{means:.2} of the means, {variances:.2} of the variances, {chunks} chunks of {:.0} s (white, steady: 1, 1)",
             rest.chunk_length() as f64 * rest.step
         ),
     );
-    text
+    rows
 }

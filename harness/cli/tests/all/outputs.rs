@@ -19,7 +19,7 @@ fn refused(directory: &Path, arguments: &[&str]) -> String {
 }
 
 /// Commands with an input IN and an output OUT, one for each option that names an output.
-const CASES: [&str; 15] = [
+const CASES: [&str; 16] = [
     "run --input IN --out OUT",
     "run --profile zero --parameters IN --out OUT",
     "torque --profile file:path=IN --out OUT",
@@ -31,6 +31,7 @@ const CASES: [&str; 15] = [
     "tank IN --fill 1 --out OUT",
     "tank IN --fill 1 --picture OUT",
     "tank IN --fill 1 --parameters OUT",
+    "gyro --recording IN --report OUT",
     "identify IN --out OUT",
     "identify IN --out result.json --report OUT",
     "design IN --free a=1 --out OUT",

@@ -211,11 +211,18 @@ fn a_recorded_gyro_at_rest_is_characterised() {
     }
     std::fs::write(directory.join("rest.csv"), text).unwrap();
     let of = ["gyro", "--recording", "rest.csv", "--columns", "time=t:ms,omega=w:deg/s"];
-    let said = hubslosh(directory, &[&of[..], &["--chunk", "50", "--out", "g"]].concat()).unwrap();
+    let said = hubslosh(
+        directory,
+        &[&of[..], &["--chunk", "50", "--out", "g", "--report", "g.html"]].concat(),
+    )
+    .unwrap();
     let line = said.lines().find(|line| line.starts_with("angle random walk N")).unwrap();
     let walk: f64 = line.split_whitespace().nth(4).unwrap().parse().unwrap();
     // 50,000 samples: 0.5 %
     assert!((walk / (4e-4 / 50f64.sqrt()) - 1.0).abs() < 0.03, "{line}");
+    let page = std::fs::read_to_string(directory.join("g.html")).unwrap();
+    assert_eq!(page.matches("<svg ").count(), 6 + 6, "six charts, each with a nested one");
+    assert!(page.contains("noise over quantisation"), "{page}");
     for name in ["allan", "quantiles", "autocorrelation", "chunks"] {
         assert!(
             directory.join(format!("g/{name}.svg")).is_file()

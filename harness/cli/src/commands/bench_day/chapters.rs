@@ -486,7 +486,12 @@ fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
                     "5.19",
                     "The white noise has the slope −1/2; the bias instability is the level part.",
                 ),
-                "quantiles.svg" => ("5.14 and 5.15", "Normal noise lies on the dashed line."),
+                "quantiles.svg" => ("5.14", "Normal noise lies on the dashed line."),
+                "histogram.svg" => ("5.15", "Normal noise has the dashed density."),
+                "kolmogorov.svg" => (
+                    "5.14 and 5.15",
+                    "Quantisation alone moves the readings off the normal distribution; between their levels it has no effect.",
+                ),
                 "autocorrelation.svg" => {
                     ("5.18", "White noise stays within the frame 95 % of the time.")
                 }
