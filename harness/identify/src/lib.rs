@@ -30,6 +30,7 @@ pub mod sensor_faults;
 pub mod simulate;
 pub mod spikes;
 pub mod start;
+pub mod start_study;
 pub mod stribeck;
 pub mod tank;
 pub mod tolerance;

@@ -33,6 +33,8 @@ pub struct Options {
     pub intersample: Option<Intersample>,
     /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
     pub acausal: bool,
+    /// Number of other starts of each of the tank's parameters from which the chosen model is fitted again.
+    pub start_study: usize,
     /// Recordings that are simulated, not fitted.
     pub validation: Vec<Recording>,
 }
@@ -50,6 +52,7 @@ impl Default for Options {
             tolerances: Tolerances::default(),
             intersample: None,
             acausal: false,
+            start_study: 0,
             validation: Vec::new(),
         }
     }

@@ -4,15 +4,19 @@
 use anyhow::{Result, bail};
 
 use crate::recording::Recording;
-use crate::start::Response;
 use analysis::innovations;
 use analysis::statistics::{deviation, mean, median, noise_level};
 
-/// Refuses what is off by a factor that only a wrong unit makes.
-pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
-    let ratio = nominal / found.inertia;
+/// Returns true if an inertia is not off by a factor that only a wrong unit makes.
+pub fn is_size(inertia: f64, nominal: f64) -> bool {
     // revolutions per minute are a factor of 9.5
-    if (0.125..8.0).contains(&ratio) {
+    (0.125..8.0).contains(&(nominal / inertia))
+}
+
+/// Refuses an inertia, kg·m², that is off by a factor that only a wrong unit makes.
+pub fn check_size(inertia: f64, nominal: f64) -> Result<()> {
+    let ratio = nominal / inertia;
+    if is_size(inertia, nominal) {
         return Ok(());
     }
     let guess = match ratio {
@@ -31,9 +35,9 @@ pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
          {guess}. A torque with little power near the slosh frequency, such as a push, does not show the inertia either: record a \
          sweep. If the bench really is that different, give its expected inertia: --known hub.I={:.1e}:{:.1e} estimates it all \
          the same.",
-        found.inertia,
-        0.8 * found.inertia,
-        0.4 * found.inertia
+        inertia,
+        0.8 * inertia,
+        0.4 * inertia
     )
 }
 

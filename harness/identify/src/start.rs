@@ -16,6 +16,7 @@ use names::hubslosh::{friction, hub, slosh, tank};
 use signals::fourier::Forward;
 
 use crate::nominal::{Bench, Nominal, Start};
+use crate::plausible;
 use crate::recording::Recording;
 
 /// Bench parameters from a frequency response.
@@ -166,7 +167,9 @@ pub fn from_data(
         let found = [translate(&measured, bench), from_features(&measured, bench)];
         responses.extend(found.into_iter().flatten());
     }
-    responses.sort_by(|a, b| b.fit.total_cmp(&a.fit));
+    // a step may have a response by chance: one with the inertia of the bench comes first
+    let key = |r: &Response| (!plausible::is_size(r.inertia, nominal.inertia), -r.fit);
+    responses.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
     let rough = friction(recordings);
     let whole = balances(recordings, bench, &|r| excited(r).into_iter().collect());
     let Some(first) = whole.into_iter().chain(responses.first().copied()).next() else {

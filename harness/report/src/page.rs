@@ -6,8 +6,8 @@ use crate::svg::{Axis, Chart, Series, Style};
 
 /// Style sheet of the page.
 const STYLE: &str = "
-:root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--warn:#fde8d7}
-@media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--paper:#16171a;--soft:#a0a0a8;--rule:#3a3b40;--a:#6cb1ff;--b:#ff9a5c;--warn:#4a2a12}}
+:root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--c:#15803d;--d:#7e22ce;--warn:#fde8d7}
+@media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--paper:#16171a;--soft:#a0a0a8;--rule:#3a3b40;--a:#6cb1ff;--b:#ff9a5c;--c:#5fd38d;--d:#c79bff;--warn:#4a2a12}}
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:62rem;margin:2rem auto;padding:0 1rem}
 h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
@@ -20,6 +20,9 @@ svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .tick,svg .label{fil
 svg .title{font-weight:600}svg .grid{stroke:var(--rule);stroke-width:.6;fill:none}svg .frame{stroke:var(--soft);fill:none}svg .curve path{fill:none;stroke-width:1.4}
 details{margin:.6rem 0}summary{cursor:pointer}
 ";
+
+/// Names of [`series`]' colours, for curves of one kind.
+pub const COLORS: [&str; 5] = ["a", "b", "c", "d", "soft"];
 
 /// Returns a page with this title, which is also its first heading.
 pub fn document(title: &str, body: &Markup) -> String {

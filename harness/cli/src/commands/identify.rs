@@ -95,6 +95,10 @@ pub struct IdentifyArgs {
     /// found in the data).
     #[arg(conflicts_with = "free", long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
     starts: Vec<(String, f64)>,
+    /// Repeats the fit from so many starts of each parameter, one at a time from a tenth to ten times its estimate, and reports how many
+    /// end at the same minimum, of --method output-error (the tank's parameters) and acceleration.
+    #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0)]
+    start_study: usize,
     /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
     #[arg(conflicts_with = "free", long)]
     perfect: bool,
@@ -102,7 +106,7 @@ pub struct IdentifyArgs {
     #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
     /// Relative standard deviations of quantities that no recording shows: torque (1%), clock (0.01%), g_axial (0.1%), tank.r
-    /// (0.4%), fluid.rho (0.3%). The intervals include them; 0 is exact.
+    /// (0.4%), fluid.rho (0.3%). The intervals include them; 0 is exact. --method acceleration takes the torque's.
     #[arg(
         conflicts_with = "free",
         long = "tolerance",
@@ -271,6 +275,10 @@ impl IdentifyArgs {
             self.starts.is_empty() || searches,
             "--start is for --method output-error and acceleration alone: the other methods need none"
         );
+        ensure!(
+            self.start_study == 0 || searches,
+            "--start-study is for --method output-error and acceleration alone: the other methods need no start"
+        );
         for (name, value) in &self.starts {
             ensure!(
                 *value > 0.0 || self.method == MethodName::Acceleration,
@@ -310,6 +318,9 @@ impl IdentifyArgs {
                     harmonics: self.harmonics,
                     settings: self.settings.clone(),
                     held: self.intersample() == Some(Intersample::ZeroOrderHold),
+                    torque_scale: self.tolerances.unwrap_or_default().torque,
+                    gyro_scale: self.gyro_scale,
+                    start_study: self.start_study,
                 };
                 self.answer(Acceleration { options }, trim)
             }
@@ -335,6 +346,7 @@ impl IdentifyArgs {
             starts: self.starts.clone(),
             sensor_errors: !self.perfect,
             gyro_scale: self.gyro_scale,
+            start_study: self.start_study,
             tolerances: self.tolerances.unwrap_or_default(),
             validation: Vec::new(),
         }

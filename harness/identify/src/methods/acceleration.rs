@@ -21,23 +21,28 @@
 //!   power of y. The residual is r_k/I instead: y_k is then what is explained, and its noise biases nothing, however large.
 //! * Near ω = 0 the measured sign is not that of ω. Expected is the mean over the noise, erf(ω/σ√2) ≈ tanh(ω/1.25σ).
 
+mod page;
 mod starts;
 
 use std::collections::BTreeMap;
 
-use analysis::statistics::{about_mean, noise_level, peak};
+use analysis::statistics::{about_mean, noise_level, peak, variance};
 use anyhow::{Result, bail, ensure};
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use names::hubslosh::{FrictionModel, SloshModel, friction, hub, slosh, tank};
+use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Identified, Method, Needs, Task};
+use super::page::Sections;
+use super::{Identified, Method, Needs, Residual, Task};
 use crate::decomposition;
-use crate::estimate::Estimated;
+use crate::estimate::{Estimated, prose};
 use crate::news::News;
 use crate::nominal::{self, Nominal};
+use crate::plausible;
 use crate::recording::Recording;
+use crate::start_study::{self, Trial};
 use crate::uncertainty::{self, Combination, Covariance, ONE_WAY, Sources, one_way};
 use crate::unknown::{self, Scale};
 use crate::verdict::DOES_NOT_FIT;
@@ -45,10 +50,11 @@ use analysis::least_squares::{self, Minimum};
 use starts::State;
 
 /// Weights of the rows (thesis 5.2.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weights {
     /// All rows alike.
+    #[default]
     Uniform,
     /// Each row by the time it stands for: unevenly sampled rows.
     Time,
@@ -68,7 +74,7 @@ pub enum Form {
 }
 
 /// Options of the method.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Weights.
     pub weights: Weights,
@@ -82,6 +88,12 @@ pub struct Options {
     pub settings: Vec<(String, String)>,
     /// The torque keeps a row's value until the next, else it goes to the next along a line.
     pub held: bool,
+    /// Relative standard deviation of the torque's scale, which no recording shows.
+    pub torque_scale: f64,
+    /// Relative standard deviation of the gyro's scale.
+    pub gyro_scale: f64,
+    /// Number of other starts of each unknown from which the fit is repeated.
+    pub start_study: usize,
 }
 
 /// The result; `measurement` is the inertia of hub and all the liquid, and each recording's gyro bias.
@@ -104,6 +116,22 @@ pub struct Details {
     pub condition_si: f64,
     /// Braking against the angle in free decay (5.4), clockwise and counter-clockwise.
     pub braking: Vec<Braking>,
+    /// Measured friction against the rate.
+    pub friction_points: Vec<FrictionPoint>,
+    /// Ends of searches from other starts, if requested.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub starts: Vec<Trial>,
+}
+
+/// Mean of τ − I ω' over rows of similar rate.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct FrictionPoint {
+    /// Mean rate, rad/s.
+    pub rate: f64,
+    /// Mean friction torque, N·m; positive if it brakes a positive rate.
+    pub torque: f64,
+    /// Number of rows.
+    pub rows: usize,
 }
 
 /// Least squares of the acceleration.
@@ -119,8 +147,13 @@ impl Method for Acceleration {
 
     fn identify(&self, task: &Task, _: &mut dyn FnMut(&News)) -> Result<Found> {
         let fmu = task.fmu()?;
-        task.check_size(&Nominal::of(fmu, &self.options.settings, &[])?)?;
-        identify(fmu, task.recordings, &self.options)
+        let found = identify(fmu, task.recordings, &self.options)?;
+        let inertia = &found.measurement["inertia"];
+        if inertia.std < VAGUE * inertia.value {
+            let nominal = Nominal::of(fmu, &self.options.settings, &[])?;
+            plausible::check_size(inertia.value, nominal.inertia)?;
+        }
+        Ok(found)
     }
 
     fn lines(found: &Found) -> Vec<String> {
@@ -138,6 +171,10 @@ impl Method for Acceleration {
             lines.push(format!("{name:24} {}", row.join(" ")));
         }
         lines
+    }
+
+    fn sections(found: &Found) -> Sections {
+        page::sections(found)
     }
 }
 
@@ -211,6 +248,14 @@ const FIRST: [&str; 6] =
 const BLOCK: f64 = 0.01;
 /// Blocks of the shortest recording.
 const FEWEST: usize = 100;
+/// Power of the rate's changes over that of the gyro's noise, below which the hub does not move.
+const MOVES: f64 = 2.0;
+/// Intervals of the rate over which the measured friction is averaged, and the fewest rows of one.
+const BINS: (usize, usize) = (160, 3);
+/// Farthest start of the study of starts over the estimate, or the estimate over it.
+const REACH: f64 = 10.0;
+/// Share of the variance by which a tolerance is reported.
+const SHARE: f64 = 0.2;
 /// Number of rows on which the starts are compared; the best start is then refined on all rows.
 const ROUGH: usize = 20_000;
 /// Stride over the grid of Stribeck speeds for intervals.
@@ -687,6 +732,78 @@ impl Problem {
         Ok(Profile { points, intervals, speeds })
     }
 
+    /// Ends of searches that start with one unknown off its estimate; `square` is the mean square of the residual. The gyro's biases
+    /// start at their estimates.
+    fn start_study(&self, minimum: &Minimum, count: usize, square: f64) -> Vec<Trial> {
+        let p = self.values(&minimum.x);
+        let first = off_the_bounds(&minimum.x);
+        let of = |(place, factor): (usize, f64)| {
+            let mut x = first.clone();
+            x[place] = self.scales[place].variable(self.inside(place, factor * p[place]));
+            let found = self.solve(&[x], &[]);
+            let end = self.values(&found.x)[place] / p[place];
+            Trial {
+                name: self.names[place].clone(),
+                start: factor,
+                end: Some(end),
+                more: Some((found.cost - minimum.cost) / square),
+            }
+        };
+        let starts = start_study::starts(count, REACH);
+        let all: Vec<(usize, f64)> =
+            (0..=STRIBECK).flat_map(|place| starts.iter().map(move |s| (place, *s))).collect();
+        all.into_par_iter().map(of).collect()
+    }
+
+    /// Measured friction, mean torque less I y, over rows of similar rate in which the hub slips.
+    fn friction_points(&self, p: &[f64]) -> Vec<FrictionPoint> {
+        let (count, fewest) = BINS;
+        let mut all: Vec<(f64, f64)> = Vec::new();
+        for (rows, bias) in self.rows.iter().zip(self.biases(p)) {
+            let slips = rows.inner().filter(|k| rows.weight[k - 1] > 0.0);
+            all.extend(slips.map(|k| {
+                (rows.rate[k] - bias, rows.torque(self.form, k) - p[0] * rows.acceleration(k))
+            }));
+        }
+        let most = all.iter().map(|(w, _)| w.abs()).fold(f64::MIN_POSITIVE, f64::max);
+        // finer near zero, where friction changes most
+        let bin =
+            |w: f64| (w.signum() * (w.abs() / most).sqrt() * count as f64 / 2.0).round() as i64;
+        let mut bins: BTreeMap<i64, (f64, f64, usize)> = BTreeMap::new();
+        for (w, torque) in all {
+            let sum = bins.entry(bin(w)).or_default();
+            *sum = (sum.0 + w, sum.1 + torque, sum.2 + 1);
+        }
+        let point = |(rate, torque, rows): (f64, f64, usize)| FrictionPoint {
+            rate: rate / rows as f64,
+            torque: torque / rows as f64,
+            rows,
+        };
+        bins.into_values().filter(|bin| bin.2 >= fewest).map(point).collect()
+    }
+
+    /// Measured acceleration and residual of the rows in which the hub slips; `e`: weighted residuals.
+    fn residuals(&self, recordings: &[Recording], e: &[f64]) -> Vec<Residual> {
+        let mut first = 0;
+        let of = |(rows, recording): (&Rows, &Recording)| {
+            let used = |k: &usize| rows.weight[k - 1] > 0.0;
+            let inner: Vec<usize> = rows.inner().filter(used).collect();
+            let residual = inner.iter().map(|k| e[first + k - 1] / rows.weight[k - 1]).collect();
+            first += rows.inner().len();
+            Residual {
+                name: recording.name.clone(),
+                label: "rad/s²".into(),
+                time: inner.iter().map(|k| rows.time[*k]).collect(),
+                measured: inner.iter().map(|k| rows.acceleration(*k)).collect(),
+                residual,
+                // differences of white noise are not white
+                noise: None,
+                torque: None,
+            }
+        };
+        self.rows.iter().zip(recordings).map(of).collect()
+    }
+
     /// Mean of the sum of w_k y_k² from the gyro's noise.
     fn noise_power(&self) -> f64 {
         self.rows.iter().flat_map(|rows| rows.inner().map(|k| rows.noise_power(k))).sum()
@@ -750,12 +867,26 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         recording.check()?;
         ensure!(
             recording.duration() > FEWEST as f64 * BLOCK,
-            "{}: it lasts {:e} s (allowed: more than {} s)",
+            "{}: it lasts {:e} s (allowed: more than {} s). Record a ramp, a step and a sweep of a minute or more each",
             recording.name,
             recording.duration(),
             FEWEST as f64 * BLOCK
         );
     }
+    let names = || recordings.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", ");
+    let torque = recordings.iter().map(|r| peak(&r.torque)).fold(0.0, f64::max);
+    ensure!(
+        torque > 0.0,
+        "{}: the torque is 0 in every row. Friction and inertia need a torque; record a ramp, a step or a sweep",
+        names()
+    );
+    let moves = |r: &Recording| variance(&r.rate) > MOVES * r.rate_noise().powi(2);
+    ensure!(
+        recordings.iter().any(moves),
+        "{}: the hub does not move: the rate is constant but for the gyro's noise. Static friction holds it up to the largest torque, \
+         {torque:.1e} N·m; record more torque",
+        names()
+    );
     ensure!(
         options.harmonics <= 2,
         "the FMU has 2 harmonics of the angle, not {}",
@@ -860,6 +991,18 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
             of_values[(place, place)] = of_values[(place, place)].max(reach * reach);
         }
     }
+    let of_noise = of_values.diagonal();
+    // both scales act exactly: I, b, c and d go with the torque's, I and b with the inverse of the gyro's, ω_s with it
+    let by_torque = |j: usize| if j <= 3 { options.torque_scale * p[j] } else { 0.0 };
+    let by_gyro = |j: usize| match j {
+        0 | 1 => -options.gyro_scale * p[j],
+        STRIBECK => options.gyro_scale * p[j],
+        _ => 0.0,
+    };
+    for j in 0..n {
+        of_values[(j, j)] += by_torque(j).powi(2) + by_gyro(j).powi(2);
+    }
+    let sum_of_dry = sum_of_dry + (by_torque(2) + by_torque(3)).powi(2);
     let estimated = |j: usize, less: f64| {
         let std = of_values[(j, j)].sqrt();
         let end = |side: f64| problem.bounded(j, p[j] + side * 1.96 * std) - less;
@@ -867,7 +1010,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         let estimated = Estimated::normal(p[j] - less, std, unit(&problem.names[j]));
         // a friction is known if it is known to half its size
         let determined = !(1..=STRIBECK).contains(&j) || std < 0.5 * p[j];
-        Estimated { interval, determined, ..estimated }
+        Estimated { std_noise: of_noise[j].sqrt(), interval, determined, ..estimated }
     };
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (j, name) in problem.names.iter().enumerate() {
@@ -916,7 +1059,34 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         .into_iter()
         .filter_map(|way| braking(recordings, problem.biases(&p), way))
         .collect();
+    let starts = problem.start_study(&minimum, options.start_study, rms * rms);
+    let rests = problem.rows.iter().any(|rows| rows.resting.iter().any(|weight| *weight > 0.0));
+    let share = |j: usize| (of_values[(j, j)] - of_noise[j]) / of_values[(j, j)];
+    let shares: Vec<String> = (0..n)
+        .filter(|j| of_noise[*j] > 0.0 && share(*j) > SHARE)
+        .map(|j| format!("{} {:.0} %", problem.names[j], 100.0 * share(j)))
+        .collect();
+    let mut remarks = Vec::new();
+    if !shares.is_empty() {
+        remarks.push(format!(
+            "The intervals include tolerances that no recording shows: scale of the torque {} %, scale of the gyro {} %. Their share of \
+             the variance: {}. --tolerance torque=… and --gyro-scale set them.",
+            100.0 * options.torque_scale,
+            100.0 * options.gyro_scale,
+            shares.join(", ")
+        ));
+    }
+    if !rests {
+        remarks.push(
+            "No recording shows the hub at rest: the gyro's bias and the friction near zero speed come from passages through zero \
+             alone. Begin a recording with some seconds without torque, and ramp the torque up until the hub breaks away."
+                .into(),
+        );
+    }
+    remarks.extend(start_study::words(&starts));
     let details = Details {
+        friction_points: problem.friction_points(&p),
+        starts,
         fit: Fit {
             rows: problem.used(),
             rmse: rms,
@@ -938,9 +1108,11 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         correlations: (named(&|j| shown.contains(&j)), correlations),
         converged: minimum.converged,
         fits: Some(fits),
+        residuals: problem.residuals(recordings, &e),
         ..Found::new(details)
     };
-    found.verdict = words(&found);
+    found.verdict = words(&found, &problem, &p);
+    found.verdict.extend(remarks);
     Ok(found)
 }
 
@@ -1020,7 +1192,7 @@ fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking
     })
 }
 
-fn words(found: &Found) -> Vec<String> {
+fn words(found: &Found, problem: &Problem, p: &[f64]) -> Vec<String> {
     let mut words = Vec::new();
     let Details { fit, at_bound, braking, .. } = &found.details;
     let (ratio, fits) = (fit.rmse / fit.expected, found.fits == Some(true));
@@ -1044,8 +1216,32 @@ fn words(found: &Found) -> Vec<String> {
         ));
     }
     for name in at_bound {
+        let Some(j) = problem.names.iter().position(|n| n == name) else { continue };
+        let low = problem.bounded(j, f64::NEG_INFINITY);
+        let end =
+            if p[j] - low < problem.bounded(j, f64::INFINITY) - p[j] { "lower" } else { "upper" };
+        let cause = match (name.as_str(), end) {
+            (friction::B, "lower") => {
+                "The rate lags behind the torque: a torque that is held between rows (--torque held), or a delay of the rate. "
+            }
+            (friction::C | friction::D, "lower") => {
+                "Friction that drives the hub does not exist: the torque or the rate has the wrong sign or lags, or liquid moves. "
+            }
+            (friction::OMEGA_S, "upper") => {
+                "Friction does not level off up to the fastest rate: record a step or a ramp with more torque. "
+            }
+            (friction::OMEGA_S, "lower") => {
+                "Friction levels off below the slowest rate that the gyro resolves: record a slow ramp through zero. "
+            }
+            (friction::ASYMMETRY, _) => {
+                "Friction acts in one direction alone: check the gyro's bias, and record both directions. "
+            }
+            _ => "",
+        };
         words.push(format!(
-            "{name} ended at a bound; its value is the bound's. --bound {name}=LOW:HIGH moves the bound."
+            "{name} ended at its {end} bound, {:.4e} {}. {cause}--bound {name}=LOW:HIGH moves the bound.",
+            p[j],
+            prose(unit(name))
         ));
     }
     if found.parameters.get(friction::OMEGA_S).is_some_and(|speed| !speed.determined) {

@@ -266,15 +266,13 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     };
     let fits = over_noise < MISFIT && structure.abs() < 3.3;
     let time = (0..count).map(|k| recording.time[0] + k as f64 * step).collect();
-    // within the band: the noise has that part of its power
-    let share = problem.s.len() as f64 / (0.5 * count as f64);
     let residual = Residual {
         name: format!("{}, {:.3} to {:.3} Hz", recording.name, band.0, band.1),
         label: RATE.into(),
         time,
         measured: signal(&problem.y, &bins, count),
         residual: signal(&problem.residual(&x), &bins, count),
-        noise: Some(noise * share.sqrt()),
+        noise: Some(noise),
         torque: Some(torque),
     };
     let verdict = words(&fit, fits, converged);

@@ -8,6 +8,7 @@ use crate::candidate::ModelFit;
 use crate::missing::Missing;
 use crate::nominal::Start;
 use crate::start::Response;
+use crate::start_study::Trial;
 use crate::uncertainty::Combination;
 
 /// Results that only the output-error method has.
@@ -29,6 +30,9 @@ pub struct Details {
     pub frequency_response: Option<Response>,
     /// Starts from the data.
     pub start: Option<Start>,
+    /// Ends of searches from other starts, if requested.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub starts: Vec<Trial>,
     /// Wall time, s.
     pub seconds: f64,
 }

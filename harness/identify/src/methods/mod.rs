@@ -51,7 +51,7 @@ impl<'a> Task<'a> {
     /// Refuses recordings of another bench than the FMU's: units or inertia are wrong.
     fn check_size(&self, nominal: &Nominal) -> Result<()> {
         match start::from_data(self.recordings, nominal)? {
-            (Some(found), _) => plausible::check_size(&found, nominal.inertia),
+            (Some(found), _) => plausible::check_size(found.inertia, nominal.inertia),
             (None, _) => Ok(()),
         }
     }

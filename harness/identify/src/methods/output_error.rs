@@ -13,6 +13,7 @@ use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use names::hubslosh::SloshModel::{self, Frozen, Linear, Paraboloid, Planar, Spherical};
 use names::hubslosh::{self, FrictionModel};
+use rayon::prelude::*;
 
 use super::identification::{Details, Identification};
 use super::page::{RATE, Sections};
@@ -33,6 +34,7 @@ use crate::options::Options;
 use crate::plausible;
 use crate::recording::{self, Recording};
 use crate::start::{self, Response};
+use crate::start_study::{self, Trial};
 use crate::uncertainty::{self, Covariance, ONE_WAY, Sources};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict::{self, Findings};
@@ -144,8 +146,9 @@ fn identify_whole(
         doubts.extend(found);
     }
     let (response, starts) = start::from_data(recordings, &nominal)?;
-    if let Some(found) = &response {
-        plausible::check_size(found, nominal.inertia)?;
+    // the response is that of a hub with slosh
+    if let (Some(found), true) = (&response, options.models.iter().any(|m| *m != Frozen.name())) {
+        plausible::check_size(found.inertia, nominal.inertia)?;
     }
     let said = response.as_ref().map(Response::line);
     tell(News::Step(said.unwrap_or("frequency response: no slosh in it".into())));
@@ -313,6 +316,8 @@ fn finish(
     let Polished { jacobian, covariance, answer, .. } = polished;
     let error_budget = budget::of(&problem, (&x, &answer), &jacobian, &covariance, &changes);
     say("higher slosh modes", &problem);
+    let starts = start_study(&problem, &x, e.norm_squared(), options.start_study);
+    say("other starts", &problem);
     fit.simulations = problem.simulations();
     let tolerances = budget::of_tolerances(&error_budget, x.len());
     let noise_only = match place(&problem) {
@@ -427,11 +432,19 @@ fn finish(
     let mut verdict =
         verdict::words(question, &findings, &fit, &combinations, &parameters, &error_budget);
     verdict.extend(shares);
+    verdict.extend(start_study::words(&starts));
     verdict.extend(regime(&fit.model, &answer));
     let (converged, condition) = (fit.converged, covariance.condition);
     let missing = findings.missing;
-    let details =
-        Details { fit, combinations, condition, error_budget, missing, ..Details::default() };
+    let details = Details {
+        fit,
+        combinations,
+        condition,
+        error_budget,
+        missing,
+        starts,
+        ..Details::default()
+    };
     Ok(Identification {
         parameters,
         measurement,
@@ -443,6 +456,44 @@ fn finish(
         residuals: residuals(&problem, &answer),
         ..Identified::new(details)
     })
+}
+
+/// Farthest start of the study of starts over the estimate, or the estimate over it.
+const REACH: f64 = 3.0;
+
+/// Ends of searches over the whole recordings that start with the tank's diameter or fill height off its estimate, or with inertia or
+/// friction if there is no tank to fit. `cost`: sum of squares at the estimate x.
+fn start_study(problem: &Problem, x: &[f64], cost: f64, count: usize) -> Vec<Trial> {
+    let there = |names: &[&str]| -> Vec<usize> {
+        names.iter().filter_map(|name| problem.index(name)).collect()
+    };
+    let mut places = there(&[hubslosh::tank::D, hubslosh::tank::H]);
+    if places.is_empty() {
+        let [b, c, d, speed] = [
+            hubslosh::friction::B,
+            hubslosh::friction::C,
+            hubslosh::friction::D,
+            hubslosh::friction::OMEGA_S,
+        ];
+        places = there(&[hubslosh::hub::I, b, c, d, speed]);
+    }
+    let starts = start_study::starts(count, REACH);
+    let one = |(place, factor): (usize, f64)| {
+        let unknown = &problem.unknowns[place];
+        let estimate = unknown.value(x[place]);
+        let mut from = x.to_vec();
+        from[place] = unknown.scale.variable(factor * estimate);
+        let found = problem.search(&from, 0.0).ok();
+        Trial {
+            name: unknown.quantity.name(),
+            start: factor,
+            end: found.as_ref().map(|found| unknown.value(found.x[place]) / estimate),
+            more: found.as_ref().map(|found| found.answer.1.norm_squared() - cost),
+        }
+    };
+    let all: Vec<(usize, f64)> =
+        places.iter().flat_map(|place| starts.iter().map(move |s| (*place, *s))).collect();
+    all.into_par_iter().map(one).collect()
 }
 
 /// A hub that turned one way alone.

@@ -5,52 +5,28 @@ use std::collections::BTreeMap;
 use analysis::random::Random;
 use host::fmu::Fmu;
 use identify::estimate::Estimated;
-use identify::methods::acceleration::{self, Weights};
+use identify::methods::acceleration::{self, Acceleration};
+use identify::methods::{Method, Task};
 use identify::recording::Recording;
 use identify::uncertainty::Combination;
 use pack::packed_for_tests;
 
-use crate::bench::{Bearing, Bench, Drive, Liquid};
+use crate::bench::{Bench, Drive};
+use crate::runs::{self, SETS, Set, recordings};
 
 /// Asymmetry of the bearing in these recordings.
 const ASYMMETRY: f64 = 0.15;
-/// Noise of a row of the thesis's gyro at 50 Hz and its least step, rad/s.
-const GYRO: (f64, f64) = (4.066e-4, 1.53e-4);
-
-/// A ramp, a step and a sweep of 120 s each on the thesis's bench with a rigid liquid, and the encoder's angle.
-fn recordings(seed: u64, bias: f64) -> Vec<Recording> {
-    let time: Vec<f64> = (0..=6000).map(|k| 0.02 * f64::from(k)).collect();
-    let sweep = |t: f64| 0.1 * (std::f64::consts::TAU * (1.25 * t + 2.25 / 240.0 * t * t)).sin();
-    let courses: [&dyn Fn(f64) -> f64; 3] = [
-        // up to 0.12 N·m and back through zero to the same torque backwards
-        &|t| if t < 60.0 { 0.002 * t } else { 0.12 - 0.004 * (t - 60.0) },
-        &|t| if !(5.0..65.0).contains(&t) { 0.0 } else { 0.05 },
-        &sweep,
-    ];
-    let bearing = Bearing { asymmetry: ASYMMETRY, ..Bench::default().bearing };
-    let bench = Bench { liquid: Liquid::Frozen, bearing, ..Bench::default() };
-    let record = |(number, torque): (usize, &&dyn Fn(f64) -> f64)| {
-        let tau: Vec<f64> = time.iter().map(|t| torque(*t)).collect();
-        let motion = bench.motion(&Drive::Lines(&time, &tau), &time);
-        let mut random = Random::new(seed, number as u64);
-        let mut read = |w: &f64| ((w + bias + GYRO.0 * random.normal()) / GYRO.1).round() * GYRO.1;
-        let rate = motion.rate.iter().map(&mut read).collect();
-        let recording = Recording::of("bench", time.clone(), tau, rate);
-        Recording { angle: Some(motion.angle), ..recording }
-    };
-    courses.iter().enumerate().map(record).collect()
-}
+/// Noise of a row of the thesis's gyro at 50 Hz, rad/s.
+const NOISE: f64 = 4.066e-4;
 
 /// A push of 0.1 N·m for 5 s forwards (1) or backwards (−1), and the free decay to rest.
 pub fn push(seed: u64, way: f64) -> Recording {
     let time: Vec<f64> = (0..=3000).map(|k| 0.02 * f64::from(k)).collect();
     let tau: Vec<f64> =
         time.iter().map(|t| if (1.0..6.0).contains(t) { 0.1 * way } else { 0.0 }).collect();
-    let bearing = Bearing { asymmetry: ASYMMETRY, ..Bench::default().bearing };
-    let bench = Bench { liquid: Liquid::Frozen, bearing, ..Bench::default() };
-    let motion = bench.motion(&Drive::Lines(&time, &tau), &time);
+    let motion = runs::bench(ASYMMETRY).motion(&Drive::Lines(&time, &tau), &time);
     let mut random = Random::new(seed, 9);
-    let rate = motion.rate.iter().map(|w| w + GYRO.0 * random.normal()).collect();
+    let rate = motion.rate.iter().map(|w| w + NOISE * random.normal()).collect();
     Recording::of("push", time, tau, rate)
 }
 
@@ -81,20 +57,17 @@ pub fn is_one_way(
 }
 
 pub fn options(harmonics: usize) -> acceleration::Options {
-    acceleration::Options {
-        weights: Weights::Uniform,
-        bounds: Vec::new(),
-        starts: Vec::new(),
-        harmonics,
-        settings: Vec::new(),
-        held: false,
-    }
+    acceleration::Options { harmonics, ..acceleration::Options::default() }
 }
 
 /// The parameters that are three standard deviations or more from the truth; the fit is a minimum, and none is at a bound.
-fn wrong(seed: u64, harmonics: usize, bias: f64) -> Vec<String> {
+fn wrong(set: &Set, seed: u64, harmonics: usize, bias: f64, asymmetry: f64) -> Vec<String> {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let found = acceleration::identify(&fmu, &recordings(seed, bias), &options(harmonics)).unwrap();
+    let recordings = recordings(set, seed, bias, asymmetry);
+    // as the command does
+    let task = Task { fmu: Some(&fmu), recordings: &recordings, validation: &[] };
+    let method = Acceleration { options: options(harmonics) };
+    let found = method.identify(&task, &mut |_| {}).unwrap();
     assert!(found.converged && found.fits == Some(true), "{seed}: {:?}", found.verdict);
     assert!(found.details.at_bound.is_empty(), "{seed}: {:?}", found.details.at_bound);
     let bearing = Bench::default().bearing;
@@ -105,43 +78,141 @@ fn wrong(seed: u64, harmonics: usize, bias: f64) -> Vec<String> {
         ("friction.c", bearing.c),
         ("friction.d", bearing.d),
         ("friction.omega_s", bearing.omega_s),
-        ("friction.asymmetry", ASYMMETRY),
+        ("friction.asymmetry", asymmetry),
         ("gyro_bias[1]", bias),
     ] {
         let p = found.parameters.get(name).unwrap_or_else(|| &found.measurement[name]);
         let off = (p.value - truth) / p.std;
         println!(
-            "{seed}, {harmonics} harmonics: {name} {:.4e} ± {:.1e}, {off:+.2} σ",
-            p.value, p.std
+            "{}, {seed}, {harmonics} harmonics: {name} {:.4e} ± {:.1e}, {off:+.2} σ",
+            set.name, p.value, p.std
         );
         // one of 370 is further off by chance, and the seeds are fixed
-        wrong
-            .extend((off.abs() >= 3.0).then(|| format!("{seed}, {harmonics}: {name} {off:+.1} σ")));
+        wrong.extend(
+            (off.abs() >= 3.0)
+                .then(|| format!("{}, {seed}, {harmonics}: {name} {off:+.1} σ", set.name)),
+        );
         // the hub rests for 4 s before the ramp breaks it away: 5e-5 rad/s
-        let sure = p.std < if name.starts_with("gyro") { 1e-4 } else { 0.3 * truth };
+        let sure = p.std < if name.starts_with("gyro") { 1e-4 } else { 0.3 * truth.abs() };
         assert!(sure, "{seed}: {name} {p:?}");
     }
     wrong
 }
 
-/// Seed 2 failed while the rows at rest did not count: two choices of rows that stick alternated, each by the bias that the other
-/// one gives. `friction.d` was 3.4 standard deviations off and the bias of the ramp 4.9, and the fit was accepted.
+/// Seed 2 of the first set failed while the rows at rest did not count: two choices of rows that stick alternated, each by the bias that
+/// the other one gives. `friction.d` was 3.4 standard deviations off and the bias of the ramp 4.9, and the fit was accepted.
 #[test]
-fn friction_of_eight_recordings_ends_in_no_false_minimum() {
-    let all = (1..=8).flat_map(|seed| [wrong(seed, 0, 0.002), wrong(seed, 1, 0.002)].concat());
-    assert_eq!(all.collect::<Vec<_>>(), [""; 0]);
+fn friction_of_two_sets_of_runs_ends_in_no_false_minimum() {
+    let first = (1..=8).flat_map(|seed| wrong(&SETS[0], seed, 0, 0.002, ASYMMETRY));
+    let others = (1..=4).flat_map(|seed| wrong(&SETS[2], seed, 0, 0.002, ASYMMETRY));
+    assert_eq!(first.chain(others).collect::<Vec<_>>(), [""; 0]);
+}
+
+/// The preferential direction came back with the opposite sign and at its bound.
+#[test]
+fn the_preferential_direction_comes_back_with_harmonics_of_the_angle() {
+    let either = |seed: u64| {
+        let asymmetry = if seed.is_multiple_of(2) { -ASYMMETRY } else { ASYMMETRY };
+        wrong(&SETS[0], seed, 1 + seed as usize % 2, 0.002, asymmetry)
+    };
+    assert_eq!((1..=4).flat_map(either).collect::<Vec<_>>(), [""; 0]);
+}
+
+/// All of the above, eight seeds each: 1 min.
+#[test]
+#[ignore = "takes minutes: cargo test --release -p identify --test all -- --ignored friction_of_every"]
+fn friction_of_every_seed_ends_in_no_false_minimum() {
+    let mut all = Vec::new();
+    for set in [0, 2].map(|number| &SETS[number]) {
+        for seed in 1..=8 {
+            all.extend(wrong(set, seed, 0, 0.002, ASYMMETRY));
+        }
+    }
+    for seed in 1..=8 {
+        for asymmetry in [ASYMMETRY, -ASYMMETRY] {
+            all.extend(wrong(&SETS[0], seed, 2, 0.002, asymmetry));
+        }
+    }
+    assert_eq!(all, [""; 0]);
 }
 
 #[test]
 fn a_bias_of_five_degrees_a_second_leads_to_no_false_minimum() {
-    assert_eq!(wrong(4, 0, 0.087), [""; 0]);
+    assert_eq!(wrong(&SETS[0], 4, 0, 0.087, ASYMMETRY), [""; 0]);
+}
+
+/// A torque that is 2 % larger than recorded makes inertia and friction 2 % smaller.
+#[test]
+fn a_tolerance_of_the_torque_widens_the_intervals_of_what_goes_with_it() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let mut recordings = recordings(&SETS[0], 1, 0.002, ASYMMETRY);
+    recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|torque| *torque /= 1.02);
+    let fit = |torque_scale: f64| {
+        let options = acceleration::Options { torque_scale, ..options(0) };
+        acceleration::identify(&fmu, &recordings, &options).unwrap()
+    };
+    let (exact, vague) = (fit(0.0), fit(0.02));
+    let bench = Bench::default();
+    for (name, truth) in [
+        ("hub.I", bench.hub_inertia),
+        ("friction.b", bench.bearing.b),
+        ("friction.omega_s", bench.bearing.omega_s),
+    ] {
+        let (a, b) = (&exact.parameters[name], &vague.parameters[name]);
+        let inside = (b.interval[0]..b.interval[1]).contains(&truth);
+        assert!(inside && (a.value - b.value).abs() < 1e-9 * a.value, "{name}: {b:?}");
+        assert!((b.std_noise - a.std).abs() < 1e-9 * a.std, "{name}: {a:?} {b:?}");
+    }
+    let [a, b] = [&exact, &vague].map(|found| &found.parameters["hub.I"]);
+    assert!(a.interval[1] < bench.hub_inertia, "{a:?}");
+    // the scale acts on all the inertia that turns
+    let total = vague.measurement["inertia"].value;
+    assert!((b.std.powi(2) - a.std.powi(2) - (0.02 * total).powi(2)).abs() < 1e-9, "{a:?} {b:?}");
+    let said = |found: &acceleration::Found| {
+        found.verdict.iter().any(|l| l.contains("scale of the torque 2 %"))
+    };
+    assert!(said(&vague) && !said(&exact), "{:?}", vague.verdict);
+}
+
+#[test]
+fn searches_from_afar_end_at_the_same_minimum_or_higher() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let options = acceleration::Options { start_study: 2, ..options(0) };
+    let recordings = recordings(&SETS[2], 1, 0.0, ASYMMETRY);
+    let found = acceleration::identify(&fmu, &recordings, &options).unwrap();
+    let trials = &found.details.starts;
+    assert_eq!(trials.len(), 10);
+    assert!(trials.iter().all(|trial| trial.more.is_some_and(|more| more > -0.5)), "{trials:?}");
+    assert!(trials.iter().filter(|trial| trial.is_same()).count() >= 5, "{trials:?}");
+    assert!(found.verdict.iter().any(|line| line.contains("of 10 starts")), "{:?}", found.verdict);
+}
+
+#[test]
+fn recordings_that_show_no_friction_are_refused_with_what_to_do() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let [_, step, _] = &recordings(&SETS[0], 1, 0.0, ASYMMETRY)[..] else { panic!("three runs") };
+    let said = |recording: Recording| {
+        acceleration::identify(&fmu, &[recording], &options(0)).unwrap_err().to_string()
+    };
+    let short = said(step.between(5.0, 5.8));
+    assert!(short.contains("it lasts") && short.contains("Record a ramp"), "{short}");
+    let free = said(Recording { torque: vec![0.0; step.time.len()], ..step.clone() });
+    assert!(free.contains("the torque is 0 in every row"), "{free}");
+    let still = said(Recording { torque: vec![0.003; 200], ..step.between(0.0, 3.99) });
+    assert!(still.contains("does not move") && still.contains("3.0e-3 N·m"), "{still}");
+    // moving all the time
+    let found = acceleration::identify(&fmu, &[step.between(10.0, 60.0)], &options(0));
+    if let Ok(found) = found {
+        let said = |line: &String| line.starts_with("No recording shows the hub at rest");
+        assert!(found.verdict.iter().any(said), "{:?}", found.verdict);
+    }
 }
 
 /// A start far off does not lead astray, and a start of what is not a unknown is refused.
 #[test]
 fn a_start_is_taken_besides_those_of_the_data() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let recordings = recordings(1, 0.0);
+    let recordings = recordings(&SETS[0], 1, 0.0, ASYMMETRY);
     let fit = |starts: &[(&str, f64)]| {
         let starts = starts.iter().map(|(name, value)| (name.to_string(), *value)).collect();
         let options = acceleration::Options { starts, ..options(0) };

@@ -17,6 +17,8 @@ mod habits;
 mod methods;
 mod other_bench;
 mod out_of_range;
+#[path = "../../examples/friction/runs.rs"]
+mod runs;
 mod sensors;
 mod solver_noise;
 mod twin;

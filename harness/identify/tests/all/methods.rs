@@ -26,14 +26,7 @@ fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
 }
 
 fn options() -> acceleration::Options {
-    acceleration::Options {
-        weights: Weights::Uniform,
-        bounds: Vec::new(),
-        starts: Vec::new(),
-        harmonics: 0,
-        settings: Vec::new(),
-        held: false,
-    }
+    acceleration::Options::default()
 }
 
 /// It comes half a row late, 8.6° of phase at 2.4 Hz: taken as linear it would turn inertia into friction.

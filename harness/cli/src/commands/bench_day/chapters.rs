@@ -6,7 +6,7 @@ use analysis::rest::Rest;
 use anyhow::{Context, Result};
 use host::fmu::Fmu;
 use identify::estimate::{Estimated, prose};
-use identify::methods::acceleration::{self, Braking, Weights};
+use identify::methods::acceleration::{self, Braking};
 use identify::nominal;
 use identify::reading::{self, Source};
 use identify::recording::Recording;
@@ -63,14 +63,7 @@ pub fn of(
     let mut settings = nominal::with_damping(day.settings.clone());
     // the least that the FMU takes: the tank is empty
     settings.push((fluid::RHO.into(), "1e-6".into()));
-    let options = acceleration::Options {
-        weights: Weights::Uniform,
-        bounds: Vec::new(),
-        starts: Vec::new(),
-        harmonics: 0,
-        settings,
-        held: false,
-    };
+    let options = acceleration::Options { settings, ..acceleration::Options::default() };
     let fitted = match all.is_empty() {
         true => None,
         false => match acceleration::identify(fmu, &all, &options) {

@@ -8,6 +8,7 @@ use crate::candidate::ModelFit;
 use crate::estimate::Estimated;
 use crate::methods::identification::Identification;
 use crate::methods::page::Sections;
+use crate::start_study;
 
 /// The sections.
 pub fn sections(found: &Identification) -> Sections {
@@ -23,7 +24,11 @@ pub fn sections(found: &Identification) -> Sections {
         },
         combinations: found.details.combinations.clone(),
         condition: Some(found.details.condition),
-        last: html! { (models(&found.details.models)) (budget(found)) },
+        last: html! {
+            (models(&found.details.models))
+            (budget(found))
+            (start_study::section(&found.details.starts))
+        },
         ..Sections::default()
     }
 }

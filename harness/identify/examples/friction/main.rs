@@ -1,0 +1,137 @@
+//! Does the friction fit end at its minimum? Ramps, steps and sweeps of [`bench`], in three sets, with the parameters of Rubaga's thesis.
+//!
+//! ```text
+//! cargo run --release -p identify --example friction -- [KEY=VALUE ...]
+//!   seeds=1-8               noise seeds
+//!   asymmetry=0.15          of the bearing
+//!   harmonics=0             of the angle that are estimated besides
+//!   method=acceleration     or output-error
+//!   write=DIR               also writes the recordings of the first seed as CSV
+//! ```
+
+#[allow(dead_code, reason = "the twins look at more of it")]
+#[path = "../twins/bench.rs"]
+mod bench;
+mod runs;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use host::fmu::Fmu;
+use identify::estimate::Estimated;
+use identify::methods::acceleration::{self, Acceleration};
+use identify::methods::output_error;
+use identify::methods::{Method, Task};
+use identify::options::Options;
+use identify::recording::Recording;
+use identify::tolerance::Tolerances;
+
+/// Bias of the gyro, rad/s.
+const BIAS: f64 = 0.002;
+
+/// Estimates, at a bound or not, and whether the fit is accepted.
+struct Answer {
+    parameters: BTreeMap<String, Estimated>,
+    fits: bool,
+    bounds: Vec<String>,
+}
+
+fn fit(fmu: &Fmu, recordings: &[Recording], method: &str, harmonics: usize) -> Result<Answer> {
+    match method {
+        "acceleration" => {
+            let options = acceleration::Options { harmonics, ..acceleration::Options::default() };
+            let task = Task { fmu: Some(fmu), recordings, validation: &[] };
+            let found = Acceleration { options }.identify(&task, &mut |_| {})?;
+            let fits = found.fits == Some(true) && found.converged;
+            Ok(Answer { parameters: found.parameters, fits, bounds: found.details.at_bound })
+        }
+        "output-error" => {
+            let options = Options {
+                models: vec!["frozen".into()],
+                gyro_scale: 0.0,
+                tolerances: Tolerances::NONE,
+                ..Options::default()
+            };
+            let found = output_error::identify(fmu, recordings, &options, &mut |_| {})?;
+            let fits = found.fits == Some(true) && found.converged;
+            Ok(Answer { parameters: found.parameters, fits, bounds: Vec::new() })
+        }
+        other => bail!("method={other} (allowed: acceleration, output-error)"),
+    }
+}
+
+fn write(recordings: &[Recording], folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    for recording in recordings {
+        let mut text = String::from("time,tau_cmd,omega,theta\n");
+        let angle = recording.angle.as_ref().context("an encoder")?;
+        for (k, t) in recording.time.iter().enumerate() {
+            let (tau, rate) = (recording.torque[k], recording.rate[k]);
+            text.push_str(&format!("{t:.2},{tau:.9},{rate:.9},{:.9}\n", angle[k]));
+        }
+        std::fs::write(folder.join(format!("{}.csv", recording.name)), text)?;
+    }
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    let (mut seeds, mut asymmetry, mut harmonics) = (1..=8, 0.15, 0);
+    let (mut method, mut folder) = (String::from("acceleration"), None);
+    for argument in std::env::args().skip(1) {
+        let (key, value) = argument.split_once('=').with_context(|| argument.clone())?;
+        match key {
+            "seeds" => {
+                let (first, last) = value.split_once('-').unwrap_or((value, value));
+                seeds = first.parse()?..=last.parse()?;
+            }
+            "asymmetry" => asymmetry = value.parse()?,
+            "harmonics" => harmonics = value.parse()?,
+            "method" => method = value.into(),
+            "write" => folder = Some(value.to_string()),
+            other => bail!("{other} is not a key"),
+        }
+    }
+    let fmu = Fmu::open(pack::packed_for_tests())?;
+    let bench = runs::bench(asymmetry);
+    let truths = [
+        ("hub.I", bench.hub_inertia),
+        ("friction.b", bench.bearing.b),
+        ("friction.c", bench.bearing.c),
+        ("friction.d", bench.bearing.d),
+        ("friction.omega_s", bench.bearing.omega_s),
+        ("friction.asymmetry", asymmetry),
+    ];
+    println!(
+        "| runs | seed | {} | worst, σ | accepted | at a bound |",
+        truths.map(|t| t.0).join(" | ")
+    );
+    println!("|{}", " --- |".repeat(truths.len() + 5));
+    let (mut count, mut signs, mut worst) = (0, 0, 0.0_f64);
+    for set in &runs::SETS {
+        for seed in seeds.clone() {
+            let recordings = runs::recordings(set, seed, BIAS, asymmetry);
+            if let (Some(folder), true) = (&folder, seed == *seeds.start()) {
+                write(&recordings, &Path::new(folder).join(set.name.replace([' ', ','], "_")))?;
+            }
+            let answer = fit(&fmu, &recordings, &method, harmonics)?;
+            let off = truths.map(|(name, truth)| {
+                let p = &answer.parameters[name];
+                (p.value - truth) / p.std
+            });
+            let most = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
+            println!(
+                "| {} | {seed} | {} | {most:.2} | {} | {} |",
+                set.name,
+                off.map(|off| format!("{off:+.2}")).join(" | "),
+                answer.fits,
+                answer.bounds.join(", ")
+            );
+            count += 1;
+            signs += i32::from(answer.parameters["friction.asymmetry"].value * asymmetry > 0.0);
+            worst = worst.max(most);
+        }
+    }
+    println!("\n{count} fits: worst {worst:.2} σ, asymmetry with the right sign in {signs}");
+    Ok(())
+}
