@@ -195,7 +195,7 @@ class Review:
         return page(self)
 
     def save(self, path: str | Path) -> None:
-        """Write the page, .html. Needs matplotlib (``pip install hubslosh[plot]``)."""
+        """Write the page, .html. Needs matplotlib."""
         if Path(path).suffix.lower() != ".html":
             raise FmuError(f"{path}: the name of the page must end in .html")
         text = self.html()

@@ -156,9 +156,7 @@ def _figure(title: str, caption: str, height: float, draw: "Callable[[Figure], N
         import matplotlib
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
-        raise FmuError(
-            "the page of a review needs matplotlib: pip install hubslosh[plot]"
-        ) from None
+        raise FmuError("the page of a review needs matplotlib: pip install matplotlib") from None
     style = {
         "svg.fonttype": "none", "svg.hashsalt": title, "font.size": 10, "text.color": INK,
         "axes.edgecolor": SOFT, "axes.labelcolor": INK, "xtick.color": SOFT, "ytick.color": SOFT,

@@ -394,6 +394,7 @@ class UncertainModel:
     counts: tuple[int, ...]
     """Number of copies of each δ in Δ."""
     model: str | Path
+    """The FMU: a name such as "Spacecraft", or a file."""
     given: "dict[str, Quantity]"
     """Parameters of the FMU at its point."""
     _craft: _Craft
