@@ -76,10 +76,37 @@ fn of<'a>(trials: &'a [Trial], name: &'a str) -> impl Iterator<Item = &'a Trial>
     trials.iter().filter(move |trial| trial.name == name)
 }
 
-/// Table and chart of the study.
-pub fn section(trials: &[Trial]) -> Markup {
+/// Unknowns of the study.
+fn names(trials: &[Trial]) -> Vec<&str> {
     let mut names: Vec<&str> = trials.iter().map(|trial| trial.name.as_str()).collect();
     names.dedup();
+    names
+}
+
+/// Sum of squares at the end of each search, against its start.
+pub fn chart(trials: &[Trial]) -> Chart {
+    let lines: Vec<_> = names(trials)
+        .iter()
+        .zip(COLORS.iter().cycle())
+        .map(|(name, color)| {
+            let point = |trial: &Trial| trial.more.map(|more| (trial.start, more.max(SAME)));
+            series(of(trials, name).filter_map(point).collect(), color, Style::Dots, name)
+        })
+        .collect();
+    let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
+    Chart {
+        title: format!("Sum of squares at the end above the minimum; {SAME} is the minimum itself"),
+        size: (900.0, 260.0),
+        x: Axis::decades("start over the estimate", trials.iter().map(|trial| trial.start)),
+        y: Axis::decades("variances of the noise", values),
+        series: lines,
+        legend: true,
+    }
+}
+
+/// Table and chart of the study.
+pub fn section(trials: &[Trial]) -> Markup {
+    let names = names(trials);
     if names.is_empty() {
         return html! {};
     }
@@ -108,27 +135,10 @@ pub fn section(trials: &[Trial]) -> Markup {
         "from, over the estimate",
         "others: start → end over the estimate, sum of squares above the minimum",
     ];
-    let lines: Vec<_> = names
-        .iter()
-        .zip(COLORS.iter().cycle())
-        .map(|(name, color)| {
-            let point = |trial: &Trial| trial.more.map(|more| (trial.start, more.max(SAME)));
-            series(of(trials, name).filter_map(point).collect(), color, Style::Dots, name)
-        })
-        .collect();
-    let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
-    let chart = Chart {
-        title: format!("Sum of squares at the end above the minimum; {SAME} is the minimum itself"),
-        size: (900.0, 260.0),
-        x: Axis::decades("start over the estimate", trials.iter().map(|trial| trial.start)),
-        y: Axis::decades("variances of the noise", values),
-        series: lines,
-        legend: true,
-    };
     html! {
         h2 { "Sensitivity to the start" }
         (table(head, rows))
-        (drawn(&chart))
+        (drawn(&chart(trials)))
     }
 }
 

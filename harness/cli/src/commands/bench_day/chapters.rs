@@ -10,6 +10,7 @@ use identify::methods::acceleration::{self, Braking};
 use identify::nominal;
 use identify::reading::{self, Source};
 use identify::recording::Recording;
+use identify::start_study;
 use names::hubslosh::{fluid, friction, hub, tank};
 use report::campaign::{Chapter, Illustration};
 use report::svg::{Axis, Chart, Series, Style};
@@ -36,12 +37,10 @@ const CENTAUR: f64 = 2.0425;
 const GRAVITY: f64 = 9.81;
 /// Points of a cloud in a figure.
 const POINTS: usize = 1500;
-/// Points of the measured friction curve.
-const BINS: usize = 240;
+/// Other starts of each unknown of the friction law.
+const STARTS: usize = 8;
 /// Largest rate of the friction curve near zero, in Stribeck speeds.
 const NEAR: f64 = 5.0;
-/// Rate over the gyro's noise beyond which the hub slips.
-const SLIPS: f64 = 5.0;
 /// Longest lag of the gyro's autocorrelation, s; length of a chunk as in the thesis, s, and the least number of chunks.
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
@@ -63,7 +62,8 @@ pub fn of(
     let mut settings = nominal::with_damping(day.settings.clone());
     // the least that the FMU takes: the tank is empty
     settings.push((fluid::RHO.into(), "1e-6".into()));
-    let options = acceleration::Options { settings, ..acceleration::Options::default() };
+    let options =
+        acceleration::Options { settings, start_study: STARTS, ..acceleration::Options::default() };
     let fitted = match all.is_empty() {
         true => None,
         false => match acceleration::identify(fmu, &all, &options) {
@@ -79,7 +79,7 @@ pub fn of(
         found.extend(fitted.parameters.iter().map(|(name, p)| (name.clone(), p.value.to_string())));
     }
     chapters.push(match &fitted {
-        Some(fitted) => bearing(&all, fitted, usable.is_some() && has_friction),
+        Some(fitted) => bearing(fitted, usable.is_some() && has_friction),
         None => none("Friction and inertia (thesis 5.2)", Kind::Friction, problems),
     });
     let braking = fitted.as_ref().map_or(&[][..], |fitted| &fitted.details.braking);
@@ -223,59 +223,22 @@ fn some(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
     points.iter().copied().step_by(points.len().div_ceil(POINTS).max(1))
 }
 
-/// Mean friction torque over rows of similar rate in which the hub slips: τ − I ω', with rates about their bias.
-fn friction_points(
-    all: &[Recording],
-    fitted: &acceleration::Found,
-    inertia: f64,
-) -> Vec<(f64, f64)> {
-    let mut rows: Vec<(f64, f64)> = Vec::new();
-    for (i, recording) in all.iter().enumerate() {
-        let name = format!("gyro_bias[{}]", i + 1);
-        let bias = fitted.measurement.get(&name).map_or(0.0, |p| p.value);
-        let slow = SLIPS * fitted.details.fit.noise[i];
-        let Recording { time, torque, rate, .. } = recording;
-        // over a fifth of a second
-        let half = ((0.1 / recording.step()).round() as usize).max(1);
-        let slips = |k: usize| {
-            let way = (rate[k] - bias).signum();
-            rate[k - half..=k + half].iter().all(|w| way * (w - bias) > slow)
-        };
-        let inner = half..time.len().saturating_sub(half);
-        rows.extend(inner.filter(|k| slips(*k)).map(|k| {
-            let acceleration =
-                (rate[k + half] - rate[k - half]) / (time[k + half] - time[k - half]);
-            let part = &torque[k - half..=k + half];
-            let mean = part.iter().sum::<f64>() / part.len() as f64;
-            (rate[k] - bias, mean - inertia * acceleration)
-        }));
-    }
-    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mean = |part: &[(f64, f64)]| {
-        let n = part.len() as f64;
-        (part.iter().map(|p| p.0).sum::<f64>() / n, part.iter().map(|p| p.1).sum::<f64>() / n)
-    };
-    let size = rows.len().div_ceil(BINS).max(1);
-    let sides = rows.chunk_by(|a, b| (a.0 > 0.0) == (b.0 > 0.0));
-    sides.flat_map(|side| side.chunks(size).map(mean)).collect()
-}
-
-fn bearing(all: &[Recording], fitted: &acceleration::Found, is_used: bool) -> Chapter {
+fn bearing(fitted: &acceleration::Found, is_used: bool) -> Chapter {
     let number = |name: &str| fitted.parameters.get(name).map_or(0.0, |p| p.value);
     let [b, c, d, speed, asymmetry] =
         [friction::B, friction::C, friction::D, friction::OMEGA_S, friction::ASYMMETRY].map(number);
-    let points = friction_points(all, fitted, number(hub::I));
+    let points = &fitted.details.friction_points;
     let curve = |w: f64| {
         let sign = w.signum();
         b * w + sign * (1.0 + asymmetry * sign) * (c + d * (-(w / speed).powi(2)).exp())
     };
-    let most = points.iter().fold(0.0_f64, |most, p| most.max(p.0.abs()));
+    let most = points.iter().fold(0.0_f64, |most, p| most.max(p.rate.abs()));
     let friction_chart = |title: &str, most: f64| {
         let rates = (-200..=200).map(|k| most * f64::from(k) / 200.0);
         // the law jumps at zero: a gap parts its two sides
         let law = rates.map(|w| (w, if w == 0.0 { f64::NAN } else { 1e3 * curve(w) }));
-        let within = points.iter().filter(|(w, _)| w.abs() <= most);
-        let measured = within.map(|(w, torque)| (*w, 1e3 * torque));
+        let within = points.iter().filter(|p| p.rate.abs() <= most);
+        let measured = within.map(|p| (p.rate, 1e3 * p.torque));
         chart(
             title,
             "rate / (rad/s)",
@@ -321,6 +284,11 @@ fn bearing(all: &[Recording], fitted: &acceleration::Found, is_used: bool) -> Ch
                 near,
                 "5.8",
                 "The same where the hub is slow: dry friction is largest when the hub begins to slip.",
+            ),
+            illustration(
+                start_study::chart(&fitted.details.starts),
+                "6.2 and 6.3",
+                "One unknown at a time starts away from its estimate. Fits at the bottom ended at the minimum; those above, in another one.",
             ),
         ],
     }
