@@ -391,21 +391,20 @@ def _exact_delay(
         cycles = int(delay / period)
         model = _compiled(delayed(delay - cycles * period))
 
-        def logarithms(*at: float) -> list[complex]:
-            w = np.array(at)
-            values = _eigenvalues(model, count, w) * np.exp(-1j * w * period * cycles)[:, None]
-            values = np.log(-values)
-            return [complex(row[np.argmin(np.abs(row))]) for row in values]
+        def logarithm(w: float) -> complex:
+            values = _eigenvalues(model, count, np.array([w]))[0]
+            values = np.log(-values * np.exp(-1j * w * period * cycles))
+            return complex(values[np.argmin(np.abs(values))])
 
         before, after = w, w * (1 + 1e-6)
-        at_before, at_after = logarithms(before, after)
+        at_before, at_after = logarithm(before), logarithm(after)
         for _ in range(20):
             if at_after.real == at_before.real or abs(after - before) <= 1e-15 * after:
                 break
             slope = (at_after.real - at_before.real) / (after - before)
             step = np.clip(-at_after.real / slope, -0.01 * w, 0.01 * w)
             before, at_before, after = after, at_after, after + step
-            (at_after,) = logarithms(after)
+            at_after = logarithm(after)
         w = after
         return float(delay + at_after.imag / w)
 
@@ -431,6 +430,8 @@ def _eigenvalues(model: Any, count: int, w: Matrix) -> NDArray[np.complex128]:
 
 def _unit_eigenvalues(gain: LinearModel) -> list[tuple[float, float]]:
     """Return delay (s) and frequency (rad/s) where an eigenvalue of L has the magnitude 1."""
+    from scipy.optimize import brentq
+
     model, period, count = _compiled(gain), gain.period or 0.0, len(gain.D)
 
     def eigenvalues(w: Matrix) -> NDArray[np.complex128]:
@@ -446,55 +447,18 @@ def _unit_eigenvalues(gain: LinearModel) -> list[tuple[float, float]]:
             nodes.append(root.imag + np.concatenate([-around, around]))
     every = np.unique(np.concatenate(nodes))
     every = np.ascontiguousarray(every[(every > low) & (every < high)])
-    sizes = np.abs(eigenvalues(every))
-    above = sizes > 1
-    k, i = np.nonzero(above[1:] != above[:-1])
-    if not len(k):
-        return []
+    above = np.abs(eigenvalues(every)) > 1
+    found = []
+    for k, i in zip(*np.nonzero(above[1:] != above[:-1]), strict=True):
 
-    def heights(w: Matrix, of: Matrix) -> Matrix:
-        """Return logarithms of magnitudes, of one eigenvalue at each frequency."""
-        found: Matrix = np.log(np.abs(np.take_along_axis(eigenvalues(w), i[of][:, None], 1)[:, 0]))
-        return found
+        def height(w: float, i: int = i) -> float:
+            return float(np.log(np.abs(eigenvalues(np.array([w]))[0, i])))
 
-    w = _roots(heights, every[k], every[k + 1], np.log(sizes[k, i]), np.log(sizes[k + 1, i]))
-    values = np.take_along_axis(eigenvalues(w), i[:, None], 1)[:, 0]
-    kept = np.abs(np.abs(values) - 1) < 1e-6
-    delays = np.angle(-values) % (2 * np.pi) / w
-    return list(zip(delays[kept].tolist(), w[kept].tolist(), strict=True))
-
-
-def _roots(
-    heights: Callable[[Matrix, Matrix], Matrix], a: Matrix, b: Matrix, at_a: Matrix, at_b: Matrix
-) -> Matrix:
-    """Return a root in each interval between ``a`` and ``b``, where the signs differ.
-
-    heights: of arguments and the numbers of their intervals. Chandrupatla's method (1997), all
-    intervals together.
-    """
-    a, b, at_a, at_b = a.copy(), b.copy(), at_a.copy(), at_b.copy()
-    share, c, at_c = np.full(len(a), 0.5), a.copy(), at_a.copy()
-    left = np.arange(len(a))
-    for _ in range(200):
-        x = a[left] + share[left] * (b[left] - a[left])
-        at_x = heights(np.ascontiguousarray(x), left)
-        same = np.sign(at_x) == np.sign(at_a[left])
-        c[left], at_c[left] = np.where(same, (a[left], at_a[left]), (b[left], at_b[left]))
-        b[left], at_b[left] = np.where(same, (b[left], at_b[left]), (a[left], at_a[left]))
-        a[left], at_a[left] = x, at_x
-        with np.errstate(all="ignore"):
-            best = np.where(np.abs(at_a) < np.abs(at_b), a, b)
-            least = 1e-10 * np.abs(best) / np.abs(b - a)
-            xi, phi = (a - b) / (c - b), (at_a - at_b) / (at_c - at_b)
-            inverse = at_a / (at_b - at_a) * at_c / (at_b - at_c)
-            inverse += (c - a) / (b - a) * at_a / (at_c - at_a) * at_b / (at_c - at_b)
-        quadratic = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(inverse)
-        share = np.where(quadratic, inverse, 0.5)
-        share = np.clip(share, np.minimum(least, 0.5), np.maximum(1 - least, 0.5))
-        left = left[(least[left] < 0.5) & (at_a[left] != 0) & (at_b[left] != 0)]
-        if not len(left):
-            break
-    return np.where(np.abs(at_a) < np.abs(at_b), a, b)
+        w = brentq(height, every[k], every[k + 1], xtol=1e-300, rtol=1e-10)
+        value = eigenvalues(np.array([w]))[0, i]
+        if abs(abs(value) - 1) < 1e-6:
+            found.append((float(np.angle(-value) % (2 * np.pi)) / w, float(w)))
+    return found
 
 
 def minimal(model: LinearModel, tolerance: float = 1e-11) -> LinearModel:

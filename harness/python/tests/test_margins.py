@@ -10,7 +10,7 @@ from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
 from hubslosh import FmuError, LinearModel, Loop, margins
-from hubslosh.stability import _broken_at, _closed, _roots, minimal
+from hubslosh.stability import _broken_at, _closed, minimal
 
 EXACT = 1e-6
 """The tolerance that is promised; what is found is better by orders of magnitude."""
@@ -290,18 +290,3 @@ def test_a_loop_gain_of_rounding_is_no_crossing(fmu: Path) -> None:
     lag = control.ss(1 / (S / 3 + 1) ** 2)
     found = margins(Loop(5 * lag, 0.1, fmu, {"friction.model": "viscous"}, "theta"))
     assert found.crossings["gain_margin"].dropna().abs().max() < 200
-
-
-def test_roots_of_many_intervals_are_those_of_one_by_one() -> None:
-    """Steep, flat and skewed functions; 1e-9 of the argument."""
-    random = np.random.default_rng(7)
-    r = random.uniform(1.0, 5.0, 200)
-    steep = 10 ** random.uniform(-3, 6, 200)
-
-    def heights(x: np.ndarray, of: np.ndarray) -> np.ndarray:
-        return np.arctan(steep[of] * (x - r[of])) + 0.1 * (x - r[of]) ** 3
-
-    low, high = r - random.uniform(0.01, 0.9, 200), r + random.uniform(0.01, 0.9, 200)
-    every = np.arange(200)
-    found = _roots(heights, low, high, heights(low, every), heights(high, every))
-    assert found == pytest.approx(r, rel=1e-9)
