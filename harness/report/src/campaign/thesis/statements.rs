@@ -293,7 +293,6 @@ pub(super) const STATEMENTS: &[Statement] = &[
         }),
         why: "The conical pendulum hardens too much: once in rotary slosh it follows the sweep too far up.",
         despite: "The linear liquid is compared with its own exact response.",
-        ..PLAIN
     },
     Statement {
         section: "7.1.1, fig. 7.1",
