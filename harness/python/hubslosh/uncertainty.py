@@ -39,6 +39,7 @@ from .fmu import FmuError, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
 from .plant import Plant
+from .short import MOST, names
 from .simulation import parameters_of
 from .stability import _closed, minimal
 
@@ -372,9 +373,11 @@ class WorstCase:
         """Return size and frequency, then the parameters."""
         if not np.isfinite(self.size):
             return "WorstCase: none was found, the lower bound of µ is 0"
-        values = "".join(f"\n  {name} = {x:.6g}" for name, x in self.parameters.items())
+        values = [f"\n  {name} = {x:.6g}" for name, x in self.parameters.items()]
+        left = len(values) - MOST
+        more = f"\n  and {left} more" if left > 0 else ""
         first = f"WorstCase: unstable from {self.size:.4g} times the ranges on, µ ≥ {self.mu:.4g}"
-        return f"{first}, at {self.frequency:.5g} Hz{values}"
+        return f"{first}, at {self.frequency:.5g} Hz{''.join(values[:MOST])}{more}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,10 +416,8 @@ class UncertainModel:
 
     def __repr__(self) -> str:
         """Return sizes, then each block of Δ."""
-        from .short import names
-
         M, width = self.M, self.order
-        copies = ", ".join(f"{n} × {c}" for n, c in zip(self.deltas, self.counts, strict=True))
+        copies = names([f"{n} × {c}" for n, c in zip(self.deltas, self.counts, strict=True)])
         return (
             f"UncertainModel, {len(M.A)} states, Δ of {width}: {copies}\n"
             f"  inputs: {names(M.inputs[width:])}\n  outputs: {names(M.outputs[width:])}"
@@ -803,8 +804,8 @@ def uncertain(
                 column[len(ranges) :] = sigmas * np.sqrt(lengths[k]) * axes[:, k]
                 columns[f"axis[{len(columns) - len(ranges) + 1}]"] = column
     chosen = []
-    for names, allowed, what in ((inputs, INPUTS, "inputs"), (outputs, OUTPUTS, "outputs")):
-        listed = names_of(names, what, problems)
+    for given_names, allowed, what in ((inputs, INPUTS, "inputs"), (outputs, OUTPUTS, "outputs")):
+        listed = names_of(given_names, what, problems)
         parts = {name: [a for a in allowed if a.startswith(f"{name}[")] for name in listed}
         listed = [part for name in listed for part in parts[name] or [name]]
         problems += [f"{name} is not among the {what} ({', '.join(allowed)})"

@@ -40,6 +40,9 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
     runs = pd.DataFrame({f"result {i}": rng.random(50) for i in range(9)})
     estimates = {f"parameter[{i}]": Estimated(1.0, 0.1, 0.1, (0.8, 1.2), "kg") for i in range(30)}
     words = tuple(f"{i} " + 100 * "long word " for i in range(40))
+    ranges = {
+        f"{tank}.{of}[1]": "5%" for tank in tanks for of in ("frequency", "zeta", "mass", "bob")
+    }
     table = pd.DataFrame(rng.random((20, 7)), columns=list("abcdefg"))
     run = loop.simulate(8.0, reference=attitude.slew(0.01, 4.0))
     return {
@@ -50,6 +53,8 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
         "Loop": lambda: loop,
         "LinearModel": lambda: many,
         "Review": lambda: craft.review(gains, 0.1, [fill], damping="nominal"),
+        "UncertainModel": lambda: craft.uncertain(fill, ranges),
+        "WorstCase": lambda: hubslosh.WorstCase({}, 0.5, 0.1, dict.fromkeys(ranges, 1.0)),
         "Margins": lambda: hubslosh.margins(many),
         "Run": lambda: run,
         "TransferFunction": lambda: hubslosh.TransferFunction(rng.random(30), rng.random(31), 99.0),
