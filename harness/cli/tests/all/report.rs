@@ -215,10 +215,8 @@ fn what_the_thesis_says_is_judged_by_the_runs() {
     assert!(agrees(page, "The synthetic data's resonance, whose liquid", linear));
     // numbers are held to: 2.21 rad/s² measured, more than twice that here
     assert!(!agrees(page, "The hub's largest acceleration at 0.25", spherical));
-    // statements whose runs are not there (0.075 N·m) have no verdict
-    let row = page.split("<tr>").find(|row| row.contains("At 0.075 N·m rotary slosh is weak"));
-    let row = row.expect("a row");
-    assert!(!row.contains("class=\"yes\"") && !row.contains("class=\"no\""), "{row}");
+    // statements whose runs are not there (0.075 N·m) have no row
+    assert!(!page.contains("At 0.075 N·m rotary slosh is weak"));
 
     // without dry friction the linear resonance has no reason to start higher: the verdict turns
     // round

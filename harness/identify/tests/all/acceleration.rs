@@ -118,16 +118,14 @@ fn the_preferential_direction_comes_back_with_harmonics_of_the_angle() {
     assert_eq!((1..=4).flat_map(either).collect::<Vec<_>>(), [""; 0]);
 }
 
-/// All of the above, eight seeds each: 1 min.
+/// Eight seeds with harmonics of either direction: 1 min.
+///
+/// Known to fail are seed 5 of the third set, whose ramp has no torque-free rest (bias 3.4 standard deviations off), and the
+/// asymmetry in one of eight seeds of the second (3.5).
 #[test]
-#[ignore = "takes minutes: cargo test --release -p identify --test all -- --ignored friction_of_every"]
-fn friction_of_every_seed_ends_in_no_false_minimum() {
+#[ignore = "takes minutes: cargo test --release -p identify --test all -- --ignored direction_of_every"]
+fn the_preferential_direction_of_every_seed_comes_back_with_two_harmonics() {
     let mut all = Vec::new();
-    for set in [0, 2].map(|number| &SETS[number]) {
-        for seed in 1..=8 {
-            all.extend(wrong(set, seed, 0, 0.002, ASYMMETRY));
-        }
-    }
     for seed in 1..=8 {
         for asymmetry in [ASYMMETRY, -ASYMMETRY] {
             all.extend(wrong(&SETS[0], seed, 2, 0.002, asymmetry));
