@@ -60,9 +60,13 @@ fn fmpy_drives_the_fmu_as_the_harness_does() {
 #[test]
 #[ignore = "minutes: cargo test --release --test tests -- --ignored all_sweeps_of_the_thesis"]
 fn fmpy_drives_all_sweeps_of_the_thesis() {
-    let tests = pack::root().join("harness/python/tests/test_same_as_harness.py");
+    let file = pack::root().join("harness/python/tests/test_same_as_harness.py");
+    let test = format!(
+        "{}::test_a_whole_sweep_of_the_thesis_is_the_same_by_fmpy_and_by_the_harness",
+        file.display()
+    );
     pytest(
-        of_the_package().args(["--all-sweeps", "-k", "whole_sweep"]).arg(tests),
+        of_the_package().args(["--all-sweeps", &test]),
         "a sweep driven by fmpy differs from the harness's",
     );
 }
