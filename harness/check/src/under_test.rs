@@ -246,7 +246,7 @@ impl FmuUnderTest {
         answer
     }
 
-    /// From here on parameters have values that the check has chosen: with them a model may have no solution. A crash
+    /// Notes that parameters now have values that the check has chosen, with which a model may have no solution. A crash
     /// or a call without end then ends the rule, and is not a finding.
     pub fn chose_values(&self) {
         *self.crash.borrow_mut() = Crash::ToldBy(String::new());

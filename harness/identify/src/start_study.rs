@@ -17,9 +17,9 @@ const SAME: f64 = 0.5;
 pub struct Trial {
     /// Unknown that starts elsewhere.
     pub name: String,
-    /// Its start over the estimate.
+    /// Start of this unknown over its estimate.
     pub start: f64,
-    /// Its end over the estimate; `None` if the search failed.
+    /// End of this unknown over its estimate; `None` if the search failed.
     pub end: Option<f64>,
     /// Sum of squares at the end above that at the estimate, in variances of the noise.
     pub more: Option<f64>,

@@ -195,7 +195,7 @@ fn a_crash_in_every_step_is_one_finding() {
     assert!(because.count() > 15, "{}", report.text());
 }
 
-/// What public FMUs showed: a fault of theirs that several rules stumbled over, or a value of ours that they could refuse.
+/// Each case comes from a public FMU: a fault that several rules reported, or a value of ours that the FMU could refuse.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_fault_is_told_by_its_own_rule_and_as_severe_as_it_is() {

@@ -56,7 +56,7 @@ impl ReviewArgs {
     }
 }
 
-/// Where a Python may be: in the environment of this command, or on PATH.
+/// Returns the places to look for Python: the environment of this command, then PATH.
 fn pythons(own: &Path) -> Vec<PathBuf> {
     let near = own.with_file_name(if cfg!(windows) { "python.exe" } else { "python3" });
     [near, "python3".into(), "python".into()].to_vec()

@@ -42,7 +42,7 @@ impl Who {
 /// Figures of a group of runs for one statement, and true if the statement holds.
 type Shown = (String, bool);
 
-/// What decides on a statement; `None` where the runs it needs are not there.
+/// Rule that decides on a statement. It returns `None` where the runs it needs are not there.
 #[derive(Clone, Copy)]
 enum Judge {
     /// A rule for each fill.

@@ -807,10 +807,7 @@ pub(super) const STATEMENTS: &[Statement] = &[
         who: Who::Bench,
         says: "Beyond the smallest torques the signal-to-noise ratio is relatively stable.",
         rule: "the band's mean stays within 6 dB from 0.1 N·m up",
-        judge: Judge::Fill(|group| {
-            let range = spread(&from(group, 0.1, snr)?);
-            Some((format!("within {range:.1} dB"), range < 6.0))
-        }),
+        judge: Judge::Fill(steady_snr),
         ..PLAIN
     },
     Statement {
@@ -829,10 +826,7 @@ pub(super) const STATEMENTS: &[Statement] = &[
         who: Who::Synthetic,
         says: "The synthetic signal-to-noise ratio does not depend on the torque beyond the smallest ones.",
         rule: "the band's mean stays within 6 dB from 0.1 N·m up",
-        judge: Judge::Fill(|group| {
-            let range = spread(&from(group, 0.1, snr)?);
-            Some((format!("within {range:.1} dB"), range < 6.0))
-        }),
+        judge: Judge::Fill(steady_snr),
         ..PLAIN
     },
     Statement {
@@ -1274,6 +1268,11 @@ fn softening(group: &Group) -> Option<Shown> {
     let resonance = |torque| at(group, torque)?.spa_features().f_res;
     let (low, high) = (resonance(LEAST)?, resonance(0.05)?);
     Some((format!("{:+.1} mHz", (high - low) * 1e3), low - high > 1e-3))
+}
+
+fn steady_snr(group: &Group) -> Option<Shown> {
+    let range = spread(&from(group, 0.1, snr)?);
+    Some((format!("within {range:.1} dB"), range < 6.0))
 }
 
 fn notch_trend(group: &Group, sign: f64) -> Option<Shown> {
