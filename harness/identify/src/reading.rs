@@ -12,7 +12,8 @@ use signals::table::Table;
 
 use crate::clocks::{self, Clocked, completed};
 use crate::recording::{LONG, Recording, SHORTEST, masked, take_out};
-use crate::{gaps, sensor_faults, spikes};
+use crate::sensor_faults::{self, Rest};
+use crate::{gaps, spikes};
 
 /// Time after the beginning of a part that is already moving in which no sensor is fitted, s: a sensor that is late shows
 /// what happened before the part's first torque.
@@ -263,15 +264,20 @@ pub fn prepare(
 /// Takes values that a sensor did not measure out of a part, and says which.
 fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
     let rows = part.time.len();
-    let Recording { name, time, rate, angle, fresh, angle_fresh, .. } = part;
-    let sensors = [("omega", Some(rate), fresh), ("theta", angle.as_mut(), angle_fresh)];
-    for (sensor, whole, mask) in sensors {
+    let Recording { name, time, torque, rate, angle, fresh, angle_fresh, .. } = part;
+    // without torque at its beginning a hub rests
+    let rest = (torque[0] == 0.0).then_some(rate[0]);
+    let sensors = [
+        ("omega", Some(rate), fresh, Rest::Rate(rest)),
+        ("theta", angle.as_mut(), angle_fresh, Rest::Angle),
+    ];
+    for (sensor, whole, mask, rest) in sensors {
         let Some(whole) = whole else { continue };
         let places: Vec<usize> =
             (0..rows).filter(|k| mask.as_ref().is_none_or(|mask| mask[*k])).collect();
         let (at, values): (Vec<f64>, Vec<f64>) =
             places.iter().map(|k| (time[*k], whole[*k])).unzip();
-        let found = sensor_faults::find(sensor, &at, &values);
+        let found = sensor_faults::find(sensor, &at, &values, rest);
         found.words.iter().for_each(|words| done(format!("{name}: {words}")));
         found.rows.iter().for_each(|k| take_out(mask, places[*k], rows));
         if let (Some(mask), false) = (&*mask, found.rows.is_empty()) {

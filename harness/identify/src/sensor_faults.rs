@@ -9,8 +9,10 @@ use crate::spikes;
 const CLIPPED: (usize, f64) = (20, 4.0);
 /// Width of that inside, in units of the noise.
 const INSIDE: f64 = 3.0;
-/// Step, in units of the noise, that a value takes when it comes back from being clipped or frozen; a hub at rest leaves slowly.
+/// Step, in units of the noise, that a value takes when it comes back from being clipped or frozen.
 const LEAVES: f64 = 5.0;
+/// First step of an angle that leaves its rest over the second, at most: it starts with zero rate, and its acceleration does not fall.
+const FROM_REST: f64 = 1.0 / 3.0;
 /// Probability that a run of equal values is chance.
 const CHANCE: f64 = 1e-6;
 /// Fewest values in a frozen run.
@@ -29,8 +31,32 @@ pub struct Faults {
     pub words: Vec<String>,
 }
 
-/// Looks for faults in values, of `name`, at growing times, s.
-pub fn find(name: &str, time: &[f64], values: &[f64]) -> Faults {
+/// Reading of a sensor while the hub rests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rest {
+    /// A rate: this value, if known.
+    Rate(Option<f64>),
+    /// An angle: any value. It leaves that value with zero rate.
+    Angle,
+}
+
+impl Rest {
+    /// Returns how far the value after row k leaves that of row k like one that was clipped or frozen, not like a hub that rested.
+    fn jump(self, values: &[f64], k: usize) -> Option<f64> {
+        let step = (values.get(k + 1)? - values[k]).abs();
+        match self {
+            Rest::Rate(rest) if rest == Some(values[k]) => None,
+            Rest::Rate(_) => Some(step),
+            Rest::Angle => {
+                let second = values.get(k + 2).map_or(0.0, |next| (next - values[k + 1]).abs());
+                Some(step - FROM_REST * second)
+            }
+        }
+    }
+}
+
+/// Looks for faults in values, of `name`, at growing times, s. The values of a hub that rests are no fault.
+pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let mut found = Faults::default();
     if values.len() < 100 {
         return found;
@@ -39,7 +65,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64]) -> Faults {
     let mut out = vec![false; values.len()];
     let at = |k: usize| format!("{:.2} s", time[k]);
     for (end, sign) in [("upper", 1.0), ("lower", -1.0)] {
-        let rows = clipped(values, sign, noise);
+        let rows = clipped(values, sign, noise, rest);
         if let [first, .., last] = rows[..] {
             found.words.push(format!(
                 "{name} is clipped: {} values are {:.4e}, the {end} end of its range, between {} and {}; they are not fitted",
@@ -54,7 +80,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64]) -> Faults {
             (k.saturating_sub(1)..=(k + 1).min(values.len() - 1)).for_each(|k| out[k] = true);
         }
     }
-    let runs = frozen(values, &out, noise);
+    let runs = frozen(values, &out, noise, rest);
     if let Some((first, _)) = runs.first() {
         let longest = runs.iter().map(|(a, b)| time[*b] - time[*a]).fold(0.0, f64::max);
         found.words.push(format!(
@@ -78,7 +104,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64]) -> Faults {
 }
 
 /// Rows at an end of the range, if that clips.
-fn clipped(values: &[f64], sign: f64, noise: f64) -> Vec<usize> {
+fn clipped(values: &[f64], sign: f64, noise: f64, rest: Rest) -> Vec<usize> {
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
     let beside = |v: &&f64| (end - INSIDE * noise..end).contains(&(sign * **v));
@@ -88,19 +114,16 @@ fn clipped(values: &[f64], sign: f64, noise: f64) -> Vec<usize> {
         **k > 0 && equal(**k - 1) || equal(**k + 1)
     };
     let in_runs = rows.iter().filter(is_run).count();
-    let steps: Vec<f64> = rows
-        .iter()
-        .filter_map(|k| values.get(k + 1).map(|next| (next - values[*k]).abs()))
-        .filter(|step| *step > 0.0)
-        .collect();
-    let leaves = median(&steps).is_some_and(|step| step > LEAVES * noise);
+    let last = rows.iter().filter(|k| values.get(**k + 1) != Some(&values[**k]));
+    let jumps: Vec<f64> = last.filter_map(|k| rest.jump(values, *k)).collect();
+    let leaves = median(&jumps).is_some_and(|jump| jump > LEAVES * noise);
     let many = rows.len() >= CLIPPED.0 && rows.len() as f64 > CLIPPED.1 * inside as f64;
     if many && leaves && 2 * in_runs > rows.len() { rows } else { Vec::new() }
 }
 
 /// First and last rows of runs of equal values that chance does not make, that are off the mean and that end in a jump. A hub at
 /// rest reads its gyro's bias, which is near the mean.
-fn frozen(values: &[f64], out: &[bool], noise: f64) -> Vec<(usize, usize)> {
+fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
     let mut runs = Vec::new();
     let mut first = 0;
     for k in 1..=values.len() {
@@ -116,7 +139,7 @@ fn frozen(values: &[f64], out: &[bool], noise: f64) -> Vec<(usize, usize)> {
     let least = 1.0 + (CHANCE / values.len() as f64).ln() / chance.ln();
     let is_frozen = |run: &&(usize, usize)| {
         let (a, b) = **run;
-        let jump = values.get(b + 1).is_some_and(|next| (next - values[b]).abs() > LEAVES * noise);
+        let jump = rest.jump(values, b).is_some_and(|jump| jump > LEAVES * noise);
         let moves = (values[b] - mean).abs() > LEAVES * noise;
         is_long(run) && (b - a + 1) as f64 >= least && jump && moves && !out[a] && !out[b]
     };
@@ -159,20 +182,48 @@ mod tests {
     }
 
     fn words(time: &[f64], values: &[f64]) -> (usize, String) {
-        let found = find("omega", time, values);
+        let found = find("omega", time, values, Rest::Rate(None));
         (found.rows.len(), found.words.join("\n"))
     }
 
     #[test]
     fn a_sound_gyro_has_no_faults() {
         let (time, mut rate) = gyro();
-        assert_eq!(find("omega", &time, &rate), Faults::default());
+        assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
         // a hub that rests for 20 s under a gyro that is coarser than its noise
         rate[..1000].fill(3e-4);
-        assert_eq!(find("omega", &time, &rate), Faults::default());
+        assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
         // a coarse gyro
         rate.iter_mut().for_each(|w| *w = (*w / 5e-3).round() * 5e-3);
-        assert_eq!(find("omega", &time, &rate), Faults::default());
+        assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
+    }
+
+    #[test]
+    fn a_hub_at_rest_is_no_fault() {
+        // at rest, half a turn in 10 s, at rest, back under constant acceleration to another rest, and on
+        let course = |t: f64| match t {
+            _ if t < 20.0 => 0.0,
+            _ if t < 30.0 => 0.016 * (t - 20.0).powi(2),
+            _ if t < 40.0 => 3.2 - 0.016 * (40.0 - t).powi(2),
+            _ if t < 60.0 => 3.2,
+            _ if t < 80.0 => 3.2 - 0.005 * (t - 60.0).powi(2),
+            _ => 1.2 - 0.005 * (100.0 - t).powi(2),
+        };
+        // the torque acts between two rows
+        let time: Vec<f64> = (0..5000).map(|k| 0.02 * f64::from(k) + 0.007).collect();
+        for step in [1e-12, 1.7e-6, 1e-3] {
+            let angle: Vec<f64> = time.iter().map(|t| (course(*t) / step).round() * step).collect();
+            assert_eq!(find("theta", &time, &angle, Rest::Angle), Faults::default(), "{step}");
+            let clipped: Vec<f64> = angle.iter().map(|a| a.min(2.0)).collect();
+            let said = find("theta", &time, &clipped, Rest::Angle).words;
+            assert!(said.len() == 1 && said[0].contains("theta is clipped"), "{step}: {said:?}");
+        }
+        // a rate without noise that is least while the hub rests
+        let pushed =
+            |t: f64| 0.05 * (t - 20.0).clamp(0.0, 5.0) - 0.02 * (t - 25.0).clamp(0.0, 12.5);
+        let rate: Vec<f64> = time.iter().map(|t| 0.002 + pushed(*t % 50.0)).collect();
+        assert_eq!(find("omega", &time, &rate, Rest::Rate(Some(rate[0]))), Faults::default());
+        assert!(!find("omega", &time, &rate, Rest::Rate(None)).words.is_empty());
     }
 
     #[test]

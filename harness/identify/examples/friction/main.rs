@@ -17,6 +17,7 @@ mod runs;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use analysis::statistics::mean;
 use anyhow::{Context, Result, bail};
 use host::fmu::Fmu;
 use identify::estimate::Estimated;
@@ -33,6 +34,8 @@ const BIAS: f64 = 0.002;
 /// Estimates, at a bound or not, and whether the fit is accepted.
 struct Answer {
     parameters: BTreeMap<String, Estimated>,
+    /// Gyro's biases.
+    measurement: BTreeMap<String, Estimated>,
     fits: bool,
     bounds: Vec<String>,
 }
@@ -44,7 +47,13 @@ fn fit(fmu: &Fmu, recordings: &[Recording], method: &str, harmonics: usize) -> R
             let task = Task { fmu: Some(fmu), recordings, validation: &[] };
             let found = Acceleration { options }.identify(&task, &mut |_| {})?;
             let fits = found.fits == Some(true) && found.converged;
-            Ok(Answer { parameters: found.parameters, fits, bounds: found.details.at_bound })
+            let bounds = found.details.at_bound;
+            Ok(Answer {
+                parameters: found.parameters,
+                measurement: found.measurement,
+                fits,
+                bounds,
+            })
         }
         "output-error" => {
             let options = Options {
@@ -55,7 +64,13 @@ fn fit(fmu: &Fmu, recordings: &[Recording], method: &str, harmonics: usize) -> R
             };
             let found = output_error::identify(fmu, recordings, &options, &mut |_| {})?;
             let fits = found.fits == Some(true) && found.converged;
-            Ok(Answer { parameters: found.parameters, fits, bounds: Vec::new() })
+            let bounds = Vec::new();
+            Ok(Answer {
+                parameters: found.parameters,
+                measurement: found.measurement,
+                fits,
+                bounds,
+            })
         }
         other => bail!("method={other} (allowed: acceleration, output-error)"),
     }
@@ -101,14 +116,16 @@ fn main() -> Result<()> {
         ("friction.d", bench.bearing.d),
         ("friction.omega_s", bench.bearing.omega_s),
         ("friction.asymmetry", asymmetry),
+        ("gyro_bias[1]", BIAS),
+        ("gyro_bias[2]", BIAS),
+        ("gyro_bias[3]", BIAS),
     ];
-    println!(
-        "| runs | seed | {} | worst, σ | accepted | at a bound |",
-        truths.map(|t| t.0).join(" | ")
-    );
+    let head = truths.map(|t| t.0.trim_start_matches("friction.")).join(" | ");
+    println!("| runs | seed | {head} | largest | accepted | at a bound |");
     println!("|{}", " --- |".repeat(truths.len() + 5));
-    let (mut count, mut signs, mut worst) = (0, 0, 0.0_f64);
+    let (mut signs, mut all) = (0, Vec::new());
     for set in &runs::SETS {
+        let mut of_set = Vec::new();
         for seed in seeds.clone() {
             let recordings = runs::recordings(set, seed, BIAS, asymmetry);
             if let (Some(folder), true) = (&folder, seed == *seeds.start()) {
@@ -116,22 +133,45 @@ fn main() -> Result<()> {
             }
             let answer = fit(&fmu, &recordings, &method, harmonics)?;
             let off = truths.map(|(name, truth)| {
-                let p = &answer.parameters[name];
-                (p.value - truth) / p.std
+                let p = answer.parameters.get(name).or(answer.measurement.get(name));
+                p.map_or(f64::NAN, |p| (p.value - truth) / p.std)
             });
-            let most = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
+            let largest = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
             println!(
-                "| {} | {seed} | {} | {most:.2} | {} | {} |",
+                "| {} | {seed} | {} | {largest:.2} | {} | {} |",
                 set.name,
                 off.map(|off| format!("{off:+.2}")).join(" | "),
                 answer.fits,
                 answer.bounds.join(", ")
             );
-            count += 1;
             signs += i32::from(answer.parameters["friction.asymmetry"].value * asymmetry > 0.0);
-            worst = worst.max(most);
+            of_set.push(off);
         }
+        for (word, of) in [("mean", mean as fn(&[f64]) -> f64), ("rms", root_mean_square)] {
+            let column = |j: usize| of_set.iter().map(|off| off[j]).collect::<Vec<f64>>();
+            let cells: Vec<String> =
+                (0..truths.len()).map(|j| format!("{:+.2}", of(&column(j)))).collect();
+            println!("| {} | {word} | {} | | | |", set.name, cells.join(" | "));
+        }
+        all.extend(of_set);
     }
-    println!("\n{count} fits: worst {worst:.2} σ, asymmetry with the right sign in {signs}");
+    let values: Vec<f64> = all.iter().flatten().copied().filter(|off| off.is_finite()).collect();
+    let beyond = |limit: f64| values.iter().filter(|off| off.abs() > limit).count();
+    println!(
+        "\nErrors in standard deviations of {} fits, {} values: largest {:.2}, rms {:.2}, {} beyond 1.96 (chance: {:.1}), {} \
+         beyond 3 (chance: {:.1}). The asymmetry has the right sign in {signs}.",
+        all.len(),
+        values.len(),
+        values.iter().fold(0.0_f64, |most, off| most.max(off.abs())),
+        root_mean_square(&values),
+        beyond(1.96),
+        0.05 * values.len() as f64,
+        beyond(3.0),
+        0.0027 * values.len() as f64
+    );
     Ok(())
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    mean(&values.iter().map(|v| v * v).collect::<Vec<f64>>()).sqrt()
 }

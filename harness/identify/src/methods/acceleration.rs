@@ -230,8 +230,12 @@ impl Braking {
 const WINDOW: f64 = 2.0;
 /// Residual over that of the gyro's noise, beyond which something else acts.
 const MISFIT: f64 = 1.1;
-/// Instants in an interval where the friction is taken.
+/// Parts of an interval over which the friction is averaged.
 const PARTS: usize = 8;
+/// Rate over the width of the noise beyond which its sign is certain: 1 − tanh is 1e-17.
+const CERTAIN: f64 = 20.0;
+/// Change of the rate over the width of the noise, up to which its mean sign is that in the middle, to 1e-6.
+const SHORT: f64 = 1e-3;
 /// Rounds in which the rows of a hub that sticks are found with the bias.
 const ROUNDS: usize = 4;
 /// Relative standard deviation of friction.d or omega_s beyond which the sum of squares is not quadratic in them.
@@ -358,25 +362,46 @@ impl Rows {
         std::f64::consts::SQRT_2 * self.resting[k - 1] / self.interval(k)
     }
 
-    /// Instants within the interval where the friction is taken, and the weights of the three rows in the parabola through
-    /// them (Lagrange).
-    fn instants(&self, form: Form, k: usize) -> ([[f64; 3]; PARTS], usize) {
-        let t = &self.time;
-        let mut weights = [[0.0, 1.0, 0.0]; PARTS];
+    /// Rates at the ends of equal parts of the interval, on the parabola through the three rows (Lagrange). The form at a row has one
+    /// part without length.
+    fn rates(&self, form: Form, k: usize) -> ([f64; PARTS + 1], usize) {
+        let (t, rate) = (&self.time, &self.rate);
+        let mut rates = [rate[k]; PARTS + 1];
         if form == Form::AtRow {
-            return (weights, 1);
+            return (rates, 1);
         }
         let (a, b, c) = (t[k - 1], t[k], t[k + 1]);
-        for (part, weight) in weights.iter_mut().enumerate() {
-            let at = a + (part as f64 + 0.5) / PARTS as f64 * (c - a);
-            *weight = [
-                (at - b) * (at - c) / ((a - b) * (a - c)),
-                (at - a) * (at - c) / ((b - a) * (b - c)),
-                (at - a) * (at - b) / ((c - a) * (c - b)),
-            ];
+        for (part, w) in rates.iter_mut().enumerate() {
+            let at = a + part as f64 / PARTS as f64 * (c - a);
+            *w = (at - b) * (at - c) / ((a - b) * (a - c)) * rate[k - 1]
+                + (at - a) * (at - c) / ((b - a) * (b - c)) * rate[k]
+                + (at - a) * (at - b) / ((c - a) * (c - b)) * rate[k + 1];
         }
-        (weights, PARTS)
+        (rates, PARTS)
     }
+}
+
+/// Expected sign of the true rate over a part in which the measured one goes from `from` to `to` along a line, and its derivative
+/// with respect to that rate. `width` is 1.25 standard deviations of the noise.
+fn mean_sign(from: f64, to: f64, width: f64) -> (f64, f64) {
+    let (a, b) = (from / width, to / width);
+    if a.abs().min(b.abs()) > CERTAIN && a * b > 0.0 {
+        return (a.signum(), 0.0);
+    }
+    if (b - a).abs() < SHORT {
+        let sign = (0.5 * (a + b)).tanh();
+        return (sign, (1.0 - sign * sign) / width);
+    }
+    let ln_cosh = |x: f64| x.abs() + (-2.0 * x.abs()).exp().ln_1p();
+    ((ln_cosh(b) - ln_cosh(a)) / (b - a), (b.tanh() - a.tanh()) / (to - from))
+}
+
+/// Size of the torque over that of the acceleration, kg·m².
+fn rough_inertia(rows: &[Rows]) -> f64 {
+    let size = |of: &dyn Fn(&Rows, usize) -> f64| {
+        rows.iter().flat_map(|r| r.inner().map(|k| of(r, k).powi(2))).sum::<f64>().sqrt()
+    };
+    size(&|r, k| r.torque[k]) / size(&|r, k| r.acceleration(k))
 }
 
 #[derive(Clone)]
@@ -412,10 +437,7 @@ impl Problem {
         // whatever the gyro's bias
         let reading = largest(&|r| peak(&r.rate));
         let speed = largest(&|r| peak(&about_mean(&r.rate)));
-        let size = |of: &dyn Fn(&Rows, usize) -> f64| {
-            rows.iter().flat_map(|r| r.inner().map(|k| of(r, k).powi(2))).sum::<f64>().sqrt()
-        };
-        let inertia = size(&|r, k| r.torque[k]) / size(&|r, k| r.acceleration(k));
+        let inertia = rough_inertia(&rows);
         let mut names: Vec<String> = FIRST.map(String::from).to_vec();
         let mut bounds = vec![
             (0.0, 30.0 * inertia),
@@ -517,45 +539,44 @@ impl Problem {
         self.rows.iter().map(of).sum()
     }
 
-    /// −τ_f at a measured rate near row i; its derivatives with respect to the values p are added to `slope`.
+    /// Mean of −τ_f over a part near row i with these measured rates at its ends; its derivatives with respect to the values p are
+    /// added to `slope`. The expected factor is linear in the expected sign, since the square of a sign is 1.
     fn friction(
         &self,
         p: &[f64],
         rows: &Rows,
-        (bias, i, rate): (usize, usize, f64),
+        (bias, i, rates): (usize, usize, [f64; 2]),
         slope: &mut [f64],
     ) -> f64 {
         let [_, b, c, d, speed, asymmetry] = [p[0], p[1], p[2], p[3], p[4], p[5]];
-        let w = rate - p[bias];
-        let width = 1.25 * rows.noise;
-        let sign = (w / width).tanh();
+        let [from, to] = rates.map(|rate| rate - p[bias]);
+        let w = 0.5 * (from + to);
+        let (sign, sign_slope) = mean_sign(from, to, 1.25 * rows.noise);
         let shape = (-(w / speed).powi(2)).exp();
         let dry = c + d * shape;
-        let mut factor = 1.0 + asymmetry * sign;
-        let mut factor_by_sign = asymmetry;
+        let (mut factor, mut factor_by_sign) = (sign + asymmetry, 1.0);
         let per_way = 2 * self.harmonics;
         if let (Some(angle), true) = (&rows.angle, self.harmonics > 0) {
+            let (forwards, backwards) = ((1.0 + sign) / 2.0, (1.0 - sign) / 2.0);
             for h in 0..self.harmonics {
                 let (sin, cos) = (angle[i] * (h + 1) as f64).sin_cos();
                 for (k, trig) in [cos, sin].into_iter().enumerate() {
                     let (ahead, back) = (6 + 2 * h + k, 6 + per_way + 2 * h + k);
-                    let (forwards, backwards) = ((1.0 + sign) / 2.0, (1.0 - sign) / 2.0);
-                    factor += trig * (p[ahead] * forwards + p[back] * backwards);
-                    factor_by_sign += trig * (p[ahead] - p[back]) / 2.0;
-                    slope[ahead] += sign * dry * trig * forwards;
-                    slope[back] += sign * dry * trig * backwards;
+                    factor += trig * (p[ahead] * forwards - p[back] * backwards);
+                    factor_by_sign += trig * (p[ahead] + p[back]) / 2.0;
+                    slope[ahead] += dry * trig * forwards;
+                    slope[back] -= dry * trig * backwards;
                 }
             }
         }
-        let sign_slope = (1.0 - sign * sign) / width;
+        let shape_slope = 2.0 * w * d * shape / (speed * speed);
         slope[1] += w;
-        slope[2] += sign * factor;
-        slope[3] += sign * factor * shape;
-        slope[4] += sign * factor * d * shape * 2.0 * w * w / speed.powi(3);
-        slope[5] += sign * sign * dry;
-        slope[bias] += -(b + sign_slope * dry * (factor + sign * factor_by_sign)
-            - sign * factor * d * shape * 2.0 * w / (speed * speed));
-        b * w + sign * factor * dry
+        slope[2] += factor;
+        slope[3] += factor * shape;
+        slope[4] += factor * shape_slope * w / speed;
+        slope[5] += dry;
+        slope[bias] -= b + sign_slope * dry * factor_by_sign - factor * shape_slope;
+        b * w + factor * dry
     }
 
     /// Residuals at the values p and, if asked for, their derivatives.
@@ -576,12 +597,11 @@ impl Problem {
                     residuals.push(weight * (rows.rate[k] - p[bias]));
                     continue;
                 }
-                let (instants, parts) = rows.instants(self.form, k);
+                let (rates, parts) = rows.rates(self.form, k);
                 slopes.fill(0.0);
                 let mut friction = 0.0;
-                for weights in &instants[..parts] {
-                    let rate = (0..3).map(|j| weights[j] * rows.rate[k - 1 + j]).sum();
-                    friction += self.friction(p, rows, (bias, k, rate), &mut slopes);
+                for ends in rates.windows(2).take(parts) {
+                    friction += self.friction(p, rows, (bias, k, [ends[0], ends[1]]), &mut slopes);
                 }
                 let (weight, y) = (rows.weight[k - 1], rows.acceleration(k));
                 let torque = rows.torque(self.form, k);

@@ -7,7 +7,7 @@
 use analysis::statistics::{deviation, mean, median};
 use nalgebra::{DMatrix, DVector};
 
-use super::{FREE, Problem, Rows};
+use super::{FREE, Problem, Rows, rough_inertia};
 
 /// Stribeck speeds of the grid over the fastest speed: the first and the last, and how many.
 const GRID: (f64, f64, usize) = (2e-3, 3.0, 14);
@@ -17,9 +17,15 @@ const FOLLOWED: usize = 3;
 const STILL: f64 = 4.0;
 /// …if so many rows in succession are.
 const RUN: usize = 5;
+/// Difference of the means of the halves of a rest in standard deviations beyond which the hub creeps; chance makes one in two million.
+const CREEPS: f64 = 5.0;
 /// Length of a part in which the hub rests without torque, s. A dry bearing that slips changes the rate within
 /// it by more than the noise.
 const REST: f64 = 0.5;
+/// Length of a part in which the hub rests under a torque, s.
+const LOADED: f64 = 2.0;
+/// Largest standard deviation of the share of the torque's changes that moves the hub: 0 at rest, 1 if it slips.
+const SHARE: f64 = 0.1;
 
 /// Inertia, b, c, d and a constant torque, and the sum of squares.
 type Linear = ([f64; 5], f64);
@@ -68,19 +74,40 @@ impl Rows {
         let (first, last) = rate.split_at(rate.len() / 2);
         let drift = (mean(last) - mean(first)).abs();
         deviation(rate) < 2.0 * self.noise
-            && drift < STILL * self.noise * (4.0 / rate.len() as f64).sqrt()
+            && drift < CREEPS * self.noise * (4.0 / rate.len() as f64).sqrt()
     }
 
-    /// Reading of the gyro while the hub rests without torque, rad/s; `None` without such a part.
-    fn reading_at_rest(&self) -> Option<f64> {
-        let length = self.shortest_rest();
+    /// Reading of the gyro while the hub rests, rad/s; `None` without such a part. `inertia` is a rough one, kg·m².
+    fn reading_at_rest(&self, inertia: f64) -> Option<f64> {
         let largest = self.torque.iter().fold(0.0_f64, |most, t| most.max(t.abs()));
-        let parts = self.rate.chunks_exact(length).zip(self.torque.chunks_exact(length));
-        let rest = parts.filter_map(|(rate, torque)| {
-            let is_free = torque.iter().all(|t| t.abs() <= FREE * largest);
-            (is_free && self.is_flat(rate)).then(|| mean(rate))
-        });
-        median(&rest.collect::<Vec<f64>>())
+        let rows = self.time.len();
+        let readings = |length: usize, rests: &dyn Fn(usize, usize) -> bool| -> Vec<f64> {
+            let parts = (0..rows / length).map(|k| (k * length, (k + 1) * length));
+            let flat = parts.filter(|(a, b)| self.is_flat(&self.rate[*a..*b]) && rests(*a, *b));
+            flat.map(|(a, b)| mean(&self.rate[a..b])).collect()
+        };
+        let is_free =
+            |a: usize, b: usize| self.torque[a..b].iter().all(|t| t.abs() <= FREE * largest);
+        let free = readings(self.shortest_rest(), &is_free);
+        let loaded = (LOADED / self.step).ceil() as usize;
+        median(&free).or_else(|| median(&readings(loaded, &|a, b| self.resists(a, b, inertia))))
+    }
+
+    /// Returns true if the hub stands still under a torque that changes so much that a slipping hub would show it. At a steady rate
+    /// friction is constant, so the rate would follow the integral of the torque, but for a line.
+    fn resists(&self, from: usize, to: usize, inertia: f64) -> bool {
+        let curve = |signal: &[f64]| -> Vec<f64> {
+            let (n, mean) = (signal.len() as f64, mean(signal));
+            let place = |k: usize| k as f64 - (n - 1.0) / 2.0;
+            let slope = signal.iter().enumerate().map(|(k, v)| place(k) * v).sum::<f64>()
+                / (n * (n * n - 1.0) / 12.0);
+            signal.iter().enumerate().map(|(k, v)| v - mean - slope * place(k)).collect()
+        };
+        let torque: Vec<f64> = self.impulse[from..to].iter().map(|i| i / inertia).collect();
+        let (torque, rate) = (curve(&torque), curve(&self.rate[from..to]));
+        let square: f64 = torque.iter().map(|t| t * t).sum();
+        let share = torque.iter().zip(&rate).map(|(t, w)| t * w).sum::<f64>() / square;
+        self.noise < SHARE * square.sqrt() && share.abs() < 0.5
     }
 }
 
@@ -88,9 +115,10 @@ impl Problem {
     /// The gyro's bias in each recording, roughly: what is read at rest, else the mean where that explains the recording better
     /// than no bias.
     pub(super) fn rough_biases(&self) -> Vec<f64> {
+        let inertia = rough_inertia(&self.rows);
         (0..self.rows.len())
             .map(|index| {
-                if let Some(rest) = self.rows[index].reading_at_rest() {
+                if let Some(rest) = self.rows[index].reading_at_rest(inertia) {
                     return rest;
                 }
                 let one = Problem { rows: vec![self.rows[index].clone()], ..self.clone() };
