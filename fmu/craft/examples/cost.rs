@@ -1,4 +1,4 @@
-//! Steps of 20 ms for counting instructions: `cost KIND STEPS TOLERANCE`.
+//! Steps of 20 ms, `telecom` 0.1 s, for counting instructions: `cost KIND STEPS TOLERANCE`.
 //!
 //! | KIND | what |
 //! | --- | --- |
@@ -7,6 +7,7 @@
 //! | `one` | 1180 kg under 2400 N, one tank, one mode |
 //! | `two` | the same, two tanks of one mode, as in the comparison with Basilisk |
 //! | `four` | the same, four tanks of three modes each |
+//! | `telecom`, `pendulums` | the satellite of example 14 at a fill of 60 %, with and without s and κ |
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*Spacecraft*step*' cost bench 1000 1e-6` counts the
 //! steps alone (`'*Plant*step*'` for `hubslosh`).
@@ -17,9 +18,9 @@ use plant::{FrictionModel, Plant, SloshModel};
 const STEP: f64 = 0.02;
 
 /// A torque that swings at w rad/s, from knot k to the next, and its slope.
-fn torque(size: f64, w: f64, k: usize) -> (f64, f64) {
-    let at = |k: usize| size * f64::sin(w * STEP * k as f64);
-    (at(k), (at(k + 1) - at(k)) / STEP)
+fn torque(size: f64, w: f64, step: f64, k: usize) -> (f64, f64) {
+    let at = |k: usize| size * f64::sin(w * step * k as f64);
+    (at(k), (at(k + 1) - at(k)) / step)
 }
 
 fn hubslosh(steps: usize, tolerance: f64) {
@@ -30,16 +31,42 @@ fn hubslosh(steps: usize, tolerance: f64) {
     p.init.slosh_angle_radial = 0.05;
     let mut plant = Plant::new(&p, &plant::Inputs::default(), 0.0, tolerance).unwrap();
     for k in 0..steps {
-        let (value, slope) = torque(0.05, 13.0, k);
+        let (value, slope) = torque(0.05, 13.0, STEP, k);
         let tau_cmd = plant::Ramp { value, slope };
         plant.step(&plant::Inputs { tau_cmd, ..plant::Inputs::default() }, STEP).unwrap();
+    }
+}
+
+/// Sets the satellite of example 14: 1400 kg with a sphere and a capsule of two modes each.
+fn telecom(p: &mut Parameters) {
+    p.tanks = 2;
+    p.craft.mass = 1400.0;
+    p.craft.r = [0.012, -0.008, 1.05];
+    p.craft.j = Inertia { xx: 1150.0, yy: 980.0, zz: 870.0, xy: -14.0, xz: 22.0, yz: 9.0 };
+    p.init.omega = [0.001, -0.002, 0.003];
+    let [nto, mmh, ..] = &mut p.tank;
+    nto.position = [0.06, 0.42, 0.2];
+    (nto.m_0, nto.h_0, nto.i_0) = (287.00845531115345, 0.5490604138460016, 0.014355023890010976);
+    nto.mass[..2].copy_from_slice(&[305.3341700207052, 9.787589025775398]);
+    nto.length[..2].copy_from_slice(&[0.32270709224095556, 0.10188824550999312]);
+    nto.hinge[..2].copy_from_slice(&[0.5499999999993295, 0.5499999999970336]);
+    nto.zeta[..2].copy_from_slice(&[0.001710917941963635, 0.0006843788123203797]);
+    mmh.position = [-0.05, -0.62, 0.1];
+    (mmh.m_0, mmh.h_0, mmh.i_0) = (383.84637993210924, 0.5942687717525935, 7.24933411788028);
+    mmh.mass[..2].copy_from_slice(&[113.7131029867415, 3.426370558296533]);
+    mmh.length[..2].copy_from_slice(&[0.24470513495019547, 0.08440492046413875]);
+    mmh.hinge[..2].copy_from_slice(&[0.8280404728615534, 0.9656763273441942]);
+    mmh.zeta[..2].copy_from_slice(&[0.004048859023143716, 0.001818331491886671]);
+    for tank in [nto, mmh] {
+        (tank.modes, tank.g_ref, tank.i_z) = (2, 0.15, 0.0);
+        tank.p_0 = [[0.05, 0.1, -0.99]; craft::MODES];
     }
 }
 
 fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
     let mut p = Parameters::default();
     p.tank[0].p_0[0] = [0.05, 0.1, -0.99];
-    let (mut thrust, mut size, mut w) = (2400.0, 20.0, 2.5);
+    let (mut thrust, mut size, mut w, mut step) = (2400.0, 20.0, 2.5, STEP);
     match kind {
         "bench" => {
             let mass = 1e9;
@@ -68,19 +95,28 @@ fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
             }
             p.init.omega = [0.01, -0.02, 0.03];
         }
+        "telecom" | "pendulums" => {
+            telecom(&mut p);
+            (thrust, size, w) = (400.0, 1.0, 0.7);
+            if kind == "telecom" {
+                p.tank[1].nonlinear_inertia[0] = 1.4502961373348606;
+                p.tank[1].nonlinear_stiffness[0] = 0.7298361502849786;
+            }
+            step = 0.1;
+        }
         _ => p.init.omega = [0.01, -0.02, 0.03],
     }
     let force = Ramp::held([0.0, 0.0, thrust]);
     let mut craft =
         Spacecraft::new(&p, &Inputs { force, ..Inputs::default() }, 0.0, tolerance).unwrap();
     for k in 0..steps {
-        let (value, slope) = torque(size, w, k);
+        let (value, slope) = torque(size, w, step, k);
         let across = if kind == "bench" { 0.0 } else { 1.0 };
         let torque = Ramp {
             value: [across * value, 0.5 * across * value, value],
             slope: [across * slope, 0.5 * across * slope, slope],
         };
-        craft.step(&Inputs { force, torque, ..Inputs::default() }, STEP).unwrap();
+        craft.step(&Inputs { force, torque, ..Inputs::default() }, step).unwrap();
     }
 }
 

@@ -87,8 +87,8 @@ pub struct MountedTank {
     /// True if a bob is on a surface other than a sphere; the surfaces of all modes.
     curved: bool,
     surfaces: [Option<Surface>; MODES],
-    /// The rigid liquid and all liquid at rest, if they are not axially symmetric.
-    uneven: Option<[Rigid; 2]>,
+    /// The rigid liquid and all liquid at rest of a tank that does not drain.
+    still: Option<[Rigid; 2]>,
 }
 
 /// Returns a constant with its derivatives, which are 0.
@@ -152,17 +152,43 @@ impl MountedTank {
         let axes = rotation(&unit_quaternion(tank.q));
         let curves = tank.fill.curves(tank.modes);
         let (e, d) = (axes.map(|row| row[2]), tank.position);
-        let uneven = (!tank.is_axial()).then(|| {
-            let point = |bob: Bob| Rigid::new(bob.m, bob.at_rest(), &[[0.0; 3]; 3]);
-            let bobs = (0..tank.modes).map(|n| point(Bob::new(tank, 0, n)));
-            [tank.rigid(), bobs.fold(tank.rigid(), |sum, bob| sum.and(&bob))]
-        });
         let across = core::array::from_fn(|n| {
             (n < tank.modes).then(|| tank.hinge_and_across(n).1).flatten()
         });
         let surfaces = core::array::from_fn(|n| tank.surface(n));
-        let (planar, curved) = (tank.is_planar(), tank.has_surface());
-        MountedTank { tank: *tank, curves, axes, e, d, planar, across, curved, surfaces, uneven }
+        let (planar, curved, still) = (tank.is_planar(), tank.has_surface(), None);
+        let mounted = MountedTank {
+            tank: *tank,
+            curves,
+            axes,
+            e,
+            d,
+            planar,
+            across,
+            curved,
+            surfaces,
+            still,
+        };
+        let still = if !tank.is_axial() {
+            let point = |bob: Bob| Rigid::new(bob.m, bob.at_rest(), &[[0.0; 3]; 3]);
+            let bobs = (0..tank.modes).map(|n| point(Bob::new(tank, 0, n)));
+            Some([tank.rigid(), bobs.fold(tank.rigid(), |sum, bob| sum.and(&bob))])
+        } else {
+            let s = add(d, scale(tank.h_0, e));
+            let rigid = Rigid::axial(tank.m_0, s, tank.i_0, tank.i_z, e);
+            (!mounted.drains()).then(|| [rigid, mounted.at_rest(0.0)])
+        };
+        MountedTank { still, ..mounted }
+    }
+
+    /// Returns the liquid at rest as a rigid body; `None` if it drains.
+    pub fn still(&self) -> Option<&Rigid> {
+        self.still.as_ref().map(|[_, whole]| whole)
+    }
+
+    /// Returns the number of modes.
+    pub fn modes(&self) -> usize {
+        self.tank.modes
     }
 
     /// Returns true if the drag of any mode depends on acceleration or amplitude.
@@ -173,7 +199,7 @@ impl MountedTank {
     /// Returns the liquid at rest as a rigid body. `liquid` matters only for tanks with a table.
     pub fn at_rest<T: Number>(&self, liquid: T) -> Rigid<T> {
         let MountedTank { tank, curves, .. } = self;
-        if let Some([_, whole]) = &self.uneven {
+        if let Some(whole) = self.still() {
             return whole.lift();
         }
         let constant_of = |x: f64| T::constant(x);
@@ -221,175 +247,17 @@ impl MountedTank {
         Some((meridian, lift))
     }
 
-    /// Evaluates the contents. x: p and p' of each mode, tank axes. `a` and `w_d` give the acceleration along the tank
-    /// that the drag follows. `liquid`, `flow` and its `slope` matter only for tanks with a table.
+    /// Returns the contents. x: p and p' of each mode, tank axes. `a` and `w_d` give the acceleration along the tank that
+    /// the drag follows. The mass of liquid, the flow and its slope matter only for tanks with a table.
     pub fn contents<T: Number>(
         &self,
         x: &[T],
-        [a, w, w_d]: [Vec3<T>; 3],
-        liquid: T,
-        flow: T,
-        slope: f64,
+        motion: [Vec3<T>; 3],
+        flow: (T, T, f64),
     ) -> Contents<'_, T> {
-        let MountedTank { tank, curves, axes, .. } = self;
-        let drains = tank.fill.points > 0;
-        let c = T::constant;
-        let flow = if drains { flow } else { c(0.0) };
-        let slope = if drains { slope } else { 0.0 };
-        // Converts derivatives by the mass of liquid to derivatives by time, with m' = -f, m'' =
-        // -f'.
-        let follow = |[value, first, second]: Jet<T>| -> Jet<T> {
-            [value, -(first * flow), second * flow * flow - first * slope]
-        };
-        let place = drains.then(|| curves.place(liquid));
-        let (e, d) = (constant::<T>(self.e), constant::<T>(self.d));
-        let outlet = add(d, e.map(|x| x * tank.outlet));
-        let mut m_0 = if drains { [liquid, -flow, c(-slope)] } else { jet(tank.m_0) };
-        let axes: Mat3<T> = axes.map(constant);
-        let zero = constant::<T>([0.0; 3]);
-        let mut bobs = [(); MODES].map(|()| None);
-        // K and L without the axial part, with their derivatives; sum of m_n' b_n and its
-        // derivative.
-        let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
-        let mut sinking = [c(0.0); 2];
-        let mut flow_wrench = [zero; 2];
-        let mut dissipation = c(0.0);
-        for n in 0..tank.modes {
-            let [m, l, h] = match place {
-                Some(place) => curves.mode(n, place).map(follow),
-                None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(jet),
-            };
-            let k = tank.k[n];
-            if drains {
-                m_0 = [m_0[0] - m[0], m_0[1] - m[1], m_0[2] - m[2]];
-            }
-            let mut p = times(&axes, vec_of(x, 6 * n));
-            let mut p_d = times(&axes, vec_of(x, 6 * n + 3));
-            let mut hinge = add(d, scale(h[0], e));
-            if self.planar {
-                [hinge, p, p_d] = self.guided(n, [hinge, p, p_d]);
-            }
-            let [p, p_d] = on_sphere(p, p_d);
-            let mut rho = add(hinge, scale(l[0], p));
-            let mut rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
-            let on_surface = if self.curved { self.on_surface(n, l, [p, p_d]) } else { None };
-            if let Some((_, lift)) = &on_surface {
-                (rho, rho_d) = (add(rho, scale(lift.z, e)), add(rho_d, scale(lift.z_d, e)));
-            }
-            let (height, height_d) = (dot(e, p), dot(e, p_d));
-            let p_perp = sub(p, scale(height, e));
-            let p_perp_d = sub(p_d, scale(height_d, e));
-            let at_hinge = add(add(a, cross(w_d, hinge)), cross(w, cross(w, hinge)));
-            let chord = add(p, e);
-            let motion = [dot(chord, chord), dot(p_d, p_d)];
-            let zeta = place.and_then(|place| curves.zeta(n, place));
-            let drag = damping::coefficient(tank, n, [m[0], l[0]], zeta, dot(e, at_hinge), motion);
-            let moved = match &on_surface {
-                Some((meridian, _)) => meridian.along(p_d),
-                None => p_d,
-            };
-            let phi = add(scale(drag * l[0], moved), scale(l[0] * k, p_perp));
-            let centripetal = add(cross(w, cross(w, rho)), cross(w, rho_d).map(|x| x * 2.0));
-            let settling = add(centripetal, scale(h[2], e));
-            let t_0 = m[0] * (l[0] * dot(p_d, p_d) - dot(p, settling) - l[2])
-                - l[0] * dot(p_perp, p_perp) * k;
-            let mut known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
-            let turned = cross(hinge, p);
-            // Flow out of the bob.
-            let mut b = h[0] + l[0] * height;
-            let mut b_d = h[1] + l[1] * height + l[0] * height_d;
-            let mut end_rate = add(scale(h[1], e), scale(l[1], p));
-            let mut centring = l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k);
-            let mut centring_d = l[0] * l[1] * dot(p_perp, p_perp) * k;
-            let surface = on_surface.map(|(meridian, lift)| {
-                (b, b_d) = (b + lift.z, b_d + lift.z_d);
-                end_rate = add(end_rate, scale(lift.z_by_length, e));
-                centring = centring + m[0] * lift.energy;
-                centring_d = centring_d + m[0] * lift.energy_d + m[1] * lift.energy;
-                known = add(known, scale(l[2] - l[0] * dot(p_d, p_d), p));
-                known = add(known, scale(lift.z_dd, e));
-                OnSurface { meridian, z: lift.z, inner: lift.inner }
-            });
-            let lost = scale(m[1] * l[0], p_perp);
-            let lost_d =
-                add(scale(m[2] * l[0] + m[1] * l[1], p_perp), scale(m[1] * l[0], p_perp_d));
-            let foot = add(d, scale(b, e));
-            sinking = [sinking[0] + m[1] * b, sinking[1] + m[2] * b + m[1] * b_d];
-            level = [add(level[0], lost), add(level[1], cross(foot, lost))];
-            level_d = [
-                add(level_d[0], lost_d),
-                add(level_d[1], add(cross(foot, lost_d), cross(scale(b_d, e), lost))),
-            ];
-            let speed = add(cross(w, rho), rho_d);
-            flow_wrench = [
-                sub(flow_wrench[0], scale(m[1], rho_d)),
-                sub(flow_wrench[1], scale(m[1], cross(rho, speed))),
-            ];
-            dissipation = dissipation + drag * l[0] * l[0] * dot(moved, moved);
-            bobs[n] = Some(Swing {
-                m: m[0],
-                l: l[0],
-                p,
-                p_d,
-                rho,
-                rho_d,
-                u: [p[0], p[1], p[2], turned[0], turned[1], turned[2]],
-                t_0,
-                phi,
-                known,
-                centring,
-                m_d: m[1],
-                end_rate,
-                centring_d,
-                surface,
-            });
-        }
-        let [h_0, i_0, i_z] = match place {
-            Some(place) => curves.rigid(place).map(follow),
-            None => [tank.h_0, tank.i_0, tank.i_z].map(jet),
-        };
-        // The rigid liquid about O.
-        let s = add(d, scale(h_0[0], e));
-        let s_d = scale(h_0[1], e);
-        let rigid = match &self.uneven {
-            Some([rigid, _]) => rigid.lift(),
-            None => Rigid::axial(m_0[0], s, i_0[0], i_z[0], e),
-        };
-        let mut shrinking = (m_0[1], [zero; 2]);
-        if drains {
-            let moment = m_0[1] * h_0[0] + m_0[0] * h_0[1];
-            let moment_d = m_0[2] * h_0[0] + m_0[1] * h_0[1] * 2.0 + m_0[0] * h_0[2];
-            let j = moment + sinking[0] + flow * tank.outlet;
-            let j_d = moment_d + sinking[1] + c(slope * tank.outlet);
-            let axial = scale(j, e);
-            let axial_d = scale(j_d, e);
-            level = [add(level[0], axial), add(level[1], cross(d, axial))];
-            level_d = [add(level_d[0], axial_d), add(level_d[1], cross(d, axial_d))];
-            let [k, l] = level;
-            let force = add(cross(w, k).map(|x| x * 2.0), level_d[0]);
-            // I_0' w
-            let along = dot(e, w);
-            let own = add(scale(i_0[1], w), scale((i_z[1] - i_0[1]) * along, e));
-            let lighter = scale(m_0[1], cross(s, cross(w, s)));
-            let moving = scale(m_0[0], add(cross(s_d, cross(w, s)), cross(s, cross(w, s_d))));
-            let turning = add(own, add(lighter, moving));
-            shrinking.1 = [add(scale(m_0[1], s), scale(m_0[0], s_d)), turning];
-            let leaving = scale(flow, cross(outlet, cross(w, outlet)));
-            let torque = [turning, leaving, cross(w, l), level_d[1]];
-            flow_wrench = [
-                sub(flow_wrench[0], force),
-                torque.into_iter().fold(flow_wrench[1], |sum, part| sub(sum, part)),
-            ];
-        }
-        Contents {
-            mounted: self,
-            rigid,
-            flow_wrench,
-            flow_momentum: level,
-            bobs,
-            dissipation,
-            shrinking,
-        }
+        let mut contents = Contents::new(self);
+        contents.evaluate(x, motion, flow);
+        contents
     }
 
     /// Writes the bobs' p' and p'' in tank axes, six numbers each, under [a; w'].
@@ -539,6 +407,182 @@ impl<T: Number> OnSurface<T> {
 }
 
 impl<T: Number> Contents<'_, T> {
+    /// Creates contents without bobs or motion.
+    pub fn new(mounted: &MountedTank) -> Contents<'_, T> {
+        let zero = constant::<T>([0.0; 3]);
+        let none = T::constant(0.0);
+        Contents {
+            mounted,
+            rigid: Rigid { mass: none, moment: zero, inertia: [zero; 3] },
+            flow_wrench: [zero; 2],
+            flow_momentum: [zero; 2],
+            bobs: [const { None }; MODES],
+            dissipation: none,
+            shrinking: (none, [zero; 2]),
+        }
+    }
+
+    /// Evaluates new contents in place, without copies of them; see [`MountedTank::contents`].
+    pub fn evaluate(
+        &mut self,
+        x: &[T],
+        [a, w, w_d]: [Vec3<T>; 3],
+        (liquid, flow, slope): (T, T, f64),
+    ) {
+        let mounted = self.mounted;
+        let MountedTank { tank, curves, axes, .. } = mounted;
+        let drains = tank.fill.points > 0;
+        let c = T::constant;
+        let flow = if drains { flow } else { c(0.0) };
+        let slope = if drains { slope } else { 0.0 };
+        // Converts derivatives by the mass of liquid to derivatives by time, with m' = -f, m'' =
+        // -f'.
+        let follow = |[value, first, second]: Jet<T>| -> Jet<T> {
+            [value, -(first * flow), second * flow * flow - first * slope]
+        };
+        let place = drains.then(|| curves.place(liquid));
+        let (e, d) = (constant::<T>(mounted.e), constant::<T>(mounted.d));
+        let outlet = add(d, e.map(|x| x * tank.outlet));
+        let mut m_0 = if drains { [liquid, -flow, c(-slope)] } else { jet(tank.m_0) };
+        let axes: Mat3<T> = axes.map(constant);
+        let zero = constant::<T>([0.0; 3]);
+        // K and L without the axial part, with their derivatives; sum of m_n' b_n and its
+        // derivative.
+        let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
+        let mut sinking = [c(0.0); 2];
+        for n in 0..tank.modes {
+            let [m, l, h] = match place {
+                Some(place) => curves.mode(n, place).map(follow),
+                None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(jet),
+            };
+            let k = tank.k[n];
+            if drains {
+                m_0 = [m_0[0] - m[0], m_0[1] - m[1], m_0[2] - m[2]];
+            }
+            let mut p = times(&axes, vec_of(x, 6 * n));
+            let mut p_d = times(&axes, vec_of(x, 6 * n + 3));
+            let mut hinge = add(d, scale(h[0], e));
+            if mounted.planar {
+                [hinge, p, p_d] = mounted.guided(n, [hinge, p, p_d]);
+            }
+            let [p, p_d] = on_sphere(p, p_d);
+            let mut rho = add(hinge, scale(l[0], p));
+            let mut rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
+            let on_surface = if mounted.curved { mounted.on_surface(n, l, [p, p_d]) } else { None };
+            if let Some((_, lift)) = &on_surface {
+                (rho, rho_d) = (add(rho, scale(lift.z, e)), add(rho_d, scale(lift.z_d, e)));
+            }
+            let height = dot(e, p);
+            let p_perp = sub(p, scale(height, e));
+            let at_hinge = add(add(a, cross(w_d, hinge)), cross(w, cross(w, hinge)));
+            let chord = add(p, e);
+            let motion = [dot(chord, chord), dot(p_d, p_d)];
+            let zeta = place.and_then(|place| curves.zeta(n, place));
+            let drag = damping::coefficient(tank, n, [m[0], l[0]], zeta, dot(e, at_hinge), motion);
+            let moved = match &on_surface {
+                Some((meridian, _)) => meridian.along(p_d),
+                None => p_d,
+            };
+            let phi = add(scale(drag * l[0], moved), scale(l[0] * k, p_perp));
+            let centripetal = add(cross(w, cross(w, rho)), cross(w, rho_d).map(|x| x * 2.0));
+            let settling = add(centripetal, scale(h[2], e));
+            let t_0 = m[0] * (l[0] * dot(p_d, p_d) - dot(p, settling) - l[2])
+                - l[0] * dot(p_perp, p_perp) * k;
+            let mut known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
+            let turned = cross(hinge, p);
+            let mut centring = l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k);
+            let (mut end_rate, mut centring_d) = (zero, c(0.0));
+            // Flow out of the bob.
+            if drains {
+                let height_d = dot(e, p_d);
+                let p_perp_d = sub(p_d, scale(height_d, e));
+                let mut b = h[0] + l[0] * height;
+                let mut b_d = h[1] + l[1] * height + l[0] * height_d;
+                end_rate = add(scale(h[1], e), scale(l[1], p));
+                centring_d = l[0] * l[1] * dot(p_perp, p_perp) * k;
+                if let Some((_, lift)) = &on_surface {
+                    (b, b_d) = (b + lift.z, b_d + lift.z_d);
+                    end_rate = add(end_rate, scale(lift.z_by_length, e));
+                    centring_d = centring_d + m[0] * lift.energy_d + m[1] * lift.energy;
+                }
+                let lost = scale(m[1] * l[0], p_perp);
+                let lost_d =
+                    add(scale(m[2] * l[0] + m[1] * l[1], p_perp), scale(m[1] * l[0], p_perp_d));
+                let foot = add(d, scale(b, e));
+                sinking = [sinking[0] + m[1] * b, sinking[1] + m[2] * b + m[1] * b_d];
+                level = [add(level[0], lost), add(level[1], cross(foot, lost))];
+                level_d = [
+                    add(level_d[0], lost_d),
+                    add(level_d[1], add(cross(foot, lost_d), cross(scale(b_d, e), lost))),
+                ];
+                let speed = add(cross(w, rho), rho_d);
+                self.flow_wrench = [
+                    sub(self.flow_wrench[0], scale(m[1], rho_d)),
+                    sub(self.flow_wrench[1], scale(m[1], cross(rho, speed))),
+                ];
+            }
+            let surface = on_surface.map(|(meridian, lift)| {
+                centring = centring + m[0] * lift.energy;
+                known = add(known, scale(l[2] - l[0] * dot(p_d, p_d), p));
+                known = add(known, scale(lift.z_dd, e));
+                OnSurface { meridian, z: lift.z, inner: lift.inner }
+            });
+            self.dissipation = self.dissipation + drag * l[0] * l[0] * dot(moved, moved);
+            self.bobs[n] = Some(Swing {
+                m: m[0],
+                l: l[0],
+                p,
+                p_d,
+                rho,
+                rho_d,
+                u: [p[0], p[1], p[2], turned[0], turned[1], turned[2]],
+                t_0,
+                phi,
+                known,
+                centring,
+                m_d: m[1],
+                end_rate,
+                centring_d,
+                surface,
+            });
+        }
+        if let Some([rigid, _]) = &mounted.still {
+            self.rigid = rigid.lift();
+        }
+        let Some(place) = place else { return };
+        let [h_0, i_0, i_z] = curves.rigid(place).map(follow);
+        // The rigid liquid about O.
+        let s = add(d, scale(h_0[0], e));
+        let s_d = scale(h_0[1], e);
+        if mounted.still.is_none() {
+            self.rigid = Rigid::axial(m_0[0], s, i_0[0], i_z[0], e);
+        }
+        let moment = m_0[1] * h_0[0] + m_0[0] * h_0[1];
+        let moment_d = m_0[2] * h_0[0] + m_0[1] * h_0[1] * 2.0 + m_0[0] * h_0[2];
+        let j = moment + sinking[0] + flow * tank.outlet;
+        let j_d = moment_d + sinking[1] + c(slope * tank.outlet);
+        let axial = scale(j, e);
+        let axial_d = scale(j_d, e);
+        level = [add(level[0], axial), add(level[1], cross(d, axial))];
+        level_d = [add(level_d[0], axial_d), add(level_d[1], cross(d, axial_d))];
+        let [k, l] = level;
+        let force = add(cross(w, k).map(|x| x * 2.0), level_d[0]);
+        // I_0' w
+        let along = dot(e, w);
+        let own = add(scale(i_0[1], w), scale((i_z[1] - i_0[1]) * along, e));
+        let lighter = scale(m_0[1], cross(s, cross(w, s)));
+        let moving = scale(m_0[0], add(cross(s_d, cross(w, s)), cross(s, cross(w, s_d))));
+        let turning = add(own, add(lighter, moving));
+        self.shrinking = (m_0[1], [add(scale(m_0[1], s), scale(m_0[0], s_d)), turning]);
+        let leaving = scale(flow, cross(outlet, cross(w, outlet)));
+        let torque = [turning, leaving, cross(w, l), level_d[1]];
+        self.flow_momentum = level;
+        self.flow_wrench = [
+            sub(self.flow_wrench[0], force),
+            torque.into_iter().fold(self.flow_wrench[1], |sum, part| sub(sum, part)),
+        ];
+    }
+
     /// Adds the bobs' inertia along their rods and perpendicular to the planes of planar modes, m u u^T.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {

@@ -10,13 +10,15 @@
 //! same equations give this impulse if only the flow's slope acts.
 
 use alloc::vec::Vec;
+use core::ops::{Mul, Range};
+
 use taylor::error::StepError;
 use taylor::extrapolation::System;
 use taylor::integrator::RATE_FLOOR;
 use taylor::number::{Dual, Number};
 use taylor::vector::{
-    Mat3, Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times, transposed_times,
-    unit_quaternion,
+    Mat3, Quaternion, Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times,
+    transposed_times, unit_quaternion,
 };
 
 use crate::contents::{
@@ -85,6 +87,31 @@ pub struct Draining {
     gravity: Vec3,
     pivot: Pivot,
     tanks: Vec<MountedTank>,
+    /// True if any drag follows acceleration or amplitude.
+    follows: bool,
+    /// Craft and liquids at rest as one rigid body, and its equations, if no tank drains.
+    still: Option<(Rigid, Equations<f64>)>,
+}
+
+/// The system for [a; w'].
+#[derive(Clone, Debug)]
+struct Equations<T> {
+    matrix: Mat6<T>,
+    /// Factors of the matrix; on a pivot with the upper rows replaced, which hold a.
+    factors: Factors<T>,
+}
+
+/// The craft at an instant, its equations solved.
+struct Instant<T> {
+    q: Quaternion<T>,
+    axes: Mat3<T>,
+    /// Velocity of O, body axes.
+    velocity: Vec3<T>,
+    w: Vec3<T>,
+    a: Vec3<T>,
+    w_d: Vec3<T>,
+    /// Power that the pivot dissipates, W.
+    by_pivot: T,
 }
 
 /// A craft during one step.
@@ -109,11 +136,17 @@ fn scales(turn: f64, position: f64, velocity: f64, swing: impl Fn(usize) -> f64)
 }
 
 impl System<STATES> for Run<'_> {
+    fn moving(&self) -> impl Iterator<Item = Range<usize>> + Clone {
+        let tanks = self.craft.tanks.iter().enumerate();
+        let bobs = tanks.map(|(i, mounted)| index::bob(i, 0)..index::bob(i, mounted.modes()));
+        [0..index::BOBS, index::LIQUID..index::BALLS].into_iter().chain(bobs)
+    }
+
     fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
-        if has_diverged(x) || self.craft.is_beyond(x) {
+        if self.moving().any(|part| has_diverged(&x[part])) || self.craft.is_beyond(x) {
             return [0.0; STATES];
         }
-        self.craft.evaluate(x, &Acting::of(self.inputs, t)).0
+        self.craft.rates(x, &Acting::of(self.inputs, t))
     }
 
     fn error_scale(
@@ -154,13 +187,24 @@ impl Draining {
     /// Creates the equations; `None` if all tanks keep their liquid and have pendulums that swing in every direction.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
-        tanks.iter().any(Tank::is_extrapolated).then(|| Draining {
+        if !tanks.iter().any(Tank::is_extrapolated) {
+            return None;
+        }
+        let tanks: Vec<_> = tanks.iter().map(|tank| MountedTank::new(&tank.resolve())).collect();
+        let mut craft = Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,
             pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
-            tanks: tanks.iter().map(|tank| MountedTank::new(&tank.resolve())).collect(),
-        })
+            follows: tanks.iter().any(MountedTank::follows),
+            still: None,
+            tanks,
+        };
+        if craft.tanks.iter().all(|mounted| mounted.still().is_some()) {
+            let whole: Rigid = craft.at_rest(&[0.0; STATES]);
+            craft.still = Some((whole, craft.equations(whole.mass_matrix())));
+        }
+        Some(craft)
     }
 
     /// Returns the tanks at the current masses of liquid.
@@ -209,8 +253,8 @@ impl Draining {
         let before = self.energy(state);
         let jump = core::array::from_fn(|i| now[i] - state.flow[i]);
         // Rates are linear in the slopes.
-        let [with, without] = [jump, [0.0; TANKS]]
-            .map(|slope| self.evaluate(&state.x, &Acting::flowing(now, slope)).0);
+        let [with, without] =
+            [jump, [0.0; TANKS]].map(|slope| self.rates(&state.x, &Acting::flowing(now, slope)));
         let x = &mut state.x;
         let mut add = |at: usize| {
             for i in at..at + 3 {
@@ -239,31 +283,46 @@ impl Draining {
     /// Total energy, J.
     fn energy(&self, state: &State) -> f64 {
         let acting = Acting::flowing(state.flow, [0.0; TANKS]);
-        self.evaluate(&state.x, &acting).1.outputs(&state.x).energy
+        self.evaluate(&state.x, &acting).outputs(&state.x).energy
+    }
+
+    /// Returns the equations of motion with a mass matrix.
+    fn equations<T: Number>(&self, matrix: Mat6<T>) -> Equations<T> {
+        let mut held = matrix;
+        if self.mount == Mount::Pivot {
+            for i in 0..3 {
+                for k in 0..6 {
+                    let one = T::constant(if i == k { 1.0 } else { 0.0 });
+                    (held[i][k], held[k][i]) = (one, one);
+                }
+            }
+        }
+        Equations { matrix, factors: Factors::of(&held) }
     }
 
     /// Solves the equations of motion for [a; w']; on a pivot a is given.
-    fn solve<T: Number>(
+    fn solve<T: Number + Mul<M, Output = T>, M: Copy>(
         &self,
-        mut matrix: Mat6<T>,
+        Equations { matrix, factors }: &Equations<M>,
         [mut force, mut torque]: [Vec3<T>; 2],
         axes: &Mat3<T>,
     ) -> [Vec3<T>; 2] {
         if self.mount == Mount::Pivot {
             let a = transposed_times(axes, constant(self.gravity)).map(|x| -x);
-            for i in 0..3 {
-                let coupled = [matrix[3 + i][0], matrix[3 + i][1], matrix[3 + i][2]];
-                torque[i] = torque[i] - dot(coupled, a);
-            }
-            for i in 0..3 {
-                for k in 0..6 {
-                    let one = T::constant(if i == k { 1.0 } else { 0.0 });
-                    (matrix[i][k], matrix[k][i]) = (one, one);
-                }
+            for (torque, row) in torque.iter_mut().zip(&matrix[3..]) {
+                *torque = *torque - (a[0] * row[0] + a[1] * row[1] + a[2] * row[2]);
             }
             force = a;
         }
-        Factors::of(&matrix).solve([force, torque])
+        factors.solve([force, torque])
+    }
+
+    /// Returns craft and liquids at rest as one rigid body.
+    fn at_rest<T: Number>(&self, x: &[T; STATES]) -> Rigid<T> {
+        let liquids = self.tanks.iter().enumerate();
+        liquids.fold(self.craft.lift::<T>(), |sum, (i, mounted)| {
+            sum.and(&mounted.at_rest(x[index::LIQUID + i]))
+        })
     }
 
     /// Returns [a; w'] of craft and liquids at rest as one rigid body, if any drag follows it
@@ -276,44 +335,46 @@ impl Draining {
         axes: &Mat3<T>,
     ) -> [Vec3<T>; 2] {
         let zero = constant::<T>([0.0; 3]);
-        if !self.tanks.iter().any(MountedTank::follows) {
+        if !self.follows {
             return [zero; 2];
         }
         let w = vec_of(x, index::OMEGA);
-        let liquids = self.tanks.iter().enumerate();
-        let whole = liquids.fold(self.craft.lift::<T>(), |sum, (i, mounted)| {
-            sum.and(&mounted.at_rest(x[index::LIQUID + i]))
-        });
+        let whole = match &self.still {
+            Some((whole, _)) => whole.lift(),
+            None => self.at_rest(x),
+        };
         let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
         let force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
         if self.pivot.acts() {
             torque = add(torque, of_pivot);
         }
-        self.solve(whole.mass_matrix(), [force, torque], axes)
+        match &self.still {
+            Some((_, equations)) => self.solve(equations, [force, torque], axes),
+            None => self.solve(&self.equations(whole.mass_matrix()), [force, torque], axes),
+        }
     }
 
-    /// Returns the rates of the states and the values for the outputs.
-    pub fn evaluate<T: Number>(
-        &self,
+    /// Solves the equations of motion.
+    #[inline(always)]
+    fn solve_instant<'a, T: Number>(
+        &'a self,
         x: &[T; STATES],
         acting: &Acting<T>,
-    ) -> ([T; STATES], Now<T>) {
-        let c = T::constant;
+        contents: &mut [Option<Contents<'a, T>>; TANKS],
+    ) -> Instant<T> {
         let zero = constant::<T>([0.0; 3]);
         let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
         let axes = rotation(&q);
         let w = vec_of(x, index::OMEGA);
-        let velocity = transposed_times(&axes, vec_of(x, index::VELOCITY));
         let (of_pivot, by_pivot, _) = self.pivot.present(&axes, w);
         let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, of_pivot, &axes);
-        let contents: [Option<Contents<T>>; TANKS] = core::array::from_fn(|i| {
-            let mounted = self.tanks.get(i)?;
-            let liquid = x[index::LIQUID + i];
+        for (i, (mounted, contents)) in self.tanks.iter().zip(contents.iter_mut()).enumerate() {
             let bobs = &x[index::bob(i, 0)..index::bob(i, 0) + 6 * MODES];
             let motion = [a_rigid, w, w_d_rigid];
-            Some(mounted.contents(bobs, motion, liquid, acting.flow[i], acting.flow_slope[i]))
-        });
+            let flow = (x[index::LIQUID + i], acting.flow[i], acting.flow_slope[i]);
+            contents.insert(Contents::new(mounted)).evaluate(bobs, motion, flow);
+        }
         let all = || contents.iter().flatten();
         let rigid = all().fold(self.craft.lift::<T>(), |sum, tank| sum.and(&tank.rigid));
         let [centripetal, gyroscopic] = rigid.inertial_wrench(zero, w, zero);
@@ -328,8 +389,18 @@ impl Draining {
             (force, torque) = (add(force, f), add(torque, tau));
             tank.add_rods(&mut matrix);
         }
-        let [a, w_d] = self.solve(matrix, [force, torque], &axes);
+        let [a, w_d] = self.solve(&self.equations(matrix), [force, torque], &axes);
+        let velocity = transposed_times(&axes, vec_of(x, index::VELOCITY));
+        Instant { q, axes, velocity, w, a, w_d, by_pivot }
+    }
 
+    /// Returns the rates of the states.
+    pub fn rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> [T; STATES] {
+        let mut contents = [const { None }; TANKS];
+        let Instant { q, axes, velocity, w, a, w_d, by_pivot } =
+            self.solve_instant(x, acting, &mut contents);
+        let all = || contents.iter().flatten();
+        let c = T::constant;
         let mut rate = [c(0.0); STATES];
         let mut put = |at: usize, numbers: &[T]| {
             rate[at..at + numbers.len()].copy_from_slice(numbers);
@@ -344,21 +415,33 @@ impl Draining {
             put(index::VELOCITY, &times(&axes, a));
         }
         put(index::WORK, &[dot(acting.force, velocity) + dot(acting.torque, w)]);
-        let mut dissipation = all().fold(c(0.0), |sum, tank| sum + tank.dissipation);
+        let mut dissipation = all().fold(c(0.0), |sum, tank: &Contents<T>| sum + tank.dissipation);
         if self.pivot.acts() {
             dissipation = dissipation + by_pivot;
         }
         put(index::DISSIPATED, &[dissipation]);
         let on_pivot = self.mount == Mount::Pivot;
         let mut drained = c(0.0);
-        let mut tanks = [(); TANKS].map(|()| None);
         for (i, (tank, mounted)) in all().zip(&self.tanks).enumerate() {
             if mounted.drains() {
                 put(index::LIQUID + i, &[-acting.flow[i]]);
                 drained = drained + tank.drained(velocity, w, [a, w_d], on_pivot);
             }
             mounted.put_rates(tank, [a, w_d], |at, numbers| put(index::bob(i, 0) + at, numbers));
-            tanks[i] = Some(TankNow {
+        }
+        put(index::DRAINED, &[drained]);
+        rate
+    }
+
+    /// Returns the values for the outputs.
+    pub fn evaluate<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> Now<T> {
+        let mut contents = [const { None }; TANKS];
+        let Instant { axes, velocity, w, a, w_d, .. } =
+            self.solve_instant(x, acting, &mut contents);
+        let mut tanks = [const { None }; TANKS];
+        let all = contents.iter().flatten().zip(&self.tanks);
+        for (now, (tank, mounted)) in tanks.iter_mut().zip(all) {
+            *now = Some(TankNow {
                 rigid: tank.rigid,
                 flow_momentum: tank.flow_momentum,
                 wrench: tank.wrench(a, w, w_d),
@@ -367,8 +450,7 @@ impl Draining {
                 ball_state: BallState::Settled,
             });
         }
-        put(index::DRAINED, &[drained]);
-        let now = Now {
+        Now {
             a,
             w,
             w_d,
@@ -379,8 +461,7 @@ impl Draining {
             pivot: self.pivot,
             craft: self.craft,
             tanks,
-        };
-        (rate, now)
+        }
     }
 }
 

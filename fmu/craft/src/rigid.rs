@@ -7,6 +7,8 @@
 //!
 //! Source: Newton and Euler about a point that is not the centre of mass.
 
+use core::ops::Mul;
+
 use taylor::number::Number;
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
@@ -173,15 +175,17 @@ impl<T: Number> Factors<T> {
             inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
         }
     }
+}
 
-    /// Returns the solution of matrix x = b.
+impl<M: Copy> Factors<M> {
+    /// Returns the solution of matrix x = b. The matrix may be constant where b has derivatives.
     #[inline(always)]
-    pub fn solve(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
+    pub fn solve<T: Number + Mul<M, Output = T>>(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let l = &self.l;
         let mut x = [b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]];
         for i in 1..6 {
             for j in 0..i {
-                x[i] = x[i] - l[i][j] * x[j];
+                x[i] = x[i] - x[j] * l[i][j];
             }
         }
         for i in 0..6 {
@@ -189,7 +193,7 @@ impl<T: Number> Factors<T> {
         }
         for i in (0..5).rev() {
             for j in i + 1..6 {
-                x[i] = x[i] - l[j][i] * x[j];
+                x[i] = x[i] - x[j] * l[j][i];
             }
         }
         [[x[0], x[1], x[2]], [x[3], x[4], x[5]]]

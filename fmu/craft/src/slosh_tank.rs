@@ -429,7 +429,7 @@ fn draining_rates<T: Number>(
     slope: f64,
 ) -> [T; TANK_STATES] {
     let ([a, w, w_d], flow) = *acting;
-    let contents = mounted.contents(x, [a, w, w_d], x[LIQUID], flow, slope);
+    let contents = mounted.contents(x, [a, w, w_d], (x[LIQUID], flow, slope));
     let mut rate = [T::constant(0.0); TANK_STATES];
     mounted.put_rates(&contents, [a, w_d], |at, numbers| {
         rate[at..at + numbers.len()].copy_from_slice(numbers);
@@ -1191,7 +1191,7 @@ impl SloshTank {
         ([a, w, w_d], flow): &Acting<T>,
         slope: f64,
     ) -> SloshTankOutputs {
-        let contents = mounted.contents(x, [*a, *w, *w_d], x[LIQUID], *flow, slope);
+        let contents = mounted.contents(x, [*a, *w, *w_d], (x[LIQUID], *flow, slope));
         let mut matrix = contents.rigid.mass_matrix();
         contents.add_rods(&mut matrix);
         let parts = Parts {

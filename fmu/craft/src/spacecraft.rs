@@ -11,7 +11,7 @@ use taylor::vector::{dot, unit_quaternion};
 use crate::contents::Drains;
 use crate::draining::{Acting, Draining, Run};
 use crate::motion::CraftMotion;
-use crate::outputs::{Now, Outputs};
+use crate::outputs::Outputs;
 use crate::parameters::{Limits, Parameters, tolerance_problem};
 use crate::ranges;
 use crate::sizes::{MODES, TANKS};
@@ -199,7 +199,7 @@ impl Spacecraft {
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
-            draining.evaluate(x, &Acting::of(inputs, 0.0)).1.outputs(x)
+            draining.evaluate(x, &Acting::of(inputs, 0.0)).outputs(x)
         } else {
             self.motion.evaluate(inputs);
             self.motion.now::<f64>().outputs(&self.motion.state.x)
@@ -232,7 +232,7 @@ impl Spacecraft {
     /// reaction -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
-            return draining.evaluate(&self.motion.state.x, &Acting::of(inputs, 0.0)).0;
+            return draining.rates(&self.motion.state.x, &Acting::of(inputs, 0.0));
         }
         self.motion.evaluate(inputs);
         self.motion.state_rates::<0>(&self.motion.state.x)
@@ -246,8 +246,8 @@ impl Spacecraft {
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
     ) -> [f64; STATES] {
-        if let Some((rates, _)) = self.along(inputs, dx, du) {
-            return rates.map(Number::result);
+        if let Some((draining, x, acting)) = self.along(inputs, dx, du) {
+            return draining.rates(&x, &acting).map(Number::result);
         }
         self.motion.evaluate_direction(inputs, dx, split(du));
         self.motion.state_rates::<1>(dx)
@@ -261,24 +261,23 @@ impl Spacecraft {
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
     ) -> Outputs {
-        if let Some((_, now)) = self.along(inputs, dx, du) {
-            return now.outputs(dx);
+        if let Some((draining, x, acting)) = self.along(inputs, dx, du) {
+            return draining.evaluate(&x, &acting).outputs(dx);
         }
         self.motion.evaluate_direction(inputs, dx, split(du));
         self.motion.now::<Dual>().outputs(dx)
     }
 
-    /// Returns derivatives of a draining craft.
+    /// Returns states and inputs of a draining craft with their derivatives.
     fn along(
         &self,
         inputs: &Inputs,
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
-    ) -> Option<([Dual; STATES], Now<Dual>)> {
+    ) -> Option<(&Draining, [Dual; STATES], Acting<Dual>)> {
         let x = &self.motion.state.x;
         let along = core::array::from_fn(|i| Dual::of(x[i], dx[i]));
-        let draining = self.draining.as_ref()?;
-        Some(draining.evaluate(&along, &Acting::along(inputs, du)))
+        Some((self.draining.as_ref()?, along, Acting::along(inputs, du)))
     }
 
     /// Applies the impulses of jumped inputs. Returns true if any input has jumped.

@@ -3,11 +3,18 @@
 //!
 //! Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.9.
 
+use core::ops::Range;
+
 use crate::error::StepError;
 use crate::integrator::{MAX_MAGNITUDE, STEP_SHARE, Steps};
 
 /// A first-order system, x' = rates(t, x), that [`advance`] integrates.
 pub trait System<const D: usize> {
+    /// Iterates over the states that are in use. The rates of all others are 0.
+    fn moving(&self) -> impl Iterator<Item = Range<usize>> + Clone {
+        core::iter::once(0..D)
+    }
+
     /// Returns the rates of the states, `t` after the start of the call.
     fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
 
@@ -52,40 +59,53 @@ fn extrapolate<const D: usize>(
     (t, h): (f64, f64),
     allowed: &[f64; D],
 ) -> Trial<D> {
-    let mut before = [[0.0; D]; COLUMNS];
+    // Columns 0 to k - 1 of the last row.
+    let mut row = [[0.0; D]; COLUMNS];
     let (mut least, mut best) = (f64::INFINITY, SHORTER * h);
     let mut error_before = f64::INFINITY;
+    let (mut last, mut now, mut end) = (*x, *x, *x);
+    let moving = system.moving();
     for k in 0..COLUMNS {
         let n = 2 * (k + 1);
         let step = h / n as f64;
-        let (mut last, mut now) = (*x, *x);
-        for i in 0..D {
-            now[i] += step * first[i];
+        for part in moving.clone() {
+            for (i, now) in part.clone().zip(&mut now[part]) {
+                last[i] = x[i];
+                *now = x[i] + step * first[i];
+            }
         }
         for j in 1..n {
             let rate = system.rates(t + j as f64 * step, &now);
-            for i in 0..D {
-                (last[i], now[i]) = (now[i], last[i] + 2.0 * step * rate[i]);
+            for part in moving.clone() {
+                let states = last[part.clone()].iter_mut().zip(&mut now[part.clone()]);
+                for ((last, now), rate) in states.zip(&rate[part]) {
+                    (*last, *now) = (*now, *last + 2.0 * step * rate);
+                }
             }
         }
         let rate = system.rates(t + h, &now);
-        let mut row = [[0.0; D]; COLUMNS];
-        for i in 0..D {
-            row[0][i] = 0.5 * (now[i] + last[i] + step * rate[i]);
-        }
-        for j in 1..=k {
-            let ratio = n as f64 / (2 * (k + 1 - j)) as f64;
-            for i in 0..D {
-                row[j][i] =
-                    row[j - 1][i] + (row[j - 1][i] - before[j - 1][i]) / (ratio * ratio - 1.0);
+        let divisors: [f64; COLUMNS] = core::array::from_fn(|j| {
+            let ratio = n as f64 / (2 * (k + 1 - j.min(k))) as f64;
+            ratio * ratio - 1.0
+        });
+        let mut error: f64 = 0.0;
+        for i in moving.clone().flatten() {
+            let mut column = 0.5 * (now[i] + last[i] + step * rate[i]);
+            let mut lower = column;
+            for j in 1..=k {
+                let next = column + (column - row[j - 1][i]) / divisors[j];
+                row[j - 1][i] = column;
+                (lower, column) = (column, next);
+            }
+            row[k][i] = column;
+            end[i] = column;
+            if k >= 2 {
+                let off = (column - lower).abs() / allowed[i];
+                // NaN counts as an unbounded error.
+                error = if off <= error { error } else { f64::min(off, f64::MAX) };
             }
         }
         if k >= 2 {
-            let error = (0..D).fold(0.0, |largest, i| {
-                let error = (row[k][i] - row[k - 1][i]).abs() / allowed[i];
-                // NaN counts as an unbounded error.
-                if error <= largest { largest } else { f64::min(error, f64::MAX) }
-            });
             // Error of column k - 1: h^(2k + 1).
             let change =
                 0.94 * libm::pow(0.65 / f64::max(error, LEAST_ERROR), 1.0 / (2 * k + 1) as f64);
@@ -99,14 +119,13 @@ fn extrapolate<const D: usize>(
                 if is_best && k + 1 < COLUMNS {
                     best = f64::min(best * work(k + 1) / work(k), LONGER * h);
                 }
-                return Trial { end: Some(row[k]), best };
+                return Trial { end: Some(end), best };
             }
             if error > 0.1 * error_before {
                 break;
             }
             error_before = error;
         }
-        before = row;
     }
     Trial { end: None, best }
 }
