@@ -35,21 +35,32 @@ pub struct Model {
     d: Vec<f64>,
     /// 0: continuous time.
     period: f64,
+    /// Column after column of A, for a model with one input and one output; its B is then a multiple of the first unit
+    /// vector.
+    columns: Vec<f64>,
 }
 
 impl Model {
     fn new([a, b, c, d]: [Vec<f64>; 4], (states, inputs, outputs): Size, period: f64) -> Model {
-        let mut model = Model { states, inputs, outputs, a, b, c, d, period };
+        let mut model = Model { states, inputs, outputs, a, b, c, d, period, columns: Vec::new() };
+        let is_scalar = (inputs, outputs) == (1, 1);
+        if is_scalar && states > 0 {
+            model.reflect(0, model.b.clone());
+        }
         for k in 1..states.saturating_sub(1) {
-            model.reflect(k);
+            model.reflect(k, (k..states).map(|i| model.a[i * states + k - 1]).collect());
+        }
+        if is_scalar {
+            let n = states;
+            model.columns = (0..n * n).map(|at| model.a[at % n * n + at / n]).collect();
         }
         model
     }
 
-    /// Clears column `k` - 1 below row `k` by a Householder reflection of the states from `k` on.
-    fn reflect(&mut self, k: usize) {
+    /// Maps the column `v` of the states from `k` on to a multiple of its first unit vector by a Householder reflection of
+    /// these states.
+    fn reflect(&mut self, k: usize, mut v: Vec<f64>) {
         let n = self.states;
-        let mut v: Vec<f64> = (k..n).map(|i| self.a[i * n + k - 1]).collect();
         let size = v.iter().map(|x| x * x).sum::<f64>().sqrt();
         if v[1..].iter().all(|x| *x == 0.0) {
             return;
@@ -82,61 +93,200 @@ impl Model {
     fn at(&self, w: f64) -> Vec<Complex> {
         let (n, m) = (self.states, self.inputs);
         let s = point(w, self.period);
-        let mut rows: Vec<Complex> = self.a.iter().map(|a| Complex::new(-a, 0.0)).collect();
-        for k in 0..n {
-            rows[k * n + k] += s;
+        // sI − A, then B: real and imaginary parts apart, which a processor computes several at once
+        let width = n + m;
+        let mut rows = [vec![0.0; n * width], vec![0.0; n * width]];
+        let [re, im] = &mut rows;
+        for i in 0..n {
+            let from = i.saturating_sub(1);
+            for (x, a) in re[i * width + from..].iter_mut().zip(&self.a[i * n..][from..n]) {
+                *x = -a;
+            }
+            re[i * width + i] += s.re;
+            im[i * width + i] = s.im;
+            re[i * width + n..][..m].copy_from_slice(&self.b[i * m..][..m]);
         }
-        // column after column
-        let mut states: Vec<Complex> = (0..m)
-            .flat_map(|j| (0..n).map(move |i| Complex::new(self.b[i * m + j], 0.0)))
-            .collect();
         for k in 0..n.saturating_sub(1) {
-            let (upper, lower) = rows[k * n..][..2 * n].split_at_mut(n);
-            let (upper, lower) = (&mut upper[k..], &mut lower[k..]);
-            if upper[0].norm_sqr() < lower[0].norm_sqr() {
-                upper.swap_with_slice(lower);
-                for state in states.chunks_exact_mut(n) {
-                    state.swap(k, k + 1);
+            let [(re_a, re_b), (im_a, im_b)] = rows.each_mut().map(|of| {
+                let (upper, lower) = of[k * width..][..2 * width].split_at_mut(width);
+                (&mut upper[k..], &mut lower[k..])
+            });
+            let (mut a, mut b) = (Complex::new(re_a[0], im_a[0]), Complex::new(re_b[0], im_b[0]));
+            if a.norm_sqr() < b.norm_sqr() {
+                re_a.swap_with_slice(re_b);
+                im_a.swap_with_slice(im_b);
+                (a, b) = (b, a);
+            }
+            if b != Complex::ZERO {
+                let factor = b / a;
+                let upper = re_a.iter().zip(im_a.iter());
+                for ((x, y), (re, im)) in re_b.iter_mut().zip(im_b.iter_mut()).zip(upper) {
+                    *x -= factor.re * re - factor.im * im;
+                    *y -= factor.re * im + factor.im * re;
                 }
-            }
-            if lower[0] == Complex::ZERO {
-                continue;
-            }
-            let factor = lower[0] / upper[0];
-            for (x, y) in lower.iter_mut().zip(&*upper).skip(1) {
-                *x -= factor * *y;
-            }
-            for state in states.chunks_exact_mut(n) {
-                let above = state[k];
-                state[k + 1] -= factor * above;
             }
         }
-        for state in states.chunks_exact_mut(n.max(1)) {
-            for i in (0..n).rev() {
-                let row = &rows[i * n..][..n];
-                let mut sum = state[i];
-                for (a, x) in row[i + 1..].iter().zip(&state[i + 1..]) {
-                    sum -= *a * *x;
-                }
-                state[i] = sum / row[i];
+        // column after column, from the last one on; the right-hand sides become the states
+        let [mut re, mut im] = rows;
+        let mut states = vec![Complex::ZERO; m];
+        let mut found: Vec<Complex> = self.d.iter().map(|d| Complex::new(*d, 0.0)).collect();
+        for i in (0..n).rev() {
+            let pivot = Complex::new(re[i * width + i], im[i * width + i]);
+            for (j, state) in states.iter_mut().enumerate() {
+                let at = i * width + n + j;
+                *state = Complex::new(re[at], im[at]) / pivot;
             }
-        }
-        let mut found = Vec::with_capacity(self.outputs * m);
-        for i in 0..self.outputs {
-            for j in 0..m {
-                let mut sum = Complex::new(self.d[i * m + j], 0.0);
-                for (c, x) in self.c[i * n..][..n].iter().zip(&states[j * n..]) {
-                    sum += *x * *c;
+            for (re, im) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)).take(i) {
+                let a = Complex::new(re[i], im[i]);
+                for (j, state) in states.iter().enumerate() {
+                    re[n + j] -= a.re * state.re - a.im * state.im;
+                    im[n + j] -= a.re * state.im + a.im * state.re;
                 }
-                found.push(sum);
+            }
+            for (k, row) in found.chunks_exact_mut(m).enumerate() {
+                let c = self.c[k * n + i];
+                for (sum, state) in row.iter_mut().zip(&states) {
+                    *sum += *state * c;
+                }
             }
         }
         found
     }
 
-    fn gain(&self, w: f64) -> Complex {
-        self.at(w)[0]
+    /// Returns the response of a model with one input and one output at `w`, rad/s; not finite at a pole.
+    ///
+    /// Column operations from the last column on clear sI − A below its diagonal, with pivots of the larger magnitude. Since
+    /// B has only its first component, the first column then decides, and one column at a time is kept in `column`.
+    fn gain(&self, w: f64, column: &mut Vec<Complex>) -> Complex {
+        let n = self.states;
+        let s = point(w, self.period);
+        let whole = |k: usize, i: usize| {
+            let a = Complex::new(-self.columns[k * n + i], 0.0);
+            if i == k { a + s } else { a }
+        };
+        let Some(last) = n.checked_sub(1) else { return Complex::new(self.d[0], 0.0) };
+        column.clear();
+        column.extend((0..n).map(|i| whole(last, i)));
+        let mut c = Complex::new(self.c[last], 0.0);
+        for k in (0..last).rev() {
+            let (below, pivot) = (-self.columns[k * n + k + 1], column[k + 1]);
+            let a = &self.columns[k * n..][..k + 1];
+            if below * below > pivot.norm_sqr() {
+                let factor = pivot * (1.0 / below);
+                for (x, a) in column.iter_mut().zip(a) {
+                    *x += factor * *a;
+                }
+                column[k] -= factor * s;
+                c -= factor * self.c[k];
+            } else if below != 0.0 {
+                let factor = -below / pivot;
+                for (x, a) in column.iter_mut().zip(a) {
+                    *x = Complex::new(
+                        factor.re * x.re - factor.im * x.im - a,
+                        factor.re * x.im + factor.im * x.re,
+                    );
+                }
+                column[k] += s;
+                c = c * factor + self.c[k];
+            } else {
+                column.clear();
+                column.extend((0..=k).map(|i| whole(k, i)));
+                c = Complex::new(self.c[k], 0.0);
+            }
+        }
+        c / column[0] * self.b[0] + self.d[0]
     }
+
+    /// Returns the eigenvalues of the response at `w`, rad/s, by magnitude; very large at a pole.
+    fn eigenvalues(&self, w: f64) -> Vec<Complex> {
+        let mut response = self.at(w);
+        for value in response.iter_mut().filter(|value| !value.is_finite()) {
+            *value = Complex::new(1e300, 0.0);
+        }
+        let mut found = eigenvalues(response, self.inputs);
+        found.sort_by(|a, b| a.norm_sqr().total_cmp(&b.norm_sqr()));
+        found
+    }
+}
+
+/// Returns the eigenvalues of a small matrix, row after row, by the QR algorithm with Wilkinson's shifts.
+fn eigenvalues(mut a: Vec<Complex>, n: usize) -> Vec<Complex> {
+    // Hessenberg form by elimination with pivots
+    for k in 1..n.saturating_sub(1) {
+        let size = |i: &usize| a[i * n + k - 1].norm_sqr();
+        let Some(pivot) = (k..n).max_by(|i, j| size(i).total_cmp(&size(j))) else { break };
+        if a[pivot * n + k - 1] == Complex::ZERO {
+            continue;
+        }
+        for j in 0..n {
+            a.swap(pivot * n + j, k * n + j);
+        }
+        for i in 0..n {
+            a.swap(i * n + pivot, i * n + k);
+        }
+        for i in k + 1..n {
+            let factor = a[i * n + k - 1] / a[k * n + k - 1];
+            for j in 0..n {
+                let x = factor * a[k * n + j];
+                a[i * n + j] -= x;
+            }
+            for j in 0..n {
+                let x = factor * a[j * n + i];
+                a[j * n + k] += x;
+            }
+        }
+    }
+    let mut found = Vec::with_capacity(n);
+    let (mut size, mut tries) = (n, 0);
+    while size > 0 {
+        let (m, last) = (size, (size - 1) * n + size - 1);
+        let small = |k: usize| {
+            let near = a[k * n + k].norm() + a[(k - 1) * n + k - 1].norm();
+            a[k * n + k - 1].norm() <= f64::EPSILON * near
+        };
+        let first = (1..m).rev().find(|k| small(*k)).unwrap_or(0);
+        if first == m - 1 || tries > 100 || !a[last].is_finite() {
+            found.push(a[last]);
+            (size, tries) = (m - 1, 0);
+            continue;
+        }
+        tries += 1;
+        let [p, q, r, s] = [last - n - 1, last - n, last - 1, last].map(|at| a[at]);
+        let half = (p - s) / 2.0;
+        let root = (half * half + q * r).sqrt();
+        let root = if (half.conj() * root).re < 0.0 { -root } else { root };
+        let mut shift = s - q * r / (half + root);
+        if tries % 10 == 0 || !shift.is_finite() {
+            shift = s + r.norm();
+        }
+        for k in first..m {
+            a[k * n + k] -= shift;
+        }
+        let mut turns = Vec::with_capacity(m);
+        for k in first..m - 1 {
+            let (x, y) = (a[k * n + k], a[(k + 1) * n + k]);
+            let length = (x.norm_sqr() + y.norm_sqr()).sqrt();
+            let (c, d) =
+                if length > 0.0 { (x / length, y / length) } else { (Complex::ONE, Complex::ZERO) };
+            turns.push((c, d));
+            for j in k..m {
+                let (x, y) = (a[k * n + j], a[(k + 1) * n + j]);
+                a[k * n + j] = c.conj() * x + d.conj() * y;
+                a[(k + 1) * n + j] = c * y - d * x;
+            }
+        }
+        for (k, (c, d)) in (first..m - 1).zip(turns) {
+            for i in first..(k + 2).min(m) {
+                let (x, y) = (a[i * n + k], a[i * n + k + 1]);
+                a[i * n + k] = x * c + y * d;
+                a[i * n + k + 1] = y * c.conj() - x * d.conj();
+            }
+        }
+        for k in first..m {
+            a[k * n + k] += shift;
+        }
+    }
+    found
 }
 
 /// s = jω, or z = exp(jωT) in its place.
@@ -148,11 +298,44 @@ fn point(w: f64, period: f64) -> Complex {
     Complex::new(cos, sin)
 }
 
+/// A pole or a zero.
+struct Root {
+    at: Complex,
+    is_zero: bool,
+    /// Distance from the axis or the unit circle.
+    axis: f64,
+    /// Factors over the second and the third power of the distance, which bound the second derivatives.
+    bends: [f64; 2],
+}
+
+impl Root {
+    fn new(at: Complex, is_zero: bool, period: f64) -> Root {
+        let (axis, bends) = match period {
+            0.0 => (at.re.abs(), [1.0, 2.0 * at.re.abs()]),
+            _ => {
+                let size = at.norm_sqr().sqrt();
+                let axis = (1.0 - size).abs();
+                (axis, [size, size.sqrt() * axis * (1.0 + size)])
+            }
+        };
+        Root { at, is_zero, axis, bends }
+    }
+}
+
+/// A zero and the pole that is nearest of those left: what a pair does to the slope is small where its distance is.
+struct Pair {
+    /// Number of roots: a pair, or one alone.
+    roots: usize,
+    /// Half the distance of both, and a factor over the third power of the distance from them.
+    half_gap: f64,
+    steep: f64,
+}
+
 /// A rational function by poles, zeros and factor.
 struct Shape {
-    /// Zeros and poles in pairs, each zero with the pole that is nearest of those left: what a pair does to the slope is
-    /// small where its distance is.
-    pairs: Vec<[Option<Complex>; 2]>,
+    /// The roots pair after pair, then those left.
+    roots: Vec<Root>,
+    pairs: Vec<Pair>,
     /// Logarithm of the factor's magnitude, and its phase.
     factor: (f64, f64),
     period: f64,
@@ -166,25 +349,57 @@ struct Logarithm {
     curvature: [f64; 2],
 }
 
+/// A product of many numbers, with its magnitude apart as a logarithm before it overflows.
+struct Product {
+    of: Complex,
+    scale: f64,
+}
+
+impl Product {
+    fn new() -> Product {
+        Product { of: Complex::new(1.0, 0.0), scale: 0.0 }
+    }
+
+    #[inline(always)]
+    fn times(&mut self, factor: Complex) {
+        self.of *= factor;
+        let size = self.of.re.abs().max(self.of.im.abs());
+        if !(1e-100..1e100).contains(&size) && size > 0.0 {
+            self.scale += size.ln();
+            self.of *= 1.0 / size;
+        }
+    }
+}
+
 impl Shape {
     /// The factor makes it `exact` at most of the frequencies.
     fn new(
         [zeros, poles]: [&[Complex]; 2],
         period: f64,
         grid: &[f64],
-        exact: impl Fn(f64) -> Complex,
+        mut exact: impl FnMut(f64) -> Complex,
     ) -> Shape {
         let mut left = poles.to_vec();
-        let mut pairs: Vec<_> = zeros
-            .iter()
-            .map(|zero| {
-                let distance = |i: &usize| (left[*i] - *zero).norm_sqr();
-                let nearest = (0..left.len()).min_by(|i, j| distance(i).total_cmp(&distance(j)));
-                [Some(*zero), nearest.map(|i| left.swap_remove(i))]
-            })
-            .collect();
-        pairs.extend(left.into_iter().map(|pole| [None, Some(pole)]));
-        let mut shape = Shape { pairs, factor: (0.0, 0.0), period };
+        let (mut roots, mut pairs) = (Vec::new(), Vec::new());
+        for zero in zeros {
+            let distance = |i: &usize| (left[*i] - *zero).norm_sqr();
+            let nearest = (0..left.len()).min_by(|i, j| distance(i).total_cmp(&distance(j)));
+            roots.push(Root::new(*zero, true, period));
+            let mut pair = Pair { roots: 1, half_gap: f64::INFINITY, steep: 0.0 };
+            if let Some(pole) = nearest.map(|i| left.swap_remove(i)) {
+                let gap = (*zero - pole).norm();
+                let largest = zero.norm().max(pole.norm());
+                let steep = if period == 0.0 { 2.0 } else { 1.0 + largest };
+                pair = Pair { roots: 2, half_gap: gap / 2.0, steep: steep * gap };
+                roots.push(Root::new(pole, false, period));
+            }
+            pairs.push(pair);
+        }
+        for pole in left {
+            roots.push(Root::new(pole, false, period));
+            pairs.push(Pair { roots: 1, half_gap: f64::INFINITY, steep: 0.0 });
+        }
+        let mut shape = Shape { roots, pairs, factor: (0.0, 0.0), period };
         let mut factors: Vec<(f64, f64)> = grid
             .iter()
             .step_by(4)
@@ -200,10 +415,6 @@ impl Shape {
         shape
     }
 
-    fn roots(&self) -> impl Iterator<Item = &Complex> {
-        self.pairs.iter().flatten().flatten()
-    }
-
     /// Returns the logarithm at `w`, and bounds its second derivative within `half` of `w`.
     fn at(&self, w: f64, half: f64) -> Logarithm {
         let s = point(w, self.period);
@@ -212,100 +423,83 @@ impl Shape {
             0.0 => (Complex::new(0.0, 1.0), half),
             period => (Complex::new(0.0, period) * s, half * period),
         };
-        let (mut product, mut scale) = (Complex::new(1.0, 0.0), 0.0);
+        let mut product = Product::new();
         let (mut sum, mut curvature) = (Complex::new(0.0, 0.0), [0.0; 2]);
+        let mut roots = self.roots.iter();
         for pair in &self.pairs {
-            let (mut bends, mut nearest, mut largest) = ([0.0; 2], f64::INFINITY, 0f64);
-            for (root, is_zero) in pair.iter().zip([true, false]) {
-                let Some(root) = root else { continue };
-                let way = s - *root;
+            let (mut bends, mut nearest) = ([0.0; 2], f64::INFINITY);
+            for root in roots.by_ref().take(pair.roots) {
+                let way = s - root.at;
                 let square = way.norm_sqr();
-                let inverse = Complex::new(way.re / square, -way.im / square);
-                // distances from the axis, and from the part of it within reach
-                let size = root.norm_sqr().sqrt();
-                let (axis, bend) = match self.period {
-                    0.0 => (root.re.abs(), [1.0, 2.0 * root.re.abs()]),
-                    _ => {
-                        let axis = (1.0 - size).abs();
-                        (axis, [size, size.sqrt() * axis * (1.0 + size)])
-                    }
-                };
-                let least = (square.sqrt() - reach).max(axis);
-                let near = bend[0] / (least * least);
+                let share = 1.0 / square;
+                let inverse = Complex::new(way.re * share, -way.im * share);
+                // distance from the part of the axis within reach
+                let least = (square.sqrt() - reach).max(root.axis);
+                let share = 1.0 / least;
+                let near = root.bends[0] * share * share;
                 bends[0] += near;
                 // the phase of a root on the axis turns steadily
-                bends[1] += near.min(bend[1] / (least * least * least));
-                (nearest, largest) = (nearest.min(least), largest.max(size));
-                if is_zero {
-                    product *= way;
+                bends[1] += near.min(root.bends[1] * share * share * share);
+                nearest = nearest.min(least);
+                if root.is_zero {
+                    product.times(way);
                     sum += inverse;
                 } else {
-                    product *= inverse;
+                    product.times(inverse);
                     sum -= inverse;
                 }
             }
-            if let [Some(zero), Some(pole)] = pair {
-                // by the derivative along the way from one to the other
-                let gap = (*zero - *pole).norm();
-                let least = nearest - gap / 2.0;
-                let steep = if self.period == 0.0 { 2.0 } else { 1.0 + largest };
-                if least > 0.0 {
-                    let both = steep * gap / (least * least * least);
-                    bends = bends.map(|bend| bend.min(both));
-                }
+            // by the derivative along the way from one to the other
+            let least = nearest - pair.half_gap;
+            if least > 0.0 {
+                let both = pair.steep / (least * least * least);
+                bends = bends.map(|bend| bend.min(both));
             }
-            let unit = if self.period == 0.0 { 1.0 } else { self.period * self.period };
-            curvature[0] += bends[0] * unit;
-            curvature[1] += bends[1] * unit;
-            let size = product.re.abs().max(product.im.abs());
-            if !(1e-100..1e100).contains(&size) && size > 0.0 {
-                scale += size.ln();
-                product *= 1.0 / size;
-            }
+            curvature[0] += bends[0];
+            curvature[1] += bends[1];
         }
+        let unit = if self.period == 0.0 { 1.0 } else { self.period * self.period };
         let slope = along * sum;
+        let Product { of, scale } = product;
         Logarithm {
-            value: [self.factor.0 + scale + product.norm().ln(), self.factor.1 + product.arg()],
+            value: [self.factor.0 + scale + of.norm().ln(), self.factor.1 + of.arg()],
             slope: [slope.re, slope.im],
-            curvature,
+            curvature: curvature.map(|bound| bound * unit),
         }
     }
 
-    /// Returns the ends of intervals outside of which there is no crossing, and in each of which there is one at most.
-    fn isolate(&self, kind: Kind, grid: &[f64]) -> Vec<f64> {
+    /// Returns the magnitude's logarithm at `w`, but for the factor.
+    fn size(&self, w: f64) -> f64 {
+        let s = point(w, self.period);
+        let (mut above, mut below) = (Product::new(), Product::new());
+        for root in &self.roots {
+            let square = Complex::new((s - root.at).norm_sqr(), 0.0);
+            if root.is_zero { above.times(square) } else { below.times(square) }
+        }
+        above.scale + above.of.re.ln() - below.scale - below.of.re.ln()
+    }
+
+    /// Returns the ends of intervals outside of which there is no crossing, and in each of which there is one at most of
+    /// each kind.
+    fn isolate(&self, grid: &[f64]) -> Vec<f64> {
         let mut ends = Vec::new();
-        let mut stack: Vec<(f64, f64)> = grid.windows(2).map(|pair| (pair[0], pair[1])).collect();
-        for _ in 0..MOST {
-            let Some((low, high)) = stack.pop() else { break };
+        let whole = grid.windows(2).map(|pair| (pair[0], pair[1], [true; 2]));
+        let mut stack: Vec<(f64, f64, [bool; 2])> = whole.collect();
+        for _ in 0..2 * MOST {
+            let Some((low, high, wanted)) = stack.pop() else { break };
             let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
-            let Logarithm { value, slope, curvature } = self.at(middle, half);
-            let reach = (slope[0].abs() + curvature[0] * half / 2.0) * half + SLACK;
-            let outside = value[0] - reach > INTEGRATOR.ln() || value[0] + reach < NOTHING.ln();
-            if kind == Kind::Phase && outside {
-                continue;
-            }
-            let (value, slope, bend) = match kind {
-                Kind::Gain => (value[0], slope[0], curvature[0] * half),
-                // the phase of a negative or positive real number
-                Kind::Phase => {
-                    let turns = value[1] / std::f64::consts::PI;
-                    let value = (turns - turns.round()) * std::f64::consts::PI;
-                    (value, slope[1], curvature[1] * half)
-                }
-            };
-            if value.abs() > slope.abs() * half + bend * half / 2.0 + SLACK {
-                continue;
-            }
-            let once = slope.abs() > bend * (1.0 + 1e-6)
-                && (matches!(kind, Kind::Gain) || 2.0 * slope.abs() * half < 3.0);
-            let level = (slope.abs() + bend) * half < 1e-13;
-            if once || level || high - low < 1e-13 * high {
+            let at = self.at(middle, half);
+            let states = [Kind::Gain, Kind::Phase].map(|kind| at.look(kind, half, high));
+            let found = |state: Look| (0..2).any(|i| wanted[i] && states[i] == state);
+            if found(Look::Once) {
                 ends.extend([low, high]);
-            } else {
-                stack.extend([(low, middle), (middle, high)]);
+            }
+            if found(Look::Divide) {
+                let left = [0, 1].map(|i| wanted[i] && states[i] == Look::Divide);
+                stack.extend([(low, middle, left), (middle, high, left)]);
             }
         }
-        ends.extend(stack.iter().flat_map(|(low, high)| [*low, *high]));
+        ends.extend(stack.iter().flat_map(|(low, high, _)| [*low, *high]));
         ends
     }
 
@@ -313,7 +507,8 @@ impl Shape {
     fn minima(&self, grid: &[f64]) -> Vec<f64> {
         let mut points = grid.to_vec();
         let (low, high) = (grid[0], grid[grid.len() - 1]);
-        for root in self.roots() {
+        for root in &self.roots {
+            let root = root.at;
             let (place, width) = match self.period {
                 0.0 => (root.im.abs(), root.re.abs()),
                 period => (root.arg().abs() / period, root.norm().ln().abs() / period),
@@ -324,7 +519,7 @@ impl Shape {
         }
         points.retain(|w| (low..=high).contains(w));
         points.sort_by(f64::total_cmp);
-        let sizes: Vec<f64> = points.iter().map(|w| self.at(*w, 0.0).value[0]).collect();
+        let sizes: Vec<f64> = points.iter().map(|w| self.size(*w)).collect();
         let mut least: Vec<usize> = (0..points.len()).collect();
         least.sort_by(|i, j| sizes[*i].total_cmp(&sizes[*j]));
         let narrow = |i: usize| {
@@ -333,7 +528,7 @@ impl Shape {
             let golden = (5f64.sqrt() - 1.0) / 2.0;
             for _ in 0..60 {
                 let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-                if self.at(left, 0.0).value[0] < self.at(right, 0.0).value[0] {
+                if self.size(left) < self.size(right) {
                     high = right;
                 } else {
                     low = left;
@@ -342,6 +537,45 @@ impl Shape {
             (low + high) / 2.0
         };
         least.into_iter().take(5).map(narrow).collect()
+    }
+}
+
+/// Crossings of an interval.
+#[derive(Clone, Copy, PartialEq)]
+enum Look {
+    /// There is none.
+    None,
+    /// There is one at most.
+    Once,
+    /// There may be several.
+    Divide,
+}
+
+impl Logarithm {
+    /// Returns whether the interval within `half` of here, up to `high`, has crossings of a kind.
+    fn look(&self, kind: Kind, half: f64, high: f64) -> Look {
+        let Logarithm { value, slope, curvature } = *self;
+        let reach = (slope[0].abs() + curvature[0] * half / 2.0) * half + SLACK;
+        let outside = value[0] - reach > INTEGRATOR.ln() || value[0] + reach < NOTHING.ln();
+        if kind == Kind::Phase && outside {
+            return Look::None;
+        }
+        let (value, slope, bend) = match kind {
+            Kind::Gain => (value[0], slope[0], curvature[0] * half),
+            // the phase of a negative or positive real number
+            Kind::Phase => {
+                let turns = value[1] / std::f64::consts::PI;
+                let value = (turns - turns.round()) * std::f64::consts::PI;
+                (value, slope[1], curvature[1] * half)
+            }
+        };
+        if value.abs() > slope.abs() * half + bend * half / 2.0 + SLACK {
+            return Look::None;
+        }
+        let once = slope.abs() > bend * (1.0 + 1e-6)
+            && (matches!(kind, Kind::Gain) || 2.0 * slope.abs() * half < 3.0);
+        let level = (slope.abs() + bend) * half < 1e-13;
+        if once || level || 2.0 * half < 1e-13 * high { Look::Once } else { Look::Divide }
     }
 }
 
@@ -362,38 +596,44 @@ impl Kind {
             Kind::Phase => gain.im / gain.norm(),
         }
     }
+}
 
-    /// Returns where the sign changes between two frequencies: bisection and secant in turn (Illinois), to rounding.
-    fn between(self, model: &Model, (mut low, mut f_low): (f64, f64), high: (f64, f64)) -> f64 {
-        let (mut high, mut f_high) = high;
-        let mut last = 0;
-        for step in 0..200 {
-            if high - low <= 2.0 * f64::EPSILON * high {
-                break;
-            }
-            let mut w = (low * f_high - high * f_low) / (f_high - f_low);
-            if step % 3 == 2 || !(w > low && w < high) {
-                w = (low + high) / 2.0;
-                if w <= low || w >= high {
-                    break;
-                }
-            }
-            let f = self.height(model.gain(w));
-            if f == 0.0 {
-                return w;
-            }
-            if (f > 0.0) == (f_high > 0.0) {
-                (high, f_high) = (w, f);
-                f_low *= if last == 1 { 0.5 } else { 1.0 };
-                last = 1;
-            } else {
-                (low, f_low) = (w, f);
-                f_high *= if last == -1 { 0.5 } else { 1.0 };
-                last = -1;
-            }
+/// Returns where a function changes its sign between two places, to rounding: inverse quadratic interpolation where it
+/// converges, otherwise bisection (Chandrupatla 1997).
+fn between(
+    mut of: impl FnMut(f64) -> f64,
+    (mut b, mut f_b): (f64, f64),
+    (mut a, mut f_a): (f64, f64),
+) -> f64 {
+    let (mut c, mut f_c);
+    let mut share = 0.5;
+    for _ in 0..200 {
+        let new = a + share * (b - a);
+        let f = of(new);
+        if f == 0.0 {
+            return new;
         }
-        if f_low.abs() < f_high.abs() { low } else { high }
+        // a, b enclose the root, c is the one before
+        if (f > 0.0) == (f_a > 0.0) {
+            (c, f_c) = (a, f_a);
+        } else {
+            (c, b, f_c, f_b) = (b, a, f_b, f_a);
+        }
+        (a, f_a) = (new, f);
+        let least = f64::EPSILON * a.abs().max(b.abs()) / (b - a).abs();
+        if least >= 0.5 {
+            break;
+        }
+        let (xi, phi) = ((a - b) / (c - b), (f_a - f_b) / (f_c - f_b));
+        share = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
+            f_a / (f_b - f_a) * f_c / (f_b - f_c)
+                + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+        } else {
+            0.5
+        };
+        share = share.clamp(least, 1.0 - least);
     }
+    if f_a.abs() < f_b.abs() { a } else { b }
 }
 
 /// Numbers of states, inputs and outputs.
@@ -418,15 +658,17 @@ fn search(
             found.push((kind == Kind::Gain, w, gain.re, gain.im));
         }
     };
-    let shape = Shape::new([zeros, poles], model.period, &grid, |w| model.gain(w));
+    let mut column = Vec::with_capacity(model.states);
+    let mut gain_at = |w: f64| model.gain(w, &mut column);
+    let shape = Shape::new([zeros, poles], model.period, &grid, &mut gain_at);
     let kinds = [Kind::Gain, Kind::Phase];
     let mut ends = grid.clone();
-    ends.extend(kinds.iter().flat_map(|kind| shape.isolate(*kind, &grid)));
+    ends.extend(shape.isolate(&grid));
     ends.sort_by(f64::total_cmp);
     ends.dedup();
     let mut before: Option<(f64, Complex)> = None;
     for w in ends {
-        let gain = model.gain(w);
+        let gain = gain_at(w);
         if !gain.is_finite() || gain.norm() < 1e-300 {
             continue;
         }
@@ -437,8 +679,9 @@ fn search(
                 if (heights[0] > 0.0) == (heights[1] > 0.0) {
                     continue;
                 }
-                let w = kind.between(model, (low, heights[0]), (w, heights[1]));
-                let gain = model.gain(w);
+                let height = |w: f64| kind.height(gain_at(w));
+                let w = between(height, (low, heights[0]), (w, heights[1]));
+                let gain = gain_at(w);
                 if kind.height(gain).abs() <= 1e-6 {
                     add(kind, w, gain);
                 }
@@ -452,17 +695,16 @@ fn search(
         if model.period == 0.0 { f64::INFINITY } else { std::f64::consts::PI / model.period },
     ];
     for w in ends.into_iter().filter(|w| w.is_finite()) {
-        let gain = model.gain(w);
+        let gain = gain_at(w);
         if gain.is_finite() {
             nearest = nearest.min((gain + Complex::new(1.0, 0.0)).norm());
             add(Kind::Phase, w, Complex::new(gain.re, 0.0));
         }
     }
     let one = Complex::new(1.0, 0.0);
-    let return_difference =
-        Shape::new([closed, poles], model.period, &grid, |w| model.gain(w) + one);
+    let return_difference = Shape::new([closed, poles], model.period, &grid, |w| gain_at(w) + one);
     for w in return_difference.minima(&grid) {
-        let distance = (model.gain(w) + one).norm();
+        let distance = (gain_at(w) + one).norm();
         if distance.is_finite() {
             nearest = nearest.min(distance);
         }
@@ -489,6 +731,57 @@ fn matrices(of: [&Bound<PyAny>; 4]) -> PyResult<([Vec<f64>; 4], Size)> {
 fn pairs(of: &Bound<PyAny>) -> PyResult<Vec<Complex>> {
     let parts = numbers(of)?;
     Ok(parts.chunks_exact(2).map(|part| Complex::new(part[0], part[1])).collect())
+}
+
+impl Model {
+    fn must_be_square(&self) -> PyResult<()> {
+        if self.inputs == self.outputs {
+            return Ok(());
+        }
+        Err(PyValueError::new_err("as many inputs as outputs are expected"))
+    }
+
+    fn unit_magnitudes(&self, nodes: &[f64]) -> Vec<(f64, f64, f64)> {
+        let height = |values: &[Complex], i: usize| values[i].norm().max(1e-300).ln();
+        let all: Vec<_> = nodes.iter().map(|w| (*w, self.eigenvalues(*w))).collect();
+        let mut found = Vec::new();
+        for pair in all.windows(2) {
+            let [(low, at_low), (high, at_high)] = pair else { continue };
+            for i in 0..self.inputs {
+                let heights = [height(at_low, i), height(at_high, i)];
+                if (heights[0] > 0.0) == (heights[1] > 0.0) {
+                    continue;
+                }
+                let here = |w: f64| height(&self.eigenvalues(w), i);
+                let w = between(here, (*low, heights[0]), (*high, heights[1]));
+                let value = self.eigenvalues(w)[i];
+                if (value.norm() - 1.0).abs() < 1e-6 {
+                    found.push((w, value.re, value.im));
+                }
+            }
+        }
+        found
+    }
+
+    fn refined(&self, w: f64, delay: f64) -> (f64, f64) {
+        let logarithm = |w: f64| {
+            let turned = -Complex::cis(-w * delay);
+            let all = self.eigenvalues(w).into_iter().map(|value| (value * turned).ln());
+            all.min_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or(Complex::new(f64::NAN, 0.0))
+        };
+        let (mut before, mut after) = (w, w * (1.0 + 1e-6));
+        let (mut at_before, mut at_after) = (logarithm(before), logarithm(after));
+        for _ in 0..20 {
+            if at_after.re == at_before.re || (after - before).abs() <= 1e-15 * after {
+                break;
+            }
+            let slope = (at_after.re - at_before.re) / (after - before);
+            let step = (-at_after.re / slope).clamp(-0.01 * w, 0.01 * w);
+            (before, at_before, after) = (after, at_after, after + step);
+            at_after = logarithm(after);
+        }
+        (after, at_after.im)
+    }
 }
 
 #[pymethods]
@@ -529,6 +822,27 @@ impl Model {
         let [poles, zeros, closed] = roots.each_ref().map(pairs);
         let (poles, zeros, closed) = (poles?, zeros?, closed?);
         Ok(py.detach(|| search(self, [&poles, &zeros, &closed], low, high)))
+    }
+
+    /// Returns frequencies, rad/s, and values at which an eigenvalue of the response has the magnitude 1: real and
+    /// imaginary part. Changes between the `nodes`, rad/s, are found.
+    ///
+    /// # Errors
+    /// If the model has other numbers of inputs and outputs, or the nodes are no array of floats.
+    fn unit_eigenvalues(&self, py: Python, nodes: &Bound<PyAny>) -> PyResult<Vec<(f64, f64, f64)>> {
+        self.must_be_square()?;
+        let nodes = numbers(nodes)?;
+        Ok(py.detach(|| self.unit_magnitudes(&nodes)))
+    }
+
+    /// Returns a better frequency than `w`, rad/s, at which −L exp(−jωτ) has an eigenvalue of magnitude 1 near 1, and the
+    /// eigenvalue's phase there, rad. `delay`: τ, s.
+    ///
+    /// # Errors
+    /// If the model has other numbers of inputs and outputs.
+    fn critical(&self, py: Python, w: f64, delay: f64) -> PyResult<(f64, f64)> {
+        self.must_be_square()?;
+        Ok(py.detach(|| self.refined(w, delay)))
     }
 
     /// Returns C (sI − A)⁻¹ B + D at frequencies in rad/s: real and imaginary parts, frequency by frequency, row after row.

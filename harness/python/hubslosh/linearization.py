@@ -182,10 +182,11 @@ class LinearModel:
         ``states``: the names of those that take part, most first, by participation factors
         (Pérez-Arriaga, Verghese and Schweppe 1982) of a fifth of the largest or more.
         """
-        import pandas as pd
-        from scipy.linalg import eig
+        return mode_table(self._modes(below))
 
-        poles, left, right = eig(self.A, left=True)
+    def _modes(self, below: float) -> list[tuple[float, float, tuple[str, ...]]]:
+        """Return the rows of `modes`."""
+        poles, left, right = eigenvectors(self)
         rows = []
         for k, pole in enumerate(poles):
             if self.period is not None:
@@ -199,9 +200,7 @@ class LinearModel:
             names = tuple(self.states[i] for i in most)
             rows.append((abs(pole) / (2 * np.pi), -pole.real / abs(pole), names))
         rows.sort(key=lambda row: row[0])
-        table = pd.DataFrame(rows, columns=["frequency", "zeta", "states"])
-        table.attrs["units"] = {"frequency": "Hz", "zeta": "1"}
-        return table
+        return rows
 
     def to_control(self) -> Any:
         """Return it as ``control.StateSpace``, with names; needs the package control."""
@@ -216,6 +215,24 @@ class LinearModel:
             inputs=list(self.inputs),
             outputs=list(self.outputs),
         )
+
+
+def mode_table(rows: list[tuple[float, float, tuple[str, ...]]]) -> "pd.DataFrame":
+    """Return rows of modes as the table of `LinearModel.modes`."""
+    import pandas as pd
+
+    table = pd.DataFrame(rows, columns=["frequency", "zeta", "states"])
+    table.attrs["units"] = {"frequency": "Hz", "zeta": "1"}
+    return table
+
+
+@lru_cache(maxsize=32)
+def eigenvectors(model: LinearModel) -> tuple[Any, Any, Any]:
+    """Return eigenvalues, left and right eigenvectors of A."""
+    from scipy.linalg import eig
+
+    found: tuple[Any, Any, Any] = eig(model.A, left=True)
+    return found
 
 
 @lru_cache(maxsize=32)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -492,8 +493,6 @@ def _linear(
 
 def _tustin(model: LinearModel, period: float) -> LinearModel:
     """Return a continuous controller discretised by Tustin's rule, s = 2/T (z − 1)/(z + 1)."""
-    from scipy.signal import cont2discrete
-
     if len(model.A) and np.abs(np.linalg.eigvals(model.A) * period - 2).min() < 1e-9:
         raise FmuError(
             f"the controller has a pole at 2/period = {2 / period:g} rad/s, which Tustin's rule "
@@ -501,8 +500,23 @@ def _tustin(model: LinearModel, period: float) -> LinearModel:
         )
     A, B, C, D = model
     if len(A):
-        A, B, C, D, _ = cont2discrete((A, B, C, D), period, "bilinear")
+        given = tuple((matrix.shape, matrix.tobytes()) for matrix in model)
+        A, B, C, D = (matrix.copy() for matrix in _bilinear(given, period))
     return LinearModel(A, B, C, D, model.states, model.inputs, model.outputs, period)
+
+
+@lru_cache(maxsize=16)
+def _bilinear(
+    given: tuple[tuple[tuple[int, ...], bytes], ...], period: float
+) -> tuple[NDArray[np.float64], ...]:
+    """Return matrices discretised by scipy; each is given as its shape and bytes.
+
+    Its threads wait: on two cores a call can take as long as all margins of a loop.
+    """
+    from scipy.signal import cont2discrete
+
+    matrices = tuple(np.frombuffer(numbers).reshape(shape) for shape, numbers in given)
+    return tuple(cont2discrete(matrices, period, "bilinear")[:4])
 
 
 def _from_control(system: Any) -> LinearModel:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fmu import FmuError, Quantity
-from .linearization import LinearModel
+from .linearization import LinearModel, eigenvectors, mode_table
 from .loop import Loop, _from_control
 from .native import Model
 
@@ -135,27 +135,23 @@ def margins_and_gain(
     if isinstance(loop, Loop):
         K = loop._must_be_linear()
         plant = loop.plant(parameters)
-        modes = plant.modes(LIGHT)
+        modes = plant._modes(LIGHT)
         small = minimal(plant)
         gain = loop._gain(small, K)
 
         def delayed(more: float) -> LinearModel:
             return loop._gain(small, K, more)
 
-        return _margins(gain, modes, _moved(plant, _rows(modes)), delayed), gain
+        return _margins(gain, modes, _moved(plant, modes), delayed), gain
     if parameters:
         raise FmuError("parameters are for a Loop; this loop gain has none")
     gain = loop if isinstance(loop, LinearModel) else _loop_gain(loop)
-    modes = gain.modes(LIGHT)
-    return _margins(gain, modes, [_rows(modes)] * gain.D.shape[1], None), gain
+    modes = gain._modes(LIGHT)
+    return _margins(gain, modes, [modes] * gain.D.shape[1], None), gain
 
 
 Modes = list[tuple[float, float, tuple[str, ...]]]
 """Frequency, damping ratio and states of each."""
-
-
-def _rows(modes: "pd.DataFrame") -> Modes:
-    return list(zip(modes["frequency"], modes["zeta"], modes["states"], strict=True))
 
 
 def _moved(plant: LinearModel, modes: Modes) -> list[Modes]:
@@ -163,10 +159,8 @@ def _moved(plant: LinearModel, modes: Modes) -> list[Modes]:
 
     Modes of one frequency go together: of two equal tanks an input moves a combination.
     """
-    from scipy.linalg import eig
-
-    A, B, C, _ = plant
-    poles, left, right = eig(A, left=True)
+    _, B, C, _ = plant
+    poles, left, right = eigenvectors(plant)
     kept = np.zeros((B.shape[1], len(modes)), bool)
     for k, (frequency, _, _) in enumerate(modes):
         same = (np.abs(np.abs(poles) / (2 * np.pi) - frequency) < 1e-6 * frequency) & (
@@ -190,7 +184,7 @@ def _loop_gain(system: Any) -> LinearModel:
 
 def _margins(
     gain: LinearModel,
-    modes: "pd.DataFrame",
+    modes: Modes,
     moved: list[Modes],
     delayed: Callable[[float], LinearModel] | None,
 ) -> Margins:
@@ -236,8 +230,8 @@ def _margins(
     stable = _largest(poles, gain.period) < (0 if gain.period is None else 1)
     delay = 0.0
     if stable:
-        delay = least_delay if delayed is None else _delay_margin(delayed, gain)
-    return Margins(table, bool(stable), poles, float(modulus), float(delay), modes)
+        delay = least_delay if delayed is None else _delay_margin(delayed, gain, poles)
+    return Margins(table, bool(stable), poles, float(modulus), float(delay), mode_table(modes))
 
 
 def _broken_at(gain: LinearModel, i: int) -> LinearModel:
@@ -363,7 +357,9 @@ def _mode_of(state: str) -> str:
     return state
 
 
-def _delay_margin(delayed: Callable[[float], LinearModel], gain: LinearModel) -> float:
+def _delay_margin(
+    delayed: Callable[[float], LinearModel], gain: LinearModel, closed: NDArray[np.complex128]
+) -> float:
     """Return the least further delay at which a sampled loop is no longer stable, s.
 
     Where an eigenvalue of L has the magnitude 1, a delay of whole cycles can turn it to -1. The
@@ -371,7 +367,7 @@ def _delay_margin(delayed: Callable[[float], LinearModel], gain: LinearModel) ->
     """
     least = np.inf
     with np.errstate(all="ignore"):  # an eigenvalue of 0
-        for delay, w in sorted(_unit_eigenvalues(gain)):
+        for delay, w in sorted(_unit_eigenvalues(gain, closed)):
             # what the hold changes between whole cycles is less than half a cycle
             if delay - (gain.period or 0.0) / 2 >= least:
                 break
@@ -383,30 +379,15 @@ def _exact_delay(
     delayed: Callable[[float], LinearModel], gain: LinearModel, delay: float, w: float
 ) -> float:
     """Return the delay at which an eigenvalue of L is -1, from its value without the hold."""
-    period, count = gain.period or 0.0, len(gain.D)
+    period = gain.period or 0.0
 
     def turned(delay: float) -> float:
         """Return a better delay: the magnitude is 1 at w, and the phase is made up for."""
         nonlocal w
         cycles = int(delay / period)
         model = _compiled(delayed(delay - cycles * period))
-
-        def logarithm(w: float) -> complex:
-            values = _eigenvalues(model, count, np.array([w]))[0]
-            values = np.log(-values * np.exp(-1j * w * period * cycles))
-            return complex(values[np.argmin(np.abs(values))])
-
-        before, after = w, w * (1 + 1e-6)
-        at_before, at_after = logarithm(before), logarithm(after)
-        for _ in range(20):
-            if at_after.real == at_before.real or abs(after - before) <= 1e-15 * after:
-                break
-            slope = (at_after.real - at_before.real) / (after - before)
-            step = np.clip(-at_after.real / slope, -0.01 * w, 0.01 * w)
-            before, at_before, after = after, at_after, after + step
-            at_after = logarithm(after)
-        w = after
-        return float(delay + at_after.imag / w)
+        w, phase = model.critical(w, period * cycles)
+        return float(delay + phase / w)
 
     for _ in range(20):  # Steffensen's iteration
         first = turned(delay)
@@ -420,24 +401,12 @@ def _exact_delay(
     return delay
 
 
-def _eigenvalues(model: Any, count: int, w: Matrix) -> NDArray[np.complex128]:
-    """Return the eigenvalues of L at frequencies in rad/s, by magnitude."""
-    values = np.array(model.response(w)).view(complex).reshape(-1, count, count)
-    values = np.where(np.isfinite(values), values, 1e300)
-    found = values[:, 0] if count == 1 else np.linalg.eigvals(values)
-    return np.take_along_axis(found, np.argsort(np.abs(found), axis=1), axis=1)
-
-
-def _unit_eigenvalues(gain: LinearModel) -> list[tuple[float, float]]:
+def _unit_eigenvalues(
+    gain: LinearModel, closed: NDArray[np.complex128]
+) -> list[tuple[float, float]]:
     """Return delay (s) and frequency (rad/s) where an eigenvalue of L has the magnitude 1."""
-    from scipy.optimize import brentq
-
-    model, period, count = _compiled(gain), gain.period or 0.0, len(gain.D)
-
-    def eigenvalues(w: Matrix) -> NDArray[np.complex128]:
-        return _eigenvalues(model, count, w)
-
-    roots = [np.linalg.eigvals(gain.A).astype(complex), _closed(gain)]
+    period = gain.period or 0.0
+    roots = [np.linalg.eigvals(gain.A).astype(complex), closed]
     low, high = _band(gain, roots)
     nodes = [np.geomspace(low, high, 100)]
     for pole in np.concatenate(roots):
@@ -447,18 +416,10 @@ def _unit_eigenvalues(gain: LinearModel) -> list[tuple[float, float]]:
             nodes.append(root.imag + np.concatenate([-around, around]))
     every = np.unique(np.concatenate(nodes))
     every = np.ascontiguousarray(every[(every > low) & (every < high)])
-    above = np.abs(eigenvalues(every)) > 1
-    found = []
-    for k, i in zip(*np.nonzero(above[1:] != above[:-1]), strict=True):
-
-        def height(w: float, i: int = i) -> float:
-            return float(np.log(np.abs(eigenvalues(np.array([w]))[0, i])))
-
-        w = brentq(height, every[k], every[k + 1], xtol=1e-300, rtol=1e-10)
-        value = eigenvalues(np.array([w]))[0, i]
-        if abs(abs(value) - 1) < 1e-6:
-            found.append((float(np.angle(-value) % (2 * np.pi)) / w, float(w)))
-    return found
+    return [
+        (float(np.angle(-complex(re, im)) % (2 * np.pi)) / w, w)
+        for w, re, im in _compiled(gain).unit_eigenvalues(every)
+    ]
 
 
 def minimal(model: LinearModel, tolerance: float = 1e-11) -> LinearModel:
