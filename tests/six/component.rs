@@ -1,5 +1,4 @@
-//! Spacecraft.fmu and SloshTank.fmu with the face of the crate `craft`: that crate's tests, which use
-//! nothing else, run through the packed FMUs as well.
+//! Spacecraft.fmu and SloshTank.fmu with the interface of the crate `craft`.
 //!
 //! All is done by calls of the C interface: parameters and inputs by name, input derivatives for the
 //! slopes, fmi2DoStep, fmi2GetReal of whatever is looked at, fmi2GetDirectionalDerivative. The first
@@ -358,6 +357,10 @@ impl Spacecraft {
         settings.reals(elements("gravity", 3), &p.gravity);
         settings.reals(elements("pivot.k", 2), &p.pivot.k);
         settings.reals(elements("pivot.c", 3), &p.pivot.c);
+        settings.reals(elements("pivot.friction.c", 3), &p.pivot.friction.c);
+        settings.reals(elements("pivot.friction.d", 3), &p.pivot.friction.d);
+        settings.real("pivot.friction.omega_s", p.pivot.friction.omega_s);
+        settings.real("pivot.friction.eps", p.pivot.friction.eps);
         settings.integer("tanks", p.tanks as i32);
         settings.integer("solver.max_steps", p.max_steps as i32);
         for (i, tank) in p.tank.iter().enumerate() {

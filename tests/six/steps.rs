@@ -10,8 +10,7 @@ use runtime::v2::{Fmi2, GET_REAL, SET_INTEGER, SET_REAL};
 use runtime::variable::Value;
 
 use super::component::{SloshTank, Spacecraft, load};
-use super::draining::tank;
-use super::random::Random;
+use super::random::{Random, draining_tank};
 use super::records::{STEP, at_end, motion_at_end};
 
 /// Right after a step outputs are limits from the left: they include the torque of wheels that have accelerated, and the rate of
@@ -53,7 +52,7 @@ fn random_steps(count: usize, seed: u64) -> usize {
         p.init.omega = [(); 3].map(|()| random.magnitude(1e-6, 1e2));
         // Every third drains.
         if random.below(3) == 0 {
-            p.tank[0] = tank(&mut random, 2);
+            p.tank[0] = draining_tank(&mut random, 2);
         }
         let alone = TankParameters { tank: p.tank[0], ..TankParameters::default() };
         let tolerance = random.magnitude(1e-14, 1e-1);

@@ -11,64 +11,16 @@
 //! r: O from the inertial origin, S: first moment of everything about O.
 
 use craft::{
-    Coupling, DampingLaw, FillTable, INPUTS, Inputs, Line, MODES, Mount, Outputs, POINTS,
-    Parameters, Ramp, STATES, Tank, TankInputs, TankParameters, index,
+    Coupling, DampingLaw, INPUTS, Inputs, Line, MODES, Mount, Outputs, POINTS, Parameters, Ramp,
+    STATES, TankInputs, TankParameters, index,
 };
 use nalgebra::{Matrix3, Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
 
 use super::component::{SloshTank, Spacecraft};
-use super::random::Random;
+use super::random::{Random, draining_craft, draining_tank};
 use super::records::STEP;
 
 type V = Vector3<f64>;
-
-/// A tank with a table: an upright cylinder of 0.45 m radius, `modes` modes, rotated and off the centre. An odd number
-/// of modes has damping ratios in the table.
-pub fn tank(random: &mut Random, modes: usize) -> Tank {
-    let mut tank = Tank { modes, diameter: 0.0, ..random.tank() };
-    let mut table = FillTable { points: POINTS, ..tank.fill };
-    for i in 0..POINTS {
-        let depth = 0.15 + 0.1 * i as f64;
-        let liquid = 1000.0 * std::f64::consts::PI * 0.45 * 0.45 * depth;
-        table.liquid[i] = liquid;
-        // Potential flow: some 40 % in the first mode of a half-full tank, less above.
-        let mut left = liquid;
-        for n in 0..modes {
-            let xi = [1.8412, 5.3314, 8.5363][n];
-            let tanh = f64::tanh(xi * depth / 0.45);
-            table.mass[n][i] = liquid * 0.9 * tanh / (xi * (xi * xi - 1.0) * depth);
-            table.length[n][i] = 0.45 / (xi * tanh);
-            table.hinge[n][i] = depth - 0.2 * tanh;
-            table.zeta[n][i] = if modes % 2 == 1 { 0.004 * (n + 1) as f64 / depth } else { 0.0 };
-            left -= table.mass[n][i];
-        }
-        table.h_0[i] = 0.45 * depth;
-        table.i_0[i] = left * (0.05 + 0.08 * depth * depth);
-        table.i_z[i] = 0.01 * left;
-    }
-    tank.fill = table;
-    tank.liquid_0 = 400.0;
-    tank.outlet = -0.05;
-    tank
-}
-
-/// A craft with one to three draining tanks and one that stays; from seed 20 on with surfaces other than spheres.
-pub fn craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
-    let mut random = Random::new(seed);
-    let mut p = random.parameters();
-    p.tanks = 2 + seed as usize % 3;
-    p.tank = [(); 4].map(|()| tank(&mut random, modes));
-    p.tank[p.tanks - 1] = random.tank();
-    if seed >= 20 {
-        random.bend_all(&mut p);
-    }
-    let mut u = random.inputs();
-    u.force.value[2] += 2.0 * p.craft.mass;
-    for flow in &mut u.mass_flow[..p.tanks - 1] {
-        *flow = Line { value: random.between(1.0, 5.0), slope: random.between(-2.0, 4.0) };
-    }
-    (p, u)
-}
 
 fn v(x: &[f64]) -> V {
     V::new(x[0], x[1], x[2])
@@ -113,7 +65,7 @@ pub fn momenta(out: &Outputs) -> [V; 2] {
 #[test]
 fn momentum_and_angular_momentum_leave_with_the_outflow() {
     for (seed, modes) in [(0, 0), (1, 0), (2, 1), (3, 2), (4, 3), (5, 1), (20, 3), (21, 1)] {
-        let (p, u) = craft(seed, modes);
+        let (p, u) = draining_craft(seed, modes);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-13).unwrap();
         let start = momenta(&craft.outputs(&u));
         let mut came_in = [V::zeros(); 2];
@@ -153,7 +105,7 @@ fn momentum_and_angular_momentum_leave_with_the_outflow() {
 #[test]
 fn momentum_is_that_of_the_mass_that_moves() {
     for seed in (0..6).chain(20..23) {
-        let (p, u) = craft(seed, 1 + seed as usize % 3);
+        let (p, u) = draining_craft(seed, 1 + seed as usize % 3);
         let e = 1e-3;
         let moment = |out: &Outputs| v(&out.center_of_mass) * out.mass;
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-13).unwrap();
@@ -187,7 +139,7 @@ fn momentum_is_that_of_the_mass_that_moves() {
 /// same.
 #[test]
 fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
-    let (p, mut u) = craft(7, 2);
+    let (p, mut u) = draining_craft(7, 2);
     for flow in &mut u.mass_flow[..p.tanks - 1] {
         *flow = Line { value: 6.0, slope: 1.0 };
     }
@@ -216,7 +168,7 @@ fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
 #[test]
 fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     for seed in 0..6 {
-        let (mut p, u) = craft(seed, seed as usize % 4);
+        let (mut p, u) = draining_craft(seed, seed as usize % 4);
         (p.init.position, p.init.velocity) = ([0.0; 3], [0.0; 3]);
         for tolerance in [1e-6, 1e-12] {
             let [short, ends @ ..] = [0.02, 1.0, 5.0].map(|h| {
@@ -273,7 +225,7 @@ fn a_tank_that_drains_at_rest_takes_long_steps() {
 #[test]
 fn a_tank_with_a_table_that_does_not_drain_is_a_tank_without() {
     for seed in 0..4 {
-        let (mut p, mut u) = craft(seed, 2);
+        let (mut p, mut u) = draining_craft(seed, 2);
         for (n, tank) in p.tank.iter_mut().enumerate() {
             tank.damping_law = DampingLaw::ALL[(seed as usize + n) % 3];
             (tank.zeta, tank.zeta_amplitude) = ([0.05; MODES], [0.1 * (seed % 2) as f64; MODES]);
@@ -319,7 +271,7 @@ fn a_tank_with_a_table_that_does_not_drain_is_a_tank_without() {
 #[test]
 fn directional_derivatives_of_draining_craft_are_those_by_differences() {
     for seed in (0..8).chain(20..24) {
-        let (mut p, u) = craft(seed, 1 + seed as usize % 3);
+        let (mut p, u) = draining_craft(seed, 1 + seed as usize % 3);
         // As a host gives them that integrates itself: without slopes.
         let mut u = after(&u, 0.0);
         for ramp in [&mut u.force, &mut u.torque, &mut u.h_wheels] {
@@ -364,7 +316,7 @@ fn directional_derivatives_of_draining_craft_are_those_by_differences() {
 #[test]
 fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
     for (i, law) in DampingLaw::ALL.into_iter().enumerate() {
-        let (mut p, u) = craft(i as u64, 1);
+        let (mut p, u) = draining_craft(i as u64, 1);
         p.tank[0].damping_law = law;
         for point in [0, 5, POINTS - 1] {
             p.tank[0].liquid_0 = p.tank[0].fill.liquid[point];
@@ -389,7 +341,7 @@ pub fn energy(out: &Outputs) -> f64 {
 #[test]
 fn energy_is_kept_while_tanks_drain() {
     for seed in (0..8).chain(21..25) {
-        let (mut p, u) = craft(seed, seed as usize % 4);
+        let (mut p, u) = draining_craft(seed, seed as usize % 4);
         if [6, 7, 24].contains(&seed) {
             (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         }
@@ -420,7 +372,7 @@ fn energy_is_kept_while_tanks_drain() {
 #[test]
 fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
     for seed in (0..6).chain(21..24) {
-        let (p, u) = craft(seed, seed as usize % 4);
+        let (p, u) = draining_craft(seed, seed as usize % 4);
         let at = |share: f64| {
             u.mass_flow.map(|flow| Line { value: share * flow.value, slope: flow.slope / 2.0 })
         };
@@ -449,7 +401,7 @@ fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
 /// A tank that drains and a host's motion.
 fn tank_alone(seed: u64, coupling: Coupling) -> (TankParameters, TankInputs) {
     let mut random = Random::new(seed);
-    let tank = tank(&mut random, seed as usize % 4);
+    let tank = draining_tank(&mut random, seed as usize % 4);
     let mut ramp = || Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
     let (a, omega, omega_dot) = (ramp(), ramp().value, ramp());
     let mass_flow = Line { value: random.between(1.0, 5.0), slope: random.between(-2.0, 4.0) };
@@ -515,7 +467,7 @@ fn a_draining_tank_s_force_is_newton_s() {
 #[test]
 fn tanks_that_drain_on_a_rigid_body_are_the_craft() {
     for seed in (0..12).chain(20..26) {
-        let (p, u) = craft(seed, seed as usize % 4);
+        let (p, u) = draining_craft(seed, seed as usize % 4);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-10).unwrap();
         craft.step(&u, 0.5).unwrap();
         // As a host that integrates itself gives them: without slopes.

@@ -5,8 +5,7 @@ use craft::{
     SloshTankOutputs, Spacecraft, TANK_INPUTS, TANK_STATES, TankInputs, TankParameters, index,
 };
 
-use super::draining;
-use super::random::Random;
+use super::random::{Random, draining_tank};
 
 fn ramps(u: &Inputs) -> [Ramp; 3] {
     [u.force, u.torque, u.h_wheels]
@@ -164,7 +163,7 @@ fn a_tank_s_directional_derivatives_are_those_by_differences() {
         let (a, omega_dot) = (ramp(), ramp());
         let mut u = TankInputs { a, omega: random.vector(1.0), omega_dot, ..TankInputs::default() };
         if seed.is_multiple_of(5) && seed < 60 {
-            p.tank = draining::tank(&mut random, 1 + seed as usize % 3);
+            p.tank = draining_tank(&mut random, 1 + seed as usize % 3);
             u.mass_flow =
                 Line { value: random.between(1.0, 9.0), slope: random.between(-2.0, 2.0) };
         }

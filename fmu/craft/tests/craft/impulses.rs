@@ -6,7 +6,7 @@ use craft::{
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use super::draining;
-use super::random::Random;
+use super::random::{Random, draining_craft, draining_tank};
 
 type V = Vector3<f64>;
 
@@ -27,7 +27,7 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
     for seed in 0..20 {
         let mut random = Random::new(seed);
         let drains = seed % 2 == 0;
-        let mut tank = if drains { draining::tank(&mut random, 2) } else { random.tank() };
+        let mut tank = if drains { draining_tank(&mut random, 2) } else { random.tank() };
         if seed % 4 == 3 {
             random.make_planar(&mut tank);
         }
@@ -77,7 +77,7 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
 fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_craft_that_has_drained_and_does() {
     let (mut by_rods, h) = (0.0_f64, 1e-7);
     for seed in (0..6).chain(21..24) {
-        let (p, u) = draining::craft(seed, seed as usize % 4);
+        let (p, u) = draining_craft(seed, seed as usize % 4);
         let mut now =
             Inputs { force: Ramp::held([0.0, 0.0, 2.0 * p.craft.mass]), ..Inputs::default() };
         now.mass_flow = u.mass_flow.map(|flow| Line { value: 4.0 * flow.value, slope: 0.0 });
@@ -114,7 +114,7 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_craft_that_has_drained_an
 fn liquids_beyond_their_tables_are_refused() {
     let mut random = Random::new(1);
     let mut p = Parameters { tanks: 2, ..random.parameters() };
-    p.tank[1] = draining::tank(&mut random, 1);
+    p.tank[1] = draining_tank(&mut random, 1);
     let masses = p.tank[1].fill.liquid;
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();
     let mut with = |liquid: f64| {
@@ -150,7 +150,7 @@ const STEPS: [[[usize; 2]; 4]; 2] =
 fn a_step_takes_few_internal_steps() {
     for (seed, expected) in (0..).zip(STEPS) {
         let mut random = Random::new(seed);
-        let tanks = [random.tank(), draining::tank(&mut random, 2)];
+        let tanks = [random.tank(), draining_tank(&mut random, 2)];
         let u = TankInputs {
             a: Ramp { value: [0.3, -0.2, 2.0], slope: [0.1, 0.2, 0.0] },
             omega: [0.1, -0.2, 0.3],

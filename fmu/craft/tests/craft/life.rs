@@ -6,7 +6,7 @@ use craft::{
 };
 
 use super::draining::after;
-use super::random::Random;
+use super::random::{Random, draining_tank};
 use super::records::{STEP, at_end, inputs, record, spacecraft};
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
@@ -87,7 +87,7 @@ fn the_tolerance_is_kept_from_rest() {
 fn the_tolerance_is_kept_while_tanks_drain() {
     for seed in 0..4 {
         let mut random = Random::new(seed);
-        let tank = super::draining::tank(&mut random, 2);
+        let tank = draining_tank(&mut random, 2);
         let mass_flow = Line { value: 5.0, slope: 0.5 };
         let alone = TankParameters { tank, ..TankParameters::default() };
         let u = TankInputs {

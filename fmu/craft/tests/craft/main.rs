@@ -1,7 +1,7 @@
 //! Tests of the craft and of the tank alone.
 //!
-//! `tests/six`, at the root of the project, runs most of these once more through the packed FMUs,
-//! and has the coupling by co-simulation.
+//! `tests/six`, at the root of the project, shows that the packed FMUs compute the same bits, and has the coupling by
+//! co-simulation.
 
 mod balances;
 mod ball;

@@ -1,8 +1,8 @@
 //! Random craft, states and inputs, of the sizes that spacecraft have.
 
 use craft::{
-    Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Pivot, PivotFriction, Ramp, TANKS,
-    Tank,
+    Craft, DampingLaw, FillTable, Inertia, Init, Inputs, Line, Mount, POINTS, Parameters, Pivot,
+    PivotFriction, Ramp, TANKS, Tank,
 };
 
 pub struct Random(fastrand::Rng);
@@ -162,4 +162,52 @@ impl Random {
             ..Inputs::default()
         }
     }
+}
+
+/// A tank with a table: an upright cylinder of 0.45 m radius, `modes` modes, rotated and off the centre. An odd number
+/// of modes has damping ratios in the table.
+pub fn draining_tank(random: &mut Random, modes: usize) -> Tank {
+    let mut tank = Tank { modes, diameter: 0.0, ..random.tank() };
+    let mut table = FillTable { points: POINTS, ..tank.fill };
+    for i in 0..POINTS {
+        let depth = 0.15 + 0.1 * i as f64;
+        let liquid = 1000.0 * std::f64::consts::PI * 0.45 * 0.45 * depth;
+        table.liquid[i] = liquid;
+        // Potential flow: some 40 % in the first mode of a half-full tank, less above.
+        let mut left = liquid;
+        for n in 0..modes {
+            let xi = [1.8412, 5.3314, 8.5363][n];
+            let tanh = f64::tanh(xi * depth / 0.45);
+            table.mass[n][i] = liquid * 0.9 * tanh / (xi * (xi * xi - 1.0) * depth);
+            table.length[n][i] = 0.45 / (xi * tanh);
+            table.hinge[n][i] = depth - 0.2 * tanh;
+            table.zeta[n][i] = if modes % 2 == 1 { 0.004 * (n + 1) as f64 / depth } else { 0.0 };
+            left -= table.mass[n][i];
+        }
+        table.h_0[i] = 0.45 * depth;
+        table.i_0[i] = left * (0.05 + 0.08 * depth * depth);
+        table.i_z[i] = 0.01 * left;
+    }
+    tank.fill = table;
+    tank.liquid_0 = 400.0;
+    tank.outlet = -0.05;
+    tank
+}
+
+/// A craft with one to three draining tanks and one that stays; from seed 20 on with surfaces other than spheres.
+pub fn draining_craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
+    let mut random = Random::new(seed);
+    let mut p = random.parameters();
+    p.tanks = 2 + seed as usize % 3;
+    p.tank = [(); 4].map(|()| draining_tank(&mut random, modes));
+    p.tank[p.tanks - 1] = random.tank();
+    if seed >= 20 {
+        random.bend_all(&mut p);
+    }
+    let mut u = random.inputs();
+    u.force.value[2] += 2.0 * p.craft.mass;
+    for flow in &mut u.mass_flow[..p.tanks - 1] {
+        *flow = Line { value: random.between(1.0, 5.0), slope: random.between(-2.0, 4.0) };
+    }
+    (p, u)
 }

@@ -2,8 +2,8 @@
 //! written twice more, once in 113-bit arithmetic; what its signals are stands in its `about`.
 
 use craft::{
-    Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank, TankInputs,
-    TankParameters,
+    Craft, DampingLaw, Inertia, Init, Inputs, Line, Mount, Parameters, Ramp, TANKS, Tank,
+    TankInputs, TankParameters,
 };
 use serde_json::Value;
 
@@ -164,7 +164,7 @@ pub fn at_end(inputs: &Inputs) -> Inputs {
         force: end(&inputs.force),
         torque: end(&inputs.torque),
         h_wheels: end(&inputs.h_wheels),
-        ..Inputs::default()
+        mass_flow: inputs.mass_flow.map(|flow| Line { value: flow.at(STEP), slope: flow.slope }),
     }
 }
 
