@@ -25,7 +25,8 @@ pub struct Deviations {
 impl Features {
     /// Returns the standard deviations of the features, from the response, its relative standard deviation at each
     /// frequency, and the relative rate at which its error changes along the frequency, 1/Hz. An error ε of ln |H|
-    /// moves an extremum by −ε'/(ln |H|)''.
+    /// moves an extremum by −ε'/(ln |H|)'' if it is small. If ε changes within the distance sqrt(2ε/(ln |H|)'') over which the extremum
+    /// rises by ε, the extremum may be anywhere within that distance: an antiresonance whose bottom is below the noise.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,
@@ -39,7 +40,10 @@ impl Features {
             let level = |i: usize| response.response[i].norm().ln();
             let rise = |i: usize| (level(i + 1) - level(i)) / (f[i + 1] - f[i]);
             let curvature = 2.0 * (rise(i) - rise(i - 1)) / (f[i + 1] - f[i - 1]);
-            let std = slope(f[i]) * relative.get(i)? / curvature.abs();
+            let (relative, slope) = (*relative.get(i)?, slope(f[i]));
+            let distance = (2.0 * relative / curvature.abs()).sqrt();
+            let std = slope * relative / curvature.abs();
+            let std = if distance * slope > 1.0 { std.max(distance) } else { std };
             std.is_finite().then_some(std)
         };
         Deviations { f_res: of(self.f_res), f_dip: of(self.f_dip) }

@@ -12,6 +12,9 @@ use crate::verdict::NO_MINIMUM;
 /// ends at 3.84.
 const SAME: f64 = 0.5;
 
+/// Ratio of the heights at which a chart draws the searches of one unknown and of the next that ended at the minimum.
+const BELOW: f64 = 0.6;
+
 /// End of a search from another start.
 #[derive(Clone, Debug, Serialize)]
 pub struct Trial {
@@ -85,17 +88,23 @@ fn names(trials: &[Trial]) -> Vec<&str> {
 
 /// Sum of squares at the end of each search, against its start.
 pub fn chart(trials: &[Trial]) -> Chart {
+    let mut level = SAME;
     let lines: Vec<_> = names(trials)
         .iter()
         .zip(COLORS.iter().cycle())
         .map(|(name, color)| {
-            let point = |trial: &Trial| trial.more.map(|more| (trial.start, more.max(SAME)));
+            level *= BELOW;
+            let height =
+                |trial: &Trial, more: f64| if trial.is_same() { level } else { more.max(SAME) };
+            let point = |trial: &Trial| Some((trial.start, height(trial, trial.more?)));
             series(of(trials, name).filter_map(point).collect(), color, Style::Dots, name)
         })
         .collect();
     let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
     Chart {
-        title: format!("Sum of squares at the end above the minimum; {SAME} is the minimum itself"),
+        title: format!(
+            "Sum of squares at the end above the minimum, by the unknown that starts elsewhere (below {SAME}: the minimum itself)"
+        ),
         size: (900.0, 260.0),
         x: Axis::decades("start over the estimate", trials.iter().map(|trial| trial.start)),
         y: Axis::decades("variances of the noise", values),

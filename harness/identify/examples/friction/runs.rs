@@ -41,7 +41,6 @@ pub const SETS: [Set; 3] = [
             |t| 0.1 * sweep(t, (1.25, 3.5), 120.0),
         ],
     },
-    // the asymmetry scatters here by twice its standard deviation (3.5 in one of eight seeds); we do not know why
     Set {
         name: "four minutes, both directions",
         seconds: 240,

@@ -124,7 +124,7 @@ pub(super) fn beside(results: &Results) -> Markup {
     }
     html! {
         p {
-            "For each recording the results of the same estimators, and below them the deviations of the models' runs with the same torque and fill. ✓: within the joint 95 % interval of both estimates. CEF and leakage come from the recording's rates about the other axes (thesis 6.3.6). A hub that cannot tilt has no such rates."
+            "For each recording the results of the same estimators, and below them the deviations of the models' runs with the same torque and fill. ✓: within the joint 95 % interval of both estimates. This interval leaves out the uncertainty of the models' parameters, which matters most for the resonance in rotary slosh. CEF and leakage come from the recording's rates about the other axes (thesis 6.3.6). A hub that cannot tilt has no such rates."
         }
         div .wide {
             table {

@@ -14,8 +14,8 @@
   };
 
   // How many powers of ten the values of a panel span.
-  function decades(spec, panel) {
-    const logs = spec.traces.filter((t) => t.panel === panel).flatMap((t) => t.y).filter((y) => y > 0).map(Math.log10);
+  function decades(spec, panel, axis = "y") {
+    const logs = spec.traces.filter((t) => t.panel === panel).flatMap((t) => t[axis]).filter((v) => v > 0).map(Math.log10);
     return logs.reduce((a, b) => Math.max(a, b), -Infinity) - logs.reduce((a, b) => Math.min(a, b), Infinity);
   }
 
@@ -104,12 +104,14 @@
       layout["xaxis" + suffix] = { ...common, domain: domain.x, anchor: "y" + suffix, title: { text: last ? panel.x : "", standoff: printing ? 4 : 8, font: { size: small + (printing ? 0 : 1) } }, showticklabels: last,
         type: panel.logx ? "log" : "-", nticks: Math.max(3, Math.round(w / 70)) };
       if (panel.logx) Object.assign(layout["xaxis" + suffix], { exponentformat: "none", tickformat: "~g" });
+      // 1, 2 and 5 of every decade: the labels of all digits overlap
+      if (panel.logx && !panel.range && decades(spec, i, "x") >= 1) layout["xaxis" + suffix].dtick = "D2";
       if (panel.range) layout["xaxis" + suffix].range = panel.logx ? panel.range.map(Math.log10) : panel.range;
       if (spec.shared && i) layout["xaxis" + suffix].matches = "x";
       layout["yaxis" + suffix] = { ...common, domain: domain.y, anchor: "x" + suffix, title: { text: panel.y, standoff: 2, font: { size: small } }, type: panel.logy ? "log" : "-", nticks: 6 };
       if (bars) Object.assign(layout["yaxis" + suffix], { type: "category", dtick: 1, tickfont: { size: printing ? 7 : 10 } });
-      // at powers of ten; where there are less than two of them, where plotly puts them
-      if (panel.logy && decades(spec, i) >= 2) layout["yaxis" + suffix].dtick = 1;
+      // at powers of ten; where there are less than two of them, at 1, 2 and 5 of each; within one decade where plotly puts them
+      if (panel.logy && decades(spec, i) >= 1) layout["yaxis" + suffix].dtick = decades(spec, i) >= 2 ? 1 : "D2";
       if (panel.equal) Object.assign(layout["yaxis" + suffix], { scaleanchor: "x" + suffix, constrain: "domain" });
     });
     if (labelled) {

@@ -62,8 +62,13 @@ pub fn of(
     let mut settings = nominal::with_damping(day.settings.clone());
     // the least that the FMU takes: the tank is empty
     settings.push((fluid::RHO.into(), "1e-6".into()));
-    let options =
-        acceleration::Options { settings, start_study: STARTS, ..acceleration::Options::default() };
+    let options = acceleration::Options {
+        settings,
+        start_study: STARTS,
+        torque_scale: day.tolerances.torque,
+        gyro_scale: day.manifest.gyro_scale,
+        ..acceleration::Options::default()
+    };
     let fitted = match all.is_empty() {
         true => None,
         false => match acceleration::identify(fmu, &all, &options) {
@@ -251,8 +256,8 @@ fn bearing(fitted: &acceleration::Found, is_used: bool) -> Chapter {
     };
     let whole = friction_chart("Friction torque against the rate", most);
     let near = friction_chart("Friction torque near zero rate", most.min(NEAR * speed));
-    let head =
-        ["parameter", "value", "95 % interval", "unit", "Table 5.5"].map(String::from).to_vec();
+    let head = ["parameter", "value", "95 % interval", "of noise alone", "unit", "Table 5.5"];
+    let head = head.map(String::from).to_vec();
     let row = |(name, p): (&String, &Estimated)| {
         let thesis = THESIS.iter().find(|(other, _)| other == name);
         let [low, high] = p.interval;
@@ -260,6 +265,7 @@ fn bearing(fitted: &acceleration::Found, is_used: bool) -> Chapter {
             name.clone(),
             format!("{:.4e}", p.value),
             format!("{low:.4e} to {high:.4e}"),
+            format!("± {:.1e}", 1.96 * p.std_noise),
             prose(&p.unit),
             thesis.map_or(String::new(), |(_, value)| format!("{value}")),
         ]
@@ -288,7 +294,8 @@ fn bearing(fitted: &acceleration::Found, is_used: bool) -> Chapter {
             illustration(
                 start_study::chart(&fitted.details.starts),
                 "6.2 and 6.3",
-                "One unknown at a time starts away from its estimate. Fits at the bottom ended at the minimum; those above, in another one.",
+                "One unknown of the friction law at a time starts away from its estimate. Fits below 0.5 ended at the minimum, those above in another \
+                 one. The thesis does so with the tank's diameter and fill: hubslosh identify SWEEP --start-study 8 --report.",
             ),
         ],
     }

@@ -12,6 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 use experiments::campaign::{Campaign, recorded};
 use experiments::plan::{Plan, Recorded};
 use files::{input, output};
+use identify::tolerance::Tolerances;
 use serde::Deserialize;
 use signals::recording::Columns;
 
@@ -49,6 +50,12 @@ struct Manifest {
     profile: String,
     #[serde(default = "models")]
     models: Vec<String>,
+    /// Relative standard deviations that no recording shows, as `identify --tolerance` takes them.
+    #[serde(default)]
+    tolerance: String,
+    /// Relative standard deviation of the gyro's scale.
+    #[serde(default = "gyro_scale")]
+    gyro_scale: f64,
     #[serde(default)]
     set: toml::Table,
     recording: Vec<Entry>,
@@ -60,6 +67,10 @@ fn title() -> String {
 
 fn profile() -> String {
     "exp-sweep:f0=1.25,f1=3.5,duration=2700".into()
+}
+
+fn gyro_scale() -> f64 {
+    0.01
 }
 
 fn models() -> Vec<String> {
@@ -88,6 +99,7 @@ struct Item {
 /// A day at the bench.
 struct Day {
     manifest: Manifest,
+    tolerances: Tolerances,
     items: Vec<Item>,
     /// Values that are known, by FMU name.
     settings: Vec<(String, String)>,
@@ -127,13 +139,24 @@ impl Day {
                 })
             });
         let items = items.collect::<Result<Vec<Item>>>()?;
+        let tolerances = match manifest.tolerance.as_str() {
+            "" => Tolerances::default(),
+            text => {
+                Tolerances::default().with(text).with_context(|| format!("{name}: tolerance"))?
+            }
+        };
+        ensure!(
+            (0.0..0.5).contains(&manifest.gyro_scale),
+            "{name}: gyro_scale = {} (allowed: 0 to 0.5)",
+            manifest.gyro_scale
+        );
         ensure!(
             items.iter().any(|item| item.kind == Kind::Sweep),
             "{name}: no [[recording]] has kind = \"sweep\"; friction runs alone: hubslosh identify --method acceleration"
         );
         let mut settings = Vec::new();
         flatten("", &manifest.set, &mut settings);
-        Ok(Day { manifest, items, settings })
+        Ok(Day { manifest, tolerances, items, settings })
     }
 
     fn of(&self, kind: Kind) -> impl Iterator<Item = &Item> {

@@ -227,3 +227,31 @@ impl Problem {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use analysis::random::Random;
+
+    /// Readings of a gyro with a bias of 0.003 rad/s at 50 Hz for 12 s.
+    fn rows(torque: &dyn Fn(f64) -> f64, rate: &dyn Fn(f64) -> f64) -> Rows {
+        let mut random = Random::new(3, 0);
+        let time: Vec<f64> = (0..600).map(|k| 0.02 * f64::from(k)).collect();
+        let rates = time.iter().map(|t| 0.003 + rate(*t) + 4e-4 * random.normal()).collect();
+        let torques = time.iter().map(|t| torque(*t)).collect();
+        Rows::new(&Recording::of("rest", time, torques, rates), false)
+    }
+
+    #[test]
+    fn a_hub_that_resists_a_growing_torque_shows_the_bias() {
+        let ramp = |t: f64| 0.002 * t;
+        // it breaks away at 4 s
+        let slips = |t: f64| 0.0023 * (t - 4.0).max(0.0).powi(2);
+        let found = rows(&ramp, &slips).reading_at_rest(0.43).unwrap();
+        assert!((found - 0.003).abs() < 2e-4, "{found}");
+        // a steady rate under a steady torque is no rest, nor is a rate that follows the torque
+        assert!(rows(&|_| 0.02, &|_| 0.4).reading_at_rest(0.43).is_none());
+        assert!(rows(&ramp, &|t| 0.0023 * t * t).reading_at_rest(0.43).is_none());
+    }
+}
