@@ -361,9 +361,10 @@ fn gyro_reads_the_same_at_any_communication_step() {
     }
 }
 
-/// Random steps in the default test, fewer without `--release`. `HUBSLOSH_RANDOM_STEPS=1000000` runs a
-/// million, in some 25 minutes; `HUBSLOSH_RANDOM_SEED` starts elsewhere, to share them among processes.
-const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 200 } else { 5_000 };
+/// Random steps in the default test, fewer without `--release`. `.ci/run --nightly` makes 20,000, and
+/// `HUBSLOSH_RANDOM_STEPS=1000000` a million in some 25 minutes; `HUBSLOSH_RANDOM_SEED` starts elsewhere, to share them among
+/// processes.
+const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 200 } else { 1_000 };
 
 #[test]
 fn random_steps_end_in_numbers_or_in_a_clear_error() {

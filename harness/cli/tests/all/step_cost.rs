@@ -21,7 +21,7 @@ fn step_cost(fmi: Fmi, arguments: &[&str]) -> Output {
 /// saved state (FMI 2.0) continues.
 #[test]
 fn the_number_of_internal_steps_chosen_for_a_deadline_is_obeyed() {
-    for fmi in Fmi::ALL {
+    for fmi in Fmi::RELEASED {
         let spherical = ["--set", "slosh.model=spherical"];
         let done = step_cost(fmi, &[&["--deadline", "2ms", "--json"][..], &spherical].concat());
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));

@@ -40,17 +40,31 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     said.into_iter().map(|why| format!("{}: {why}", case.name)).collect()
 }
 
+/// Models of the liquid of the plan that seeks the onset of rotary slosh; a search takes seconds.
+const MODELS: &str = r#"["linear", "planar", "spherical", "paraboloid", "liquid"]"#;
+
+/// Of a plan that says so one run has to leave the range, of the others none may. The search for the onset of rotary slosh has
+/// the linear liquid alone, which leaves the range.
 #[test]
 fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for (name, text) in BUILT_IN {
         let mut plan = Plan::parse(text).unwrap();
+        if text.contains("\n[onset]") {
+            assert!(text.contains(MODELS), "{name}");
+            plan = Plan::parse(&text.replace(MODELS, r#"["linear"]"#)).unwrap();
+        }
         seek_onset(&mut plan, &fmu, 0, &|_| {}).unwrap();
         let cases = plan.cases(fmu.description()).unwrap();
-        let left: Vec<String> =
-            some(&plan, &cases).par_iter().flat_map(|case| beyond(&fmu, case)).collect();
+        let cases = some(&plan, &cases);
         let says = text.contains("\n# Beyond the range of ");
         assert_eq!(says, BEYOND.contains(name), "{name}");
-        assert_eq!(says, !left.is_empty(), "{name}: {left:#?}");
+        if says {
+            let leaves = cases.par_iter().any(|case| !beyond(&fmu, case).is_empty());
+            assert!(leaves, "{name}");
+        } else {
+            let left: Vec<String> = cases.par_iter().flat_map(|case| beyond(&fmu, case)).collect();
+            assert!(left.is_empty(), "{name}: {left:#?}");
+        }
     }
 }
