@@ -2,7 +2,7 @@
 //! Unknowns: eight, and those that `hubslosh identify` adds.
 //!
 //! ```text
-//! cargo run --release -p identify --example bounds -- [NAME:VALUE ...]
+//! cargo run --release -p identify --features studies --example bounds -- [NAME:VALUE ...]
 //! ```
 
 #[path = "fmu_twin/mod.rs"]

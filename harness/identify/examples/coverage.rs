@@ -3,7 +3,7 @@
 //! which models were chosen, and how often no model fitted.
 //!
 //! ```text
-//! cargo run --release -p identify --example coverage -- [KEY=VALUE ...]
+//! cargo run --release -p identify --features studies --example coverage -- [KEY=VALUE ...]
 //!   seeds=1-50          gyro noises
 //!   torque=PROFILE      as for hubslosh run, or multisine:PEAK,SECONDS
 //!   twin=linear         slosh model of the twin

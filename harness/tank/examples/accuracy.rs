@@ -1,7 +1,7 @@
 //! Measures accuracy and time for every tank of `tests/tanks.json`: deviation from the reference over five modes,
 //! stated error, and the shortest time of several repetitions on one core.
 //!
-//! `cargo run --release -p hubslosh-tank --example accuracy [REPETITIONS [NAME]]`
+//! `cargo run --release -p hubslosh-tank --features studies --example accuracy [REPETITIONS [NAME]]`
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,6 +1,6 @@
 //! Draws a tank at a fill and a sweep over its fills, and prints the table.
 //!
-//! `cargo run -p hubslosh-tank --example draw -- TANK.toml FILL TANK.svg SWEEP.svg`
+//! `cargo run -p hubslosh-tank --features studies --example draw -- TANK.toml FILL TANK.svg SWEEP.svg`
 
 use std::path::Path;
 

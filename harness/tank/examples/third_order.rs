@@ -1,6 +1,6 @@
 //! Draws how frequency depends on amplitude in an upright cylinder, the figure of HubSlosh's documentation.
 //!
-//! `cargo run --release -p hubslosh-tank --example third_order -- modelDescription/HubSlosh/documentation/liquid.svg`
+//! `cargo run --release -p hubslosh-tank --features studies --example third_order -- modelDescription/HubSlosh/documentation/liquid.svg`
 
 use hubslosh_tank::{picture, third_order::Overlaps};
 

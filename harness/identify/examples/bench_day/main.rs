@@ -1,8 +1,8 @@
 //! Writes the logs of a day at the bench that is not the FMU, for `hubslosh analyse --bench-day`.
 //!
 //! ```text
-//! cargo run --release -p identify --example bench_day -- target/day          # 22 sweeps of 45 minutes
-//! cargo run --release -p identify --example bench_day -- target/day short    # 6 sweeps of 450 s
+//! cargo run --release -p identify --features studies --example bench_day -- target/day          # 22 sweeps of 45 minutes
+//! cargo run --release -p identify --features studies --example bench_day -- target/day short    # 6 sweeps of 450 s
 //! hubslosh analyse --bench-day target/day --out dist/day
 //! ```
 

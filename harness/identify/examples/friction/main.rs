@@ -1,7 +1,7 @@
 //! Does the friction fit end at its minimum? Ramps, steps and sweeps of [`bench`], in three sets, with the parameters of Rubaga's thesis.
 //!
 //! ```text
-//! cargo run --release -p identify --example friction -- [KEY=VALUE ...]
+//! cargo run --release -p identify --features studies --example friction -- [KEY=VALUE ...]
 //!   seeds=1-8               noise seeds
 //!   asymmetry=0.15          of the bearing
 //!   harmonics=0             of the angle that are estimated besides

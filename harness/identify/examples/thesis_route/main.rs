@@ -3,7 +3,7 @@
 //! (`hubslosh identify`).
 //!
 //! ```text
-//! cargo run --release -p identify --example thesis_route -- [duration of the sweep, s]
+//! cargo run --release -p identify --features studies --example thesis_route -- [duration of the sweep, s]
 //! ```
 //!
 //! The thesis reports fits of 71.1 % for clean synthetic data, 46.28 % with noise and −520.9 % for experiments (6.1.2). A fit

@@ -3,7 +3,7 @@
 //! 95 % intervals hold the truth.
 //!
 //! ```text
-//! cargo run --release -p identify --example twins -- [KEY=VALUE ...]
+//! cargo run --release -p identify --features studies --example twins -- [KEY=VALUE ...]
 //!   seeds=1-200         which twins
 //!   duration=200        of each recording, s; twice that for a slow sweep
 //!   models=linear,…     as for hubslosh identify --model; else linear and spherical for every third, for the others what it is
