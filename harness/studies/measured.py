@@ -3,7 +3,7 @@
     PYTHONPATH=harness/python python3 harness/studies/measured.py
 
 needs dist/HubSlosh.fmu and dist/SloshTank.fmu (``cargo run --release -- pack``, the second with
-``--model SloshTank``), the program ``hubslosh`` and the packages in requirements.txt. Two minutes
+``--model SloshTank``), the program ``hubslosh`` and the packages in requirements.txt. One minute
 of CPU time.
 
 The measurements are in ``measured/``, numbers only, each file with its source and its error. What

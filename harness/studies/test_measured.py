@@ -56,11 +56,12 @@ def test_harmonic_balance_has_the_branches_of_the_fmu() -> None:
 
 
 def test_every_measurement_has_its_source() -> None:
-    """A file of numbers says where they come from and how far they can be trusted."""
+    """A file of numbers has its source, its licence and its error."""
     ours = (measured.RESULTS, measured.BEFORE)
     files = [file for file in measured.DATA.glob("*.csv") if file not in ours]
     assert len(files) >= 9
     for file in files:
         head = "".join(line for line in file.open(encoding="utf-8") if line.startswith("#"))
         assert "Source:" in head
+        assert "Licence:" in head
         assert "Error:" in head or "computed, not measured" in head
