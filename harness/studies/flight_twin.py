@@ -1,12 +1,14 @@
 """A flight in twins: what slews of 0.3° with two gyros of different quality tell of slosh.
 
-    python flight_twin.py [--gyro good|mems] [--twins 1] [--program hubslosh] [--fmu Spacecraft]
+    python flight_twin.py [--gyro good|mems] [--twins 1] [--known exact|wrong|tolerances]
 
 A second simulator, independent of Spacecraft.fmu, flies a rigid craft with two tanks under thrust.
 It solves Newton's law of craft and bobs, with the rods' tensions as unknowns, as one dense system
 by Runge–Kutta. Wheels turn it by 0.3° to and fro and hold it, thrusters pulse sideways. Three gyros
 with scales, alignment and biases and an accelerometer are recorded at 10 Hz, in two flights. The
 search starts at what `hubslosh tank` says of the tanks' drawing; the truth is up to 10 % off.
+With --known wrong, dry mass, thrust, hinges and rigid liquids are off by their tolerances, too;
+with --known tolerances, the fit takes these tolerances into account.
 
 Prints estimates and true values; for several twins the number of intervals that contain the truth.
 """
@@ -40,6 +42,16 @@ NOISE = {  # of a row: gyro, rad/s, and its drift; accelerometer, m/s²; biases,
 }
 
 
+TOLERANCES = {  # standard deviations of known values: part, or m
+    "craft.mass": "0.5%",
+    "scale(force[3])": "0.3%",
+    "tank[1].hinge[1]": "±0.005",
+    "tank[2].hinge[1]": "±0.005",
+    "tank[1].m_0": "0.5%",
+    "tank[2].m_0": "0.5%",
+}
+
+
 def cross(v: np.ndarray) -> np.ndarray:
     """Return the matrix of v ×."""
     x, y, z = v
@@ -69,6 +81,7 @@ class Craft:
             rate = np.sqrt(p[t + "g_ref"] / length)
             drag = 2.0 * p[t + "zeta[1]"] * m * rate
             bobs.append((m, length, drag, d + np.array([0, 0, p[t + "hinge[1]"]])))
+        self.thrust = THRUST * (1.0 + p.get("scale(force[3])", 0.0))
         self.mass = sum(m for m, _, _ in rigid)
         self.moment = sum(m * s for m, s, _ in rigid)
         self.inertia = sum(j - m * cross(s) @ cross(s) for m, s, j in rigid)
@@ -125,16 +138,17 @@ class Craft:
         total = self.mass + sum(m for m, _, _, _ in self.bobs)
         down = np.array([0.0, 0.0, 1.0])
         center = self.moment + sum(m * (hinge - rod * down) for m, rod, _, hinge in self.bobs)
-        trim = times(center / total, np.array([0.0, 0.0, THRUST]))
+        trim = times(center / total, np.array([0.0, 0.0, self.thrust]))
         for row in range(ROWS):
             # proportional, derivative; a torque of the wheels over the next step
             torque = -np.diag(self.inertia) * (0.5 * (angle - slew[row]) + 0.9 * x[:3])
             torque = np.clip(torque, -3.0, 3.0)
-            force = np.array([*pulse[row], THRUST])
+            force = np.array([*pulse[row], self.thrust])
             # the thrusters push 0.2 m above O
             side = times(np.array([0.0, 0.0, 0.2]), np.array([*pulse[row], 0.0]))
             u = np.concatenate([force, trim + side, h])
-            rows.append([row * STEP, *u, *x[:3], *self.solve(x, u, -torque)[:3]])
+            commanded = [*force[:2], THRUST, *u[3:]]
+            rows.append([row * STEP, *commanded, *x[:3], *self.solve(x, u, -torque)[:3]])
             parts, d = 2, STEP / 2
             for part in range(parts):
                 v = u.copy()
@@ -225,7 +239,15 @@ def measured(
     return table
 
 
-def asked(start: dict[str, float], noise: dict[str, float]) -> list[str]:
+def deviation(name: str, start: dict[str, float]) -> float:
+    """Return the standard deviation of a known value."""
+    size = TOLERANCES[name]
+    if not size.endswith("%"):
+        return float(size.removeprefix("±"))
+    return float(size.removesuffix("%")) / 100 * start.get(name, 1.0)
+
+
+def asked(start: dict[str, float], noise: dict[str, float], known_as: str) -> list[str]:
     """Return the flags of `hubslosh identify` and `design` but for files."""
     free = [f"craft.J{i}{i}={start[f'craft.J{i}{i}']}:200:2500" for i in "xyz"]
     free += [f"{name}={start[name]}:-1:1" for name in names("craft.r")]
@@ -254,11 +276,13 @@ def asked(start: dict[str, float], noise: dict[str, float]) -> list[str]:
     flags += ["--outputs", ",".join([*OMEGA, *FORCE])]
     for name, value in known.items():
         flags += ["--set", f"{name}={value}"]
+    if known_as == "tolerances":
+        flags += ["--tolerance", ",".join(f"{n}={size}" for n, size in TOLERANCES.items())]
     return flags
 
 
 def twin(
-    seed: int, kind: str, program: str, fmu: str, folder: Path
+    seed: int, kind: str, program: str, fmu: str, folder: Path, known_as: str = "exact"
 ) -> tuple[dict, dict[str, Any], float]:
     """Fly and identify one; returns truth, result and CPU time (s)."""
     random, noise = default_rng(seed), NOISE[kind]
@@ -273,6 +297,10 @@ def twin(
             truth[name] = random.uniform(0.003, 0.008)
         if "craft.r" in name:
             truth[name] += random.uniform(-0.01, 0.01)
+    if known_as != "exact":
+        others = default_rng([seed, 1])
+        for name in TOLERANCES:
+            truth[name] = start.get(name, 0.0) + deviation(name, start) * others.normal()
     errors = np.where(np.eye(3) > 0, noise["scale"], noise["angle"]) * random.normal(size=(3, 3))
     for i, read in enumerate(OMEGA):
         for j, of in enumerate(OMEGA):
@@ -283,7 +311,7 @@ def twin(
         table = measured(random, craft.fly(*manoeuvre(flight)), noise, errors, truth)
         table.to_csv(files[-1], index=False)
     result = folder / f"{kind}{seed}.json"
-    flags = [*asked(start, noise), *(["--drift"] if noise["drift"] else [])]
+    flags = [*asked(start, noise, known_as), *(["--drift"] if noise["drift"] else [])]
     command = [program, "-q", "identify", *files, "--fmu", fmu, *flags, "--out", result]
     before = os.times().children_user
     done = subprocess.run(command, check=False, capture_output=True, text=True)
@@ -296,6 +324,9 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--gyro", default="good", choices=list(NOISE), help="which gyro")
+    parser.add_argument(
+        "--known", default="exact", choices=["exact", "wrong", "tolerances"], help="known values"
+    )
     parser.add_argument("--twins", type=int, default=1, help="how many")
     parser.add_argument("--first", type=int, default=1, help="the first seed")
     parser.add_argument("--program", default="hubslosh", help="the program")
@@ -307,7 +338,7 @@ def main() -> None:
         folder = arguments.keep or Path(temporary)
         for seed in range(arguments.first, arguments.first + arguments.twins):
             truth, found, seconds = twin(
-                seed, arguments.gyro, arguments.program, arguments.fmu, folder
+                seed, arguments.gyro, arguments.program, arguments.fmu, folder, arguments.known
             )
             fits = found["fits"] and found["converged"]
             print(f"twin {seed}: {seconds:.0f} s of CPU time, fits: {fits}", flush=True)

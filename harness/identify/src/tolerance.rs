@@ -29,6 +29,50 @@ impl Default for Tolerances {
     }
 }
 
+/// Reads a relative tolerance, `1%` or `0.01`; `None`: the text is not a number.
+///
+/// # Errors
+/// If the tolerance is outside 0 to 50 %.
+pub fn part(name: &str, text: &str) -> Result<Option<f64>> {
+    let text = text.trim();
+    let number = match text.strip_suffix('%') {
+        Some(percent) => percent.trim().parse::<f64>().map(|p| p / 100.0),
+        None => text.parse(),
+    };
+    let Ok(number) = number else { return Ok(None) };
+    ensure!((0.0..0.5).contains(&number), "{name}: must be from 0 to 50 %, not {text}");
+    Ok(Some(number))
+}
+
+/// Share of the variance above which the verdict names it.
+const TOLD_SHARE: f64 = 0.2;
+
+/// Share of tolerances in the variance of an estimate.
+pub struct Share {
+    /// The estimate.
+    pub name: String,
+    /// Share, 0 to 1.
+    pub share: f64,
+    /// The tolerance with the largest share.
+    pub most: String,
+}
+
+/// Returns the sentence on estimates whose uncertainty is due to tolerances more than to the recording; `known`: the tolerances in words.
+pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
+    let large = shares.iter().filter(|share| share.share > TOLD_SHARE);
+    let large: Vec<String> = large
+        .map(|s| format!("{} {:.0} % (most by {})", s.name, 100.0 * s.share, s.most))
+        .collect();
+    (!large.is_empty()).then(|| {
+        format!(
+            "The intervals include tolerances of quantities that the recording does not show ({}). Their share of the variance: \
+             {}. --tolerance sets them.",
+            known.join(", "),
+            large.join(", ")
+        )
+    })
+}
+
 impl Tolerances {
     /// All is known exactly.
     pub const NONE: Tolerances =
@@ -45,13 +89,8 @@ impl Tolerances {
             let (name, value) = item
                 .split_once('=')
                 .with_context(|| format!("{item}: must be NAME=NUMBER or NAME=NUMBER%"))?;
-            let number = match value.trim().strip_suffix('%') {
-                Some(percent) => percent.trim().parse::<f64>().map(|p| p / 100.0),
-                None => value.trim().parse(),
-            };
-            let number = number
+            let number = part(name, value)?
                 .with_context(|| format!("{name}: {value} is not a number; 1% or 0.01 is one"))?;
-            ensure!((0.0..0.5).contains(&number), "{name}: must be from 0 to 50 %, not {value}");
             match name.trim() {
                 "torque" => self.torque = number,
                 "clock" => self.clock = number,

@@ -26,12 +26,18 @@ use crate::{progress, terminal};
 #[command(next_help_heading = "Any FMU")]
 pub struct AnyFmuArgs {
     /// Real parameters and start values of any FMU that are estimated, with bounds (else the FMU's min and max). NAME@each: every
-    /// recording has its own.
+    /// recording has its own. scale(NAME): the error of an input's or output's scale, 0 is exact.
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
     /// Prior of an unknown: mean and standard deviation.
     #[arg(long, value_name = "NAME=MEAN:STD,…", requires = "free")]
     prior: Vec<String>,
+    /// Standard deviations of known values, included in the intervals. With --free: any value that is set, relative (0.5% or 0.005) or
+    /// absolute (5mm; ±0.1 in the variable's unit), and scales of inputs, outputs and clock, scale(NAME), scale(time). Of the bench,
+    /// relative alone: torque (1%), clock (0.01%), g_axial (0.1%), tank.r (0.4%), fluid.rho (0.3%). 0 is exact. --method acceleration
+    /// takes the torque's.
+    #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
+    pub tolerances: Vec<String>,
     /// Inputs that the recordings drive.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     inputs: Vec<String>,
@@ -146,6 +152,7 @@ impl AnyFmuArgs {
         let question = Question {
             free: read(&self.free, &mut problems),
             priors: read(&self.prior, &mut problems),
+            tolerances: read(&self.tolerances, &mut problems),
             settings: kept(settings, &mut problems),
             inputs: names(&self.inputs),
             held: names(&self.held),

@@ -119,6 +119,10 @@ impl DesignArgs {
             };
             return self.any.design(&told, &self.noise);
         }
+        ensure!(
+            self.any.tolerances.is_empty(),
+            "--tolerance is for --free here: the bound of the bench takes what is set as exact"
+        );
         if let Some(out) = &self.out {
             table::check_ending(out)?;
         }

@@ -105,15 +105,6 @@ pub struct IdentifyArgs {
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
     #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
-    /// Relative standard deviations of quantities that no recording shows: torque (1%), clock (0.01%), g_axial (0.1%), tank.r
-    /// (0.4%), fluid.rho (0.3%). The intervals include them; 0 is exact. --method acceleration takes the torque's.
-    #[arg(
-        conflicts_with = "free",
-        long = "tolerance",
-        value_name = "NAME=PART,…",
-        value_parser = |text: &str| Tolerances::default().with(text)
-    )]
-    tolerances: Option<Tolerances>,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, a sampled controller's) or
     /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
     #[arg(conflicts_with = "free", long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
@@ -309,7 +300,7 @@ impl IdentifyArgs {
             return self.any.identify(&told, &out);
         }
         match self.method {
-            MethodName::OutputError => self.answer(OutputError { options: self.options() }, trim),
+            MethodName::OutputError => self.answer(OutputError { options: self.options()? }, trim),
             MethodName::Acceleration => {
                 let options = acceleration::Options {
                     weights: self.weights.into(),
@@ -318,7 +309,7 @@ impl IdentifyArgs {
                     harmonics: self.harmonics,
                     settings: self.settings.clone(),
                     held: self.intersample() == Some(Intersample::ZeroOrderHold),
-                    torque_scale: self.tolerances.unwrap_or_default().torque,
+                    torque_scale: self.tolerances()?.torque,
                     gyro_scale: self.gyro_scale,
                     start_study: self.start_study,
                 };
@@ -334,9 +325,14 @@ impl IdentifyArgs {
         }
     }
 
+    /// Tolerances of the bench.
+    fn tolerances(&self) -> Result<Tolerances> {
+        self.any.tolerances.iter().try_fold(Tolerances::default(), |all, text| all.with(text))
+    }
+
     /// Options with the names of the FMU.
-    fn options(&self) -> Options {
-        Options {
+    fn options(&self) -> Result<Options> {
+        Ok(Options {
             intersample: self.intersample(),
             acausal: self.acausal,
             models: self.model.clone(),
@@ -347,9 +343,9 @@ impl IdentifyArgs {
             sensor_errors: !self.perfect,
             gyro_scale: self.gyro_scale,
             start_study: self.start_study,
-            tolerances: self.tolerances.unwrap_or_default(),
+            tolerances: self.tolerances()?,
             validation: Vec::new(),
-        }
+        })
     }
 
     /// Intersample behaviour of the torque, if it is given.
@@ -368,7 +364,7 @@ impl IdentifyArgs {
             "--validate is for --method output-error and black-box alone"
         );
         let fmu = if M::NEEDS.fmu { Some(open(&self.fmu)?) } else { None };
-        let nominal = fmu.as_ref().map(|fmu| self.options().nominal(fmu)).transpose()?;
+        let nominal = fmu.as_ref().map(|fmu| self.options()?.nominal(fmu)).transpose()?;
         let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
         let mut notes = Vec::new();
         if let Some(fmu) = &fmu {

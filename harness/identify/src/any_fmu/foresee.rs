@@ -107,7 +107,7 @@ pub fn foresee(
             prior,
             unit: unknown.unit.clone(),
             with,
-            is_parameter: matches!(unknown.what, What::Parameter { .. }),
+            is_parameter: !unknown.is_known && matches!(unknown.what, What::Parameter { .. }),
         }
     };
     Ok(all.iter().map(|&j| bound(j)).collect())

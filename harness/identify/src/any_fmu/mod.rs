@@ -36,6 +36,7 @@ use crate::decomposition::Curvature;
 use crate::estimate::{Estimated, prose};
 use crate::methods::{Identified, Residual};
 use crate::news::News;
+use crate::tolerance::{self, Share};
 use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use analysis::innovations::{LIMIT, Tests, crossed};
 use analysis::statistics::{mean, variance};
@@ -301,6 +302,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
         })
         .collect();
     let intervals = profile::intervals(problem, minimum, &std)?;
+    let known = Tolerated::of(problem, minimum, &inner)?;
     let outputs = outputs(problem, &minimum.answer.motion, &minimum.x, question);
     let mut found = Identified::new(Details {
         outputs,
@@ -372,13 +374,15 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
         let mut e = Estimated {
             value: minimum.x[j],
             std: finite(std[j]),
-            std_noise: finite(std[j]),
+            std_noise: known.as_ref().map_or(finite(std[j]), |known| finite(known.noise_only[j])),
             interval: interval.ends.map(finite),
             determined: false,
             unit: unknown.unit.clone(),
         };
         if decided_by_solver[j] {
             e.interval = [f64::NAN; 2];
+        } else if unknown.is_known {
+            e.determined = true;
         } else {
             say(unknown, &e, interval, inner.contains(&j), std[j], &mut found.details, &mut words);
             e.determined = interval.ends.iter().all(|end| end.is_finite())
@@ -386,14 +390,17 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
         }
         match unknown.what {
             What::Parameter { .. } => found.parameters.insert(unknown.name.clone(), e),
-            What::Bias { .. } | What::Gain { .. } => {
-                found.measurement.insert(unknown.name.clone(), e)
-            }
+            _ => found.measurement.insert(unknown.name.clone(), e),
         };
+    }
+    match known {
+        Some(known) => words.extend(known.words(problem, &std)),
+        None => words.push(NOISE_ALONE.into()),
     }
     for i in 0..n {
         for j in 0..i {
-            if correlations[i][j].abs() > CORRELATED {
+            let is_asked = !(problem.unknowns[i].is_known || problem.unknowns[j].is_known);
+            if is_asked && correlations[i][j].abs() > CORRELATED {
                 words.push(format!(
                     "{} and {} are strongly correlated ({:+.3}): the recordings determine a combination of them better than each \
                      alone",
@@ -430,6 +437,72 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
         })
         .collect();
     Ok(found)
+}
+
+/// Sentence about intervals of a fit without tolerances.
+const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
+
+/// Contribution of known values to the uncertainty.
+struct Tolerated {
+    /// Standard deviation of each unknown if all known values were exact.
+    noise_only: Vec<f64>,
+    /// Known values, by number, with the change of each unknown by their standard deviations.
+    effects: Vec<(usize, Vec<f64>)>,
+}
+
+impl Tolerated {
+    /// Returns the contribution; `None`: there are no tolerances.
+    fn of(problem: &Problem, minimum: &Minimum, inner: &[usize]) -> Result<Option<Self>> {
+        let unknowns = &problem.unknowns;
+        let (known, asked): (Vec<usize>, Vec<usize>) =
+            inner.iter().partition(|j| unknowns[**j].is_known);
+        if known.is_empty() {
+            return Ok(None);
+        }
+        let jacobian = &minimum.jacobian;
+        let curvature = Curvature::of(jacobian, &problem.names(), &asked)?;
+        let at_places = |values: &[f64]| -> Vec<f64> {
+            let mut all = vec![0.0; unknowns.len()];
+            asked.iter().zip(values).for_each(|(&j, value)| all[j] = *value);
+            all
+        };
+        let picked = jacobian.select_columns(&asked);
+        let effect = |&q: &usize| {
+            let std = unknowns[q].prior.map_or(0.0, |(_, std)| std);
+            let moved = curvature.solve(&picked.tr_mul(&(jacobian.column(q) * std)), 0.0);
+            (q, at_places(moved.as_slice()))
+        };
+        let noise = curvature.inverse().diagonal().map(f64::sqrt);
+        Ok(Some(Tolerated {
+            noise_only: at_places(noise.as_slice()),
+            effects: known.iter().map(effect).collect(),
+        }))
+    }
+
+    /// Returns the sentence on estimates that they dominate.
+    fn words(&self, problem: &Problem, std: &[f64]) -> Option<String> {
+        let unknowns = &problem.unknowns;
+        let size = |&(q, _): &(usize, Vec<f64>)| {
+            let Unknown { name, what, unit, prior, .. } = &unknowns[q];
+            let (mean, std) = prior.unwrap_or_default();
+            let whole = if matches!(what, What::Parameter { .. }) { mean.abs() } else { 1.0 };
+            match whole > 0.0 {
+                true => format!("{name} {:.2} %", 100.0 * std / whole),
+                false => format!("{name} ± {std:.1e} {}", prose(unit)),
+            }
+        };
+        let of = |j: usize| {
+            let most = self.effects.iter().max_by(|a, b| a.1[j].abs().total_cmp(&b.1[j].abs()))?;
+            Some(Share {
+                name: unknowns[j].name.clone(),
+                share: 1.0 - (self.noise_only[j] / std[j]).powi(2),
+                most: unknowns[most.0].name.clone(),
+            })
+        };
+        let asked = (0..unknowns.len()).filter(|j| !unknowns[*j].is_known && std[*j].is_finite());
+        let known: Vec<String> = self.effects.iter().map(size).collect();
+        tolerance::shares(&known, &asked.filter_map(of).collect::<Vec<_>>())
+    }
 }
 
 /// JSON knows no infinity.

@@ -14,6 +14,8 @@
 //! section 2.1.9), and unknowns are set before it. The variational equations would need ∂f/∂p by differences all the same, and
 //! jump at each event.
 
+use std::borrow::Cow;
+
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -135,8 +137,8 @@ impl<'a> Problem<'a> {
 
     fn values(&self, x: &[f64], number: usize) -> Vec<Value> {
         let of = |(unknown, &x): (&Unknown, &f64)| match unknown.what {
-            What::Parameter { reference, recording } => {
-                recording.is_none_or(|of| of == number).then_some((reference, x))
+            What::Parameter { reference, .. } => {
+                unknown.what.is_of(number).then_some((reference, x))
             }
             _ => None,
         };
@@ -144,7 +146,28 @@ impl<'a> Problem<'a> {
     }
 
     fn run(&self, x: &[f64], number: usize) -> Result<Vec<Vec<f64>>> {
-        self.setup.run(self.model, &self.values(x, number), number, &self.records[number])
+        let record = self.acting(x, number);
+        self.setup.run(self.model, &self.values(x, number), number, &record)
+    }
+
+    /// The recording with inputs and times as they act, if a scale is among the unknowns.
+    fn acting(&self, x: &[f64], number: usize) -> Cow<'_, Record> {
+        let mut record = Cow::Borrowed(&self.records[number]);
+        for (unknown, x) in self.unknowns.iter().zip(x).filter(|(u, _)| u.what.is_of(number)) {
+            let factor = 1.0 + x;
+            match unknown.what {
+                What::Scale { input, .. } => {
+                    record.to_mut().inputs[input].iter_mut().for_each(|value| *value *= factor);
+                }
+                What::Clock { .. } => {
+                    let first = record.time[0];
+                    let time = &mut record.to_mut().time;
+                    time.iter_mut().for_each(|t| *t = first + factor * (*t - first));
+                }
+                _ => {}
+            }
+        }
+        record
     }
 
     /// The FMU's warnings of the motions that begin at the starts, each once.
@@ -166,7 +189,7 @@ impl<'a> Problem<'a> {
         for unknown in &self.unknowns {
             let What::Parameter { recording, .. } = unknown.what else { continue };
             let own = warnings.iter().enumerate();
-            let own = own.filter(|(number, _)| recording.is_none_or(|of| of == *number));
+            let own = own.filter(|(number, _)| unknown.what.is_of(*number));
             let name = recording.and_then(|_| unknown.name.rsplit_once('@'));
             let name = name.map_or(&*unknown.name, |(name, _)| name);
             let refused: Vec<Result<()>> = own.map(|(_, said)| refuse(name, said)).collect();
@@ -251,9 +274,9 @@ impl<'a> Problem<'a> {
         let filters = self.filters();
         let column = |j: usize| -> Result<(DVector<f64>, f64)> {
             let unknown = &self.unknowns[j];
-            let (mut pieces, least) = match unknown.what {
-                What::Parameter { .. } => self.resolved_difference(x, j, base, steps[j])?,
-                _ => {
+            let (mut pieces, least) = match unknown.what.is_in_runs() {
+                true => self.resolved_difference(x, j, base, steps[j])?,
+                false => {
                     let one = |channel: &Channel| {
                         let rows = channel.sampled.len();
                         match sensor(unknown, channel, &base[channel.recording]) {
@@ -313,17 +336,14 @@ impl<'a> Problem<'a> {
         DVector::from_vec(all)
     }
 
-    /// The FMU's outputs with one unknown moved; `only`: the one recording that it is of.
+    /// The FMU's outputs with one unknown moved.
     pub fn moved(&self, x: &[f64], j: usize, to: f64, base: &Motion) -> Result<Motion> {
         let mut moved = x.to_vec();
         moved[j] = to;
-        let only = match self.unknowns[j].what {
-            What::Parameter { recording, .. } => recording,
-            _ => None,
-        };
-        let runs = (0..self.records.len()).into_par_iter().map(|number| match only {
-            Some(of) if of != number => Ok(base[number].clone()),
-            _ => self.run(&moved, number),
+        let what = self.unknowns[j].what;
+        let runs = (0..self.records.len()).into_par_iter().map(|number| match what.is_of(number) {
+            true => self.run(&moved, number),
+            false => Ok(base[number].clone()),
         });
         runs.collect()
     }
@@ -415,12 +435,11 @@ impl<'a> Problem<'a> {
 
     /// Runs that a Jacobian needs.
     pub fn runs_of_jacobian(&self) -> usize {
-        let one = |unknown: &Unknown| match unknown.what {
-            What::Parameter { recording: Some(_), .. } => 2,
-            What::Parameter { recording: None, .. } => 2 * self.records.len(),
-            _ => 0,
+        let one = |unknown: &Unknown| {
+            let own = (0..self.records.len()).filter(|number| unknown.what.is_of(*number));
+            2 * own.count()
         };
-        self.unknowns.iter().map(one).sum()
+        self.unknowns.iter().filter(|unknown| unknown.what.is_in_runs()).map(one).sum()
     }
 
     /// Estimates the noise of each channel from the residual at x, of which `free` degrees of freedom are fitted.

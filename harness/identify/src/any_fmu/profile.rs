@@ -50,6 +50,11 @@ fn interval(problem: &Problem, minimum: &Minimum, j: usize, std: f64) -> Result<
         let ends = [low, high].map(|end| if end.is_finite() { end } else { f64::NAN });
         return Ok(Interval { ends, ended: [false; 2], quadratic: false });
     }
+    if problem.unknowns[j].is_known {
+        // its prior is a normal distribution, and its interval was not requested
+        let ends = [-1.0, 1.0].map(|sign| (x + sign * Z * std).clamp(low, high));
+        return Ok(Interval { ends, ended: [true; 2], quadratic: true });
+    }
     let others: Vec<usize> = minimum.inner(problem).into_iter().filter(|k| *k != j).collect();
     let profile = Profile::new(problem, minimum, j, others)?;
     let mut sides = [-1.0, 1.0].map(|sign| {

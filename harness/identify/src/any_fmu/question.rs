@@ -8,11 +8,13 @@ use experiments::sensors::quantity::Quantity;
 use host::description::{ModelDescription, Type, Variable};
 
 use crate::names::list;
+use crate::tolerance::part;
 
 /// Ends the name of an unknown that each recording has one of.
 pub const EACH: &str = "@each";
 
-/// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised.
+/// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised, or the error of
+/// a scale, `scale(NAME)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
     /// Name in the FMU.
@@ -73,6 +75,45 @@ impl FromStr for Prior {
             _ => bail!("--prior {text} (allowed: NAME=MEAN:STD with STD above 0)"),
         }
     }
+}
+
+/// `NAME=PART`, `NAME=PART%` or `NAME=NUMBER UNIT`: the standard deviation of a value that is known but not exact. PART is relative
+/// to the value, NUMBER is in the unit; `±NUMBER` is in the variable's own unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Name of a variable, of one with its recording (`NAME@2`), or of a scale (`scale(NAME)`, see [`scaled`]).
+    pub name: String,
+    /// Size.
+    pub size: Size,
+}
+
+/// Size of a tolerance.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Size {
+    /// Relative to the value.
+    Part(f64),
+    /// A number, with a unit if it is not the variable's own.
+    Absolute(String),
+}
+
+impl FromStr for Tolerance {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text).with_context(|| format!("--tolerance {text}"))?;
+        let absolute = value.strip_prefix('±').or_else(|| value.strip_prefix("+-"));
+        let size = match absolute {
+            Some(number) => Size::Absolute(number.trim().into()),
+            None => part(&format!("--tolerance {name}"), value)?
+                .map_or_else(|| Size::Absolute(value.into()), Size::Part),
+        };
+        Ok(Tolerance { name: name.into(), size })
+    }
+}
+
+/// Returns the input, output or `time` whose scale an unknown of this name is: `scale(NAME)`.
+pub fn scaled(name: &str) -> Option<&str> {
+    name.strip_prefix("scale(")?.strip_suffix(')')
 }
 
 /// `OUTPUT` or `OUTPUT=STD`: a sensor with a bias, another one in each recording, of which STD is known beforehand.
@@ -174,6 +215,8 @@ pub struct Question {
     pub free: Vec<Free>,
     /// Priors.
     pub priors: Vec<Prior>,
+    /// Tolerances of known values: unknowns with a prior that are not asked for.
+    pub tolerances: Vec<Tolerance>,
     /// Settings.
     pub settings: Vec<Setting>,
     /// Inputs that are driven.
@@ -272,6 +315,13 @@ mod tests {
         for wrong in ["k", "k=1:2", "k=3:4:5", "k=1:2:0", "k=x"] {
             assert!(wrong.parse::<Free>().is_err(), "{wrong}");
         }
+        let size = |text: &str| text.parse::<Tolerance>().unwrap().size;
+        assert_eq!(size("m=0.5%"), Size::Part(0.005));
+        assert_eq!(size("scale(force[3])=0.003"), Size::Part(0.003));
+        assert_eq!(size("tank.h=5mm"), Size::Absolute("5mm".into()));
+        assert_eq!(size("x=±0.1"), Size::Absolute("0.1".into()));
+        assert!("m=80%".parse::<Tolerance>().is_err() && "m".parse::<Tolerance>().is_err());
+        assert_eq!((scaled("scale(w[1])"), scaled("w[1]")), (Some("w[1]"), None));
         assert!("k=1:0".parse::<Prior>().is_err() && "w=0".parse::<Bias>().is_err());
     }
 }

@@ -176,6 +176,9 @@ pub fn best(
 /// A start within the bounds, or within the reach where there are none.
 fn drawn(unknowns: &[Unknown], random: &mut Random) -> Vec<f64> {
     let one = |unknown: &Unknown| {
+        if unknown.is_known {
+            return unknown.start;
+        }
         // all of bounds that were given (their reach is a quarter of them)
         let (low, high) = unknown.bounds;
         let wide = if high - low < 5.0 * unknown.reach { 4.0 } else { 1.0 };

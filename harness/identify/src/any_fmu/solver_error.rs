@@ -17,7 +17,6 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::problem::{Motion, Problem, Step};
-use super::unknown::What;
 use crate::decomposition::Curvature;
 
 /// Part of its standard deviation from which on the solver's errors decide an estimate.
@@ -64,7 +63,9 @@ fn roughness(
     step: f64,
 ) -> Option<Roughness> {
     let unknown = &problem.unknowns[j];
-    let What::Parameter { .. } = unknown.what else { return None };
+    if !unknown.what.is_in_runs() {
+        return None;
+    }
     let (low, high) = unknown.bounds;
     let step = step.min(0.25 * (high - low));
     let centre = x[j].max(low + 2.0 * step).min(high - 2.0 * step);

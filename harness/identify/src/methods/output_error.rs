@@ -35,6 +35,7 @@ use crate::plausible;
 use crate::recording::{self, Recording};
 use crate::start::{self, Response};
 use crate::start_study::{self, Trial};
+use crate::tolerance::{self, Share};
 use crate::uncertainty::{self, Covariance, ONE_WAY, Sources};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict::{self, Findings};
@@ -579,39 +580,25 @@ fn shares(
     full: &DMatrix<f64>,
     effects: &[Effect],
 ) -> Option<String> {
-    let mut large = Vec::new();
+    let mut all = Vec::new();
     for (i, unknown) in problem.unknowns.iter().enumerate() {
-        let share = tolerances[(i, i)] / full[(i, i)];
         let most = effects
             .iter()
             .filter(|effect| effect.tolerance)
             .max_by(|a, b| a.x[i].abs().total_cmp(&b.x[i].abs()));
-        if let (Some(most), true) = (most, share > TOLD_SHARE) {
-            let name = most.source.split(' ').next().unwrap_or_default();
-            large.push(format!(
-                "{} {:.0} % (most by {name})",
-                unknown.quantity.name(),
-                100.0 * share
-            ));
-        }
+        all.extend(most.map(|most| Share {
+            name: unknown.quantity.name(),
+            share: tolerances[(i, i)] / full[(i, i)],
+            most: most.source.split(' ').next().unwrap_or_default().into(),
+        }));
     }
     let known: Vec<String> = effects
         .iter()
         .filter(|effect| effect.tolerance)
         .map(|effect| effect.source.replace(" wrong by", ""))
         .collect();
-    (!large.is_empty()).then(|| {
-        format!(
-            "The intervals include tolerances of quantities that the recording does not show ({}). Their share of the variance: \
-             {}. --tolerance sets them.",
-            known.join(", "),
-            large.join(", ")
-        )
-    })
+    tolerance::shares(&known, &all)
 }
-
-/// Share of the variance above which the report names it.
-const TOLD_SHARE: f64 = 0.2;
 
 /// Intersample behaviour of the torque, if it was free.
 #[derive(Default)]

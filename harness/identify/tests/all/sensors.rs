@@ -60,6 +60,7 @@ fn comes_back(sensor: &str, column: &str, noise: f64) {
     let question = Question {
         free: free.iter().map(|text| text.parse().unwrap()).collect(),
         priors: Vec::new(),
+        tolerances: Vec::new(),
         settings: settings.iter().map(|text| text.parse().unwrap()).collect(),
         inputs: vec![TORQUE.into()],
         held: Vec::new(),

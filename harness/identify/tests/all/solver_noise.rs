@@ -18,7 +18,8 @@ const STEP: f64 = 0.05;
 const ROWS: usize = 400;
 /// Noise of a row: of r, m, and of phi, rad.
 const NOISE: [f64; 2] = [2e-3, 4e-3];
-const TRUTH: [(&str, f64); 5] = [("k", 42.0), ("d", 0.1), ("c", 0.03), ("r", 1.3), ("phi", 0.4)];
+pub const TRUTH: [(&str, f64); 5] =
+    [("k", 42.0), ("d", 0.1), ("c", 0.03), ("r", 1.3), ("phi", 0.4)];
 const FREE: [&str; 5] = ["k=40:20:80", "d=0.05:0:1", "c=0.02:0:1", "r=1.25:1:2", "phi=0.35:-1:1"];
 
 /// The FMU, with these definitions of `adaptive.c`.
@@ -131,6 +132,7 @@ pub fn question(solver: Solver) -> Question {
     Question {
         free: FREE.iter().map(|text| text.parse().unwrap()).collect(),
         priors: Vec::new(),
+        tolerances: Vec::new(),
         settings: Vec::new(),
         inputs: Vec::new(),
         held: Vec::new(),
