@@ -25,8 +25,8 @@ pub struct Deviations {
 impl Features {
     /// Returns the standard deviations of the features, from the response, its relative standard deviation at each
     /// frequency, and the relative rate at which its error changes along the frequency, 1/Hz. An error ε of ln |H|
-    /// moves an extremum by −ε'/(ln |H|)'' if it is small. If ε changes within the distance sqrt(2ε/(ln |H|)'') over which the extremum
-    /// rises by ε, the extremum may be anywhere within that distance: an antiresonance whose bottom is below the noise.
+    /// moves an extremum by −ε'/(ln |H|)'' if the curvature is that of the response. Where ε'' is no longer small against it, as at an
+    /// antiresonance whose bottom is below the noise, the extremum may be anywhere where |H| is within the error of its difference, √2 ε.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,
@@ -41,9 +41,13 @@ impl Features {
             let rise = |i: usize| (level(i + 1) - level(i)) / (f[i + 1] - f[i]);
             let curvature = 2.0 * (rise(i) - rise(i - 1)) / (f[i + 1] - f[i - 1]);
             let (relative, slope) = (*relative.get(i)?, slope(f[i]));
-            let distance = (2.0 * relative / curvature.abs()).sqrt();
             let std = slope * relative / curvature.abs();
-            let std = if distance * slope > 1.0 { std.max(distance) } else { std };
+            let near =
+                |j: &usize| (level(*j) - level(i)).abs() < std::f64::consts::SQRT_2 * relative;
+            let low = (0..i).rev().take_while(near).last().unwrap_or(i);
+            let high = (i + 1..f.len()).take_while(near).last().unwrap_or(i);
+            let is_noise = slope * slope * relative > NOISY * curvature.abs();
+            let std = if is_noise { std.max(0.5 * (f[high] - f[low])) } else { std };
             std.is_finite().then_some(std)
         };
         Deviations { f_res: of(self.f_res), f_dip: of(self.f_dip) }
@@ -90,6 +94,9 @@ impl Features {
         Some(self.f_res? - self.f_dip?)
     }
 }
+
+/// Curvature of the error of ln |H| over that of an extremum, beyond which the extremum may be one of the error alone.
+const NOISY: f64 = 0.25;
 
 /// Smallest rise from antiresonance to resonance that counts, dB. A tank damped to ζ = 0.05 still
 /// rises by 3.9 dB.

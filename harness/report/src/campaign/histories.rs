@@ -194,7 +194,7 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     let time = Figure {
         title: format!("The same over time, {}", group.title()),
         caption: html! {
-            (name) ": the radial motion grows out of the plane of the tangential one; in rotary slosh the two are a quarter of a period apart."
+            "Run: " (name) ". The radial motion grows out of the plane of the tangential one; in rotary slosh the two are a quarter of a period apart."
         },
         height: 470,
         half: true,

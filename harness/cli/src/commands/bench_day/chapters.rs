@@ -256,7 +256,7 @@ fn bearing(fitted: &acceleration::Found, is_used: bool) -> Chapter {
     };
     let whole = friction_chart("Friction torque against the rate", most);
     let near = friction_chart("Friction torque near zero rate", most.min(NEAR * speed));
-    let head = ["parameter", "value", "95 % interval", "of noise alone", "unit", "Table 5.5"];
+    let head = ["parameter", "value", "95 % interval", "noise alone", "unit", "Table 5.5"];
     let head = head.map(String::from).to_vec();
     let row = |(name, p): (&String, &Estimated)| {
         let thesis = THESIS.iter().find(|(other, _)| other == name);
