@@ -33,6 +33,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--wheel", type=Path, default=wheels[-1] if wheels else ROOT / "dist" / "none")
     parser.addoption("--all-sweeps", action="store_true")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
+    parser.addoption("--octave", action="store_true", help="also the tests that need Octave")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the marker of tests that need Octave, which not every machine has."""
+    config.addinivalue_line("markers", "octave: needs Octave; --octave (.ci/octave) runs it")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what needs Octave."""
+    if not config.getoption("--octave"):
+        items[:] = [item for item in items if item.get_closest_marker("octave") is None]
 
 
 def option(request: pytest.FixtureRequest, name: str) -> Path:

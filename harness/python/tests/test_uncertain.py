@@ -1,7 +1,6 @@
 """Uncertain models against the FMU's own linear models, and a worst case against its motion."""
 
 import json
-import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -132,7 +131,7 @@ def test_files_give_the_model_back(spacecraft: Path, tmp_path: Path) -> None:
     assert system.ninputs == model.order + 3 and (system.A == model.M.A).all()
 
 
-@pytest.mark.skipif(not shutil.which("octave-cli"), reason="needs Octave: .ci/octave")
+@pytest.mark.octave
 def test_octave_reads_the_file(spacecraft: Path, tmp_path: Path) -> None:
     """read_lft.m, the part that is arithmetic."""
     model = uncertain(POINT, RANGES, model=spacecraft)
