@@ -436,18 +436,21 @@ def _damping(craft: "Craft", tanks: list[dict[str, Any]]) -> list[Uncertain]:
     found = []
     for number, name in enumerate(craft.tanks, 1):
         tables = [of[name].modes if name in of else None for of in tanks]
-        if not any(table is not None and "zeta_low" in table for table in tables):
+        ends = [
+            table[["zeta_low", "zeta", "zeta_high"]].to_numpy().tolist()
+            if table is not None and "zeta_low" in table
+            else []
+            for table in tables
+        ]
+        if not any(ends):
             continue
 
         def values(
-            fill: int, share: float, number: int = number, tables: list[Any] = tables
+            fill: int, share: float, number: int = number, ends: list[Any] = ends
         ) -> dict[str, float]:
-            table = tables[fill]
-            if table is None or "zeta_low" not in table:
-                return {}
             return {
-                f"tank[{number}].zeta[{n}]": _between(row.zeta_low, row.zeta, row.zeta_high, share)
-                for n, row in enumerate(table.itertuples(), 1)
+                f"tank[{number}].zeta[{n}]": _between(*row, share)
+                for n, row in enumerate(ends[fill], 1)
             }
 
         found.append(Uncertain(f"damping of {name}", "over its interval", values))

@@ -30,6 +30,9 @@ MOST = 13
 LIGHT = 0.2
 """Damping ratio below which a pole is a mode to be named."""
 
+CONVERGED = 1e-11
+"""Relative change below which a delay has converged; rounding is a tenth of it."""
+
 MOVED = 1e-11
 """Residue, over the norms of B and C, below which an input does not move a mode."""
 
@@ -59,14 +62,16 @@ class Margins:
     @property
     def gain_margins(self) -> tuple[float, float]:
         """Factors in dB by which the gain may shrink and grow: (-inf, inf) if without limit."""
-        all_of = self.crossings.loc[self.crossings["crossing"] == "phase", "gain_margin"]
-        return max(all_of[all_of < 0], default=-np.inf), min(all_of[all_of >= 0], default=np.inf)
+        every = self.crossings["gain_margin"].to_numpy(float)  # NaN: a gain crossing
+        down, up = every[every < 0], every[every >= 0]
+        return float(down.max(initial=-np.inf)), float(up.min(initial=np.inf))
 
     @property
     def phase_margin(self) -> float:
         """Return the smallest phase margin in magnitude, deg; inf without a gain crossing."""
-        margins = self.crossings["phase_margin"].dropna()
-        return float(margins.iloc[margins.abs().argmin()]) if len(margins) else np.inf
+        margins = self.crossings["phase_margin"].to_numpy(float)
+        margins = margins[~np.isnan(margins)]
+        return float(margins[np.abs(margins).argmin()]) if len(margins) else np.inf
 
     def __str__(self) -> str:
         """Return the verdict, then the crossings."""
@@ -391,13 +396,13 @@ def _exact_delay(
 
     for _ in range(20):  # Steffensen's iteration
         first = turned(delay)
+        if abs(first - delay) <= CONVERGED * first:
+            return first
         second = turned(first)
+        if abs(second - first) <= CONVERGED * second:
+            return second
         bend = second - 2 * first + delay
-        new = second if bend == 0 else delay - (first - delay) ** 2 / bend
-        done = abs(second - first) <= 1e-13 * first or abs(new - delay) <= 1e-13 * first
-        delay = new
-        if done:
-            break
+        delay = second if bend == 0 else delay - (first - delay) ** 2 / bend
     return delay
 
 

@@ -1,6 +1,7 @@
 """The worst point of a design review: found by search, confirmed by simulation."""
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -150,11 +151,10 @@ def confirm(point: "Point") -> Confirmation:
         row = rows.loc[rows["gain_margin"].abs().idxmin()]
         command, factor = str(row["loop"]), float(10 ** (row["gain_margin"] / 20))
         factors = [factor * (1 - ASIDE), factor * (1 + ASIDE)]
-    runs, expected, simulated = {}, [], []
-    for scale in factors:
-        runs[scale], pole, found = _compare(point, command, scale)
-        expected.append(pole)
-        simulated.append(found)
+    with ThreadPoolExecutor() as pool:
+        found = list(pool.map(lambda scale: _compare(point, command, scale), factors))
+    runs = {scale: run for scale, (run, _, _) in zip(factors, found, strict=True)}
+    expected, simulated = ([row[i] for row in found] for i in (1, 2))
     if command is None:
         limit = 1.0
     else:
