@@ -39,6 +39,7 @@ fn a_profile_that_cannot_be_followed_to_its_end_refuses_no_recording() {
 /// A delay of 4 ms under a torque that is held was stated as one of 14 ms under a linear one, to 0.1 ms: the held one had not been sought to
 /// its minimum.
 #[test]
+#[ignore = "a quarter of a minute: .ci/run --nightly"]
 fn a_delay_is_not_sure_while_another_torque_between_rows_fits_as_well() {
     is_described(89, &[]);
 }
@@ -58,6 +59,7 @@ fn fill_and_inertia_of_a_deep_tank_are_in_their_intervals() {
 /// A point of its friction's profile whose search went astray ended the interval of the Stribeck speed, which was stated 4.2 standard
 /// deviations off.
 #[test]
+#[ignore = "a quarter of a minute: .ci/run --nightly"]
 fn a_point_of_the_profile_that_went_astray_ends_no_interval() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let twin = Twin::draw(168, 200.0);
