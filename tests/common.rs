@@ -1,8 +1,8 @@
 //! Functions shared by several tests.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::Once;
+use std::sync::LazyLock;
 
 use HubSlosh::table::TABLE;
 use runtime::variable::Kind;
@@ -37,33 +37,40 @@ pub fn run(command: &mut Command, sentence: &str) -> String {
     panic!("{why}\n{sentence}\n(the command: {command:?})");
 }
 
+/// Cargo's target directory.
+///
+/// # Panics
+/// If the FMU that tells where it is cannot be packed.
+pub fn target() -> &'static Path {
+    pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu")
+}
+
 /// The interpreter of the tests' virtual environment, which is made if need be, as the package's compiled half.
 ///
 /// # Panics
 /// If they can't be made.
-pub fn python() -> PathBuf {
-    static NATIVE: Once = Once::new();
-    NATIVE.call_once(|| {
+pub fn python() -> &'static Path {
+    static PYTHON: LazyLock<PathBuf> = LazyLock::new(|| {
         pack::build_native(true).expect("the compiled half of the Python package");
+        let scripts = pack::root().join("harness").join("python");
+        let first = if cfg!(windows) { "python" } else { "python3" };
+        let path = run(
+            Command::new(first)
+                .arg(scripts.join("environment.py"))
+                .arg(target().join("python").join("tests"))
+                .arg(scripts.join("requirements.txt")),
+            "the tests in Python need Python 3.11 or newer with its module venv, and the network once",
+        );
+        PathBuf::from(path.trim())
     });
-    let target =
-        pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu");
-    let scripts = pack::root().join("harness").join("python");
-    let first = if cfg!(windows) { "python" } else { "python3" };
-    let path = run(
-        Command::new(first)
-            .arg(scripts.join("environment.py"))
-            .arg(target.join("python").join("tests"))
-            .arg(scripts.join("requirements.txt")),
-        "the tests in Python need Python 3.11 or newer with its module venv, and the network once",
-    );
-    PathBuf::from(path.trim())
+    &PYTHON
 }
 
 /// The binary `hubslosh`, of the profile that this test was built with; it is
 /// another package's, so Cargo does not say where it is.
-pub fn harness() -> PathBuf {
-    binary("hubslosh", &[])
+pub fn harness() -> &'static Path {
+    static HARNESS: LazyLock<PathBuf> = LazyLock::new(|| binary("hubslosh", &[]));
+    &HARNESS
 }
 
 /// A binary of the workspace by its name, of the profile that this test was built with; `of` says where it is if not in one
@@ -79,7 +86,5 @@ pub fn binary(name: &str, of: &[&str]) -> PathBuf {
         build.arg("--release");
     }
     run(&mut build, "a binary of the workspace did not build");
-    let target =
-        pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu");
-    target.join(profile).join(name).with_extension(std::env::consts::EXE_EXTENSION)
+    target().join(profile).join(name).with_extension(std::env::consts::EXE_EXTENSION)
 }

@@ -77,6 +77,7 @@ def _ensure(directory: Path, requirements: Path, hashes: bool) -> Path:
             "pip",
             "install",
             "--disable-pip-version-check",
+            "--no-compile",  # most modules are never imported; Python compiles what is
             *(["--require-hashes"] if hashes else []),
             "-r",
             str(requirements),

@@ -8,6 +8,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::LazyLock;
 
 use crate::common::{python, run};
 use host::description::{ModelDescription, Type, Variable};
@@ -131,10 +132,15 @@ fn under_valgrind() -> bool {
 }
 
 /// Folder of fmi2Functions.h and fmi3Functions.h: fmpy contains the official headers.
-fn headers() -> PathBuf {
-    let script = "import fmpy, pathlib; print(pathlib.Path(fmpy.__file__).parent / 'c-code')";
-    let sentence = "fmpy does not say where it is";
-    PathBuf::from(run(Command::new(python()).args(["-c", script]), sentence).trim())
+fn headers() -> &'static Path {
+    static HEADERS: LazyLock<PathBuf> = LazyLock::new(|| {
+        let script = "import importlib.util; print(importlib.util.find_spec('fmpy').origin)";
+        let sentence = "fmpy does not say where it is";
+        let origin =
+            PathBuf::from(run(Command::new(python()).args(["-c", script]), sentence).trim());
+        origin.with_file_name("c-code")
+    });
+    &HEADERS
 }
 
 /// The number before `word` in what a host says at its end.
