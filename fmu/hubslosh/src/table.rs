@@ -532,6 +532,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("imu.bias_time", |p, _| &mut p.imu.bias_time, "s",
         "Correlation time of the gyro's bias")
         .range(1e-3, 1e9),
+    V::parameter("imu.flicker", |p, _| &mut p.imu.flicker, "rad/s",
+        "Bias instability of the gyro's flicker noise, whose Allan deviation is flat at 0.664 imu.flicker from 0.3 s to 3 h; 0: none")
+        .display_unit("deg/h").range(0.0, 10.0),
+    V::parameter("imu.rrw", |p, _| &mut p.imu.rrw, "rad/s/sqrt(s)",
+        "Rate random walk of the gyro; its Allan deviation is imu.rrw sqrt(averaging time/3), and it is 0 at the start; 0: none")
+        .range(0.0, 10.0),
     V::parameter("imu.lsb", |p, _| &mut p.imu.lsb, "rad/s",
         "Quantisation step of the gyro; 0: none")
         .display_unit("deg/s").range(0.0, 10.0),

@@ -1,16 +1,29 @@
-//! The rate gyro on the hub: samples the hub's rate, adds white noise and a Gauss-Markov bias,
-//! quantises, and holds the value until the next sample.
+//! The rate gyro on the hub: samples the hub's rate, adds white noise, a Gauss-Markov bias, flicker
+//! noise and a rate random walk, quantises, and holds the value until the next sample.
 //!
 //! White noise per sample sigma = N sqrt(rate) (N as an Allan coefficient). The bias is of first
 //! order, with sigma_b = B/0.664 and correlation time `bias_time` (thesis 5.5; IEEE Std 952). The
-//! noise of sample k is a function of only the seed and k, so a restored state continues with the
-//! same noise.
+//! random numbers of sample k are functions of only the seed and k, so a restored state continues
+//! with the same noise.
+//!
+//! Flicker noise is the sum of [`FLICKERS`] Gauss-Markov processes of equal variance whose
+//! correlation times grow by the factor q = [`RATIO`]. The sum of their one-sided spectra
+//! 4 sigma² T/(1 + (2 pi f T)²) is sigma²/(f ln q) with a ripple of 2/cosh(pi²/ln q) = 1.6 %. It is
+//! B²/(pi f), the flicker noise of bias instability B, for sigma² = B² ln q/pi. The rate random walk
+//! adds K/sqrt(rate) times a normal number a sample.
 
 use crate::parameters::Imu;
 
 /// Part of a sampling period by which a sample may be early. Communication points and time events
 /// match sampling instants only to the rounding of the host's clock.
 pub(crate) const SLACK: f64 = 1e-6;
+
+/// Number of processes of the flicker noise.
+pub(crate) const FLICKERS: usize = 8;
+/// Ratio of their correlation times, …
+const RATIO: f64 = 6.0;
+/// … and the shortest, s. At 0.1 s the white noise of a gyro is far larger.
+const SHORTEST: f64 = 0.1;
 
 /// State of the gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,13 +34,22 @@ pub(crate) struct Gyro {
     pub bias: f64,
     /// The value held, rad/s.
     pub held: f64,
+    /// Rate random walk of the next sample, rad/s.
+    pub walk: f64,
+    /// Processes of the flicker noise of the next sample, rad/s.
+    pub flicker: [f64; FLICKERS],
 }
 
 impl Imu {
     /// Returns the gyro before its first sample, with a bias from its stationary distribution.
     pub(crate) fn start(&self) -> Gyro {
         let (spread, _) = normals(self.seed, u64::MAX);
-        Gyro { next: 0, bias: self.bias_instability / 0.664 * spread, held: 0.0 }
+        let bias = self.bias_instability / 0.664 * spread;
+        let mut gyro = Gyro { next: 0, bias, held: 0.0, walk: 0.0, flicker: [0.0; FLICKERS] };
+        if self.flicker > 0.0 {
+            self.each_flicker(&mut gyro.flicker, u64::MAX, |_| 0.0);
+        }
+        gyro
     }
 
     /// Takes the samples that fall due within `length` from `since_start` on, both s, but at most
@@ -66,7 +88,17 @@ impl Imu {
     /// Takes the next sample of the rate `omega`.
     pub(crate) fn sample(&self, gyro: &mut Gyro, omega: f64) {
         let (white, drift) = normals(self.seed, gyro.next);
-        let reading = omega + gyro.bias + self.arw * libm::sqrt(self.rate) * white;
+        let mut reading = omega + gyro.bias + self.arw * libm::sqrt(self.rate) * white;
+        if self.flicker > 0.0 {
+            reading += gyro.flicker.iter().sum::<f64>();
+            self.each_flicker(&mut gyro.flicker, gyro.next, |time| {
+                libm::exp(-1.0 / (self.rate * time))
+            });
+        }
+        if self.rrw > 0.0 {
+            reading += gyro.walk;
+            gyro.walk += self.rrw / libm::sqrt(self.rate) * normals_of(self.seed, 1, gyro.next).0;
+        }
         // Quantisation steps below rounding have no effect.
         let seen = reading.abs() < 1e16 * self.lsb;
         gyro.held = if seen { libm::rint(reading / self.lsb) * self.lsb } else { reading };
@@ -75,12 +107,32 @@ impl Imu {
         gyro.bias = keep * gyro.bias + spread * drift;
         gyro.next += 1;
     }
+
+    /// Moves the processes of the flicker noise by sample k; `keep` is the part of a process that remains, by its
+    /// correlation time, s.
+    fn each_flicker(&self, all: &mut [f64; FLICKERS], k: u64, keep: impl Fn(f64) -> f64) {
+        let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
+        let mut time = SHORTEST;
+        for (pair, stream) in all.as_chunks_mut::<2>().0.iter_mut().zip(2..) {
+            let (first, second) = normals_of(self.seed, stream, k);
+            for (process, normal) in pair.iter_mut().zip([first, second]) {
+                let keep = keep(time);
+                *process = keep * *process + sigma * libm::sqrt(1.0 - keep * keep) * normal;
+                time *= RATIO;
+            }
+        }
+    }
 }
 
 /// Returns two independent standard normal numbers for (seed, k): the Box-Muller transform of two
 /// uniform numbers from the SplitMix64 mixer.
 fn normals(seed: i32, k: u64) -> (f64, f64) {
-    let stream = mix(seed as u32 as u64);
+    normals_of(seed, 0, k)
+}
+
+/// Returns [`normals`] of one of several independent streams of a seed.
+fn normals_of(seed: i32, stream: u64, k: u64) -> (f64, f64) {
+    let stream = mix(seed as u32 as u64 | stream << 32);
     let uniform = |j: u64| {
         let bits = mix(stream ^ mix(k.wrapping_mul(2).wrapping_add(j)));
         ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
@@ -150,6 +202,58 @@ mod tests {
     /// Returns a gyro without noise, bias and quantisation.
     fn clean(rate: f64) -> Imu {
         Imu { rate, arw: 0.0, bias_instability: 0.0, lsb: 0.0, ..Imu::default() }
+    }
+
+    /// Mean Allan variance of readings at rest of seeds 0 to `seeds`, at averages of m samples.
+    fn allan_variance(imu: Imu, seeds: i32, m: usize) -> f64 {
+        let mut sum = 0.0;
+        for seed in 0..seeds {
+            let imu = Imu { seed, ..imu };
+            let mut gyro = imu.start();
+            let mut mean = || {
+                let total: f64 = (0..m)
+                    .map(|_| {
+                        imu.sample(&mut gyro, 0.0);
+                        gyro.held
+                    })
+                    .sum();
+                total / m as f64
+            };
+            let (first, second) = (mean(), mean());
+            sum += (second - first) * (second - first) / 2.0;
+        }
+        sum / f64::from(seeds)
+    }
+
+    #[test]
+    fn flicker_noise_has_a_flat_allan_deviation_and_the_random_walk_a_rising_one() {
+        // one pair of averages for each of 10,000 seeds: √(2/10,000) = 1.4 %; four of them and the ripple
+        let flicker = Imu { flicker: 1e-3, ..clean(10.0) };
+        let flat = 2.0 * core::f64::consts::LN_2 / core::f64::consts::PI * 1e-6;
+        for m in [10, 30, 100, 1000] {
+            let found = allan_variance(flicker, 10_000, m);
+            assert!((found / flat - 1.0).abs() < 0.07, "{m}: {}", found / flat);
+        }
+        let walk = Imu { rrw: 1e-3, ..clean(10.0) };
+        for m in [10, 100] {
+            // K² τ/3 with the walk in steps: 1 + 1/(2 m²)
+            let expected = 1e-6 * m as f64 * 0.1 / 3.0 * (1.0 + 0.5 / (m * m) as f64);
+            let found = allan_variance(walk, 10_000, m);
+            assert!((found / expected - 1.0).abs() < 0.06, "{m}: {}", found / expected);
+        }
+    }
+
+    #[test]
+    fn without_flicker_and_random_walk_their_streams_are_not_used() {
+        let imu = Imu { lsb: 0.0, ..Imu::default() };
+        let (mut gyro, mut slow) = (imu.start(), Imu { rrw: 1e-9, ..imu }.start());
+        for _ in 0..100 {
+            imu.sample(&mut gyro, 0.1);
+            Imu { rrw: 1e-9, ..imu }.sample(&mut slow, 0.1);
+            assert_eq!((gyro.walk, gyro.flicker, gyro.bias), (0.0, [0.0; FLICKERS], slow.bias));
+            assert!((gyro.held - slow.held).abs() < 1e-7);
+        }
+        assert!(slow.walk != 0.0);
     }
 
     #[test]

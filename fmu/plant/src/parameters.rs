@@ -273,6 +273,8 @@ pub struct Imu {
     pub arw: f64,
     pub bias_instability: f64,
     pub bias_time: f64,
+    pub flicker: f64,
+    pub rrw: f64,
     pub lsb: f64,
     pub seed: i32,
 }
@@ -390,6 +392,8 @@ impl Default for Imu {
             arw: 5.75e-5,
             bias_instability: 5.21e-5,
             bias_time: 100.0,
+            flicker: 0.0,
+            rrw: 0.0,
             lsb: 0.0,
             seed: 1,
         }

@@ -5,7 +5,7 @@ use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
 
 use crate::contact::Contact;
-use crate::imu::Gyro;
+use crate::imu::{FLICKERS, Gyro};
 
 /// Indices of the continuous states in x. A new one is a new constant before [`x::SLOSH`].
 pub mod x {
@@ -112,7 +112,7 @@ impl State {
     pub const WORDS: usize = 2 + Self::REALS;
 
     /// Number of words that are real numbers; the last of them are x.
-    const REALS: usize = 11 + STATES;
+    const REALS: usize = 12 + FLICKERS + STATES;
 
     /// Returns the state as words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
@@ -136,8 +136,10 @@ impl State {
             self.axial.rate,
             self.gyro.bias,
             self.gyro.held,
+            self.gyro.walk,
         ];
-        for (word, real) in words[2..].iter_mut().zip(reals.iter().chain(&self.x)) {
+        let all = reals.iter().chain(&self.gyro.flicker).chain(&self.x);
+        for (word, real) in words[2..].iter_mut().zip(all) {
             *word = real.to_bits();
         }
         words
@@ -161,7 +163,8 @@ impl State {
         for (real, word) in reals.iter_mut().zip(&words[2..]) {
             *real = f64::from_bits(*word);
         }
-        let (head, x) = reals.split_first_chunk()?;
+        let (head, rest) = reals.split_first_chunk()?;
+        let (flicker, x) = rest.split_first_chunk()?;
         let [
             time,
             event_time,
@@ -174,6 +177,7 @@ impl State {
             rate,
             bias,
             held,
+            walk,
         ] = *head;
         let finite = reals.iter().all(|real| real.is_finite());
         // Beyond this number the instants of the samples cannot be separated.
@@ -188,7 +192,7 @@ impl State {
             start_time,
             start_g,
             axial: Axial { work, time: axial_time, g, mass_height, rate },
-            gyro: Gyro { next: words[1], bias, held },
+            gyro: Gyro { next: words[1], bias, held, walk, flicker: *flicker },
         })
     }
 
@@ -238,7 +242,13 @@ mod tests {
             start_time: -7.0,
             start_g: 9.81,
             axial: Axial { work: 0.5, time: 1.0, g: 2.0, mass_height: 3.0, rate: 4.0 },
-            gyro: Gyro { next: 12, bias: -1e-5, held: 0.125 },
+            gyro: Gyro {
+                next: 12,
+                bias: -1e-5,
+                held: 0.125,
+                walk: 2e-6,
+                flicker: [3e-6; FLICKERS],
+            },
         };
         let words = state.to_words();
         assert_eq!(State::from_words(&words), Some(state));

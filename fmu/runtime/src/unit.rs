@@ -60,6 +60,7 @@ pub static UNITS: &[Unit] = &[
     unit("J",       [ 1,  2, -2, 0], &[]),
     unit("W",       [ 1,  2, -3, 0], &[]),
     Unit { name: "rad/s/sqrt(Hz)", base: None, display_units: &[] },
+    Unit { name: "rad/s/sqrt(s)", base: None, display_units: &[] },
 ];
 
 /// The unit of this name.

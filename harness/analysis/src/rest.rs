@@ -4,7 +4,7 @@
 
 use signals::fourier::{Forward, Inverse};
 
-use crate::allan::{self, Noise, Point};
+use crate::allan::{self, Fit, Octaves, Point};
 use crate::statistics::{deviation, mean, variance};
 
 /// Number of quantiles compared.
@@ -40,8 +40,8 @@ pub struct Rest {
     pub histogram: Vec<(f64, f64)>,
     /// Allan variances of the samples, (rad/s)².
     pub allan: Vec<Point>,
-    /// The noise that fits them.
-    pub noise: Option<Noise>,
+    /// The noise that fits them ([`Octaves::describe`]).
+    pub noise: Option<Fit>,
     /// Standard normal quantile and that of the samples without the line over their standard deviation.
     pub quantiles: Vec<(f64, f64)>,
     /// Autocorrelation of the samples without the line, at 0, 1, … steps.
@@ -119,7 +119,7 @@ impl Rest {
             kurtosis: moment(4) - 3.0,
             quantum,
             histogram: histogram(&sorted, sigma, quantum),
-            noise: Noise::fitted(&allan),
+            noise: Octaves::of(step, samples).describe(),
             allan,
             quantiles,
             autocorrelation: autocorrelation(&detrended, (lag / step).round() as usize),

@@ -8,15 +8,12 @@ use serde_json::json;
 use crate::profile::{Torque, Written};
 use crate::progress::Progress;
 use crate::run::{Run, TORQUE};
-use analysis::allan::{self, Noise, Point};
+use analysis::allan::{self, Estimate, Fit, Noise, Octaves, Point, Term};
 use files::budget;
 use host::fmu::Fmu;
 use names::hubslosh::{OMEGA, OMEGA_IMU, imu};
 use signals::table::Table;
 
-/// Smallest number of records for a standard error from their scatter; that of four is uncertain by
-/// 40 %.
-const LEAST_RECORDS: usize = 4;
 /// Largest number of records; more would take days.
 const MOST_RECORDS: usize = 10_000;
 /// Shortest record in correlation times of the bias, so that the maximum (at 1.89) is visible. The
@@ -39,11 +36,8 @@ pub struct Recording {
 pub struct Characteristics {
     /// Specified noise; N includes the quantisation noise of `imu.lsb`, lsb/√(12 rate).
     pub specified: Noise,
-    /// Noise estimated from the mean of the records' Allan variances.
-    pub estimated: Noise,
-    /// Standard errors of `estimated`, from the scatter of the single records; NaN if fewer than
-    /// [`LEAST_RECORDS`] can be fitted.
-    pub error: Noise,
+    /// Fit of the specified terms to the mean of the records' Allan variances.
+    pub fit: Fit,
     /// The mean of the records' Allan variances, (rad/s)².
     pub points: Vec<Point>,
 }
@@ -78,13 +72,16 @@ impl Recording {
         let (rate, lsb) = (real(imu::RATE)?, real(imu::LSB)?);
         let specified = Noise {
             arw: real(imu::ARW)?.hypot(lsb / (12.0 * rate).sqrt()),
+            flicker: real(imu::FLICKER)?,
+            rrw: real(imu::RRW)?,
+            ramp: 0.0,
             bias_instability: real(imu::BIAS_INSTABILITY)?,
             bias_time: real(imu::BIAS_TIME)?,
         };
         drop(instance);
         ensure!(
-            specified.arw > 0.0 || specified.bias_instability > 0.0,
-            "the gyro has no noise: imu.arw, imu.bias_instability and imu.lsb are 0"
+            !specified.terms().is_empty(),
+            "the gyro has no noise: imu.arw, imu.bias_instability, imu.flicker, imu.rrw and imu.lsb are 0"
         );
         ensure!(
             specified.bias_instability == 0.0 || seconds >= LEAST_TIMES * specified.bias_time,
@@ -106,7 +103,7 @@ impl Recording {
             .collect::<Result<Vec<_>>>()?;
         let steps = runs.iter().map(|run| run.steps() as u64).sum();
         watch(Progress::Begins { runs: runs.len(), steps });
-        let records: Vec<Vec<Point>> =
+        let records: Vec<(Vec<Point>, Octaves)> =
             runs.par_iter().map(|run| record(run, fmu, watch)).collect::<Result<_>>()?;
         Characteristics::of(specified, &records)
     }
@@ -131,7 +128,11 @@ impl Recording {
 }
 
 /// Returns the Allan variances of one record.
-fn record(run: &Run, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Point>> {
+fn record(
+    run: &Run,
+    fmu: &Fmu,
+    watch: &(dyn Fn(Progress) + Sync),
+) -> Result<(Vec<Point>, Octaves)> {
     let mut instance = run.initialise(fmu)?;
     let table =
         run.drive(&mut instance, &[OMEGA, OMEGA_IMU], |steps| watch(Progress::Steps(steps)))?;
@@ -140,36 +141,37 @@ fn record(run: &Run, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Vec
         column(OMEGA).iter().all(|omega| *omega == 0.0),
         "the hub does not rest: leave its start, its torques and the friction of the bearing alone"
     );
-    Ok(allan::variances(run.step, column(OMEGA_IMU)))
+    let readings = column(OMEGA_IMU);
+    Ok((allan::variances(run.step, readings), Octaves::of(run.step, readings)))
 }
 
 impl Characteristics {
-    fn of(specified: Noise, records: &[Vec<Point>]) -> Result<Self> {
+    fn of(specified: Noise, records: &[(Vec<Point>, Octaves)]) -> Result<Self> {
         let count = records.len() as f64;
-        let points: Vec<Point> = (0..records[0].len())
+        let points: Vec<Point> = (0..records[0].0.len())
             .map(|i| Point {
-                tau: records[0][i].tau,
-                variance: records.iter().map(|record| record[i].variance).sum::<f64>() / count,
+                tau: records[0].0[i].tau,
+                variance: records.iter().map(|record| record.0[i].variance).sum::<f64>() / count,
             })
             .collect();
-        let why = "the gyro's readings do not change; is imu.lsb larger than its noise?";
-        let estimated = Noise::fitted(&points).context(why)?;
-        let each: Vec<Noise> = records.iter().filter_map(|record| Noise::fitted(record)).collect();
-        let error = |of: fn(&Noise) -> f64| {
-            if each.len() < LEAST_RECORDS {
-                return f64::NAN;
-            }
-            let count = each.len() as f64;
-            let mean = each.iter().map(of).sum::<f64>() / count;
-            let squares: f64 = each.iter().map(|noise| (of(noise) - mean).powi(2)).sum();
-            (squares / (count - 1.0) / count).sqrt()
-        };
-        let error = Noise {
-            arw: error(|noise| noise.arw),
-            bias_instability: error(|noise| noise.bias_instability),
-            bias_time: error(|noise| noise.bias_time),
-        };
-        Ok(Characteristics { specified, estimated, error, points })
+        let octaves: Vec<Octaves> = records.iter().map(|record| record.1.clone()).collect();
+        let fit = Octaves::mean(&octaves).and_then(|mean| mean.fit(&specified.terms(), 0));
+        let fit =
+            fit.context("the gyro's readings do not change; is imu.lsb larger than its noise?")?;
+        Ok(Characteristics { specified, fit, points })
+    }
+
+    /// Returns the specified parameters with their names, and their estimates where the noise has that term.
+    fn quantities(&self) -> [(&'static str, f64, Option<Estimate>); 5] {
+        let of = |term| self.fit.terms.iter().find(|(t, _)| *t == term).map(|(_, found)| *found);
+        let Noise { arw, bias_instability, bias_time, flicker, rrw, .. } = self.specified;
+        [
+            ("N, rad/s/sqrt(Hz)", arw, of(Term::White)),
+            ("B, rad/s", bias_instability, of(Term::Markov)),
+            ("imu.bias_time, s", bias_time, self.fit.bias_time),
+            ("B of flicker, rad/s", flicker, of(Term::Flicker)),
+            ("K, rad/s/sqrt(s)", rrw, of(Term::Walk)),
+        ]
     }
 
     /// Returns specified and estimated values as lines of text.
@@ -178,32 +180,35 @@ impl Characteristics {
             "{:22}{:>12}{:>12}{:>12}{:>16}\n",
             "", "specified", "estimated", "deviation", "standard error"
         );
-        for (name, of) in QUANTITIES {
-            let (specified, estimated, error) =
-                (of(&self.specified), of(&self.estimated), of(&self.error));
+        for (name, specified, found) in self.quantities() {
+            let Some(found) = found else { continue };
             let percent = |part: f64| match part / specified * 100.0 {
                 percent if percent.is_finite() => format!("{percent:.2} %"),
                 _ => "-".into(),
             };
             text.push_str(&format!(
-                "{name:22}{specified:>12.4e}{estimated:>12.4e}{:>12}{:>16}\n",
-                percent(estimated - specified),
-                percent(error)
+                "{name:22}{specified:>12.4e}{:>12.4e}{:>12}{:>16}\n",
+                found.value,
+                percent(found.value - specified),
+                percent(found.error)
             ));
         }
         text
     }
 
-    /// Returns specified and estimated values for programs; null for a non-finite number.
+    /// Returns specified and estimated values for programs; null for a term that the gyro does not have.
     pub fn json(&self) -> serde_json::Value {
-        let quantity = |(name, of): &Quantity| {
-            let (specified, estimated, error) =
-                (of(&self.specified), of(&self.estimated), of(&self.error));
-            let values =
-                json!({ "specified": specified, "estimated": estimated, "standard_error": error });
+        let quantity = |(name, specified, found): (&str, f64, Option<Estimate>)| {
+            let [value, error, low, high] = match found {
+                Some(found) => [found.value, found.error, found.low, found.high],
+                None => [f64::NAN; 4],
+            };
+            let values = json!({
+                "specified": specified, "estimated": value, "standard_error": error, "low": low, "high": high
+            });
             (name.to_string(), values)
         };
-        serde_json::Value::Object(QUANTITIES.iter().map(quantity).collect())
+        serde_json::Value::Object(self.quantities().into_iter().map(quantity).collect())
     }
 
     /// Returns the Allan deviations of the records, of the specified and of the fitted noise.
@@ -215,7 +220,7 @@ impl Characteristics {
             self.points.iter().map(|point| point.tau).collect(),
             deviation(&|point| point.variance),
             deviation(&|point| self.specified.variance(point.tau)),
-            deviation(&|point| self.estimated.variance(point.tau)),
+            deviation(&|point| self.fit.noise.variance(point.tau)),
         ];
         Table::new(
             ["tau_s", "deviation", "specified", "estimated"].map(String::from).to_vec(),
@@ -223,13 +228,3 @@ impl Characteristics {
         )
     }
 }
-
-/// A parameter of the noise by its name and unit.
-type Quantity = (&'static str, fn(&Noise) -> f64);
-
-/// Quantities in the table.
-const QUANTITIES: [Quantity; 3] = [
-    ("N, rad/s/sqrt(Hz)", |noise| noise.arw),
-    ("B, rad/s", |noise| noise.bias_instability),
-    ("imu.bias_time, s", |noise| noise.bias_time),
-];

@@ -169,6 +169,8 @@ pub mod imu {
     pub const ARW: &str = "imu.arw";
     pub const BIAS_INSTABILITY: &str = "imu.bias_instability";
     pub const BIAS_TIME: &str = "imu.bias_time";
+    pub const FLICKER: &str = "imu.flicker";
+    pub const RRW: &str = "imu.rrw";
     pub const LSB: &str = "imu.lsb";
     pub const SEED: &str = "imu.seed";
 }

@@ -37,7 +37,7 @@ pub fn allan_deviations(gyro: &Characteristics) -> String {
                 curve(&|point| gyro.specified.variance(point.tau)),
                 "#b45309",
                 Style::Line,
-                "specified noise and bias",
+                "specified noise",
             ),
         ],
         legend: true,
@@ -79,11 +79,12 @@ pub fn rest(rest: &Rest) -> [(&'static str, Chart); 6] {
     };
     let measured = deviation(&|point| point.variance);
     let mut allan = vec![series(measured.clone(), MEASURED, Style::Dots, "recorded")];
-    if let Some(noise) = &rest.noise {
+    if let Some(fit) = &rest.noise {
+        let noise = &fit.noise;
         let white = deviation(&|point| noise.arw.powi(2) / point.tau);
         allan.insert(0, series(white, EXPECTED, Style::Dashed, "its white noise, slope −1/2"));
         let fitted = deviation(&|point| noise.variance(point.tau));
-        allan.push(series(fitted, FITTED, Style::Line, "fitted noise and bias"));
+        allan.push(series(fitted, FITTED, Style::Line, "fitted noise"));
     }
     let allan = chart(
         "Allan deviation of the recorded gyro at rest",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use analysis::allan::Noise;
+use analysis::allan::{Estimate, Fit, Term};
 use analysis::rest::Rest;
 use anyhow::{Result, ensure};
 use experiments::gyro::Recording;
@@ -162,7 +162,7 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     let mut allan = (vec!["tau_s", "deviation"], vec![tau.clone(), deviation]);
     if let Some(noise) = &rest.noise {
         allan.0.push("estimated");
-        allan.1.push(tau.iter().map(|tau| noise.variance(*tau).sqrt()).collect());
+        allan.1.push(tau.iter().map(|tau| noise.noise.variance(*tau).sqrt()).collect());
     }
     let (normal, reading) = rest.quantiles.iter().copied().unzip();
     let lags = (0..rest.autocorrelation.len()).map(|k| k as f64 * rest.step).collect();
@@ -191,6 +191,46 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     ]
 }
 
+/// Parameters of a recording's noise with their intervals, and whether they describe its Allan deviation: name and value.
+pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
+    let stated = |Estimate { value, low, high, .. }: &Estimate, unit: &str| match (*low, *high) {
+        (0.0, f64::INFINITY) => {
+            format!("{value:.4e} {unit}, the recording is too short for an interval")
+        }
+        (0.0, high) => format!("{value:.4e} {unit}, not significant (95 %: below {high:.3e})"),
+        (low, f64::INFINITY) => format!("{value:.4e} {unit} (95 %: above {low:.3e})"),
+        (low, high) => format!("{value:.4e} {unit} (95 %: {low:.3e} to {high:.3e})"),
+    };
+    let mut rows = Vec::new();
+    for (term, found) in &fit.terms {
+        let (name, unit) = match term {
+            Term::White => ("angle random walk N", "rad/s/sqrt(Hz)"),
+            Term::Flicker => ("bias instability B", "rad/s"),
+            Term::Walk => ("rate random walk K", "rad/s/sqrt(s)"),
+            Term::Ramp => ("rate ramp R", "rad/s2"),
+            Term::Markov => ("Gauss-Markov bias B", "rad/s"),
+        };
+        rows.push((name, stated(found, unit)));
+    }
+    if let Some(time) = &fit.bias_time {
+        rows.push(("Gauss-Markov bias time", stated(time, "s")));
+    }
+    let (chi_squared, degrees) = fit.chi_squared;
+    let chi_squared = format!("chi-squared {chi_squared:.1}, {degrees} degrees of freedom");
+    let verdict = match fit.fits {
+        true => format!("these terms describe it from {:.3} s on ({chi_squared})", fit.from),
+        false => format!(
+            "does not fit: at {:.3} s it lies {:.0} % {} these terms ({chi_squared}); a Gauss-Markov bias, a ramp or a filter do \
+             not explain it. Look for temperature, vibration, steps of the bias",
+            fit.worst.tau,
+            100.0 * (fit.worst.ratio - 1.0).abs(),
+            if fit.worst.ratio > 1.0 { "above" } else { "below" }
+        ),
+    };
+    rows.push(("fit of the Allan deviation", verdict));
+    rows
+}
+
 /// Statistics of a recording at rest: name and value.
 fn rows(rest: &Rest) -> Vec<(String, String)> {
     let hours = rest.count as f64 * rest.step / 3600.0;
@@ -206,9 +246,8 @@ fn rows(rest: &Rest) -> Vec<(String, String)> {
         "noise over quantisation (QNR)",
         format!("{:.1} (variance over Δ²/12, Δ the smallest change)", rest.quantisation_ratio()),
     );
-    if let Some(Noise { arw, bias_instability, bias_time }) = rest.noise {
-        row("angle random walk N", format!("{arw:.4e} rad/s/sqrt(Hz)"));
-        row("bias instability B", format!("{bias_instability:.4e} rad/s, time {bias_time:.0} s"));
+    if let Some(fit) = &rest.noise {
+        noise_rows(fit).into_iter().for_each(|(name, value)| row(name, value));
     }
     row(
         "skewness, excess kurtosis",

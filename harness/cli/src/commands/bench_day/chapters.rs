@@ -16,6 +16,7 @@ use report::campaign::{Chapter, Illustration};
 use report::svg::{Axis, Chart, Series, Style};
 use signals::recording::{self, Between, Signal, Wanted};
 
+use super::super::gyro::noise_rows;
 use super::{Day, Item, Kind};
 use crate::terminal;
 
@@ -431,15 +432,11 @@ fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
     let mut chapter = Chapter { title: title.into(), ..Chapter::default() };
     for (name, rest) in &found {
         let noise = match &rest.noise {
-            Some(noise) if noise.bias_instability > 0.0 => format!(
-                "angle random walk N = {:.3e} rad/s/√Hz, bias instability B = {:.2e} rad/s",
-                noise.arw, noise.bias_instability
-            ),
-            Some(noise) => format!(
-                "angle random walk N = {:.3e} rad/s/√Hz, no bias instability within this duration",
-                noise.arw
-            ),
-            None => "its Allan deviation fits no noise model".into(),
+            Some(fit) => {
+                let rows = noise_rows(fit).into_iter();
+                rows.map(|(name, value)| format!("{name}: {value}")).collect::<Vec<_>>().join("; ")
+            }
+            None => "its Allan deviation shows no noise".into(),
         };
         chapter.text.push(format!(
             "{name}: bias {:.4e} rad/s, standard deviation of a sample {:.3e} rad/s, {noise} (thesis: N = 5.75e-5, B = 5.21e-5). \

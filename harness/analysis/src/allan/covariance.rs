@@ -1,0 +1,129 @@
+//! Covariance of Allan variances at several averaging times, for Gaussian noise.
+//!
+//! The overlapping estimate at τ = m Δt is the mean of D_m²/(2τ²) over a record, with the second differences
+//! D_m(t) = θ(t + τ) − 2θ(t) + θ(t − τ) of the integrated rate θ. For Gaussian noise
+//!
+//! ```text
+//! cov(A_m, A_n) = Σ_k Σ_l 2 C_mn(l − k)² / (4 τ_m² τ_n² M_m M_n),   C_mn(s) = E[D_m(t) D_n(t + s)]
+//! ```
+//!
+//! C_mn follows from the generalized autocovariance of θ (C. A. Greenhall and W. J. Riley, *Uncertainty of stability variances
+//! based on finite differences*, PTTI 2003): −N²|s|/2, B² s² ln|s|/2π, K²|s|³/12, −σ²T²(x − 1 + e^−x) with x = |s|/T.
+//! Equivalent degrees of freedom are 2 A²/var A.
+
+use nalgebra::DMatrix;
+
+use super::Term;
+use std::f64::consts::PI;
+
+/// Lags per averaging time of the sum over lags, which is exact for up to as many samples.
+const PER_TIME: usize = 8;
+/// Range of the lags in sums of both averaging times; terms beyond 1 are flicker's alone, and fall as s⁻².
+const RANGE: usize = 2;
+/// Largest ratio of two averaging times whose estimates count as correlated.
+const RATIO: usize = 32;
+
+/// Tables of C_mn for coefficients of 1.
+pub(super) struct Covariance {
+    terms: Vec<Term>,
+    size: usize,
+    pairs: Vec<Pair>,
+}
+
+struct Pair {
+    places: (usize, usize),
+    /// Pairs of differences at each lag, over M_m M_n.
+    counts: Vec<f64>,
+    /// 1/(2 τ_m² τ_n²).
+    scale: f64,
+    /// C_mn at each lag, for each term.
+    of_terms: Vec<Vec<f64>>,
+}
+
+/// Returns the generalized autocovariance of the angle for a coefficient of 1.
+fn angle(term: Term, lag: f64, time: f64) -> f64 {
+    let s = lag.abs();
+    match term {
+        Term::White => -s / 2.0,
+        Term::Flicker if s > 0.0 => s * s * s.ln() / (2.0 * PI),
+        Term::Walk => s * s * s / 12.0,
+        Term::Markov => -time * time * ((-s / time).exp_m1() + s / time),
+        Term::Flicker | Term::Ramp => 0.0,
+    }
+}
+
+impl Covariance {
+    /// Tables for records of `count` samples `step` (s) apart, averages of these numbers of samples in increasing order, and
+    /// these terms; `time`: correlation time of the Gauss–Markov bias, s.
+    pub fn of(step: f64, count: usize, factors: &[usize], terms: &[Term], time: f64) -> Self {
+        let mut pairs = Vec::new();
+        for (i, &m) in factors.iter().enumerate() {
+            for (j, &n) in factors.iter().enumerate().skip(i) {
+                if n > RATIO * m {
+                    break;
+                }
+                pairs.push(pair((i, j), (m, n), (step, count), terms, time));
+            }
+        }
+        Covariance { terms: terms.to_vec(), size: factors.len(), pairs }
+    }
+
+    /// Returns the covariance for these coefficients, in the order of the terms.
+    pub fn matrix(&self, coefficients: &[f64]) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(self.size, self.size);
+        let ramp = self.terms.iter().zip(coefficients).find(|(term, _)| **term == Term::Ramp);
+        let ramp = ramp.map_or(0.0, |(_, coefficient)| *coefficient);
+        for pair in &self.pairs {
+            let (mut squares, mut sum) = (0.0, 0.0);
+            for (k, count) in pair.counts.iter().enumerate() {
+                let c: f64 = pair.of_terms.iter().zip(coefficients).map(|(t, a)| a * t[k]).sum();
+                squares += count * c * c;
+                sum += count * c;
+            }
+            // a ramp moves the differences by R τ²: their products with noise scatter
+            let value = pair.scale * squares + ramp * sum;
+            let (i, j) = pair.places;
+            matrix[(i, j)] = value;
+            matrix[(j, i)] = value;
+        }
+        matrix
+    }
+}
+
+fn pair(
+    places: (usize, usize),
+    (m, n): (usize, usize),
+    (step, count): (f64, usize),
+    terms: &[Term],
+    time: f64,
+) -> Pair {
+    let by = (m / PER_TIME).max(1);
+    let last = (RANGE * (m + n) / by) as i64;
+    let lags: Vec<i64> = (-last..=last).map(|k| k * by as i64).collect();
+    let (m, n, count) = (m as i64, n as i64, count as i64);
+    // centres of differences run from m to count − m, and from n to count − n
+    let total = ((count - 2 * m + 1) * (count - 2 * n + 1)) as f64;
+    let counts = lags.iter().map(|s| {
+        let overlap = (count - m).min(count - n - s) - m.max(n - s) + 1;
+        overlap.max(0) as f64 * by as f64 / total
+    });
+    let difference = [(-1, 1.0), (0, -2.0), (1, 1.0)];
+    let of_terms = terms.iter().map(|term| {
+        let of_lag = |s: &i64| -> f64 {
+            let products = difference.iter().flat_map(|(u, a)| {
+                difference.iter().map(move |(v, b)| {
+                    a * b * angle(*term, (s + v * n - u * m) as f64 * step, time)
+                })
+            });
+            products.sum()
+        };
+        lags.iter().map(of_lag).collect()
+    });
+    let (tau_m, tau_n) = (m as f64 * step, n as f64 * step);
+    Pair {
+        places,
+        of_terms: of_terms.collect(),
+        counts: counts.collect(),
+        scale: 1.0 / (2.0 * tau_m * tau_m * tau_n * tau_n),
+    }
+}

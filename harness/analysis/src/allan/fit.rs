@@ -1,0 +1,664 @@
+//! Noise that fits Allan variances, with intervals, and a test of the fit.
+//!
+//! Averaging times are octaves: overlapping estimates closer than that add little. Generalized least squares of the
+//! coefficients N², B², K², … weights the octaves with the inverse of their [`Covariance`], which holds their degrees of freedom,
+//! and is repeated with the covariance of the noise found. Coefficients are not negative.
+//!
+//! A 95 % interval holds the values of a coefficient that a test does not reject. The test compares the unconstrained estimate with
+//! its distribution if that value is true and the other terms are fitted again: mean, variance, and skewness (Pearson's type III,
+//! which for one octave is its χ²).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::covariance::Covariance;
+use super::{LONGEST, Noise, Term, overlapping};
+
+/// Standard normal quantile of a 95 % interval.
+const NORMAL: f64 = 1.96;
+/// Standard normal quantile of the fit's χ² beyond which the fit does not describe the record; by chance once in 1,000.
+const MISFIT: f64 = 3.1;
+/// Iterations of the estimate and of a value of an interval.
+const ITERATIONS: usize = 12;
+/// Shortest averaging times that may be left out, and their longest, s.
+const LEFT_OUT: (usize, f64) = (8, 2.0);
+/// Shortest correlation time of a Gauss–Markov bias in averaging times: a shorter one looks like white noise.
+const SHORTEST: f64 = 10.0;
+
+/// Overlapping Allan variances of one record, or the means of several, at 1, 2, 4, … samples up to a tenth of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Octaves {
+    /// Time between samples, s.
+    step: f64,
+    /// Number of samples of a record.
+    count: usize,
+    /// Number of records.
+    records: usize,
+    /// Samples of each average.
+    factors: Vec<usize>,
+    variances: Vec<f64>,
+}
+
+/// Estimate of a parameter with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The estimate.
+    pub value: f64,
+    /// Lower end of the interval; 0 if the record does not show the term.
+    pub low: f64,
+    /// Upper end of the interval; infinite if the record is too short.
+    pub high: f64,
+    /// Standard error, NaN for an estimate of 0.
+    pub error: f64,
+}
+
+/// Averaging time at which a fit is worst.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outlier {
+    /// Averaging time, s.
+    pub tau: f64,
+    /// Allan deviation of the record over that of the fit.
+    pub ratio: f64,
+}
+
+/// Noise that fits Allan variances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// The noise.
+    pub noise: Noise,
+    /// Estimates of the fitted terms' parameters, in units of [`Noise`].
+    pub terms: Vec<(Term, Estimate)>,
+    /// Estimate of the Gauss–Markov bias's correlation time, s, if it is fitted.
+    pub bias_time: Option<Estimate>,
+    /// Shortest averaging time of the fit, s.
+    pub from: f64,
+    /// Misfit χ² and its degrees of freedom.
+    pub chi_squared: (f64, usize),
+    /// True if noise of these terms explains the misfit (once in 1,000 records it does not).
+    pub fits: bool,
+    /// Where the fit is worst.
+    pub worst: Outlier,
+}
+
+/// Coefficients of the terms, and the correlation time of the Gauss–Markov bias, s.
+#[derive(Clone, Debug)]
+struct State {
+    coefficients: Vec<f64>,
+    time: f64,
+}
+
+/// The fit of some terms to the octaves from one on.
+struct Problem<'a> {
+    octaves: &'a Octaves,
+    terms: &'a [Term],
+    from: usize,
+}
+
+impl Octaves {
+    /// Octaves of samples `step` (s) apart.
+    pub fn of(step: f64, samples: &[f64]) -> Octaves {
+        let longest = samples.len() / LONGEST;
+        let factors: Vec<usize> =
+            (0..usize::BITS).map(|k| 1 << k).take_while(|m| *m <= longest).collect();
+        let points = overlapping(step, samples, factors.iter().copied());
+        let variances = points.iter().map(|point| point.variance).collect();
+        Octaves { step, count: samples.len(), records: 1, factors, variances }
+    }
+
+    /// Means of records of one length; `None` of none.
+    pub fn mean(records: &[Octaves]) -> Option<Octaves> {
+        let first = records.first()?;
+        let mean = |k: usize| {
+            records.iter().map(|record| record.variances[k]).sum::<f64>() / records.len() as f64
+        };
+        let variances = (0..first.variances.len()).map(mean).collect();
+        Some(Octaves { records: records.len(), variances, ..first.clone() })
+    }
+
+    /// Fits these terms to the averaging times from the octave `from` on; `None` if the octaves show no noise, or are
+    /// fewer than the parameters.
+    pub fn fit(&self, terms: &[Term], from: usize) -> Option<Fit> {
+        Problem { octaves: self, terms, from }.fit()
+    }
+
+    /// Fits N, B and K. If they do not describe the record, leaves out short averaging times, at which filters of a gyro
+    /// act, or adds a Gauss–Markov bias or a ramp. If nothing does, returns the fit of N, B and K to all octaves. `None` as
+    /// [`Octaves::fit`].
+    pub fn describe(&self) -> Option<Fit> {
+        const BASIC: [Term; 3] = [Term::White, Term::Flicker, Term::Walk];
+        let first = self.fit(&BASIC, 0)?;
+        if first.fits {
+            return Some(first);
+        }
+        let extras = [None, Some(Term::Ramp), Some(Term::Markov)];
+        let out = |from: &usize| self.tau(*from) <= LEFT_OUT.1;
+        let found = extras.into_iter().find_map(|extra| {
+            let terms: Vec<Term> = BASIC.into_iter().chain(extra).collect();
+            let froms = (0..=LEFT_OUT.0.min(self.factors.len())).filter(out);
+            froms.filter_map(|from| self.fit(&terms, from)).find(|fit| fit.fits)
+        });
+        Some(found.unwrap_or(first))
+    }
+
+    /// Averaging time of an octave, s.
+    fn tau(&self, k: usize) -> f64 {
+        self.factors.get(k).map_or(f64::INFINITY, |m| *m as f64 * self.step)
+    }
+}
+
+impl Problem<'_> {
+    fn factors(&self) -> &[usize] {
+        &self.octaves.factors[self.from..]
+    }
+
+    fn measured(&self) -> DVector<f64> {
+        DVector::from_column_slice(&self.octaves.variances[self.from..])
+    }
+
+    fn taus(&self) -> Vec<f64> {
+        (self.from..self.octaves.factors.len()).map(|k| self.octaves.tau(k)).collect()
+    }
+
+    fn markov(&self) -> Option<usize> {
+        self.terms.iter().position(|term| *term == Term::Markov)
+    }
+
+    /// Returns the derivatives of the Allan variances by the coefficients, and by ln T if there is a Gauss–Markov bias.
+    fn jacobian(&self, state: &State) -> DMatrix<f64> {
+        let taus = self.taus();
+        let columns = self.terms.len() + usize::from(self.markov().is_some());
+        DMatrix::from_fn(taus.len(), columns, |row, column| match self.terms.get(column) {
+            Some(term) => term.variance(taus[row], state.time),
+            None => {
+                let by = 1e-4;
+                let at =
+                    |sign: f64| Term::Markov.variance(taus[row], state.time * (sign * by).exp());
+                let size = self.markov().map_or(0.0, |k| state.coefficients[k]);
+                size * (at(1.0) - at(-1.0)) / (2.0 * by)
+            }
+        })
+    }
+
+    fn tables(&self, time: f64) -> Covariance {
+        let Octaves { step, count, .. } = *self.octaves;
+        Covariance::of(step, count, self.factors(), self.terms, time)
+    }
+
+    fn modelled(&self, state: &State) -> DVector<f64> {
+        let coefficients = DVector::from_column_slice(&state.coefficients);
+        self.jacobian(state).columns(0, self.terms.len()) * coefficients
+    }
+
+    /// Returns the covariance of the measured variances in a state.
+    fn covariance(&self, tables: &Covariance, state: &State) -> DMatrix<f64> {
+        tables.matrix(&state.coefficients) / self.octaves.records as f64
+    }
+
+    /// Returns the state that fits best with weights from relative errors: the start of the iterations.
+    fn start(&self) -> Option<State> {
+        let measured = self.measured();
+        let taus = self.taus();
+        // intervals of that length in the record, as the inverse variance of a relative error
+        let weights = DVector::from_iterator(
+            taus.len(),
+            measured.iter().zip(&taus).map(|(value, tau)| 1.0 / (value * tau.sqrt())),
+        );
+        let solved = |time: f64| {
+            let state = State { coefficients: vec![0.0; self.terms.len()], time };
+            let jacobian = self.jacobian(&state).columns(0, self.terms.len()).into_owned();
+            let weighted = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| {
+                weights[row] * jacobian[(row, column)]
+            });
+            let (coefficients, miss) =
+                not_negative(&weighted, &measured.component_mul(&weights), &[])?;
+            Some((State { coefficients, time }, miss))
+        };
+        let (low, high) = self.times()?;
+        let looks = if self.markov().is_some() { 60 } else { 0 };
+        let time = |k: usize| low * (high / low).powf(k as f64 / f64::max(1.0, looks as f64));
+        let states = (0..=looks).filter_map(|k| solved(time(k)));
+        states.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(state, _)| state)
+    }
+
+    /// Returns the shortest and the longest correlation time, s.
+    fn times(&self) -> Option<(f64, f64)> {
+        let taus = self.taus();
+        let (first, last) = (taus.first()?, taus.last()?);
+        Some(((SHORTEST * first).min(*last), *last))
+    }
+
+    /// Returns the state in which the generalized least squares' weights are its own. A `fixed` coefficient keeps its value, and
+    /// the correlation time too.
+    fn settled(
+        &self,
+        mut state: State,
+        fixed: Option<(usize, f64)>,
+        tables: &mut Covariance,
+    ) -> Option<State> {
+        if let Some((place, value)) = fixed {
+            state.coefficients[place] = value;
+        }
+        let (low, high) = self.times()?;
+        for _ in 0..ITERATIONS {
+            let lower = factored(&self.covariance(tables, &state))?.l();
+            let mut measured = self.measured();
+            let mut jacobian = self.jacobian(&state);
+            let mut free: Vec<usize> = (0..jacobian.ncols()).collect();
+            if let Some((place, value)) = fixed {
+                measured -= jacobian.column(place) * value;
+                free.retain(|k| *k != place && *k < self.terms.len());
+            }
+            jacobian = jacobian.select_columns(&free);
+            let either: Vec<usize> =
+                (0..free.len()).filter(|k| free[*k] >= self.terms.len()).collect();
+            let weighted = lower.solve_lower_triangular(&jacobian)?;
+            let values = lower.solve_lower_triangular(&measured)?;
+            let (solved, _) = not_negative(&weighted, &values, &either)?;
+            let before = state.clone();
+            for (k, value) in free.iter().zip(solved) {
+                match state.coefficients.get_mut(*k) {
+                    Some(coefficient) => *coefficient = value,
+                    None => {
+                        let time = state.time * value.clamp(-0.5, 0.5).exp();
+                        state.time = time.clamp(low, high);
+                    }
+                }
+            }
+            if state.coefficients.iter().all(|c| *c == 0.0) {
+                return None;
+            }
+            if state.time != before.time {
+                *tables = self.tables(state.time);
+            }
+            let near = |a: f64, b: f64| (a - b).abs() <= 1e-7 * a.abs().max(b.abs());
+            let mut pairs = state.coefficients.iter().zip(&before.coefficients);
+            if pairs.all(|(a, b)| near(*a, *b)) && near(state.time, before.time) {
+                break;
+            }
+        }
+        Some(state)
+    }
+
+    /// Returns the unconstrained estimates of the coefficients (and the change of ln T) with the weights of a state,
+    /// the matrix that makes them of the measured variances, and their covariance.
+    fn unconstrained(
+        &self,
+        state: &State,
+        covariance: &DMatrix<f64>,
+    ) -> Option<(DVector<f64>, DMatrix<f64>, DMatrix<f64>)> {
+        let cholesky = factored(covariance)?;
+        let mut jacobian = self.jacobian(state);
+        if jacobian.ncols() > self.terms.len() && jacobian.column(self.terms.len()).norm() == 0.0 {
+            jacobian = jacobian.columns(0, self.terms.len()).into_owned();
+        }
+        // columns of one size, because coefficients differ by decades
+        let sizes: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+        let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| {
+            jacobian[(row, column)] / sizes[column]
+        });
+        let weighted = scaled.transpose() * cholesky.inverse();
+        let spread = (&weighted * &scaled).try_inverse()?;
+        let unit = DMatrix::from_fn(sizes.len(), sizes.len(), |row, column| {
+            spread[(row, column)] / sizes[row] / sizes[column]
+        });
+        let mut makes = spread * weighted;
+        for (mut row, size) in makes.row_iter_mut().zip(&sizes) {
+            row /= *size;
+        }
+        Some((&makes * self.measured(), makes, unit))
+    }
+
+    fn fit(&self) -> Option<Fit> {
+        let parameters = self.terms.len() + usize::from(self.markov().is_some());
+        let measured = self.measured();
+        if measured.len() <= parameters || measured.iter().any(|v| !(*v > 0.0 && v.is_finite())) {
+            return None;
+        }
+        let start = self.start()?;
+        let mut tables = self.tables(start.time);
+        let state = self.settled(start, None, &mut tables)?;
+        let covariance = self.covariance(&tables, &state);
+        let (.., spread) = self.unconstrained(&state, &covariance)?;
+        let mut noise = Noise { bias_time: state.time, ..Noise::default() };
+        let mut terms = Vec::new();
+        for (place, term) in self.terms.iter().enumerate() {
+            // B of a Gauss–Markov bias is 0.664 of its standard deviation
+            let unit = if *term == Term::Markov { super::FLICKER } else { 1.0 };
+            let value = unit * state.coefficients[place].sqrt();
+            *noise.parameter(*term) = value;
+            let (low, high) = self.interval(place, &state, &mut tables)?;
+            let error = unit * unit * spread[(place, place)].sqrt() / (2.0 * value);
+            let error = if value > 0.0 { error } else { f64::NAN };
+            let (low, high) = (unit * low.sqrt(), unit * high.sqrt());
+            terms.push((
+                *term,
+                Estimate { value, low: low.min(value), high: high.max(value), error },
+            ));
+        }
+        let bias_time = self.markov().filter(|_| spread.nrows() > self.terms.len()).map(|_| {
+            let relative = spread[(self.terms.len(), self.terms.len())].sqrt();
+            let around = |sign: f64| state.time * (sign * NORMAL * relative).exp();
+            let (low, high) = (around(-1.0), around(1.0));
+            Estimate { value: state.time, low, high, error: relative * state.time }
+        });
+        let shown = state.coefficients.iter().filter(|c| **c > 0.0).count()
+            + usize::from(bias_time.is_some());
+        let (chi_squared, worst) = self.misfit(&state, &covariance)?;
+        let degrees = measured.len() - shown;
+        Some(Fit {
+            noise,
+            terms,
+            bias_time,
+            from: self.octaves.tau(self.from),
+            chi_squared: (chi_squared, degrees),
+            fits: cube_root(chi_squared / degrees as f64, degrees as f64) < MISFIT,
+            worst,
+        })
+    }
+
+    /// Returns χ² of the normal deviates of the octaves, and the worst octave.
+    fn misfit(&self, state: &State, covariance: &DMatrix<f64>) -> Option<(f64, Outlier)> {
+        let modelled = self.modelled(state);
+        let measured = self.measured();
+        let count = measured.len();
+        let deviates = DVector::from_fn(count, |k, _| {
+            let degrees = 2.0 * modelled[k].powi(2) / covariance[(k, k)];
+            cube_root(measured[k] / modelled[k], degrees)
+        });
+        let correlation = DMatrix::from_fn(count, count, |i, j| {
+            covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt()
+        });
+        let chi_squared = deviates.dot(&factored(&correlation)?.solve(&deviates));
+        let worst = deviates.iamax();
+        let ratio = (measured[worst] / modelled[worst]).sqrt();
+        Some((chi_squared, Outlier { tau: self.taus()[worst], ratio }))
+    }
+
+    /// Returns the 95 % interval of a coefficient.
+    fn interval(&self, place: usize, state: &State, tables: &mut Covariance) -> Option<(f64, f64)> {
+        // the unconstrained estimate less each end of its 95 % range if this value is true
+        let mut beyond = |value: f64| -> Option<(f64, f64, f64)> {
+            let mut there = self.settled(state.clone(), Some((place, value)), tables);
+            if there.is_none() {
+                // nothing else is left of the noise
+                let mut alone = state.clone();
+                alone.coefficients[place] = value;
+                there = Some(alone);
+            }
+            let there = there?;
+            let covariance = self.covariance(tables, &there);
+            let (estimates, makes, spread) = self.unconstrained(&there, &covariance)?;
+            let deviation = spread[(place, place)].sqrt();
+            let modelled = self.modelled(&there);
+            let (mut third, mut second) = (0.0, 0.0);
+            for (k, weight) in makes.row(place).iter().enumerate() {
+                // χ² with ν degrees of freedom, of mean A: third cumulant 8 A³/ν²
+                let variance = covariance[(k, k)];
+                second += weight * weight * variance;
+                third += weight.powi(3) * 2.0 * variance * variance / modelled[k];
+            }
+            let skewness = third / second.powf(1.5);
+            let end = |normal: f64| value + deviation * pearson(normal, skewness);
+            let estimate = estimates[place];
+            Some((estimate - end(NORMAL), estimate - end(-NORMAL), deviation))
+        };
+        let value = state.coefficients[place];
+        let (above, _, deviation) = beyond(value)?;
+        let step = deviation.max(f64::MIN_POSITIVE);
+        let low = match beyond(0.0) {
+            Some((above_none, ..)) if above_none > 0.0 => {
+                let (mut out, mut within) = (0.0, value);
+                if above > 0.0 {
+                    within = value + 4.0 * step;
+                }
+                for _ in 0..BISECTIONS {
+                    let middle = 0.5 * (out + within);
+                    if beyond(middle)?.0 > 0.0 { out = middle } else { within = middle }
+                }
+                within
+            }
+            _ => 0.0,
+        };
+        let (mut within, mut by) = (value, 2.0 * step);
+        let mut out = value + by;
+        while beyond(out)?.1 > 0.0 {
+            (within, by) = (out, 2.0 * by);
+            out += by;
+            if by > 1e6 * (value + step) {
+                return Some((low, f64::INFINITY));
+            }
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (out + within);
+            if beyond(middle)?.1 > 0.0 { within = middle } else { out = middle }
+        }
+        Some((low, within))
+    }
+}
+
+/// Bisections of an end of an interval.
+const BISECTIONS: usize = 20;
+
+/// Returns the Cholesky factors of a covariance. Distant octaves count as not correlated, by which the covariance of a noise that
+/// does not describe the record may be indefinite; then its diagonal grows.
+fn factored(covariance: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    [0.0, 1e-3, 1e-2, 0.1, 1.0].into_iter().find_map(|more| {
+        let mut matrix = covariance.clone();
+        for k in 0..matrix.nrows() {
+            matrix[(k, k)] *= 1.0 + more;
+        }
+        Cholesky::new(matrix)
+    })
+}
+
+/// Returns the standard normal deviate of a χ² variable over its mean (Wilson and Hilferty).
+fn cube_root(ratio: f64, degrees: f64) -> f64 {
+    let spread = 2.0 / (9.0 * degrees);
+    (ratio.cbrt() - (1.0 - spread)) / spread.sqrt()
+}
+
+/// Returns the quantile of a distribution of Pearson's type III with mean 0, variance 1 and this skewness, from the standard
+/// normal one (Wilson and Hilferty's frequency factor).
+fn pearson(normal: f64, skewness: f64) -> f64 {
+    if skewness.abs() < 1e-3 {
+        return normal;
+    }
+    let base = 1.0 + skewness * normal / 6.0 - skewness * skewness / 36.0;
+    2.0 / skewness * (base.powi(3) - 1.0)
+}
+
+/// Returns the least-squares solution with coefficients that are not negative, but for those at `either`, and its squared
+/// errors, by trying all subsets of the columns.
+fn not_negative(
+    columns: &DMatrix<f64>,
+    values: &DVector<f64>,
+    either: &[usize],
+) -> Option<(Vec<f64>, f64)> {
+    let count = columns.ncols();
+    let mut best: Option<(Vec<f64>, f64)> = None;
+    for subset in 0..1_u32 << count {
+        let free: Vec<usize> = (0..count).filter(|k| subset & 1 << k != 0).collect();
+        let mut all = vec![0.0; count];
+        let mut errors = values.clone();
+        if !free.is_empty() {
+            let mut part = columns.select_columns(&free);
+            let sizes: Vec<f64> = part.column_iter().map(|column| column.norm()).collect();
+            if sizes.contains(&0.0) {
+                continue;
+            }
+            for (mut column, size) in part.column_iter_mut().zip(&sizes) {
+                column /= *size;
+            }
+            let qr = part.clone().qr();
+            let Some(solved) = qr.r().solve_upper_triangular(&(qr.q().transpose() * values)) else {
+                continue;
+            };
+            errors -= part * &solved;
+            for ((k, value), size) in free.iter().zip(solved.iter()).zip(&sizes) {
+                all[*k] = value / size;
+            }
+        }
+        let allowed = (0..count).all(|k| all[k] >= 0.0 || either.contains(&k));
+        let miss = errors.norm_squared();
+        if allowed && best.as_ref().is_none_or(|(_, least)| miss < *least) {
+            best = Some((all, miss));
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use signals::fourier::{Forward, Inverse};
+
+    use super::*;
+    use crate::random::Random;
+
+    /// Time between samples of the records, s.
+    const STEP: f64 = 0.1;
+
+    /// Flicker noise of bias instability 1: white noise filtered with (1 − z⁻¹)^(−1/2), whose impulse response is a
+    /// recursion (N. J. Kasdin, *Discrete simulation of colored noise and stochastic processes and 1/f^α power law noise
+    /// generation*, Proc. IEEE 83, 1995). The first half, where the filter starts, is dropped.
+    fn flicker(count: usize, random: &mut Random) -> Vec<f64> {
+        let length = 4 * count;
+        let white = (0..2 * count).map(|_| random.normal()).chain(vec![0.0; 2 * count]).collect();
+        let mut response = vec![1.0];
+        for k in 1..2 * count {
+            response.push(response[k - 1] * (k as f64 - 0.5) / k as f64);
+        }
+        response.resize(length, 0.0);
+        let forward = Forward::new(length);
+        let (a, b) = (forward.of(white), forward.of(response));
+        let filtered = Inverse::new(length).of(a.iter().zip(&b).map(|(a, b)| a * b).collect());
+        filtered[count..2 * count].iter().map(|value| value / length as f64).collect()
+    }
+
+    /// A record of known noise.
+    fn record(noise: &Noise, count: usize, seed: u64) -> Vec<f64> {
+        let mut random = Random::new(seed, 7);
+        let slow = match noise.flicker {
+            0.0 => vec![0.0; count],
+            _ => flicker(count, &mut random),
+        };
+        let keep = (-STEP / noise.bias_time).exp();
+        let spread = noise.bias_instability / super::super::FLICKER;
+        let (mut walk, mut bias) = (0.0, spread * random.normal());
+        (slow.iter().enumerate())
+            .map(|(k, slow)| {
+                let white = noise.arw / STEP.sqrt() * random.normal();
+                let value =
+                    white + noise.flicker * slow + walk + bias + noise.ramp * k as f64 * STEP;
+                walk += noise.rrw * STEP.sqrt() * random.normal();
+                bias = keep * bias + spread * (1.0 - keep * keep).sqrt() * random.normal();
+                value
+            })
+            .collect()
+    }
+
+    /// Flicker dominates from 20 to 200 s.
+    const ALL: Noise = Noise {
+        arw: 1e-4,
+        flicker: 3.4e-5,
+        rrw: 2.8e-6,
+        ramp: 0.0,
+        bias_instability: 0.0,
+        bias_time: 100.0,
+    };
+    const COUNT: usize = 1 << 16;
+
+    /// Counts, for N, B and K, the records whose interval holds the truth, and whose fit describes them.
+    fn covered(noise: &Noise, draws: u64) -> ([u64; 3], u64) {
+        let (mut held, mut described) = ([0; 3], 0);
+        for seed in 0..draws {
+            let fit = Octaves::of(STEP, &record(noise, COUNT, seed)).describe().unwrap();
+            described += u64::from(fit.fits && fit.bias_time.is_none());
+            for (held, (term, estimate)) in held.iter_mut().zip(&fit.terms) {
+                let truth = noise.coefficient(*term).sqrt();
+                *held += u64::from((estimate.low..=estimate.high).contains(&truth));
+            }
+        }
+        (held, described)
+    }
+
+    #[test]
+    fn the_noise_put_in_is_within_its_intervals() {
+        // a binomial of 40 draws at 0.95 is below 33 once in 3,000 times
+        let (held, described) = covered(&ALL, 40);
+        assert!(held.iter().all(|count| *count >= 33) && described >= 37, "{held:?} {described}");
+    }
+
+    #[test]
+    #[ignore = "minutes: the nightly run has it"]
+    fn allan_intervals_hold_the_truth_in_95_of_100() {
+        let white = Noise { flicker: 0.0, rrw: 0.0, ..ALL };
+        let walk = Noise { flicker: 0.0, ..ALL };
+        let plateau = Noise { rrw: 0.0, ..ALL };
+        for noise in [ALL, white, walk, plateau] {
+            let (held, described) = covered(&noise, 400);
+            println!("{noise:?}: {held:?} of 400, {described} described");
+            // 400 draws determine a share of 0.95 to 0.011
+            assert!(
+                held.iter().all(|count| *count >= 366) && described >= 384,
+                "{held:?} {described}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_covariance_is_that_of_many_records() {
+        // variance of each octave over 300 records: √(2/300) = 8 %; χ² of few degrees of freedom scatter more
+        let records: Vec<Octaves> =
+            (0..300).map(|seed| Octaves::of(STEP, &record(&ALL, 1 << 12, seed))).collect();
+        let factors = &records[0].factors;
+        let terms = [Term::White, Term::Flicker, Term::Walk];
+        let tables = Covariance::of(STEP, 1 << 12, factors, &terms, 1.0);
+        let expected = tables.matrix(&terms.map(|term| ALL.coefficient(term)));
+        let mean = Octaves::mean(&records).unwrap();
+        let covariance = |i: usize, j: usize| {
+            let products = records.iter().map(|record| {
+                (record.variances[i] - mean.variances[i])
+                    * (record.variances[j] - mean.variances[j])
+            });
+            products.sum::<f64>() / 299.0
+        };
+        for i in 0..factors.len() {
+            let ratio = covariance(i, i) / expected[(i, i)];
+            assert!((0.7..1.4).contains(&ratio), "{i}: {ratio}");
+            for j in 0..i {
+                let size = (expected[(i, i)] * expected[(j, j)]).sqrt();
+                // a correlation of 300 records scatters by 6 %
+                let off = (covariance(i, j) - expected[(i, j)]) / size;
+                assert!(off.abs() < 0.25, "{i}, {j}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_misfit_is_named_and_what_explains_it_is_found() {
+        let bias = Noise { bias_instability: 1e-4, bias_time: 40.0, ..ALL };
+        let bias = Noise { flicker: 0.0, rrw: 0.0, ..bias };
+        let fit = Octaves::of(STEP, &record(&bias, 1 << 17, 1)).describe().unwrap();
+        let Some(time) = fit.bias_time else { panic!("{fit:?}") };
+        // 13,000 s are 330 correlation times
+        assert!(fit.fits && (time.low..time.high).contains(&40.0), "{fit:?}");
+        let ramp = Noise { ramp: 1e-6, ..ALL };
+        let fit = Octaves::of(STEP, &record(&ramp, COUNT, 2)).describe().unwrap();
+        assert!(fit.fits && (fit.noise.ramp / 1e-6 - 1.0).abs() < 0.1, "{fit:?}");
+        // a sine of 100 s is none of these
+        let mut sine = record(&ALL, COUNT, 3);
+        for (k, value) in sine.iter_mut().enumerate() {
+            *value += 1e-4 * (0.0628 * STEP * k as f64).sin();
+        }
+        let fit = Octaves::of(STEP, &sine).describe().unwrap();
+        assert!(!fit.fits && (10.0..200.0).contains(&fit.worst.tau), "{fit:?}");
+        // means of two neighbours: a filter
+        let smooth: Vec<f64> =
+            record(&ALL, COUNT, 4).windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        let fit = Octaves::of(STEP, &smooth).describe().unwrap();
+        assert!(fit.fits && fit.from > STEP && fit.bias_time.is_none(), "{fit:?}");
+        assert!((fit.noise.arw / ALL.arw - 1.0).abs() < 0.03, "{fit:?}");
+        // no noise at all
+        assert_eq!(Octaves::of(STEP, &[0.0; 1000]).describe(), None);
+        assert_eq!(Octaves::of(STEP, &[1.0, 2.0]).describe(), None);
+    }
+}
