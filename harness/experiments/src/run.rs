@@ -242,7 +242,7 @@ impl Run {
     fn inputs(&self, description: &ModelDescription) -> Result<Inputs> {
         let driven = self.driven();
         let names: Vec<&str> = driven.iter().map(|(name, _)| *name).collect();
-        Inputs::new(description, &names, self.hold)
+        Ok(Inputs::new(description, &names, self.hold)?.with_tolerance(self.tolerance))
     }
 
     /// Fails with one sentence if the numbers make no sense.

@@ -1,5 +1,6 @@
-//! A run by Co-Simulation of either version of FMI: inputs set at every communication point, Reals with the slopes that they have
-//! until the next. Integers, enumerations and Booleans are held.
+//! A run of either version of FMI: inputs set at every communication point, Reals with the slopes that they have
+//! until the next. Integers, enumerations and Booleans are held. An FMU that was opened for Model Exchange is integrated between
+//! communication points ([`exchange`]).
 
 use std::borrow::Cow;
 
@@ -7,6 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::c_abi::Called;
 use crate::description::{ModelDescription, Type, Value, Variable};
+use crate::exchange;
 use crate::fmu::Instance;
 
 /// The inputs that a host drives.
@@ -18,7 +20,16 @@ pub struct Inputs {
     discrete: Vec<(usize, Variable)>,
     /// The FMU takes slopes of inputs.
     sloped: bool,
+    /// The inputs are held over each step.
+    hold: bool,
+    /// Relative tolerance of the host's solver, for an FMU without Co-Simulation.
+    exchange: Option<f64>,
 }
+
+/// Relative tolerance of the host's solver, unless the user or the default experiment of the FMU states one.
+const TOLERANCE: f64 = 1e-6;
+/// Part of an input's size by which it may be off its slope before it jumps.
+const JUMP: f64 = 1e-9;
 
 /// Course of the inputs between two communication points, in their order.
 pub struct Course<'a> {
@@ -45,7 +56,14 @@ impl Inputs {
         let interpolates =
             description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs);
         let sloped = !hold && interpolates && !references.is_empty();
-        Ok(Inputs { references, places, discrete, sloped })
+        let tolerance = description.default_experiment.tolerance.unwrap_or(TOLERANCE);
+        let exchange = description.co_simulation.is_none().then_some(tolerance);
+        Ok(Inputs { references, places, discrete, sloped, hold, exchange })
+    }
+
+    /// The same with a relative tolerance of the host's solver; `None` leaves the default.
+    pub fn with_tolerance(self, tolerance: Option<f64>) -> Self {
+        Inputs { exchange: self.exchange.map(|default| tolerance.unwrap_or(default)), ..self }
     }
 
     /// Returns true if an input of this type can be driven.
@@ -79,6 +97,9 @@ impl Inputs {
         start: f64,
         mut at: impl FnMut(&mut Instance<'fmu>, f64, Course) -> Result<Option<f64>>,
     ) -> Result<()> {
+        if let Some(tolerance) = self.exchange {
+            return self.integrate(instance, start, tolerance, at);
+        }
         let count = self.places.len() + self.discrete.len();
         let (mut values, mut slopes) = (vec![0.0; count], vec![0.0; count]);
         let mut t = start;
@@ -86,6 +107,49 @@ impl Inputs {
         {
             self.step(instance, t, next, &values, &slopes)
                 .with_context(|| format!("the run stopped at t = {t} s"))?;
+            t = next;
+        }
+        Ok(())
+    }
+
+    /// The same by Model Exchange. An input that leaves its slope, and one that is not a Real and changes, is an event.
+    fn integrate<'fmu>(
+        &self,
+        instance: &mut Instance<'fmu>,
+        start: f64,
+        tolerance: f64,
+        mut at: impl FnMut(&mut Instance<'fmu>, f64, Course) -> Result<Option<f64>>,
+    ) -> Result<()> {
+        let count = self.places.len() + self.discrete.len();
+        let (mut values, mut slopes) = (vec![0.0; count], vec![0.0; count]);
+        let mut run = exchange::Run::new(instance, tolerance, start, exchange::MOST_STEPS)?;
+        // inputs since the last communication point, which led to here
+        let mut last: Option<(Vec<f64>, Vec<f64>, f64)> = None;
+        let mut t = start;
+        while let Some(next) =
+            at(run.instance(), t, Course { values: &mut values, slopes: &mut slopes })?
+        {
+            if self.hold {
+                slopes.fill(0.0);
+            }
+            let mut step = || -> Result<()> {
+                let jumps = |place: &usize| {
+                    last.as_ref().is_some_and(|(before, slopes, from)| {
+                        let (value, before) = (values[*place], before[*place]);
+                        let by = slopes[*place] * (t - from);
+                        let size = value.abs() + before.abs() + by.abs();
+                        (value - before - by).abs() > JUMP * size
+                    })
+                };
+                if self.discrete.iter().any(|(place, _)| jumps(place)) {
+                    run.change(|instance| self.set_discrete(instance, &values))?;
+                }
+                let jump = self.places.iter().any(jumps);
+                run.drive(&self.references, &self.reals(&values), &self.reals(&slopes), jump)?;
+                run.integrate(next)
+            };
+            step().with_context(|| format!("the run stopped at t = {t} s"))?;
+            last = Some((values.clone(), slopes.clone(), t));
             t = next;
         }
         Ok(())
@@ -100,6 +164,14 @@ impl Inputs {
     }
 
     fn set(&self, instance: &mut Instance, values: &[f64]) -> Called {
+        self.set_discrete(instance, values)?;
+        match self.references.is_empty() {
+            true => Ok(()),
+            false => instance.set_real(&self.references, &self.reals(values)),
+        }
+    }
+
+    fn set_discrete(&self, instance: &mut Instance, values: &[f64]) -> Called {
         for (place, variable) in &self.discrete {
             let value = match variable.kind() {
                 Type::Boolean => Value::Boolean(values[*place] != 0.0),
@@ -107,10 +179,7 @@ impl Inputs {
             };
             instance.set_value(variable, value)?;
         }
-        match self.references.is_empty() {
-            true => Ok(()),
-            false => instance.set_real(&self.references, &self.reals(values)),
-        }
+        Ok(())
     }
 
     fn step(

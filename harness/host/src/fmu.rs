@@ -57,6 +57,15 @@ impl Fmu {
         Fmu::open_for(Interface::CoSimulation, path, settings)
     }
 
+    /// The same for a run from communication point to communication point: by Model Exchange if the FMU offers nothing else.
+    pub fn open_to_run(path: impl AsRef<Path>, settings: &[(String, String)]) -> Result<Self> {
+        let path = path.as_ref();
+        let (_, description) = described(&Archive::open(path)?, path)?;
+        let exchanges = description.co_simulation.is_none() && description.model_exchange.is_some();
+        let interface = if exchanges { Interface::ModelExchange } else { Interface::CoSimulation };
+        Fmu::open_for(interface, path, settings)
+    }
+
     /// The same for one interface.
     pub fn open_for(
         interface: Interface,

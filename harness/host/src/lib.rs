@@ -9,6 +9,7 @@ pub mod c_abi;
 pub mod causality;
 pub mod description;
 pub mod drive;
+pub mod exchange;
 pub mod fmi2;
 pub mod fmi3;
 pub mod fmu;

@@ -46,12 +46,19 @@ pub fn open(name: &Path) -> Result<Fmu> {
 
 /// The same; arrays of FMI 3.0 have the sizes that structural parameters among the settings give them.
 pub fn open_with(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
-    let path = crate::fmu::find(name)?;
-    let fmu = Fmu::open_with(&path, settings)?;
+    opened(Fmu::open_with(crate::fmu::find(name)?, settings)?)
+}
+
+/// The same for a run: by Model Exchange if the FMU offers nothing else.
+pub fn open_to_run(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
+    opened(Fmu::open_to_run(crate::fmu::find(name)?, settings)?)
+}
+
+fn opened(fmu: Fmu) -> Result<Fmu> {
     for what in fmu.changed() {
         terminal::warn(format_args!(
             "loading {} has changed this process's {what}",
-            path.display()
+            fmu.path().display()
         ));
     }
     Ok(fmu)

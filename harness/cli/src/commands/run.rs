@@ -10,12 +10,12 @@ use experiments::rest;
 use experiments::run::{self, Run, driven, histories};
 use experiments::sensors::{self, Sensor, Sensors};
 use experiments::weight::{Tanks, WATER_TENSION};
-use host::description::ModelDescription;
+use host::description::{ModelDescription, Type};
 use host::guard;
 use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL};
 use report::view;
 
-use super::{DEFAULT_FMU, check_out, open_with, setting, write_out};
+use super::{DEFAULT_FMU, check_out, open_to_run, setting, write_out};
 use crate::{progress, set_file, terminal};
 
 /// Simulates one run: a torque history in, signals out.
@@ -91,8 +91,21 @@ impl RunArgs {
             None => Vec::new(),
         };
         settings.extend(self.settings);
-        let fmu = open_with(&self.fmu, &settings)?;
+        let fmu = open_to_run(&self.fmu, &settings)?;
         let description = fmu.description();
+        if description.co_simulation.is_none() {
+            terminal::note(
+                "the FMU has Model Exchange alone: the host integrates it (Dormand and Prince, order 5)",
+            );
+        }
+        let clocks = description.variables.iter().filter(|v| v.kind() == Type::Clock);
+        let clocks: Vec<&str> = clocks.map(|clock| clock.name.as_str()).collect();
+        if !clocks.is_empty() {
+            terminal::warn(format_args!(
+                "the FMU has clocks, and none ticks in this run: what they activate keeps its start values ({})",
+                clocks.join(", ")
+            ));
+        }
         let drive = self.drive.as_deref();
         let (input, torque, others) = match (&self.profile, &self.input) {
             (Some(profile), _) => {

@@ -41,11 +41,35 @@ fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("Model3.fmu");
         model(&path, mutant);
-        follows_its_closed_solution(&path, folder.path());
+        follows_its_closed_solution(&path, folder.path(), 1e-12);
     }
 }
 
-fn follows_its_closed_solution(path: &Path, folder: &Path) {
+/// Without Co-Simulation the host integrates. A clock that nobody activates is named.
+#[test]
+fn an_fmu_with_model_exchange_alone_runs_as_its_closed_solution() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("Model3.fmu");
+    let xml = std::fs::read_to_string(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../check/tests/all/model3.xml"
+    ));
+    let xml = xml.unwrap();
+    let from = xml.find("  <CoSimulation").unwrap();
+    let element = &xml[from..from + xml[from..].find("/>").unwrap() + 2];
+    let clock = "<Clock name=\"tick\" valueReference=\"11\" causality=\"input\" intervalVariability=\"triggered\"/>\n  </ModelVariables>";
+    changed_model(&path, 0, &[(element, ""), ("</ModelVariables>", clock)]);
+    // the default experiment's tolerance is 1e-6
+    let said = follows_its_closed_solution(&path, folder.path(), 2e-5);
+    assert!(said.contains("the host integrates it"), "{said}");
+    assert!(
+        said.contains("has clocks, and none ticks in this run") && said.contains("(tick)"),
+        "{said}"
+    );
+}
+
+/// Returns what the command printed.
+fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> String {
     let input = folder.join("u.csv");
     std::fs::write(&input, "time,u\n0,0\n10,5\n").unwrap();
     let out = folder.join("out.csv");
@@ -69,13 +93,14 @@ fn follows_its_closed_solution(path: &Path, folder: &Path) {
         // x' = -k (x - s t), x(0) = 1: x = s t - s/k + (1 + s/k) exp(-k t)
         let (t, k, s) = (row[0], 2.0, 0.5);
         let x = s * t - s / k + (1.0 + s / k) * (-k * t).exp();
-        // 100 steps, each exact to rounding
-        assert!((row[2] - 2.0 * x).abs() < 1e-12, "{line}: {x}");
+        // 100 steps, in Co-Simulation each exact to rounding
+        assert!((row[2] - 2.0 * x).abs() < within, "{line}: {x}");
         assert_eq!(row[3], (t / 0.25 + 1e-6).floor(), "{line}");
         assert_eq!(row[4..], [1.0, 7.0, 0.0], "{line}");
         rows += 1;
     }
     assert_eq!(rows, 101);
+    String::from_utf8(done.stderr).unwrap()
 }
 
 /// The counter of this model shows 100 while its Boolean is true.

@@ -1,11 +1,10 @@
 //! Identification of any FMU by output error: which values of its parameters and starts make its outputs those of the recordings.
 //!
 //! [`question`] defines the unknowns, [`record`] reads recordings, and [`simulate`] runs the FMU with its own solver or the
-//! host's ([`exchange`]). [`problem`] computes the sum of squares, [`search`] minimises it, [`profile`] finds intervals, and
+//! host's ([`host::exchange`]). [`problem`] computes the sum of squares, [`search`] minimises it, [`profile`] finds intervals, and
 //! [`solver_error`] estimates the effect of the solver's errors. [`page`] writes the report. What a planned recording will tell
 //! is in [`foresee`], the likelihood at other points in [`likelihood`].
 
-pub mod exchange;
 pub mod foresee;
 pub mod likelihood;
 mod page;

@@ -8,9 +8,9 @@ use experiments::sensors::Sensor;
 use experiments::sensors::quantity::Quantity;
 use host::causality::Causality;
 use host::description::{ModelDescription, Type};
+use host::exchange;
 use host::fmu::{Fmu, Instance, Interface};
 
-use super::exchange;
 use super::question::{Question, Setting, Solver, real};
 use super::record::Record;
 
@@ -125,7 +125,7 @@ enum Initialised<'m> {
     /// Co-Simulation.
     Own(Instance<'m>),
     /// The host integrates.
-    Host(exchange::Run<'m>),
+    Host(exchange::Run<Box<Instance<'m>>>),
 }
 
 /// An unknown's value: its reference.
@@ -335,12 +335,16 @@ impl Setup {
             return Ok(Initialised::Own(instance));
         }
         let tolerance = self.tolerance.unwrap_or(FINE);
-        let run = exchange::Run::new(instance, tolerance, start, self.most_steps)?;
+        let run = exchange::Run::new(Box::new(instance), tolerance, start, self.most_steps)?;
         Ok(Initialised::Host(run))
     }
 
     /// Simulates with the host's solver, from row to row.
-    fn integrate(&self, mut run: exchange::Run, record: &Record) -> Result<Vec<Vec<f64>>> {
+    fn integrate(
+        &self,
+        mut run: exchange::Run<Box<Instance>>,
+        record: &Record,
+    ) -> Result<Vec<Vec<f64>>> {
         let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
         for row in 0..record.time.len() {
             let (values, slopes) = self.course(record, row);

@@ -5,8 +5,12 @@
 //! step. Time events and those that completedIntegratorStep asks for are handled as they come. Where events pile up, as under
 //! chattering, each one still moves time on by [`APART`] of the way to the next row, so that the run ends.
 
+use std::ops::DerefMut;
+
 use anyhow::{Result, bail, ensure};
-use host::fmu::Instance;
+
+use crate::c_abi::Called;
+use crate::fmu::Instance;
 
 /// Part of a step to which an event is located.
 const LOCATED: f64 = 1e-13;
@@ -48,8 +52,8 @@ const D: [f64; 7] = [
 ];
 
 /// A run of an initialised instance.
-pub struct Run<'fmu> {
-    instance: Instance<'fmu>,
+pub struct Run<I> {
+    instance: I,
     t: f64,
     x: Vec<f64>,
     z: Vec<f64>,
@@ -63,15 +67,10 @@ pub struct Run<'fmu> {
     inputs: (Vec<u32>, Vec<f64>, Vec<f64>, f64),
 }
 
-impl<'fmu> Run<'fmu> {
+impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
     /// Starts a run from an instance in event mode, as initialization leaves it. `most_steps` limits the steps from one row to
     /// the next.
-    pub fn new(
-        mut instance: Instance<'fmu>,
-        tolerance: f64,
-        start: f64,
-        most_steps: usize,
-    ) -> Result<Self> {
+    pub fn new(mut instance: I, tolerance: f64, start: f64, most_steps: usize) -> Result<Self> {
         let (states, indicators) = instance.sizes()?;
         let mut run = Run {
             instance,
@@ -95,6 +94,13 @@ impl<'fmu> Run<'fmu> {
     /// The instance, to read from.
     pub fn instance(&mut self) -> &mut Instance<'fmu> {
         &mut self.instance
+    }
+
+    /// Sets what is not a Real, which is an event.
+    pub fn change(&mut self, set: impl FnOnce(&mut Instance<'fmu>) -> Called) -> Result<()> {
+        self.instance.enter_event_mode()?;
+        set(&mut self.instance)?;
+        self.update()
     }
 
     /// Sets inputs from here on; `jump`: one of them jumps, which is an event.
