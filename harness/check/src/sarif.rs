@@ -7,12 +7,26 @@ use serde_json::json;
 
 use super::{Report, Severity};
 
+/// A path as a reference of RFC 3986: an absolute one is a file's address.
+fn uri(path: &str) -> String {
+    let mut uri = String::from(if path.starts_with('/') { "file://" } else { "" });
+    for byte in path.bytes() {
+        match byte {
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' | b'~' => {
+                uri.push(byte.into())
+            }
+            _ => uri.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    uri
+}
+
 /// Writes the report.
 ///
 /// # Errors
 /// If it cannot be written.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
-    let fmu = report.path.display().to_string().replace('\\', "/");
+    let fmu = uri(&report.path.display().to_string().replace('\\', "/"));
     let rules: Vec<_> = report
         .outcomes
         .iter()
@@ -35,7 +49,10 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
                 "ruleId": rule.id,
                 "level": level,
                 "message": { "text": format!("{}: {}", finding.place, finding.text) },
-                "locations": [{ "physicalLocation": { "artifactLocation": { "uri": fmu } } }],
+                // GitHub asks for a line
+                "locations": [{ "physicalLocation": {
+                    "artifactLocation": { "uri": fmu }, "region": { "startLine": 1 }
+                } }],
             })
         })
         .collect();
