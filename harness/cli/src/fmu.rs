@@ -42,8 +42,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
         let there: Vec<_> =
             all().iter().filter_map(|fmu| Some(fmu.file_stem()?.display().to_string())).collect();
         bail!(
-            "{file} was not found in dist or in this command's folder ({}; FMUs: {}). `hubslosh pack` builds other variants in the \
-             project's source, with Rust; --fmu FILE takes a file",
+            "{file} was not found in dist or in this command's folder ({}; FMUs: {}). In the project's source, with Rust, \
+             `cargo run --release -- pack` builds it and other variants; --fmu FILE takes a file",
             places.join(", "),
             if there.is_empty() { "none".into() } else { there.join(", ") }
         );

@@ -92,6 +92,11 @@ def fmu_path(model: str | Path) -> Path:
             f"pack --model Spacecraft --tanks {sizes[1]} --modes {sizes[2]}"
             f"{' --fmi 3' if sizes[3] else ''}"
         )
+    if own := re.fullmatch(r"(HubSlosh|SloshTank|Spacecraft)(-fmi3)?", model):
+        raise FmuError(
+            f"{there}; in the project's source, with Rust, this makes it: "
+            f"cargo run --release -- pack --model {own[1]}{' --fmi 3' if own[2] else ''}"
+        )
     raise FmuError(f"{there}{did_you_mean(model, names)}; for another FMU give its file, ….fmu")
 
 

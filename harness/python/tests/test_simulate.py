@@ -259,3 +259,5 @@ def test_a_variant_that_is_not_in_the_package_is_refused_with_the_way_to_it(
     assert said.endswith("hubslosh pack --model Spacecraft --tanks 3 --modes 2 --fmi 3")
     with pytest.raises(FmuError, match="did you mean HubSlosh"):
         hubslosh.fmu_path("Hubslosh")
+    with pytest.raises(FmuError, match=r"pack --model SloshTank --fmi 3$"):
+        hubslosh.fmu_path("SloshTank-fmi3")
