@@ -5,6 +5,7 @@ mod any_fmu;
 #[path = "../../examples/twins/bench.rs"]
 #[allow(dead_code, reason = "the example looks at more of it")]
 mod bench;
+mod coverage;
 #[path = "../../examples/twins/draw.rs"]
 #[allow(dead_code, reason = "the example says more of it")]
 mod draw;
