@@ -232,10 +232,7 @@ fn unknowns(
         }
     }
     if law == FrictionModel::Lugre.name() && !setting(friction::SIGMA0) {
-        // stiffer than the upper end, bristles move less than 1/100 of what a gyro of this kind sees
-        let mut stiffness = Unknown::positive(friction::SIGMA0, &unit(friction::SIGMA0)?, 100.0);
-        stiffness.scale = Scale::Logit(0.0, 1000.0);
-        list.push(stiffness);
+        list.push(Unknown::bristle_stiffness(&unit(friction::SIGMA0)?));
     }
     for (name, mean, deviation) in &options.known {
         if let Some(unknown) = list.iter_mut().find(|u| u.quantity.parameter() == Some(name)) {
@@ -252,6 +249,7 @@ fn unknowns(
         }
         list.extend((0..recordings.len()).map(Unknown::gyro_bias));
     }
+    list.extend(options.effects.iter().cloned());
     // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise
     let nonlinear = !frozen && model != SloshModel::Linear.name();
     if options.gyro_scale > 0.0 && (nonlinear || recordings.iter().any(|r| r.angle.is_some())) {

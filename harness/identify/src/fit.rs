@@ -38,6 +38,7 @@ use nalgebra::{DMatrix, DVector};
 use names::hubslosh::{friction, init};
 use rayon::prelude::*;
 
+use crate::effect::Effects;
 use crate::minimum::{self, End, SumOfSquares};
 use crate::nominal::{self, Bench, Nominal};
 use crate::overridden::{near, refuse};
@@ -325,8 +326,14 @@ impl<'a> Problem<'a> {
             .collect();
         let delay = self.value_of(x, &Quantity::Delay, 0.0);
         let recording = &self.recordings[recording];
+        let effects = Effects {
+            torque: besides,
+            actuator_lag: self.value_of(x, &Quantity::ActuatorLag, 0.0),
+            gyro_lag: self.value_of(x, &Quantity::GyroLag, 0.0),
+            friction_drift: self.value_of(x, &Quantity::FrictionDrift, 0.0),
+        };
         self.driven.fetch_add(recording.time.len(), Relaxed);
-        self.setup.run_under(self.fmu, &values, recording, delay, besides, read)
+        self.setup.run_under(self.fmu, &values, recording, delay, &effects, read)
     }
 
     fn motions(&self, x: &[f64], read: Read) -> Result<Vec<Motion>> {
@@ -494,7 +501,7 @@ impl<'a> Problem<'a> {
     /// Derivative of the residuals with respect to one variable, for each channel.
     fn column(&self, x: &[f64], j: usize, base: &[Motion], step: f64) -> Result<Vec<Vec<f64>>> {
         let quantity = &self.unknowns[j].quantity;
-        if matches!(quantity, Quantity::Parameter(_) | Quantity::Initial(..)) {
+        if quantity.is_in_runs() {
             let moved = |by: f64| -> Result<Vec<Motion>> {
                 let mut moved = x.to_vec();
                 moved[j] += by;

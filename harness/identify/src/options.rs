@@ -9,6 +9,7 @@ use crate::nominal::Nominal;
 use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::tolerance::Tolerances;
+use crate::unknown::Unknown;
 
 /// Options of an identification.
 #[derive(Clone, Debug)]
@@ -25,6 +26,8 @@ pub struct Options {
     pub starts: Vec<(String, f64)>,
     /// True to estimate delay, gyro bias and friction asymmetry as well.
     pub sensor_errors: bool,
+    /// Effects of the bench that the FMU does not have and that are estimated: [`Unknown::actuator_lag`] and others.
+    pub effects: Vec<Unknown>,
     /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
     pub gyro_scale: f64,
     /// Tolerances of values that are not estimated.
@@ -48,6 +51,7 @@ impl Default for Options {
             known: Vec::new(),
             starts: Vec::new(),
             sensor_errors: true,
+            effects: Vec::new(),
             gyro_scale: 0.01,
             tolerances: Tolerances::default(),
             intersample: None,

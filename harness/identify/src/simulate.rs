@@ -4,9 +4,10 @@ use anyhow::Result;
 use experiments::rest;
 use host::drive::Inputs;
 use host::fmu::Fmu;
-use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA};
+use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA, friction};
 
 use crate::clocks;
+use crate::effect::{self, Effects};
 use crate::recording::Recording;
 
 /// Instants closer than this are the same, s.
@@ -14,6 +15,9 @@ const SAME: f64 = 1e-9;
 
 /// The FMU's input for a torque on the hub besides the actuator's.
 pub const TORQUE_BESIDES: &str = TAU_EXT;
+
+/// The FMU's parameters that friction is proportional to.
+const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
 
 /// Motion of the hub at the rows of a recording.
 #[derive(Clone, Debug, Default)]
@@ -144,17 +148,18 @@ impl Setup {
         recording: &Recording,
         delay: f64,
     ) -> Result<Motion> {
-        self.run_under(fmu, values, recording, delay, None, Read::All)
+        self.run_under(fmu, values, recording, delay, &Effects::default(), Read::All)
     }
 
-    /// The same with a torque on the hub besides the recorded one, N·m, at the recording's rows; of the motion `read` is read.
+    /// The same with effects that the FMU does not have; of the motion `read` is read. The rate is the one that the gyro's filter
+    /// passes.
     pub fn run_under(
         &self,
         fmu: &Fmu,
         values: &[(&str, f64)],
         recording: &Recording,
         delay: f64,
-        besides: Option<&[f64]>,
+        effects: &Effects,
         read: Read,
     ) -> Result<Motion> {
         let reference =
@@ -166,8 +171,12 @@ impl Setup {
         for (name, value) in values {
             instance.set_real(&[reference(name)?], &[*value])?;
         }
-        let held = self.intersample == Intersample::ZeroOrderHold;
-        let (knots, torque) = course(recording, self.intersample);
+        let (mut knots, mut torque) = course(recording, self.intersample);
+        let mut held = self.intersample == Intersample::ZeroOrderHold;
+        if effects.actuator_lag > 0.0 {
+            (knots, torque) = effect::of_actuator(effects.actuator_lag, &knots, &torque, held);
+            held = false;
+        }
         let at_knots = |signal: &[f64]| -> Vec<f64> {
             if knots.len() == recording.time.len() && knots == recording.time {
                 return signal.to_vec();
@@ -177,7 +186,7 @@ impl Setup {
             knots.iter().map(value).collect()
         };
         let gravity = recording.gravity.as_deref().map(at_knots);
-        let besides = besides.map(at_knots);
+        let besides = effects.torque.map(at_knots);
         let mut driven = vec![(TAU_CMD, torque.as_slice())];
         driven.extend(gravity.as_ref().map(|gravity| (G_AXIAL, gravity.as_slice())));
         driven.extend(besides.as_ref().map(|torque| (TORQUE_BESIDES, torque.as_slice())));
@@ -186,6 +195,13 @@ impl Setup {
         let time = &recording.time;
         let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
         inputs.initialise(&mut instance, None, time[0], None, &first)?;
+        let drifting = match effects.friction_drift == 0.0 {
+            true => Vec::new(),
+            false => FRICTION.map(reference).into_iter().collect::<Result<Vec<u32>>>()?,
+        };
+        let mut friction = vec![0.0; drifting.len()];
+        instance.get_real(&drifting, &mut friction)?;
+        let span = time[time.len() - 1] - time[0];
 
         let outputs =
             [reference(THETA)?, reference(OMEGA)?, reference(OMEGA_DOT)?, reference(SLOSH_ANGLE)?];
@@ -212,6 +228,12 @@ impl Setup {
                     motion.slosh_angle.push(values[3]);
                 }
                 row += 1;
+                if !drifting.is_empty() {
+                    let part = 1.0 + effects.friction_drift * (recorded - time[0]) / span;
+                    let now: Vec<f64> =
+                        friction.iter().map(|value| value * part.max(0.0)).collect();
+                    instance.set_real(&drifting, &now)?;
+                }
             };
             if knots.get(knot + 1).is_some_and(|end| t >= *end) {
                 knot += 1;
@@ -226,6 +248,13 @@ impl Setup {
             }
             Ok(Some(end.filter(|end| *end < target + SAME).unwrap_or(target)))
         })?;
+        if effects.gyro_lag > 0.0 {
+            for signal in [&mut motion.rate, &mut motion.acceleration] {
+                if signal.len() > 3 {
+                    *signal = effect::of_gyro(effects.gyro_lag, time, &smooth(time, signal));
+                }
+            }
+        }
         Ok(motion)
     }
 }

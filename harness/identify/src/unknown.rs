@@ -45,6 +45,12 @@ pub enum Quantity {
     Delay,
     /// Delay of the encoder's angle, s. It is that of the rate where the two sensors are equally late.
     AngleDelay,
+    /// Time constant of an actuator that lags its command, s ([`crate::effect`]).
+    ActuatorLag,
+    /// Time constant of the gyro's filter, s.
+    GyroLag,
+    /// Relative change of the friction from a recording's first row to its last.
+    FrictionDrift,
     /// Reading of the gyro over the rate.
     GyroScale,
     /// Reading of the gyro at rest, rad/s, one for each recording.
@@ -62,11 +68,20 @@ impl Quantity {
             Quantity::Parameter(name) => name.clone(),
             Quantity::Delay => "delay".into(),
             Quantity::AngleDelay => "angle_delay".into(),
+            Quantity::ActuatorLag => "actuator_lag".into(),
+            Quantity::GyroLag => "gyro_lag".into(),
+            Quantity::FrictionDrift => "friction_drift".into(),
             Quantity::GyroScale => "gyro_scale".into(),
             Quantity::GyroBias(recording) => format!("gyro_bias[{}]", recording + 1),
             Quantity::AngleOffset(recording) => format!("angle_offset[{}]", recording + 1),
             Quantity::Initial(recording, name) => format!("{name}[{}]", recording + 1),
         }
+    }
+
+    /// Returns true if derivatives by it are differences of runs; the others are exact.
+    pub fn is_in_runs(&self) -> bool {
+        use Quantity::{ActuatorLag, FrictionDrift, GyroLag, Initial, Parameter};
+        matches!(self, Parameter(_) | Initial(..) | ActuatorLag | GyroLag | FrictionDrift)
     }
 
     /// The parameter's name if it is one of the FMU's for all recordings.
@@ -212,6 +227,27 @@ impl Unknown {
     /// The delay from torque to the encoder's angle.
     pub fn angle_delay() -> Self {
         Unknown::new(Quantity::AngleDelay, "s", 0.0, Scale::Linear(1e-3))
+    }
+
+    /// The lag of the actuator.
+    pub fn actuator_lag() -> Self {
+        Unknown::new(Quantity::ActuatorLag, "s", 0.02, Scale::Softplus(5e-3))
+    }
+
+    /// The lag of the gyro's filter.
+    pub fn gyro_lag() -> Self {
+        Unknown::new(Quantity::GyroLag, "s", 0.02, Scale::Softplus(5e-3))
+    }
+
+    /// The drift of the friction.
+    pub fn friction_drift() -> Self {
+        Unknown::new(Quantity::FrictionDrift, "1", 0.1, Scale::Linear(0.1))
+    }
+
+    /// The stiffness of LuGre's bristles. Stiffer than the upper end, bristles move less than 1/100 of what a gyro of this kind sees.
+    pub fn bristle_stiffness(unit: &str) -> Self {
+        let stiffness = Unknown::positive(friction::SIGMA0, unit, 100.0);
+        Unknown { scale: Scale::Logit(0.0, 1000.0), ..stiffness }
     }
 
     /// The gyro's scale.

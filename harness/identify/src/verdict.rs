@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
+use crate::cause::Cause;
 use crate::estimate::{Estimated, prose};
 use crate::evidence::{DECIDES, probabilities};
 use crate::missing::Missing;
@@ -42,6 +43,8 @@ pub struct Findings {
     pub torque: Vec<String>,
     /// Torques that the model lacks.
     pub missing: Vec<Missing>,
+    /// The likeliest cause of a misfit, if one was found.
+    pub cause: Option<Cause>,
     /// Doubts about recordings or model, in words.
     pub doubts: Vec<String>,
 }
@@ -69,13 +72,20 @@ pub fn words(
     if !fits {
         let mut reasons: Vec<String> =
             fit.tests.iter().flat_map(|tests| failed(tests, "the torque")).collect();
-        reasons.extend(findings.missing.iter().map(Missing::words));
+        // a torque that explains less than the cause does is its shadow
+        let gain = findings.cause.as_ref().map_or(0.0, |cause| cause.gain);
+        let missing = findings.missing.iter();
+        reasons.extend(missing.filter(|m| m.deviations.powi(2) > gain).map(Missing::words));
         reasons.extend(findings.doubts.iter().cloned());
+        if reasons.is_empty() {
+            reasons.extend(findings.missing.iter().map(Missing::words));
+        }
         lines.push(format!(
             "{DOES_NOT_FIT}: no model leaves only the gyro's noise as residual ({}). Values and intervals are those of the \
              nearest model and cannot be trusted: something acts on the bench that the models lack.",
             reasons.join("; ")
         ));
+        lines.extend(findings.cause.as_ref().map(Cause::words));
     }
     if !fit.converged {
         lines.push(format!(

@@ -19,6 +19,7 @@ use identify::reading::{self, Source};
 use identify::recording::Recording;
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
+use identify::unknown::Unknown;
 use names::hubslosh::fluid;
 use signals::recording::Columns;
 use std::io::Write;
@@ -102,6 +103,15 @@ pub struct IdentifyArgs {
     /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
     #[arg(conflicts_with = "free", long)]
     perfect: bool,
+    /// Also estimates the time constant with which the actuator lags its command.
+    #[arg(conflicts_with = "free", long)]
+    actuator_lag: bool,
+    /// Also estimates the time constant of a low-pass filter in the gyro.
+    #[arg(conflicts_with = "free", long)]
+    gyro_lag: bool,
+    /// Also estimates the relative change of the friction over a recording.
+    #[arg(conflicts_with = "free", long)]
+    friction_drift: bool,
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
     #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
@@ -237,6 +247,7 @@ impl IdentifyArgs {
     /// Runs the command.
     pub fn run(mut self) -> Result<()> {
         if !self.any.is_asked() {
+            self.tolerances()?;
             self.settings = nominal::with_damping(self.settings);
         }
         if self.empty {
@@ -341,6 +352,14 @@ impl IdentifyArgs {
             settings: self.settings.clone(),
             starts: self.starts.clone(),
             sensor_errors: !self.perfect,
+            effects: [
+                (self.actuator_lag, Unknown::actuator_lag()),
+                (self.gyro_lag, Unknown::gyro_lag()),
+                (self.friction_drift, Unknown::friction_drift()),
+            ]
+            .into_iter()
+            .filter_map(|(is_asked, unknown)| is_asked.then_some(unknown))
+            .collect(),
             gyro_scale: self.gyro_scale,
             start_study: self.start_study,
             tolerances: self.tolerances()?,

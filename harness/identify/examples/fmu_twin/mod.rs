@@ -43,6 +43,10 @@ pub enum Unmodelled {
     Clipping,
     /// Air slows the hub by [`AIR`] ω|ω|.
     Drag,
+    /// The wheel's torque follows its command with the time constant [`LAG`].
+    ActuatorLag,
+    /// The gyro has a filter with the time constant [`LAG`].
+    GyroLag,
 }
 
 /// Frequency of rocking, Hz.
@@ -55,11 +59,15 @@ const ROCKING_SEEN: f64 = 0.01;
 const WARM: f64 = 0.3;
 /// Drag of the air, N·m·s².
 const AIR: f64 = 0.02;
+/// Time constant of wheel or gyro, s.
+const LAG: f64 = 0.03;
+/// Parts of the way from row to row in which a lag is computed.
+const LAG_PARTS: usize = 8;
 /// Time constant of warming up, s.
 const WARMING: f64 = 600.0;
 
 impl Unmodelled {
-    /// Effect by its name: tilt, nutation, warming, clipping or drag.
+    /// Effect by its name.
     pub fn named(name: &str) -> Result<Self> {
         Ok(match name {
             "tilt" => Unmodelled::Tilt,
@@ -67,7 +75,11 @@ impl Unmodelled {
             "warming" => Unmodelled::Warming,
             "clipping" => Unmodelled::Clipping,
             "drag" => Unmodelled::Drag,
-            _ => bail!("{name} is none of tilt, nutation, warming, clipping, drag"),
+            "actuator-lag" => Unmodelled::ActuatorLag,
+            "gyro-lag" => Unmodelled::GyroLag,
+            _ => bail!(
+                "{name} is none of tilt, nutation, warming, clipping, drag, actuator-lag, gyro-lag"
+            ),
         })
     }
 }
@@ -158,6 +170,9 @@ impl Twin {
             let values = std::iter::once(tau[0]).chain(tau.iter().copied()).collect();
             Torque::Rows { time: knots, tau: values, held }
         };
+        let is = |effect: Unmodelled| self.unmodelled.contains(&effect);
+        let lags = is(Unmodelled::ActuatorLag) || is(Unmodelled::GyroLag);
+        let heard = if is(Unmodelled::ActuatorLag) { behind(&heard, &time) } else { heard };
         // steps that meet the knots, or are short against a smooth torque's cycle
         let parts = match (self.intersample, late == 0.0) {
             (Intersample::BandLimited, _) => (step / 1e-3).ceil() as usize,
@@ -166,6 +181,7 @@ impl Twin {
         };
         let drags = self.unmodelled.contains(&Unmodelled::Drag);
         // the drag is held over a step of 1 ms: 0.4° of a cycle at 2.4 Hz
+        let parts = if lags { LAG_PARTS } else { parts };
         let parts = if drags { parts.max((step / 1e-3).ceil() as usize) } else { parts };
         let run = Run {
             settings: self.settings(&tau, seed),
@@ -188,12 +204,16 @@ impl Twin {
         let omega = reference("omega")?;
         let (mut angle, mut random) = (Vec::new(), Random::new(seed.unwrap_or(0).into(), 1));
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
+        let mut filter = Lag::default();
         let names = [TORQUE, TORQUE_BESIDES];
         let names = if drags { &names[..] } else { &names[..1] };
         let inputs = Inputs::new(fmu.description(), names, held)?;
         let mut steps = 0;
         inputs.drive(&mut instance, start, |instance, t, course| {
             let (row, part) = (steps / parts, steps % parts);
+            let mut true_rate = [0.0];
+            instance.get_real(&[omega], &mut true_rate)?;
+            let passed = filter.step(true_rate[0], run.step);
             if part == 0 {
                 let mut now = [0.0; 3];
                 instance.get_real(&read, &mut now)?;
@@ -201,8 +221,9 @@ impl Twin {
                     true => ROCKING_SEEN * rocking.step(now[1], step),
                     false => 0.0,
                 };
+                let late = if is(Unmodelled::GyroLag) { passed - true_rate[0] } else { 0.0 };
                 let SensorErrors { gyro_scale, gyro_bias, .. } = self.sensor_errors;
-                rate.push(gyro_scale * (now[0] + seen) + gyro_bias);
+                rate.push(gyro_scale * (now[0] + seen + late) + gyro_bias);
                 angle.extend(self.encoder.map(|std| now[2] + std * random.normal()));
                 if row == rows {
                     return Ok(None);
@@ -224,9 +245,8 @@ impl Twin {
                 false => heard.chord((t - shift).max(start), next - t),
             };
             if drags {
-                let mut rate = [0.0];
-                instance.get_real(&[omega], &mut rate)?;
-                (course.values[1], course.slopes[1]) = (-AIR * rate[0] * rate[0].abs(), 0.0);
+                let rate = true_rate[0];
+                (course.values[1], course.slopes[1]) = (-AIR * rate * rate.abs(), 0.0);
             }
             steps += 1;
             Ok(Some(next))
@@ -234,6 +254,39 @@ impl Twin {
         let angle = self.encoder.map(|_| angle);
         Ok(Recording { angle, ..Recording::of("twin", time, tau, rate) })
     }
+}
+
+/// y' = (u − y)/[`LAG`], from rest.
+#[derive(Default)]
+struct Lag {
+    y: f64,
+    u: f64,
+}
+
+impl Lag {
+    /// y after a step on which u is a line from its last value, by the trapezoidal rule.
+    fn step(&mut self, u: f64, step: f64) -> f64 {
+        let half = 0.5 * step / LAG;
+        self.y = ((1.0 - half) * self.y + half * (self.u + u)) / (1.0 + half);
+        self.u = u;
+        self.y
+    }
+}
+
+/// A torque behind its command, at [`LAG_PARTS`] instants from row to row.
+fn behind(torque: &Torque, rows: &[f64]) -> Torque {
+    let mut lag = Lag::default();
+    let (mut time, mut tau) = (vec![rows[0]], vec![0.0]);
+    for ends in rows.windows(2) {
+        let h = (ends[1] - ends[0]) / LAG_PARTS as f64;
+        for part in 1..=LAG_PARTS {
+            let t = if part == LAG_PARTS { ends[1] } else { ends[0] + part as f64 * h };
+            // just before a step of a held torque
+            tau.push(lag.step(torque.at(t - 1e-9), h));
+            time.push(t);
+        }
+    }
+    Torque::Rows { time, tau, held: false }
 }
 
 /// φ'' + 2ζΩφ' + Ω²φ = Ω² ∫a dt: far below Ω φ follows the hub's rate.

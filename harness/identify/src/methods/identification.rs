@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::Identified;
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
+use crate::cause::Cause;
 use crate::missing::Missing;
 use crate::nominal::Start;
 use crate::start::Response;
@@ -24,6 +25,8 @@ pub struct Details {
     pub error_budget: Vec<Effect>,
     /// Torques that the model lacks.
     pub missing: Vec<Missing>,
+    /// The likeliest cause of a misfit.
+    pub cause: Option<Cause>,
     /// All models that were tried, the chosen one first.
     pub models: Vec<ModelFit>,
     /// Estimates from the frequency response.

@@ -21,6 +21,7 @@ use super::{Identified, Method, Needs, Residual, Task};
 use crate::between::{self, Others};
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
+use crate::cause;
 use crate::deep_tank;
 use crate::estimate::Estimated;
 use crate::evidence::{self, ALIKE, DECIDES};
@@ -299,7 +300,8 @@ fn finish(
     let e = problem.stacked(&polished.answer, &x);
     let changes = budget::slopes(&problem, &polished, &options.tolerances)?;
     say("tolerances", &problem);
-    let findings = Findings {
+    let mut findings = Findings {
+        cause: None,
         torque: between_rows.words,
         missing: missing::torques(&problem, &polished, &e, &changes)?,
         doubts: question
@@ -312,6 +314,12 @@ fn finish(
     };
     say("torques that may be missing", &problem);
     let fits = findings.fits(&fit);
+    if !fits {
+        let law = fit.friction.clone();
+        findings.cause = cause::find(&problem, &polished.x, (&model, &law), &mut |line| {
+            say(line, &problem);
+        })?;
+    }
     let profile = friction::profile(&problem, &polished, &speeds)?;
     say("profile of the friction's curve", &problem);
     let Polished { jacobian, covariance, answer, .. } = polished;
@@ -436,13 +444,14 @@ fn finish(
     verdict.extend(start_study::words(&starts));
     verdict.extend(regime(&fit.model, &answer));
     let (converged, condition) = (fit.converged, covariance.condition);
-    let missing = findings.missing;
+    let (missing, cause) = (findings.missing, findings.cause);
     let details = Details {
         fit,
         combinations,
         condition,
         error_budget,
         missing,
+        cause,
         starts,
         ..Details::default()
     };

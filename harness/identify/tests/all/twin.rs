@@ -114,6 +114,36 @@ fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals
     assert!(is_told, "{:?}", found.verdict);
 }
 
+/// A lag of 30 ms in the wheel. Its first order is a delay, which is free; the rest passed for a torque of the rate's square.
+#[test]
+fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque: Profile = "lin-sweep:amplitude=0.1,duration=120,f0=1.5,f1=3.6".parse().unwrap();
+    let settings = vec![("slosh.zeta_from_correlation".to_string(), "false".to_string())];
+    let twin =
+        Twin { settings, unmodelled: vec![Unmodelled::ActuatorLag], rate: 25.0, ..Twin::default() };
+    let recordings = [twin.record(&fmu, &Torque::Profile(torque), Some(4)).unwrap()];
+    let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
+    let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
+    assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
+    let cause = found.details.cause.as_ref().unwrap();
+    assert!(cause.fits && cause.flags == "--actuator-lag", "{cause:?}");
+    let says = |words: &str| found.verdict.iter().any(|line| line.contains(words));
+    assert!(
+        says("an actuator that lags its command") && !says("rate's square"),
+        "{:?}",
+        found.verdict
+    );
+    let effects = vec![Unknown::actuator_lag()];
+    let found = identify(&fmu, &recordings, &Options { effects, ..options }, &mut |_| {}).unwrap();
+    assert!(found.fits == Some(true) && found.converged, "{:?}", found.verdict);
+    let lag = &found.measurement["actuator_lag"];
+    assert!((lag.value - 0.03).abs() < 4.0 * lag.std && lag.std < 3e-3, "{lag:?}");
+    // the friction of a wheel that is late is the bearing's
+    let inertia = &found.parameters["hub.I"];
+    assert!((inertia.value - 0.322414).abs() < 4.0 * inertia.std, "{inertia:?}");
+}
+
 /// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
 /// exclude the truth by fourteen standard deviations.
 #[test]
