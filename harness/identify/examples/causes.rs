@@ -2,7 +2,7 @@
 //! own. Prints the cause that the verdict names, and counts the right ones.
 //!
 //! ```text
-//! cargo run --release -p identify --example causes -- [KEY=VALUE ...]
+//! cargo run --release -p identify --features studies --example causes -- [KEY=VALUE ...]
 //!   seeds=1-3           benches of each way
 //!   ways=lag,…          the ways, see [`WAYS`]
 //!   say=false           true: the search of every bench
