@@ -14,9 +14,11 @@ mod stamps;
 mod text;
 mod unit;
 
+use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use files::input;
 
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
 pub use self::even::even;
@@ -127,6 +129,8 @@ pub struct Wanted<'a> {
 
 /// Times from here on, s, are counted from the recording's beginning: seconds since 1970, say.
 const LATE: f64 = 1e6;
+/// Latest time whose unit may be unstated, s since 1970: the year 5138. Milliseconds since 1970 are later.
+const LATEST: f64 = 1e11;
 /// Largest magnitude of a value in SI: its fourth power, which statistics take, is finite in sums over all rows.
 const LARGEST: f64 = 1e60;
 /// Rows that a slow signal may miss in succession, in units of its usual spacing, and at least [`SHORT`].
@@ -162,6 +166,9 @@ enum File {
 impl File {
     fn open(path: &Path) -> Result<File> {
         let ending = path.extension().and_then(|e| e.to_str()).map(str::to_lowercase);
+        if !matches!(ending.as_deref(), Some("parquet" | "mat")) {
+            refuse_binary(path)?;
+        }
         match ending.as_deref() {
             Some("csv" | "txt" | "tsv" | "dat" | "asc" | "log") => {
                 Ok(File::Text(text::Layout::of(path)?))
@@ -182,6 +189,32 @@ impl File {
             File::Text(layout) => &layout.header,
             File::Parquet(header) | File::Matlab(header) => header,
         }
+    }
+}
+
+/// Fails for files of formats that others call by the ending of a text, with what to do.
+fn refuse_binary(path: &Path) -> Result<()> {
+    const KNOWN: [(&[u8], &str); 8] = [
+        (b"\x1f\x8b", "it is compressed with gzip: unpack it first (gunzip)"),
+        (b"\x28\xb5\x2f\xfd", "it is compressed with zstd: unpack it first (unzstd)"),
+        (
+            b"PK\x03\x04",
+            "it is a zip archive, as .xlsx is: save the sheet as CSV UTF-8, or unpack the archive",
+        ),
+        (b"\xd0\xcf\x11\xe0", "it is an old Excel workbook (.xls): save the sheet as CSV UTF-8"),
+        (
+            b"SQLite format 3",
+            "it is an SQLite database, as a ROS 2 bag is: export its topics as CSV",
+        ),
+        (b"\x89HDF", "it is HDF5: read it with h5py or pandas, and write CSV or Parquet"),
+        (b"TDSm", "it is TDMS: read it with npTDMS, and write CSV or Parquet"),
+        (b"PAR1", "it is Parquet: give it the ending .parquet"),
+    ];
+    let mut start = Vec::new();
+    input::open(path).context("it cannot be opened")?.take(16).read_to_end(&mut start)?;
+    match KNOWN.iter().find(|(sign, _)| start.starts_with(sign)) {
+        Some((_, words)) => bail!("{words}"),
+        None => Ok(()),
     }
 }
 
@@ -291,6 +324,16 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
                 column[row]
             );
         }
+    }
+    if timed
+        && stated.is_none()
+        && !seconds
+        && let Some(late) = columns[0].iter().find(|t| t.abs() > LATEST)
+    {
+        bail!(
+            "column {time} is {late} s, millennia after 1970: it counts ms, us or ns (allowed: up to {LATEST:e} s where no unit is \
+             stated): {remedy}"
+        );
     }
     if let Some(origin) = origin {
         done(format!("its times are dates: time counts from {origin}"));

@@ -97,11 +97,12 @@ impl Value {
 }
 
 /// Forms of dates, all with a time of day and any number of decimals of the second.
-const DATES: [&str; 4] = [
+const DATES: [&str; 5] = [
     "%Y-%m-%dT%H:%M:%S%.f",
     "%Y-%m-%d %H:%M:%S%.f",
     "%Y/%m/%d %H:%M:%S%.f",
     "%d.%m.%Y %H:%M:%S%.f",
+    "%d-%b-%Y %H:%M:%S%.f",
 ];
 
 /// Nanoseconds since 1970 of a date and time by ISO 8601, with slashes or as 31.1.2026, in UTC unless it says otherwise.
@@ -117,8 +118,12 @@ fn date(field: &str) -> Option<i64> {
     zoned().or_else(|| DATES.iter().find_map(|form| plain(form)))
 }
 
-/// Nanoseconds since midnight of a time of day, 23:59:59.98.
+/// Nanoseconds since midnight of a time of day, 23:59:59.98, or of a duration as pandas writes it, 0 days 00:00:00.02.
 fn clock(field: &str) -> Option<i64> {
+    if let Some((days, rest)) = field.split_once(" days ") {
+        let days = days.parse::<i64>().ok().filter(|days| (0..100_000).contains(days))?;
+        return Some(days * DAY + clock(rest)?);
+    }
     if field.len() < 7 || field.bytes().filter(|byte| *byte == b':').count() != 2 {
         return None;
     }
@@ -126,10 +131,28 @@ fn clock(field: &str) -> Option<i64> {
     Some(i64::from(time.num_seconds_from_midnight()) * 1_000_000_000 + i64::from(time.nanosecond()))
 }
 
-/// Returns true for a field that marks a missing value.
+/// Returns true for a field that marks a missing value, or what C's library and spreadsheets print for NaN.
 fn missing(field: &str) -> bool {
-    let words = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"];
-    field.len() < 5 && words.iter().any(|word| field.eq_ignore_ascii_case(word))
+    const WORDS: [&str; 17] = [
+        "",
+        "nan",
+        "na",
+        "n/a",
+        "#n/a",
+        "null",
+        "none",
+        "-",
+        "--",
+        "nat",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "-1.#ind",
+        "#nv",
+        "#div/0!",
+    ];
+    field.len() < 10 && WORDS.iter().any(|word| field.eq_ignore_ascii_case(word))
 }
 
 /// Value of a field; `style` is how its column writes numbers so far.
@@ -358,6 +381,17 @@ impl Layout {
         let head = sample[..at].iter().position(|(_, line)| fits(line));
         let (names, units) = match head {
             Some(head) => {
+                let names = texts(&sample[head].1);
+                if names.len() < width {
+                    let closed = texts(&sample[at].1).last().is_some_and(String::is_empty);
+                    ensure!(
+                        closed,
+                        "its header, line {}, has {} names, its rows have {width} fields (allowed: as many, or one more that is \
+                         empty)",
+                        sample[head].0,
+                        names.len()
+                    );
+                }
                 let row = sample[head + 1..at].iter().rev().find(|(_, line)| fits(line));
                 if head > 0 {
                     notes.push(format!("the {head} lines above its header were passed over"));
@@ -365,7 +399,7 @@ impl Layout {
                 if let Some((line, _)) = row {
                     notes.push(format!("line {line} was taken for a row of units"));
                 }
-                (texts(&sample[head].1), row.map(|(_, line)| texts(line)))
+                (names, row.map(|(_, line)| texts(line)))
             }
             None => {
                 if let Some((line, text)) = at.checked_sub(1).map(|above| &sample[above]) {

@@ -66,10 +66,15 @@ const UNITS: &[(Quantity, &str, f64)] = &[
     (Force, "kN", 1e3),
 ];
 
-/// A unit's name as [`UNITS`] has it: N·m, N.m, N*m and "N m" are Nm, m/s² and m/s^2 are m/s2, °/s is deg/s.
+/// A unit's name as [`UNITS`] has it: N·m, N.m, N*m and "N m" are Nm, m/s² and m/s^2 are m/s2, °/s and deg/sec are deg/s.
 fn plain(text: &str) -> String {
     let text = text.replace('°', "deg").replace(['µ', 'μ'], "u").replace('²', "2");
-    text.chars().filter(|c| !matches!(c, '·' | '.' | '*' | '^' | ' ' | '⋅')).collect()
+    let name: String =
+        text.chars().filter(|c| !matches!(c, '·' | '.' | '*' | '^' | ' ' | '⋅')).collect();
+    match name.strip_suffix("sec") {
+        Some(start) if !start.ends_with("arc") => format!("{start}s"),
+        _ => name,
+    }
 }
 
 /// Factor from one unit to another; `None` unless both are known units of one quantity.

@@ -31,19 +31,19 @@ fn read_file(path: &Path, columns: &Columns) -> Result<(Table, String), String> 
 }
 
 /// The same of a text in a file of that ending.
-fn read_text(ending: &str, text: &[u8], of: &str) -> Result<(Table, String), String> {
+pub fn read_text(ending: &str, text: &[u8], of: &str) -> Result<(Table, String), String> {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(format!("a.{ending}"));
     std::fs::write(&path, text).unwrap();
     read_file(&path, &columns(of))
 }
 
-fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
+pub fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
     table.column(name).unwrap()
 }
 
 /// Bit for bit but for a factor's rounding.
-fn assert_close(found: &[f64], expected: &[f64], of: &str) {
+pub fn assert_close(found: &[f64], expected: &[f64], of: &str) {
     assert_eq!(found.len(), expected.len(), "{of}: {found:?}");
     for (found, expected) in found.iter().zip(expected) {
         assert!(

@@ -1,0 +1,569 @@
+//! Files as the tools of a laboratory write them, 40 rows each, from one recording: every one is read with the right values, or
+//! refused with the line and the words that help.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use parquet::basic::{LogicalType, Repetition, TimeUnit, Type as Physical};
+use parquet::data_type::{DoubleType, Int64Type};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::{PrimitiveTypeBuilder, Type};
+
+use super::recording::{assert_close, column, read_text};
+
+const ROWS: usize = 40;
+/// 2026-01-31T12:00:00Z, s since 1970.
+const BEGIN: i64 = 1_769_860_800;
+
+/// Time, ms.
+fn millis(k: usize) -> usize {
+    20 * k
+}
+
+/// Torque command, mN·m.
+fn torque(k: usize) -> i64 {
+    (37 * k % 200) as i64 - 100
+}
+
+/// Tenths of the rate in deg/s.
+fn tenths(k: usize) -> i64 {
+    (13 * k % 50) as i64 - 25
+}
+
+fn rate(k: usize) -> String {
+    format!(
+        "{}{}.{}",
+        if tenths(k) < 0 { "-" } else { "" },
+        tenths(k).abs() / 10,
+        tenths(k).abs() % 10
+    )
+}
+
+fn seconds(k: usize) -> String {
+    format!("{}.{:03}", millis(k) / 1000, millis(k) % 1000)
+}
+
+/// Clock time, from 12:00:00 on.
+fn clock(k: usize) -> String {
+    format!("12:00:0{}.{:03}", millis(k) / 1000, millis(k) % 1000)
+}
+
+/// A head, and a line for each row.
+fn lines(head: &str, line: impl Fn(usize) -> String) -> Vec<u8> {
+    let mut text = String::from(head);
+    for k in 0..ROWS {
+        let _ = writeln!(text, "{}", line(k));
+    }
+    text.into_bytes()
+}
+
+fn commas(text: &str) -> String {
+    text.replace('.', ",")
+}
+
+fn crlf(text: &[u8]) -> Vec<u8> {
+    String::from_utf8_lossy(text).replace('\n', "\r\n").into_bytes()
+}
+
+/// The time, the torque and the rate in columns of these names.
+fn of(time: &str, tau: &str, omega: &str) -> String {
+    format!("time={time},tau_cmd={tau},omega={omega}")
+}
+
+/// An element of a .mat file.
+fn element(kind: u32, data: &[u8]) -> Vec<u8> {
+    let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
+    bytes.extend(data);
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    bytes
+}
+
+/// An array of a .mat file: class, size, name and what it holds.
+fn array(class: u32, [rows, columns]: [u32; 2], name: &str, body: &[u8]) -> Vec<u8> {
+    let words = |words: [u32; 2]| words.map(u32::to_le_bytes).concat();
+    let head = [
+        element(6, &words([class, 0])),
+        element(5, &words([rows, columns])),
+        element(1, name.as_bytes()),
+    ];
+    element(14, &[&head.concat()[..], body].concat())
+}
+
+fn doubles(name: &str, columns: u32, value: impl Fn(usize) -> f64) -> Vec<u8> {
+    let count = ROWS * columns as usize;
+    let data: Vec<u8> = (0..count).flat_map(|k| value(k).to_le_bytes()).collect();
+    array(6, [ROWS as u32, columns], name, &element(9, &data))
+}
+
+fn structure(name: &str, fields: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    let mut names = Vec::new();
+    for (name, _) in fields {
+        names.extend(name.bytes().chain(std::iter::repeat(0)).take(32));
+    }
+    // the length of a name is a small element
+    let small = [(4_u32 << 16 | 5).to_le_bytes(), 32_u32.to_le_bytes()].concat();
+    let values: Vec<u8> = fields.iter().flat_map(|(_, value)| value.clone()).collect();
+    array(2, [1, 1], name, &[small, element(1, &names), values].concat())
+}
+
+fn mat(elements: &[Vec<u8>]) -> Vec<u8> {
+    let mut file =
+        b"MATLAB 5.0 MAT-file, Platform: GLNXA64, Created on: Sat Jan 31 12:00:00 2026".to_vec();
+    file.resize(124, b' ');
+    file.extend([0, 1, b'I', b'M']);
+    file.extend(elements.concat());
+    file
+}
+
+/// A Parquet file: an index of timestamps in ns or a time in s, torque in mN·m, rate in deg/s.
+fn parquet(time: &str, timestamps: bool) -> Vec<u8> {
+    fn real(name: &str) -> PrimitiveTypeBuilder<'_> {
+        Type::primitive_type_builder(name, Physical::DOUBLE)
+    }
+    let first = match timestamps {
+        true => Type::primitive_type_builder(time, Physical::INT64)
+            .with_logical_type(Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
+        false => real(time),
+    };
+    let fields = [real("T_cmd"), real("gyro_z"), first];
+    let fields = fields.map(|f| Arc::new(f.with_repetition(Repetition::OPTIONAL).build().unwrap()));
+    let schema = Type::group_type_builder("schema").with_fields(fields.to_vec()).build().unwrap();
+    let mut bytes = Vec::new();
+    let properties = Arc::new(WriterProperties::builder().build());
+    let mut writer = SerializedFileWriter::new(&mut bytes, Arc::new(schema), properties).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let there = [1_i16; ROWS];
+    let reals: [&dyn Fn(usize) -> f64; 2] = [&|k| torque(k) as f64, &|k| tenths(k) as f64 / 10.0];
+    for value in reals {
+        let values: Vec<f64> = (0..ROWS).map(value).collect();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<DoubleType>().write_batch(&values, Some(&there), None).unwrap();
+        column.close().unwrap();
+    }
+    let mut column = group.next_column().unwrap().unwrap();
+    if timestamps {
+        let at = |k: usize| BEGIN * 1_000_000_000 + millis(k) as i64 * 1_000_000;
+        let values: Vec<i64> = (0..ROWS).map(at).collect();
+        column.typed::<Int64Type>().write_batch(&values, Some(&there), None).unwrap();
+    } else {
+        let values: Vec<f64> = (0..ROWS).map(|k| millis(k) as f64 / 1e3).collect();
+        column.typed::<DoubleType>().write_batch(&values, Some(&there), None).unwrap();
+    }
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    bytes
+}
+
+/// A file of a tool: its name, the file's ending and bytes, the columns, and the words of the refusal (`None`: it is read).
+type Case = (&'static str, &'static str, Vec<u8>, String, Option<&'static str>);
+
+fn spreadsheets() -> Vec<Case> {
+    let plain = of("t:ms", "T_cmd:mNm", "gyro z:deg/s");
+    let german = lines("sep=;\nt;T_cmd;gyro z\n", |k| {
+        format!("{};{};{}", millis(k), torque(k), commas(&rate(k)))
+    });
+    let minus = |text: &str| text.replace('-', "\u{2212}");
+    let french = lines("t;T_cmd;gyro z\n", |k| {
+        // µN·m, with narrow blanks between thousands
+        let torque = format!("{}\u{202f}000", torque(k)).replace("0\u{202f}000", "0\u{202f}000");
+        let torque = if torque.starts_with("0\u{202f}") { "0".into() } else { torque };
+        format!("{};{};{}", millis(k), minus(&torque), minus(&commas(&rate(k))))
+    });
+    let utf_16: Vec<u8> = String::from_utf8(lines("\u{feff}t\tT_cmd\tgyro z\n", |k| {
+        format!("{}\t{}\t{}", millis(k), torque(k), rate(k))
+    }))
+    .unwrap()
+    .encode_utf16()
+    .flat_map(u16::to_le_bytes)
+    .collect();
+    vec![
+        (
+            "Excel, Germany",
+            "csv",
+            crlf(&[b"\xef\xbb\xbf", &german[..]].concat()),
+            plain.clone(),
+            None,
+        ),
+        ("Excel, France", "csv", french, of("t:ms", "T_cmd:uNm", "gyro z:deg/s"), None),
+        (
+            "Excel, Unicode text",
+            "txt",
+            utf_16,
+            plain.clone(),
+            Some("it is UTF-16; save it as UTF-8"),
+        ),
+        (
+            "Excel, #N/A and #DIV/0! in a column that is not used",
+            "csv",
+            lines("t,T_cmd,gyro z,ratio\n", |k| {
+                let ratio = if k % 3 == 0 { "#DIV/0!" } else { "1.5" };
+                format!("{},{},{},{ratio}", millis(k), torque(k), rate(k))
+            }),
+            plain.clone(),
+            None,
+        ),
+        (
+            "Excel workbook under another name",
+            "csv",
+            b"PK\x03\x04\x14\0\x06\0".to_vec(),
+            plain.clone(),
+            Some("a zip archive, as .xlsx is"),
+        ),
+        (
+            "LibreOffice, all fields quoted",
+            "csv",
+            lines("\"t\",\"T_cmd\",\"gyro z\"\n", |k| {
+                format!("\"{}\",\"{}\",\"{}\"", millis(k), torque(k), commas(&rate(k)))
+            }),
+            plain,
+            None,
+        ),
+    ]
+}
+
+fn robots() -> Vec<Case> {
+    let nanoseconds = |k: usize| BEGIN * 1_000_000_000 + 1_000_000 * millis(k) as i64;
+    let bag = lines(
+        "%time,field.header.seq,field.header.frame_id,field.torque,field.angular_velocity.z\n",
+        |k| format!("{},{k},imu_link,{},{}", nanoseconds(k), torque(k), rate(k)),
+    );
+    let influx = lines("name,time,T_cmd,gyro\n", |k| {
+        format!("bench,{},{},{}", nanoseconds(k), torque(k), rate(k))
+    });
+    let tau = "field.torque:mNm";
+    let z = "field.angular_velocity.z:deg/s";
+    let late = "is 1769860800000000000 s";
+    vec![
+        ("rostopic echo -p", "csv", bag.clone(), of("time:ns", tau, z), None),
+        ("rostopic echo -p, its unit not stated", "csv", bag, of("time", tau, z), Some(late)),
+        (
+            "PlotJuggler",
+            "csv",
+            lines("__time,/bench/torque/data,/imu/angular_velocity/z\n", |k| {
+                format!(
+                    "{}.{:06},{},{}",
+                    BEGIN + millis(k) as i64 / 1000,
+                    millis(k) % 1000 * 1000,
+                    torque(k),
+                    rate(k)
+                )
+            }),
+            of("__time", "/bench/torque/data:mNm", "/imu/angular_velocity/z:deg/s"),
+            None,
+        ),
+        (
+            "PX4 ulog2csv",
+            "csv",
+            lines("timestamp,timestamp_sample,xyz[0],xyz[1],xyz[2],torque\n", |k| {
+                format!(
+                    "{0},{0},0.5,-0.25,{1},{2}",
+                    123_456_789 + 1000 * millis(k),
+                    rate(k),
+                    torque(k)
+                )
+            }),
+            of("timestamp:us", "torque:mNm", "xyz[2]:deg/s"),
+            None,
+        ),
+        (
+            "ArduPilot mavlogdump --format csv",
+            "csv",
+            lines("timestamp,TimeUS,I,GyrZ,Tq,Mode\n", |k| {
+                format!(
+                    "{}.{:03},{},0,{},{},GUIDED",
+                    BEGIN + millis(k) as i64 / 1000,
+                    millis(k) % 1000,
+                    1000 * millis(k),
+                    rate(k),
+                    torque(k)
+                )
+            }),
+            of("TimeUS:us", "Tq:mNm", "GyrZ:deg/s"),
+            None,
+        ),
+        (
+            "gnss-ins-sim",
+            "csv",
+            lines("time (sec),gyro_x (deg/s),gyro_y (deg/s),gyro_z (deg/s),T (mN.m)\n", |k| {
+                format!("{},0.1,-0.2,{},{}", seconds(k), rate(k), torque(k))
+            }),
+            of("time", "T", "gyro_z"),
+            None,
+        ),
+        ("InfluxDB 1 shell", "csv", influx.clone(), of("time:ns", "T_cmd:mNm", "gyro:deg/s"), None),
+        (
+            "InfluxDB 1 shell, its unit not stated",
+            "csv",
+            influx,
+            of("time", "T_cmd:mNm", "gyro:deg/s"),
+            Some(late),
+        ),
+        (
+            "InfluxDB 2 annotated, pivoted",
+            "csv",
+            lines(
+                "#group,false,false,true,false,false\n#datatype,string,long,dateTime:RFC3339,double,double\n#default,_result,,,,\n,result,table,_time,T_cmd,gyro\n",
+                |k| format!(",,0,2026-01-31T{}Z,{},{}", clock(k), torque(k), rate(k)),
+            ),
+            of("_time", "T_cmd:mNm", "gyro:deg/s"),
+            None,
+        ),
+        (
+            "Grafana",
+            "csv",
+            lines("\"Time\",\"T_cmd\",\"gyro\"\n", |k| {
+                format!("2026-01-31 {},{} mN·m,{}", clock(k), torque(k), rate(k))
+            }),
+            of("Time", "T_cmd:mNm", "gyro:deg/s"),
+            Some("line 2, column T_cmd: \"-100 mN·m\" is not a number"),
+        ),
+    ]
+}
+
+fn laboratories() -> Vec<Case> {
+    vec![
+        (
+            "NI TDMS to CSV (npTDMS)",
+            "csv",
+            lines(",/'Bench'/'Time',/'Bench'/'T_cmd',/'Bench'/'gyro z'\n", |k| {
+                format!("{k},{},{},{}", seconds(k), torque(k), rate(k))
+            }),
+            of("/'Bench'/'Time'", "/'Bench'/'T_cmd':mNm", "/'Bench'/'gyro z':deg/s"),
+            None,
+        ),
+        (
+            "Saleae Logic",
+            "csv",
+            lines("Time [s],Channel 0,Channel 1\n", |k| {
+                format!("{}000000,{}.000,{}00", seconds(k), torque(k), rate(k))
+            }),
+            of("Time", "Channel 0:mNm", "Channel 1:deg/s"),
+            None,
+        ),
+        (
+            "HBM catman, Germany",
+            "txt",
+            lines(
+                "HBM_CATMANFILE_5.0\nDatum: 31.01.2026\nZeit\tDrehmoment\tDrehrate\ns\tmN·m\t°/s\n",
+                |k| format!("{}\t{}\t{}\t", commas(&seconds(k)), torque(k), commas(&rate(k))),
+            ),
+            of("Zeit", "Drehmoment", "Drehrate"),
+            None,
+        ),
+        (
+            "Arduino serial plotter",
+            "txt",
+            lines("", |k| format!("T_cmd:{},gyro:{}", torque(k), rate(k))),
+            of("t", "T_cmd:mNm", "gyro:deg/s"),
+            Some("line 2, \"T_cmd:-63,gyro:-1.2\", is not a row of numbers"),
+        ),
+        (
+            "C on Windows: NaN and infinities in a spare column",
+            "csv",
+            lines("t,T_cmd,gyro,spare\n", |k| {
+                let spare = ["-nan(ind)", "1.#QNAN", "-1.#IND", "nan", "-nan", "0.5"][k % 6];
+                format!("{},{},{},{spare}", millis(k), torque(k), rate(k))
+            }),
+            of("t:ms", "T_cmd:mNm", "gyro:deg/s"),
+            None,
+        ),
+        (
+            "gzip under another name",
+            "csv",
+            b"\x1f\x8b\x08\0\0\0\0\0\0\x03".to_vec(),
+            of("t", "a", "b"),
+            Some("it is compressed with gzip"),
+        ),
+        (
+            "gzip",
+            "gz",
+            b"\x1f\x8b\x08\0\0\0\0\0\0\x03".to_vec(),
+            of("t", "a", "b"),
+            Some("it is compressed with gzip"),
+        ),
+        (
+            "ROS 2 bag",
+            "csv",
+            b"SQLite format 3\0\x10\0".to_vec(),
+            of("t", "a", "b"),
+            Some("it is an SQLite database"),
+        ),
+    ]
+}
+
+fn programs() -> Vec<Case> {
+    let log = structure(
+        "log",
+        &[
+            ("time", doubles("", 1, |k| millis(k) as f64 / 1e3)),
+            (
+                "signals",
+                structure(
+                    "",
+                    &[(
+                        "values",
+                        doubles("", 2, |k| match k / ROWS {
+                            0 => torque(k) as f64,
+                            _ => tenths(k % ROWS) as f64 / 10.0,
+                        }),
+                    )],
+                ),
+            ),
+        ],
+    );
+    let vectors = [
+        doubles("t", 1, |k| millis(k) as f64 / 1e3),
+        doubles("T_cmd", 1, |k| torque(k) as f64),
+        doubles("gyro", 1, |k| tenths(k) as f64 / 10.0),
+    ];
+    // logsout is an object of MATLAB's classes: class 17, opaque
+    let dataset = array(17, [1, 1], "logsout", &element(1, b"MCOS"));
+    let plain = || of("t:ms", "T_cmd:mNm", "gyro_z:deg/s");
+    vec![
+        ("MATLAB -v6", "mat", mat(&vectors), of("t", "T_cmd:mNm", "gyro:deg/s"), None),
+        (
+            "Simulink, structure with time",
+            "mat",
+            mat(&[log]),
+            of("log.time", "log.signals.values(1):mNm", "log.signals.values(2):deg/s"),
+            None,
+        ),
+        (
+            "Simulink logsout, a Dataset",
+            "mat",
+            mat(&[dataset]),
+            of("t", "a", "b"),
+            Some("it holds no vector or matrix of real numbers"),
+        ),
+        (
+            "MATLAB writetable with datetime",
+            "csv",
+            lines("t,T_cmd,gyro_z\n", |k| {
+                format!("31-Jan-2026 {},{},{}", clock(k), torque(k), rate(k))
+            }),
+            of("t", "T_cmd:mNm", "gyro_z:deg/s"),
+            None,
+        ),
+        (
+            "pandas to_csv with its index",
+            "csv",
+            lines(",t,T_cmd,gyro_z\n", |k| {
+                format!("{k},{}.0,{}.0,{}", millis(k), torque(k), rate(k))
+            }),
+            plain(),
+            None,
+        ),
+        (
+            "pandas to_csv, DatetimeIndex",
+            "csv",
+            lines("time,T_cmd,gyro_z\n", |k| {
+                let stamp = format!("2026-01-31 {}000", clock(k));
+                format!(
+                    "{},{},{}",
+                    stamp.strip_suffix(".000000").unwrap_or(&stamp),
+                    torque(k),
+                    rate(k)
+                )
+            }),
+            of("time", "T_cmd:mNm", "gyro_z:deg/s"),
+            None,
+        ),
+        (
+            "pandas to_csv, TimedeltaIndex",
+            "csv",
+            lines("time,T_cmd,gyro_z\n", |k| {
+                let stamp = format!("0 days 00:00:0{}000", seconds(k));
+                format!(
+                    "{},{},{}",
+                    stamp.strip_suffix(".000000").unwrap_or(&stamp),
+                    torque(k),
+                    rate(k)
+                )
+            }),
+            of("time", "T_cmd:mNm", "gyro_z:deg/s"),
+            None,
+        ),
+        (
+            "pandas to_parquet, DatetimeIndex",
+            "parquet",
+            parquet("__index_level_0__", true),
+            of("__index_level_0__", "T_cmd:mNm", "gyro_z:deg/s"),
+            None,
+        ),
+        (
+            "Polars write_parquet",
+            "parquet",
+            parquet("t", false),
+            of("t", "T_cmd:mNm", "gyro_z:deg/s"),
+            None,
+        ),
+        (
+            "Python logging",
+            "log",
+            lines("", |k| format!("2026-01-31 {};{};{}", commas(&clock(k)), torque(k), rate(k))),
+            of("#1", "#2:mNm", "#3:deg/s"),
+            None,
+        ),
+        (
+            "numpy savetxt with a header",
+            "txt",
+            lines("# t T_cmd gyro_z\n", |k| {
+                format!("{:.18e} {:.18e} {}", millis(k) as f64, torque(k) as f64, rate(k))
+            }),
+            plain(),
+            None,
+        ),
+        (
+            "Dymola, OpenModelica",
+            "csv",
+            lines("\"t\",\"T_cmd\",\"gyro_z\",\n", |k| {
+                format!("{},{},{},", millis(k), torque(k), rate(k))
+            }),
+            plain(),
+            None,
+        ),
+        (
+            "JavaScript dates",
+            "csv",
+            lines("t,T_cmd,gyro_z\n", |k| {
+                format!("{},{},{}", BEGIN * 1000 + millis(k) as i64, torque(k), rate(k))
+            }),
+            of("t", "T_cmd:mNm", "gyro_z:deg/s"),
+            Some("is 1769860800000 s"),
+        ),
+    ]
+}
+
+#[test]
+fn the_files_of_tools_are_read_with_the_right_values_or_refused_with_the_words_that_help() {
+    let cases = [spreadsheets(), robots(), laboratories(), programs()].concat();
+    let time: Vec<f64> = (0..ROWS).map(|k| millis(k) as f64 * 1e-3).collect();
+    let torques: Vec<f64> = (0..ROWS).map(|k| torque(k) as f64 * 1e-3).collect();
+    let rates: Vec<f64> = (0..ROWS).map(|k| (tenths(k) as f64 / 10.0).to_radians()).collect();
+    let mut wrong = Vec::new();
+    for (tool, ending, bytes, columns, refusal) in &cases {
+        match (read_text(ending, bytes, columns), refusal) {
+            (Ok((table, said)), None) => {
+                // times count from the first row where they are dates, else from their own zero
+                let from = column(&table, "time")[0];
+                let times: Vec<f64> = column(&table, "time").iter().map(|t| t - from).collect();
+                // times since 1970 in s have 52 binary digits
+                let off = |(a, b): (&f64, &f64)| (a - b).abs() > 3e-7;
+                if times.len() != ROWS || times.iter().zip(&time).any(off) {
+                    wrong.push(format!("{tool}: times {times:?}\n{said}"));
+                    continue;
+                }
+                assert_close(column(&table, "tau_cmd"), &torques, tool);
+                assert_close(column(&table, "omega"), &rates, tool);
+            }
+            (Err(error), Some(words)) if error.contains(words) => {}
+            (Ok((_, said)), Some(words)) => {
+                wrong.push(format!("{tool}: read, not \"{words}\"\n{said}"))
+            }
+            (Err(error), _) => wrong.push(format!("{tool}: {error}")),
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
