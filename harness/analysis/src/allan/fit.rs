@@ -21,6 +21,9 @@ const MISFIT: f64 = 3.1;
 const ITERATIONS: usize = 12;
 /// Shortest averaging times that may be left out, and their longest, s.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
+/// Octaves that are left out beyond those that the test of the fit demands. A filter's effect on the variance halves with each octave:
+/// what passes the test can still move N by several of its standard deviations.
+const BEYOND: usize = 2;
 /// Shortest correlation time of a Gauss–Markov bias in averaging times: a shorter one looks like white noise.
 const SHORTEST: f64 = 10.0;
 
@@ -133,8 +136,12 @@ impl Octaves {
         let out = |from: &usize| self.tau(*from) <= LEFT_OUT.1;
         let found = extras.into_iter().find_map(|extra| {
             let terms: Vec<Term> = BASIC.into_iter().chain(extra).collect();
-            let froms = (0..=LEFT_OUT.0.min(self.factors.len())).filter(out);
-            froms.filter_map(|from| self.fit(&terms, from)).find(|fit| fit.fits)
+            let mut froms = (0..=LEFT_OUT.0.min(self.factors.len())).filter(out);
+            froms.find_map(|from| {
+                let fits = |from: usize| self.fit(&terms, from).filter(|fit| fit.fits);
+                let found = fits(from)?;
+                Some(if from == 0 { found } else { fits(from + BEYOND).unwrap_or(found) })
+            })
         });
         Some(found.unwrap_or(first))
     }
