@@ -204,11 +204,19 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
             ax.plot(bands["at"], nominal, ".-", color=COLORS[0], markersize=4)
         ax.set_ylabel(label)
         ax.margins(y=0.15)
-        low, high = ax.get_ylim()
+        low, high = _widened(*ax.get_ylim())
+        ax.set_ylim(low, high)
         if low < 0.5 * high or names == ("gain_up", "gain_down"):
             ax.set_ylim(min(low, 0), max(high, 0))
     axes[-1].set_xlabel(unit)
     figure.align_ylabels(axes)
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """Return the ends of an axis at least 1 % of the value apart: rounding fills no axis."""
+    least = 0.01 * max(abs(low), abs(high))
+    more = max(least - (high - low), 0) / 2
+    return low - more, high + more
 
 
 def _by_mode(review: "Review") -> list[tuple[str, str, pd.DataFrame]]:
@@ -255,10 +263,11 @@ def _modes(figure: "Figure", review: "Review", unit: str) -> None:
         axes[1].plot(at, 100 * rows["zeta_closed"], "x", color=color, markersize=5)
     axes[0].set_ylabel("frequency (Hz)")
     axes[1].set(ylabel="damping ratio (%)", xlabel=unit)
-    if (review.slosh[["zeta", "zeta_closed"]] > 0).all(axis=None):
-        axes[1].set_yscale("log")
+    zetas = review.slosh[["zeta", "zeta_closed"]].to_numpy(float)
+    if np.nanmin(zetas) > 0 and np.nanmax(zetas) > 10 * np.nanmin(zetas):
+        axes[1].set_yscale("log", subs=[2, 5])
         axes[1].yaxis.set_major_formatter("{x:g}")
-        axes[1].yaxis.set_minor_formatter("")
+        axes[1].yaxis.set_minor_formatter("{x:g}")
     figure.align_ylabels(axes)
     _legend(figure)
 
@@ -376,6 +385,7 @@ def _draws(figure: "Figure", drawn: pd.DataFrame) -> None:
         share = 100 * np.arange(1, len(values) + 1) / len(drawn)
         ax.step(values, share, where="post", color=COLORS[0])
         ax.set(xlabel=label, ylabel="points below (%)", ylim=(0, 102))
+        ax.set_xlim(*_widened(*ax.get_xlim()))
 
 
 def _simulated(figure: "Figure", review: "Review", unit: str) -> None:
