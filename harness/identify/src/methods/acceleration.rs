@@ -953,7 +953,8 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let liquid = bench.real(tank::M_LIQ)? * bench.real(tank::R)?.powi(2);
     let mut plain = Problem::new(fmu, recordings, options, Form::AtRow)?;
     let given = given(&plain, options, liquid)?;
-    let biases = plain.rough_biases();
+    let rests = plain.readings_at_rest();
+    let biases = plain.rough_biases(&rests);
     plain.leave_out_stuck(&biases);
     let rough = plain.thinned(ROUGH);
     let starts = rough.starts(&biases, &given);
@@ -962,9 +963,18 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let near = plain.solve_to(&[off_the_bounds(&start.x)], &[], 1e-6);
     let uncorrected = plain.values(&near.x);
     let mut problem = Problem::new(fmu, recordings, options, Form::Averaged)?;
-    problem.leave_out_stuck(problem.biases(&uncorrected).to_vec().as_slice());
-    problem.place_kinks(&uncorrected);
-    let mut minimum = problem.solve_to(&[off_the_bounds(&near.x)], &[], 1e-6);
+    // a fit at rows has no residuals of the rest: with another bias the hub would creep there without friction
+    let (mut first, mut x) = (uncorrected.clone(), off_the_bounds(&near.x));
+    let place = first.len() - rests.len();
+    for (place, rest) in (place..).zip(&rests) {
+        if let Some(rest) = rest {
+            first[place] = *rest;
+            x[place] = problem.scales[place].variable(problem.inside(place, *rest));
+        }
+    }
+    problem.leave_out_stuck(problem.biases(&first).to_vec().as_slice());
+    problem.place_kinks(&first);
+    let mut minimum = problem.solve_to(&[x, starts[0].clone()], &[], 1e-6);
     for _ in 0..ROUNDS {
         let p = problem.values(&minimum.x);
         if !problem.leave_out_stuck(problem.biases(&p).to_vec().as_slice()) {

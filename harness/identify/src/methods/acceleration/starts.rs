@@ -112,13 +112,18 @@ impl Rows {
 }
 
 impl Problem {
-    /// The gyro's bias in each recording, roughly: what is read at rest, else the mean where that explains the recording better
-    /// than no bias.
-    pub(super) fn rough_biases(&self) -> Vec<f64> {
+    /// Reading of the gyro at rest in each recording, rad/s.
+    pub(super) fn readings_at_rest(&self) -> Vec<Option<f64>> {
         let inertia = rough_inertia(&self.rows);
+        self.rows.iter().map(|rows| rows.reading_at_rest(inertia)).collect()
+    }
+
+    /// The gyro's bias in each recording, roughly: `rests`, the readings at rest, else the mean where that explains the recording better
+    /// than no bias.
+    pub(super) fn rough_biases(&self, rests: &[Option<f64>]) -> Vec<f64> {
         (0..self.rows.len())
             .map(|index| {
-                if let Some(rest) = self.rows[index].reading_at_rest(inertia) {
+                if let Some(rest) = rests[index] {
                     return rest;
                 }
                 let one = Problem { rows: vec![self.rows[index].clone()], ..self.clone() };
