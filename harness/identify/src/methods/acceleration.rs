@@ -434,6 +434,8 @@ struct Problem {
     form: Form,
     scales: Vec<Scale>,
     names: Vec<String>,
+    /// The hub turns one way alone, so the asymmetry stays zero.
+    one_way: bool,
 }
 
 impl Problem {
@@ -501,7 +503,7 @@ impl Problem {
             bounds[place] = (*low, *high);
         }
         let scales = bounds.into_iter().map(|(a, b)| Scale::Logit(a, b)).collect();
-        Ok(Problem { rows, harmonics: options.harmonics, form, scales, names })
+        Ok(Problem { rows, harmonics: options.harmonics, form, scales, names, one_way: false })
     }
 
     /// The same with so many rows, or a few more, taken evenly.
@@ -665,6 +667,11 @@ impl Problem {
         jacobian
     }
 
+    /// Returns true if a search moves a variable.
+    fn is_free(&self, held: &[usize], place: usize) -> bool {
+        !held.contains(&place) && (!self.one_way || place != ASYMMETRY)
+    }
+
     /// The best of the minima from these starts, without moving the variables `held`.
     fn solve(&self, starts: &[Vec<f64>], held: &[usize]) -> Minimum {
         self.solve_to(starts, held, 1e-9)
@@ -677,7 +684,7 @@ impl Problem {
         let derivatives = |x: &[f64]| {
             let mut jacobian = self.jacobian(&self.values(x));
             for (j, mut column) in jacobian.column_iter_mut().enumerate() {
-                column *= if held.contains(&j) { 0.0 } else { self.scales[j].slope(x[j]) };
+                column *= if self.is_free(held, j) { self.scales[j].slope(x[j]) } else { 0.0 };
             }
             Some(jacobian)
         };
@@ -696,7 +703,7 @@ impl Problem {
         let p = self.values(&minimum.x);
         // how sure the others are must not depend on a value that only a bound keeps from going on
         let whole = self.jacobian(&p);
-        let free = |j: &usize| !held.contains(j);
+        let free = |j: &usize| self.is_free(held, *j);
         let all = (0..p.len()).filter(free);
         let acting = all.clone().filter(|&j| whole.column(j).norm() > 0.0).collect();
         let inner = all.filter(|&j| !self.is_at_bound(j, p[j])).collect();
@@ -956,6 +963,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let rests = plain.readings_at_rest();
     let biases = plain.rough_biases(&rests);
     plain.leave_out_stuck(&biases);
+    plain.one_way = !plain.turns_both_ways(&biases);
     let rough = plain.thinned(ROUGH);
     let starts = rough.starts(&biases, &given);
     ensure!(!starts.is_empty(), "inertia and friction have no influence on the recording");
@@ -963,7 +971,8 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let near = plain.solve_to(&[off_the_bounds(&start.x)], &[], 1e-6);
     let uncorrected = plain.values(&near.x);
     let mut problem = Problem::new(fmu, recordings, options, Form::Averaged)?;
-    // a fit at rows has no residuals of the rest: with another bias the hub would creep there without friction
+    problem.one_way = plain.one_way;
+    // a fit at rows has no residuals of the rest, so its bias may be far off if the hub turns one way: then no row would be at rest
     let (mut first, mut x) = (uncorrected.clone(), off_the_bounds(&near.x));
     let place = first.len() - rests.len();
     for (place, rest) in (place..).zip(&rests) {
@@ -974,7 +983,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     }
     problem.leave_out_stuck(problem.biases(&first).to_vec().as_slice());
     problem.place_kinks(&first);
-    let mut minimum = problem.solve_to(&[x, starts[0].clone()], &[], 1e-6);
+    let mut minimum = problem.solve_to(&[x], &[], 1e-6);
     for _ in 0..ROUNDS {
         let p = problem.values(&minimum.x);
         if !problem.leave_out_stuck(problem.biases(&p).to_vec().as_slice()) {
@@ -992,7 +1001,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
             !known.shown.contains(&place) || known.of_values[(place, place)].sqrt() > part
         })
     };
-    if is_vague(&known, ASYMMETRY, ONE_WAY) {
+    if !problem.one_way && is_vague(&known, ASYMMETRY, ONE_WAY) {
         // the dry friction of one direction alone is seen: that of both is as large
         let mut x = off_the_bounds(&minimum.x);
         let factor = 1.0 + way * problem.values(&x)[ASYMMETRY];
@@ -1001,7 +1010,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
             x[place] = problem.scales[place].variable(problem.inside(place, value));
         }
         x[ASYMMETRY] = problem.scales[ASYMMETRY].variable(problem.inside(ASYMMETRY, 0.0));
-        held.push(ASYMMETRY);
+        problem.one_way = true;
         minimum = problem.solve(&[x], &held);
         known = problem.known(&minimum, &held)?;
     }
@@ -1104,7 +1113,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
             });
         }
     }
-    if held.contains(&ASYMMETRY) {
+    if problem.one_way {
         let bounds = [f64::NEG_INFINITY, f64::INFINITY].map(|end| problem.bounded(ASYMMETRY, end));
         combinations.extend(one_way(&mut parameters, way, bounds));
     }

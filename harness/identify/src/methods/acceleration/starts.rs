@@ -137,6 +137,18 @@ impl Problem {
             .collect()
     }
 
+    /// Returns true if the hub clearly turns in each direction for long enough to show its dry friction. The few rows just before a
+    /// hub stops would not do: their sign is uncertain, so any asymmetry explains them with its own c and d.
+    pub(super) fn turns_both_ways(&self, biases: &[f64]) -> bool {
+        [1.0, -1.0].iter().all(|way| {
+            let of = |(rows, bias): (&Rows, &f64)| {
+                let turns = |rate: &&f64| way * (**rate - bias) > STILL * rows.noise;
+                rows.rate.iter().filter(turns).count() as f64 * rows.step
+            };
+            self.rows.iter().zip(biases).map(of).sum::<f64>() >= REST
+        })
+    }
+
     /// Starts in the lowest basins of the grid of Stribeck speeds; values `given` by the user replace those of the grid.
     pub(super) fn starts(&self, biases: &[f64], given: &[(usize, f64)]) -> Vec<Vec<f64>> {
         let grid = self.grid(biases);
@@ -150,7 +162,7 @@ impl Problem {
         let of_grid = |k: &usize| self.start(grid[*k].0, &grid[*k].1.0, biases);
         let mut starts: Vec<Vec<f64>> = basins.iter().take(FOLLOWED).map(of_grid).collect();
         if let (Some(mut own), false) = (starts.first().cloned(), given.is_empty()) {
-            for (place, value) in given {
+            for (place, value) in given.iter().filter(|(place, _)| self.is_free(&[], *place)) {
                 own[*place] = self.scales[*place].variable(self.inside(*place, *value));
             }
             starts.push(own);
@@ -207,7 +219,8 @@ impl Problem {
                 square += torque * torque;
             }
         }
-        let mut free: Vec<usize> = (0..N).collect();
+        // a constant torque is friction that acts one way, if the hub turns that way alone
+        let mut free: Vec<usize> = (0..if self.one_way { N - 1 } else { N }).collect();
         loop {
             let part = normal.select_rows(&free).select_columns(&free);
             // the columns differ by orders of magnitude
