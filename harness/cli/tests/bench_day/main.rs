@@ -89,7 +89,7 @@ fn a_day_of_logs_gives_the_chapters_and_every_number_is_within_its_interval() {
     }
     // the gyro: N = σ/√50 with the quantisation's variance
     let walk = (GYRO.0.powi(2) + GYRO.1.powi(2) / 12.0).sqrt() * 0.02f64.sqrt();
-    let found = page.split("angle random walk N = ").nth(1).unwrap().split(' ').next().unwrap();
+    let found = page.split("angle random walk N: ").nth(1).unwrap().split(' ').next().unwrap();
     let found: f64 = found.parse().unwrap();
     // 30,000 samples: 0.4 %
     assert!((found / walk - 1.0).abs() < 0.02, "N = {found} for {walk}");
