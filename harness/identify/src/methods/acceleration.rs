@@ -983,7 +983,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     }
     problem.leave_out_stuck(problem.biases(&first).to_vec().as_slice());
     problem.place_kinks(&first);
-    let mut minimum = problem.solve_to(&[x], &[], 1e-6);
+    let mut minimum = problem.solve_to(&[x, starts[0].clone()], &[], 1e-6);
     for _ in 0..ROUNDS {
         let p = problem.values(&minimum.x);
         if !problem.leave_out_stuck(problem.biases(&p).to_vec().as_slice()) {
