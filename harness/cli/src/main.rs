@@ -77,7 +77,7 @@ impl Cli {
             Analyse(args) => Some(&args.fmu),
             Gyro(args) => args.needs_fmu().then_some(&args.fmu),
             Example(args) => Some(&args.fmu),
-            Identify(args) => args.needs_fmu().then_some(&args.fmu),
+            Identify(args) => args.fmu(),
             Design(args) => Some(&args.fmu),
             // what is traced has no other process around it
             StepCost(args) => args.counted.is_empty().then_some(&args.fmu),

@@ -13,6 +13,7 @@ pub mod effect;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
+pub mod force_record;
 pub mod friction;
 pub mod gaps;
 pub mod goodness;

@@ -157,9 +157,10 @@ pub fn read_decay(
     );
     all.check()?;
     let seconds = all.duration();
+    // the last row stands for a step too
     ensure!(
-        seconds >= SHORTEST,
-        "{name}: {seconds:.1} s are too few (allowed: at least {SHORTEST} s)"
+        seconds + all.step() >= SHORTEST * (1.0 - 1e-9),
+        "{name}: {seconds:.2} s are too few (allowed: at least {SHORTEST} s)"
     );
     ensure!(deviation(&all.rate) > 0.0, "{name}: {found} is constant ({})", all.rate[0]);
     Ok((found, all))
@@ -205,10 +206,11 @@ pub fn prepare(
     for (index, (from, to)) in cuts.iter().enumerate() {
         let mut part = all.rows(*from, *to);
         let seconds = if part.time.len() > 1 { part.duration() } else { 0.0 };
-        if seconds < SHORTEST {
+        let step = if part.time.len() > 1 { part.step() } else { 0.0 };
+        if seconds + step < SHORTEST * (1.0 - 1e-9) {
             ensure!(
                 cuts.len() > 1,
-                "{name}: {seconds:.0} s of data are too few (allowed: at least {SHORTEST} s, and {LONG} s where the \
+                "{name}: {seconds:.2} s of data are too few (allowed: at least {SHORTEST} s, and {LONG} s where the \
                  damping of a bare tank is to be seen: its slosh decays in some 23 s, its resonance is 14 mHz wide)"
             );
             done(format!(
@@ -461,7 +463,7 @@ mod tests {
         type Change = fn(&mut Recording);
         let faults: [(Change, &str); 8] = [
             (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N·m)"),
-            (|r| *r = r.rows(0, 500), "10 s of data are too few"),
+            (|r| *r = r.rows(0, 500), "9.98 s of data are too few"),
             (|r| std::mem::swap(&mut r.torque, &mut r.rate), "swapped"),
             (|r| r.rate.iter_mut().for_each(|w| *w = -*w), "wrong sign"),
             (|r| r.time.iter_mut().for_each(|t| *t *= 1e3), "Is time in milliseconds?"),

@@ -244,6 +244,7 @@ def identify(
     outputs: Sequence[str] = (),
     prior: Mapping[str, tuple[float, float]] | None = None,
     settings: Mapping[str, object] | None = None,
+    tank: str | Path | bool = False,
     out: str | Path | None = None,
     program: str | Path | None = None,
 ) -> Identification:
@@ -271,18 +272,26 @@ def identify(
     * ``inputs``, ``outputs``: Columns of the data, by the FMU's names.
     * ``prior``: Mean and standard deviation of an unknown.
     * ``settings``: Values of other parameters.
+    * ``tank``: True, or the drawing of a tank (TANK.toml): ``data`` are records of its force and
+      moment, ``Fx`` to ``Mz`` over ``time``, and `all` has its mechanical model as ``"tank"``.
     """
+    if tank and (free is not None or model is not None or method != "output-error"):
+        raise FmuError("tank= fits SloshTank: free=, model= and method= are not for it")
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("--method is given as method=")
-    if free is None and (inputs or outputs or prior):
+    if free is None and (inputs or outputs or (prior and not tank)):
         raise FmuError("inputs=, outputs= and prior= go with free=")
     if free is not None and (model is not None or method != "output-error"):
         raise FmuError("free= fits any FMU by output error: model= and method= are not for it")
     path = find_program(program)
     needed: Sequence[str] = ("time",) if method == "free-decay" else ("time", "tau_cmd", "omega")
     flags = ["--model", model] if model is not None else []
-    flags += ["--fmu", str(fmu_path(fmu))]
-    if free is None:
+    flags += ["--fmu", str(fmu_path("SloshTank" if tank and fmu == "HubSlosh" else fmu))]
+    if tank:
+        needed = ("time",)
+        flags += ["--tank" if tank is True else f"--tank={tank}"]
+        flags += _asked({}, inputs, outputs, prior or {})
+    elif free is None:
         flags += ["--method", method]
     else:
         needed = (

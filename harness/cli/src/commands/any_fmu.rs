@@ -12,6 +12,7 @@ use identify::any_fmu::question::{Question, Setting, Solver};
 use identify::any_fmu::record::Record;
 use identify::any_fmu::simulate::Model;
 use identify::any_fmu::{self, Identification};
+use identify::force_record::Task;
 use identify::names::list;
 use identify::news::News;
 use signals::recording::Columns;
@@ -27,16 +28,16 @@ use crate::{progress, terminal};
 pub struct AnyFmuArgs {
     /// Real parameters and start values of any FMU that are estimated, with bounds (else the FMU's min and max). NAME@each: every
     /// recording has its own. scale(NAME): the error of an input's or output's scale, 0 is exact.
-    #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
+    #[arg(long, value_name = "NAME=START[:LOW:HIGH],…", group = "fit")]
     pub free: Vec<String>,
     /// Prior of an unknown: mean and standard deviation.
-    #[arg(long, value_name = "NAME=MEAN:STD,…", requires = "free")]
+    #[arg(long, value_name = "NAME=MEAN:STD,…", requires = "fit")]
     prior: Vec<String>,
     /// Standard deviations of known values, included in the intervals. With --free: any value that is set, relative (0.5% or 0.005) or
     /// absolute (5mm; ±0.1 in the variable's unit), and scales of inputs, outputs and clock, scale(NAME), scale(time). Of the bench,
     /// relative alone: torque (1%), clock (0.01%), g_axial (0.1%), tank.r (0.4%), fluid.rho (0.3%). 0 is exact. --method acceleration
     /// takes the torque's.
-    #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
+    #[arg(long = "tolerance", value_name = "NAME=SIZE,…", conflicts_with = "tank")]
     pub tolerances: Vec<String>,
     /// Inputs that the recordings drive.
     #[arg(long, value_name = "NAME,…", requires = "free")]
@@ -52,24 +53,25 @@ pub struct AnyFmuArgs {
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…", requires = "free")]
     sensors: Vec<Sensor>,
     /// Outputs whose sensor has a bias, in each recording another one; STD: what is known of it.
-    #[arg(long, value_name = "OUTPUT[=STD],…", requires = "free")]
+    #[arg(long, value_name = "OUTPUT[=STD],…", requires = "fit")]
     bias: Vec<String>,
     /// Three outputs read by an instrument with three axes, whose scales and alignment (rad) are estimated; SCALE and ANGLE are what
     /// is known of them.
     #[arg(long, value_name = "A,B,C=SCALE:ANGLE", requires = "free")]
     triad: Vec<String>,
     /// The noise of every output drifts: white noise and a Gauss–Markov bias.
-    #[arg(long, requires = "free")]
+    #[arg(long, requires = "fit")]
     drift: bool,
     /// The host steps the FMU (Model Exchange) with this relative tolerance, in place of the FMU's own solver.
     #[arg(long, value_name = "TOLERANCE", requires = "free", num_args = 0..=1, default_missing_value = "1e-8")]
     exchange: Option<f64>,
     /// Relative tolerance that the FMU's own solver is given [default: the FMU's own].
-    #[arg(long, value_name = "TOLERANCE", requires = "free", conflicts_with = "exchange")]
+    #[arg(long, value_name = "TOLERANCE", requires = "fit", conflicts_with = "exchange")]
     solver_tolerance: Option<f64>,
-    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit.
-    #[arg(long, value_name = "NUMBER", requires = "free", default_value_t = 8)]
-    tries: usize,
+    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit [default: 8, of
+    /// --tank 2].
+    #[arg(long, value_name = "NUMBER", requires = "fit")]
+    tries: Option<usize>,
 }
 
 /// Points at which the likelihood is asked for.
@@ -132,6 +134,27 @@ impl AnyFmuArgs {
         !self.free.is_empty()
     }
 
+    /// Returns the options that a force record shares: those of priors, offsets, noise and search.
+    ///
+    /// # Errors
+    /// All that is wrong with them.
+    pub fn common(&self, told: &Told) -> Result<Task> {
+        let mut problems = Vec::new();
+        let settings: Vec<String> =
+            told.settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let task = Task {
+            settings: read(&settings, &mut problems),
+            priors: read(&self.prior, &mut problems),
+            biases: read(&self.bias, &mut problems),
+            drift: self.drift,
+            tolerance: self.solver_tolerance,
+            starts: self.tries.unwrap_or(2),
+            ..Task::default()
+        };
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        Ok(task)
+    }
+
     fn question(&self, told: &Told) -> Result<Question> {
         let mut problems = Vec::new();
         let names = |flags: &[String]| -> Vec<String> {
@@ -163,7 +186,7 @@ impl AnyFmuArgs {
             drift: self.drift,
             solver: self.exchange.map_or(Solver::Own, Solver::Host),
             tolerance: self.solver_tolerance,
-            starts: self.tries,
+            starts: self.tries.unwrap_or(8),
         };
         let unread = |sensor: &&Sensor| !question.outputs.iter().any(|output| sensor.has(output));
         for sensor in self.sensors.iter().filter(unread) {

@@ -26,6 +26,7 @@ use std::io::Write;
 
 use super::any_fmu::{AnyFmuArgs, Out, PointsArgs, Told};
 use super::estimates::print_estimates;
+use super::force_record::ForceRecordArgs;
 use super::{DEFAULT_FMU, open, setting};
 use crate::{progress, terminal};
 
@@ -35,7 +36,8 @@ use crate::{progress, terminal};
 /// encoder, g_axial (m/s²), wheel_speed, omega_x and omega_y (rad/s); --columns takes other names and units.
 /// Several are fitted together. A free decay has no torque.
 ///
-/// With --free it fits any FMU: what is free, which inputs the recordings drive and which outputs they have is named.
+/// With --free it fits any FMU: what is free, which inputs the recordings drive and which outputs they have is named. With --tank it
+/// fits the mechanical model of a tank to records of force, moment and motion.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
@@ -54,22 +56,22 @@ pub struct IdentifyArgs {
     /// and inertia without a simulation, for a bench whose liquid does not move. `frequency` fits three poles and two zeros.
     /// `multisine` separates noise from nonlinear distortion. `black-box` fits ARX and ARMAX. `free-decay` finds frequency and
     /// damping over the amplitude, from records without torque.
-    #[arg(conflicts_with = "free", long, value_name = "NAME", default_value = "output-error")]
+    #[arg(conflicts_with = "fit", long, value_name = "NAME", default_value = "output-error")]
     method: MethodName,
     /// Weights of the rows, of --method acceleration.
-    #[arg(conflicts_with = "free", long, value_name = "NAME", default_value = "uniform")]
+    #[arg(conflicts_with = "fit", long, value_name = "NAME", default_value = "uniform")]
     weights: Weighting,
     /// Bounds of an unknown, of --method acceleration.
-    #[arg(conflicts_with = "free", long = "bound", value_name = "NAME=LOW:HIGH", value_parser = bound)]
+    #[arg(conflicts_with = "fit", long = "bound", value_name = "NAME=LOW:HIGH", value_parser = bound)]
     bounds: Vec<(String, f64, f64)>,
     /// Harmonics of the angle in the friction, 0 to 2, of --method acceleration.
-    #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0)]
+    #[arg(conflicts_with = "fit", long, value_name = "NUMBER", default_value_t = 0)]
     harmonics: usize,
     /// Period of the torque, s, of --method multisine.
-    #[arg(conflicts_with = "free", long, value_name = "SECONDS", default_value_t = 100.0)]
+    #[arg(conflicts_with = "fit", long, value_name = "SECONDS", default_value_t = 100.0)]
     period: f64,
     /// Slosh models to try.
-    #[arg(conflicts_with = "free", 
+    #[arg(conflicts_with = "fit", 
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
@@ -78,7 +80,7 @@ pub struct IdentifyArgs {
     )]
     model: Vec<String>,
     /// Friction laws to try, the first with all slosh models, the others with the one that is chosen.
-    #[arg(conflicts_with = "free", 
+    #[arg(conflicts_with = "fit", 
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
@@ -87,40 +89,40 @@ pub struct IdentifyArgs {
     )]
     friction: Vec<String>,
     /// Prior of a parameter: value and standard deviation.
-    #[arg(conflicts_with = "free", long, value_name = "NAME=VALUE:STD", value_parser = known)]
+    #[arg(conflicts_with = "fit", long, value_name = "NAME=VALUE:STD", value_parser = known)]
     known: Vec<(String, f64, f64)>,
     /// Sets what is known of the bench by its FMU name; it is then not estimated.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Starts from this value instead of one found in the data, of --method output-error and acceleration (there besides those
     /// found in the data).
-    #[arg(conflicts_with = "free", long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
+    #[arg(conflicts_with = "fit", long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
     starts: Vec<(String, f64)>,
     /// Repeats the fit from so many starts of each parameter, one at a time from a tenth to ten times its estimate, and reports how many
     /// end at the same minimum, of --method output-error (the tank's parameters) and acceleration.
-    #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0)]
+    #[arg(conflicts_with = "fit", long, value_name = "NUMBER", default_value_t = 0)]
     start_study: usize,
     /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
-    #[arg(conflicts_with = "free", long)]
+    #[arg(conflicts_with = "fit", long)]
     perfect: bool,
     /// Also estimates the time constant with which the actuator lags its command.
-    #[arg(conflicts_with = "free", long)]
+    #[arg(conflicts_with = "fit", long)]
     actuator_lag: bool,
     /// Also estimates the time constant of a low-pass filter in the gyro.
-    #[arg(conflicts_with = "free", long)]
+    #[arg(conflicts_with = "fit", long)]
     gyro_lag: bool,
     /// Also estimates the relative change of the friction over a recording.
-    #[arg(conflicts_with = "free", long)]
+    #[arg(conflicts_with = "fit", long)]
     friction_drift: bool,
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
-    #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0.01)]
+    #[arg(conflicts_with = "fit", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, a sampled controller's) or
     /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
-    #[arg(conflicts_with = "free", long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
+    #[arg(conflicts_with = "fit", long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
     /// The rate's time stamps may be early: takes a delay below zero as it comes. Else it is a sign that something is wrong.
-    #[arg(conflicts_with = "free", long)]
+    #[arg(conflicts_with = "fit", long)]
     acausal: bool,
     /// Columns of the recordings for the signals, with units: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x,
     /// omega_y; of a free decay wave_height, force, theta or omega. With --free the signals are inputs and outputs of the FMU.
@@ -135,11 +137,11 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// Fits an empty tank: no slosh model, all inertia belongs to the hub.
-    #[arg(conflicts_with = "free", long)]
+    #[arg(conflicts_with = "fit", long)]
     empty: bool,
     /// Uses the rows between two times alone.
     #[arg(
-        conflicts_with = "free",
+        conflicts_with = "fit",
         long,
         value_name = "S,S",
         value_delimiter = ',',
@@ -147,7 +149,7 @@ pub struct IdentifyArgs {
     )]
     trim: Vec<f64>,
     /// A recording that is simulated with the result, not fitted.
-    #[arg(conflicts_with = "free", long, value_name = "DATA")]
+    #[arg(conflicts_with = "fit", long, value_name = "DATA")]
     validate: Vec<PathBuf>,
     /// Also prints each attempt of the search: its start, window and free unknowns, and why it was made, accepted or
     /// refused.
@@ -155,7 +157,7 @@ pub struct IdentifyArgs {
     verbose: bool,
     /// The FMU: a file, or the name of one of this project.
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
-    pub fmu: PathBuf,
+    fmu: PathBuf,
     /// Print the result as JSON too, in place of tables and verdict.
     #[arg(long)]
     json: bool,
@@ -169,6 +171,8 @@ pub struct IdentifyArgs {
     any: AnyFmuArgs,
     #[command(flatten)]
     points: PointsArgs,
+    #[command(flatten)]
+    force_record: ForceRecordArgs,
 }
 
 /// The methods, one file each in `harness/identify/src/methods`.
@@ -232,8 +236,12 @@ fn known(text: &str) -> Result<(String, f64, f64)> {
 }
 
 impl IdentifyArgs {
-    /// Returns true if the method simulates the FMU.
-    pub fn needs_fmu(&self) -> bool {
+    /// Returns the FMU that the method simulates, if it simulates one.
+    pub fn fmu(&self) -> Option<&Path> {
+        self.needs_fmu().then(|| self.force_record.fmu(&self.fmu))
+    }
+
+    fn needs_fmu(&self) -> bool {
         match self.method {
             MethodName::OutputError => OutputError::NEEDS.fmu,
             MethodName::Acceleration => Acceleration::NEEDS.fmu,
@@ -246,7 +254,7 @@ impl IdentifyArgs {
 
     /// Runs the command.
     pub fn run(mut self) -> Result<()> {
-        if !self.any.is_asked() {
+        if !self.any.is_asked() && !self.force_record.is_asked() {
             self.tolerances()?;
             self.settings = nominal::with_damping(self.settings);
         }
@@ -296,19 +304,22 @@ impl IdentifyArgs {
             let html = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
             ensure!(html, "{}: the name must end in .html", path.display());
         }
-        if self.any.is_asked() {
+        if self.any.is_asked() || self.force_record.is_asked() {
             let told = Told {
                 data: &self.data,
                 settings: &self.settings,
                 columns: &self.columns,
                 rate: self.rate,
-                fmu: &self.fmu,
+                fmu: self.force_record.fmu(&self.fmu),
                 json: self.json,
             };
             let report = self.report.as_deref();
             let out =
                 Out { result: &self.out, report, verbose: self.verbose, points: &self.points };
-            return self.any.identify(&told, &out);
+            return match self.force_record.is_asked() {
+                true => self.force_record.identify(&self.any, &told, &out),
+                false => self.any.identify(&told, &out),
+            };
         }
         match self.method {
             MethodName::OutputError => self.answer(OutputError { options: self.options()? }, trim),

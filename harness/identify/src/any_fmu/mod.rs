@@ -20,6 +20,7 @@ pub mod unknown;
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
+use maud::Markup;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -656,5 +657,10 @@ pub fn lines(found: &Identification) -> Vec<String> {
 
 /// The page, in HTML.
 pub fn page(found: &Identification) -> String {
-    page::of(found)
+    page_with(found, Markup::default())
+}
+
+/// The page with a section before the verdict, in HTML.
+pub fn page_with(found: &Identification, first: Markup) -> String {
+    page::of(found, first)
 }

@@ -12,6 +12,7 @@ mod draw;
 #[path = "../../examples/fmu_twin/mod.rs"]
 #[allow(dead_code, reason = "the examples use the rest of it")]
 mod fmu_twin;
+mod force_record;
 #[allow(dead_code, reason = "the example writes every habit")]
 #[path = "../../examples/twins/habits.rs"]
 mod habits;

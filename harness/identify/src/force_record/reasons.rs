@@ -1,0 +1,98 @@
+//! Reasons why a record does not tell a quantity, with the remedy.
+
+use std::collections::BTreeMap;
+
+use names::sloshtank::tank;
+
+use super::start::Start;
+use super::{BREAKING, Task};
+use crate::any_fmu::question::Question;
+use crate::estimate::{Estimated, prose};
+
+/// Steepness k a of an upright cylinder's first mode over its slosh angle, 1/rad (SloshTank's rule for all tanks).
+const STEEPNESS: f64 = 1.54;
+
+/// Facts behind the reasons.
+pub struct Context<'a> {
+    pub task: &'a Task,
+    pub question: &'a Question,
+    pub start: &'a Start,
+    /// Slosh angles of each record, rad.
+    pub angles: &'a [Vec<f64>],
+    pub told: &'a BTreeMap<String, bool>,
+    /// True if the residual is noise.
+    pub fits: bool,
+}
+
+impl Context<'_> {
+    /// Returns the reason for a quantity.
+    pub fn reason(&self, name: &str, e: &Estimated) -> String {
+        let n = self.start.mode;
+        let bare = name.rsplit_once('@').map_or(name, |(bare, _)| bare);
+        let largest = self.angles.iter().flatten().copied().fold(0.0, f64::max);
+        let degrees = largest.to_degrees();
+        let starts = [1, 2].map(|axis| [tank::P_0.at([n, axis]), tank::P_DOT_0.at([n, axis])]);
+        let is_start = starts.as_flattened().iter().any(|start| start == bare);
+        let mass = tank::MASS.at([n]);
+        let has_untold_mass = self.told.get(&mass) == Some(&false);
+        let has_scale = self.start.is_moved || !has_untold_mass;
+        let is_third = [tank::NONLINEAR_INERTIA.at([n]), tank::NONLINEAR_STIFFNESS.at([n])]
+            .iter()
+            .any(|t| t == bare);
+        let breaks = [tank::ZETA_BREAKING.at([n]), tank::BREAKING_STEEPNESS.at([n])];
+        let breaks = breaks.iter().any(|name| name == bare);
+        let has_growth = is_third || breaks || bare == tank::ZETA_AMPLITUDE.at([n]);
+        if !has_scale && has_growth {
+            return format!(
+                "its effect grows with the slosh angle, which this free decay does not show. Give the angle with --release, or the \
+                 mass with --set {mass}=KG"
+            );
+        }
+        if !self.start.is_moved && (bare == mass || is_start && has_untold_mass) {
+            return format!(
+                "a free decay shows the product of modal mass and slosh angle alone. Give the angle with --release, or the \
+                 mass with --set {mass}=KG, or record a forced motion"
+            );
+        }
+        let width = if e.std.is_finite() {
+            format!("the record would give it ± {:.1e} {}", 1.96 * e.std, prose(&e.unit))
+        } else {
+            "no load of this record depends on it".into()
+        };
+        let width = match self.fits {
+            true => width,
+            false => format!("the residual is not noise, so that {width} or ten times that"),
+        };
+        let width = width.trim_end_matches([' ', '1']).to_string();
+        if breaks {
+            let steepness = STEEPNESS * largest;
+            let (begins, _) = BREAKING;
+            return if steepness < begins - 0.03 {
+                format!(
+                    "the record never breaks: its steepness k a reaches {steepness:.2} ({degrees:.1}°), and waves break from 0.60 on"
+                )
+            } else {
+                format!(
+                    "too little of the record lies above the steepness of breaking (k a reaches {steepness:.2}, breaking begins at \
+                     {begins}); {width}"
+                )
+            };
+        }
+        if is_third || bare == tank::ZETA_AMPLITUDE.at([n]) {
+            let power = if is_third { "the square of the slosh angle" } else { "the slosh angle" };
+            return format!(
+                "its effect grows with {power}, which reaches {degrees:.1}°; {width}. Record larger waves"
+            );
+        }
+        if self.question.inputs.is_empty() && bare == tank::M_0 {
+            return format!(
+                "the tank does not move, and the load along its axis leaves it open; {width}"
+            );
+        }
+        let gravity = self.task.gravity;
+        format!(
+            "{width}; a longer record, or a motion near {:.2} Hz, tells more",
+            1.0 / self.start.period(gravity)
+        )
+    }
+}
