@@ -4,7 +4,8 @@
 //! and chooses unknowns, starts and priors. The starts are those of the tank's drawing ([`Prediction`]) or of the record's spectrum.
 //!
 //! Every unknown that a record may lack has a wide prior. A value is stated only if the record narrows this prior to [`TOLD`] of its
-//! width, or to [`TOLD_WITHOUT_FIT`] if the model does not fit. For all others the result names the reason.
+//! width, or to [`TOLD_WITHOUT_FIT`] if the model does not fit. For all others the result names the reason. A result of a model that
+//! does not fit has no intervals.
 
 pub mod motion;
 mod reasons;
@@ -297,7 +298,7 @@ pub struct Quantity {
     pub unit: String,
     /// Estimate; `None` if the record does not tell it.
     pub value: Option<f64>,
-    /// 95 % interval.
+    /// 95 % interval; `None` without a value, and if the result is not trusted.
     pub interval: Option<[f64; 2]>,
     /// Value by theory.
     pub predicted: Option<f64>,
@@ -315,8 +316,10 @@ pub struct ForceRecord {
     pub found: Identification,
     /// The mechanical model.
     pub tank: Vec<Quantity>,
-    /// Largest slosh angle of each record, rad.
-    pub largest_angle: Vec<f64>,
+    /// True if the model fits and the search ended at a minimum. If false, no interval is stated and the values may be wrong.
+    pub trusted: bool,
+    /// Largest slosh angle of each record, rad; `None` if the record has no scale of it.
+    pub largest_angle: Option<Vec<f64>>,
 }
 
 /// Places of the loads across the tank's axis that a record has: force and moment, of motion along the tank's x and y axes.
@@ -616,7 +619,8 @@ fn interpret(
     let largest_angle: Vec<f64> =
         angles.iter().map(|angles| angles.iter().copied().fold(0.0, f64::max)).collect();
     let prior = |name: &str| question.priors.iter().find(|prior| prior.name == name).map(|p| p.std);
-    let most = if found.fits == Some(true) { TOLD } else { TOLD_WITHOUT_FIT };
+    let trusted = found.fits == Some(true) && found.converged;
+    let most = if trusted { TOLD } else { TOLD_WITHOUT_FIT };
     let is_own = |name: &str| task.priors.iter().any(|prior| prior.name == name);
     // a free decay without a known angle or mass shows their product alone: no effect of the angle can be scaled
     let mass = tank::MASS.at([n]);
@@ -636,7 +640,13 @@ fn interpret(
         let is_listed = lists.iter().any(|list| list.iter().any(|other| other == name));
         let is_in_set =
             found.details.cannot_tell_apart.iter().any(|set| set.direction.contains_key(name));
-        e.std.is_finite() && width.is_finite() && is_narrow && !is_listed && !is_in_set
+        let is_stopped = !trusted && found.details.at_bound.iter().any(|other| other == name);
+        !is_stopped
+            && e.std.is_finite()
+            && width.is_finite()
+            && is_narrow
+            && !is_listed
+            && !is_in_set
     };
     let told: BTreeMap<String, bool> =
         found.parameters.iter().map(|(name, e)| (name.clone(), is_told(name, e))).collect();
@@ -646,7 +656,9 @@ fn interpret(
         start,
         angles: &angles,
         told: &told,
-        fits: found.fits == Some(true),
+        has_scale,
+        at_bound: &found.details.at_bound,
+        trusted,
     };
     let mut quantities = Vec::new();
     let predicted = |name: &str| task.prediction.as_ref().and_then(|p| p.values.get(name).copied());
@@ -658,14 +670,18 @@ fn interpret(
             label,
             unit: e.unit.clone(),
             value: is_told.then_some(e.value),
-            interval: is_told.then_some(e.interval),
+            interval: (trusted && is_told).then_some(e.interval),
             predicted: theory.map(|p| p.value),
             predicted_interval: theory.and_then(|p| p.interval),
             reason: (!is_told).then(|| context.reason(&name, e)),
             name,
         });
     }
-    quantities.extend(derived(task, start, &found, &told, has_scale.then_some(most)));
+    let mut also = derived(task, start, &found, &told, has_scale.then_some(most));
+    if !trusted {
+        also.iter_mut().for_each(|quantity| quantity.interval = None);
+    }
+    quantities.extend(also);
     for number in 0..records.len() {
         let at_start = [0, 1].map(|axis| format!("{}@{}", tank::P_0.at([n, axis + 1]), number + 1));
         let at_start =
@@ -677,7 +693,8 @@ fn interpret(
                 name: name.clone(),
                 unit: "deg".into(),
                 value: is_told.then(|| e.value.atan().to_degrees()),
-                interval: is_told.then(|| e.interval.map(|end| end.atan().to_degrees())),
+                interval: (trusted && is_told)
+                    .then(|| e.interval.map(|end| end.atan().to_degrees())),
                 predicted: None,
                 predicted_interval: None,
                 reason: (!is_told).then(|| context.reason(name, e)),
@@ -694,7 +711,8 @@ fn interpret(
     found.parameters.retain(|name, _| told[name]);
     let reasons = quantities.iter().filter_map(|q| Some((q, q.reason.as_ref()?)));
     found.verdict.extend(reasons.map(|(q, reason)| format!("{} is not stated: {reason}", q.label)));
-    Ok(ForceRecord { found, tank: quantities, largest_angle })
+    let largest_angle = has_scale.then_some(largest_angle);
+    Ok(ForceRecord { found, tank: quantities, trusted, largest_angle })
 }
 
 /// Quantities that follow from several estimates.
@@ -776,12 +794,21 @@ fn shift_prior() -> f64 {
     (0.5 * start::WIDE_SHIFT).hypot(0.375 * start::WIDE_SHIFT)
 }
 
-/// Lines for a terminal.
+/// Head of the column of values.
+fn head(result: &ForceRecord) -> &'static str {
+    if result.trusted { "estimate" } else { "NOT TRUSTED" }
+}
+
+/// Lines for a terminal; the verdict comes first.
 pub fn lines(result: &ForceRecord) -> Vec<String> {
-    let mut lines = vec![format!(
+    let mut lines = result.found.verdict.clone();
+    lines.push(format!(
         "{:44} {:>12} {:>27} {:>12}  unit",
-        "mechanical model", "estimate", "95 % interval", "by theory"
-    )];
+        "mechanical model",
+        head(result),
+        "95 % interval",
+        "by theory"
+    ));
     let number = |value: f64| format!("{value:.5}");
     for q in &result.tank {
         let interval =
@@ -794,8 +821,10 @@ pub fn lines(result: &ForceRecord) -> Vec<String> {
             crate::estimate::prose(&q.unit)
         ));
     }
-    let largest = result.largest_angle.iter().map(|a| format!("{:.1}°", a.to_degrees()));
-    lines.push(format!("largest slosh angle: {}", largest.collect::<Vec<_>>().join(", ")));
+    if let Some(angles) = &result.largest_angle {
+        let angles = angles.iter().map(|a| format!("{:.1}°", a.to_degrees()));
+        lines.push(format!("largest slosh angle: {}", angles.collect::<Vec<_>>().join(", ")));
+    }
     lines.extend(any_fmu::lines(&result.found));
     lines
 }
@@ -816,7 +845,9 @@ pub fn page(result: &ForceRecord) -> String {
             crate::estimate::prose(&q.unit),
         ]
     });
-    let head = ["quantity", "estimate", "95 % interval", "by theory", "expected", "unit"];
+    let head = ["quantity", head(result), "95 % interval", "by theory", "expected", "unit"];
     let table = report::page::table(head, rows);
-    any_fmu::page_with(&result.found, maud::html! { h2 { "Mechanical model" } (table) })
+    let doubt = result.found.verdict.first().filter(|_| !result.trusted);
+    let first = maud::html! { h2 { "Mechanical model" } @if let Some(doubt) = doubt { p { (doubt) } } (table) };
+    any_fmu::page_with(&result.found, first)
 }

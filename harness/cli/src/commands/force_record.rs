@@ -222,11 +222,11 @@ impl ForceRecordArgs {
         if told.json {
             print!("{text}");
         } else {
-            for line in force_record::lines(&found).iter().chain(&found.found.verdict) {
+            for line in force_record::lines(&found) {
                 println!("{line}");
             }
         }
-        if found.found.fits != Some(true) || !found.found.converged {
+        if !found.trusted {
             terminal::warn("the result cannot be trusted; its verdict says why");
         }
         if let Some(path) = out.report {

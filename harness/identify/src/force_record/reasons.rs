@@ -20,8 +20,12 @@ pub struct Context<'a> {
     /// Slosh angles of each record, rad.
     pub angles: &'a [Vec<f64>],
     pub told: &'a BTreeMap<String, bool>,
-    /// True if the residual is noise.
-    pub fits: bool,
+    /// True if the records tell the size of the slosh angle.
+    pub has_scale: bool,
+    /// Estimates at a bound.
+    pub at_bound: &'a [String],
+    /// True if the model fits.
+    pub trusted: bool,
 }
 
 impl Context<'_> {
@@ -35,35 +39,41 @@ impl Context<'_> {
         let is_start = starts.as_flattened().iter().any(|start| start == bare);
         let mass = tank::MASS.at([n]);
         let has_untold_mass = self.told.get(&mass) == Some(&false);
-        let has_scale = self.start.is_moved || !has_untold_mass;
         let is_third = [tank::NONLINEAR_INERTIA.at([n]), tank::NONLINEAR_STIFFNESS.at([n])]
             .iter()
             .any(|t| t == bare);
         let breaks = [tank::ZETA_BREAKING.at([n]), tank::BREAKING_STEEPNESS.at([n])];
         let breaks = breaks.iter().any(|name| name == bare);
         let has_growth = is_third || breaks || bare == tank::ZETA_AMPLITUDE.at([n]);
-        if !has_scale && has_growth {
+        if !self.has_scale && has_growth {
             return format!(
                 "its effect grows with the slosh angle, which this free decay does not show. Give the angle with --release, or the \
                  mass with --set {mass}=KG"
             );
         }
-        if !self.start.is_moved && (bare == mass || is_start && has_untold_mass) {
+        if !self.has_scale && (bare == mass || is_start && has_untold_mass) {
             return format!(
                 "a free decay shows the product of modal mass and slosh angle alone. Give the angle with --release, or the \
                  mass with --set {mass}=KG, or record a forced motion"
             );
         }
+        if !self.trusted && self.at_bound.iter().any(|other| other == name) {
+            return format!(
+                "the search ends at its bound, {:.4e}, and the model does not fit",
+                e.value
+            );
+        }
+        let unit = Some(prose(&e.unit)).filter(|unit| unit != "1");
+        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
         let width = if e.std.is_finite() {
-            format!("the record would give it ± {:.1e} {}", 1.96 * e.std, prose(&e.unit))
+            format!("the record would give it ± {:.1e}{unit}", 1.96 * e.std)
         } else {
             "no load of this record depends on it".into()
         };
-        let width = match self.fits {
+        let width = match self.trusted {
             true => width,
             false => format!("the residual is not noise, so that {width} or ten times that"),
         };
-        let width = width.trim_end_matches([' ', '1']).to_string();
         if breaks {
             let steepness = STEEPNESS * largest;
             let (begins, _) = BREAKING;
