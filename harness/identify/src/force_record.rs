@@ -569,6 +569,7 @@ fn question(
         outputs: outputs.into_iter().map(load_name).collect(),
         sensors: Vec::new(),
         biases,
+        tolerances: Vec::new(),
         triads: Vec::new(),
         drift: task.drift,
         solver: Solver::Own,

@@ -182,8 +182,6 @@ const FORCED: Tank = Tank { drive: [0.1, 2.2, 0.03], growth: 0.01, ..TANK };
 fn a_forced_record_of_another_integration_gives_the_whole_model() {
     let raw = FORCED.record(10.0, 0.02, 0.0, 0.01, 1);
     let result = found(&task(), &[raw]);
-    println!("{:#?}", lines(&result));
-    println!("{:#?}", result.found.verdict);
     assert_eq!(result.found.fits, Some(true), "{:#?}", lines(&result));
     let stated = compared(&FORCED, &result);
     for name in
