@@ -709,6 +709,12 @@ fn interpret(
         line.strip_prefix(name).is_some_and(|rest| rest.starts_with([' ', ':']))
     };
     found.verdict.retain(|line| !untold.iter().any(|name| is_of(line, name)));
+    found.verdict.retain(|line| trusted || !line.contains("its 95 % interval"));
+    // --tank takes no tolerances
+    found.verdict.retain(|line| line != any_fmu::NOISE_ALONE);
+    if trusted {
+        found.verdict.push("The intervals include noise alone: settings, motion, clock and the scales of the loads count as exact.".into());
+    }
     found.parameters.retain(|name, _| told[name]);
     let reasons = quantities.iter().filter_map(|q| Some((q, q.reason.as_ref()?)));
     found.verdict.extend(reasons.map(|(q, reason)| format!("{} is not stated: {reason}", q.label)));

@@ -20,6 +20,8 @@ use crate::{progress, terminal};
 
 /// The FMU that is fitted.
 const FMU: &str = "SloshTank";
+/// What `--tank` alone stands for.
+const NO_DRAWING: &str = "-";
 
 /// Options for records of force and moment.
 #[derive(clap::Args)]
@@ -29,7 +31,7 @@ pub struct ForceRecordArgs {
     /// the tank, of a balance or of CFD. x, y, z (m) is the displacement of the reference point, ax, ay, az (m/s²) its acceleration
     /// without gravity, rx, ry or rz (rad) a rotation. Without motion it is a free decay. With a drawing (=TANK.toml) the result is
     /// compared with `hubslosh tank`.
-    #[arg(long, value_name = "TANK.toml", group = "fit", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    #[arg(long, value_name = "TANK.toml", group = "fit", num_args = 0..=1, require_equals = true, default_missing_value = NO_DRAWING)]
     tank: Option<PathBuf>,
     /// Height of the free surface above the tank's lowest point, m, or per cent of the volume, of --tank=TANK.toml.
     #[arg(long, value_name = "METRES|PERCENT%", requires = "tank")]
@@ -128,7 +130,7 @@ impl ForceRecordArgs {
 
     /// Theory's values, if there is a drawing.
     fn prediction(&self) -> Result<Option<Prediction>> {
-        let Some(path) = self.tank.as_ref().filter(|path| !path.as_os_str().is_empty()) else {
+        let Some(path) = self.tank.as_ref().filter(|path| *path != Path::new(NO_DRAWING)) else {
             ensure!(
                 self.fill.is_none() && self.fill_mass.is_none() && self.nu.is_none(),
                 "--fill, --fill-mass and --nu are for a drawing: --tank=TANK.toml"

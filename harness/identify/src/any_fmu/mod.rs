@@ -440,7 +440,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
 }
 
 /// Sentence about intervals of a fit without tolerances.
-const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
+pub(crate) const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
 
 /// Contribution of known values to the uncertainty.
 struct Tolerated {
