@@ -201,8 +201,9 @@ fn a_forced_record_of_another_integration_gives_the_whole_model() {
 }
 
 #[test]
+#[ignore = "11 s of CPU time"]
 fn a_small_free_decay_does_not_state_mass_and_angle_but_their_product() {
-    let raw = TANK.record(8.0, 0.02, 0.035, 0.02, 2);
+    let raw = TANK.record(12.0, 0.02, 0.035, 0.02, 2);
     let mut raw = raw;
     raw.loads[2] = None;
     let result = found(&task(), &[raw.clone()]);
