@@ -206,7 +206,7 @@ fn a_small_free_decay_does_not_state_mass_and_angle_but_their_product() {
     let raw = TANK.record(12.0, 0.02, 0.035, 0.02, 2);
     let mut raw = raw;
     raw.loads[2] = None;
-    let result = found(&task(), &[raw.clone()]);
+    let result = found(&task(), std::slice::from_ref(&raw));
     is_untold(&result, "tank.mass[1]", "product of modal mass and slosh angle");
     is_untold(&result, "tank.p_0[1,1]@1", "product of modal mass and slosh angle");
     is_untold(&result, "tank.nonlinear_stiffness[1]", "does not show");
@@ -233,7 +233,7 @@ fn a_small_free_decay_does_not_state_mass_and_angle_but_their_product() {
 fn frame_point_and_sign_do_not_change_the_model() {
     let raw = TANK.record(4.0, 0.02, 0.15, 0.01, 3);
     let release = Some([0.15, 0.0]);
-    let own = found(&Task { release, ..task() }, &[raw.clone()]);
+    let own = found(&Task { release, ..task() }, std::slice::from_ref(&raw));
     // tank x = record z, tank y = record x, tank z = record y; about a point 0.2 m above and 0.03 m off its axis
     let [fx, _, fz, _, my, _] = raw.loads.clone();
     let negative =
