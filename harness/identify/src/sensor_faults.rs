@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hub_at_rest_is_no_fault() {
+    fn a_hub_at_rest_is_neither_clipped_nor_frozen() {
         // at rest, half a turn in 10 s, at rest, back under constant acceleration to another rest, and on
         let course = |t: f64| match t {
             _ if t < 20.0 => 0.0,
@@ -213,7 +213,8 @@ mod tests {
         let time: Vec<f64> = (0..5000).map(|k| 0.02 * f64::from(k) + 0.007).collect();
         for step in [1e-12, 1.7e-6] {
             let angle: Vec<f64> = time.iter().map(|t| (course(*t) / step).round() * step).collect();
-            assert_eq!(find("theta", &time, &angle, Rest::Angle), Faults::default(), "{step}");
+            let said = find("theta", &time, &angle, Rest::Angle).words.join("\n");
+            assert!(!said.contains("clipped") && !said.contains("frozen"), "{step}: {said}");
             let clipped: Vec<f64> = angle.iter().map(|a| a.min(2.0)).collect();
             let said = find("theta", &time, &clipped, Rest::Angle).words;
             assert!(said[0].contains("theta is clipped"), "{step}: {said:?}");
