@@ -165,6 +165,38 @@ fn unsafe_code_stands_in_the_files_of_the_c_interface() {
     assert_eq!(found, known.map(String::from).into());
 }
 
+/// `cargo test` leaves out ignored tests: each is in a command of a script of `.ci`.
+#[test]
+fn a_script_runs_every_test_that_is_ignored() {
+    let root = pack::root();
+    let scripts = root.join(".ci").read_dir().expect("the scripts").flatten();
+    let texts = scripts.filter_map(|entry| fs::read_to_string(entry.path()).ok());
+    // of commands with --ignored, what follows
+    let commands: String = texts
+        .map(|text| text.replace("\\\n", " "))
+        .flat_map(|text| text.lines().map(String::from).collect::<Vec<_>>())
+        .filter_map(|line| line.split_once("--ignored").map(|(_, words)| format!("{words} ")))
+        .collect();
+    let words: Vec<&str> = commands
+        .split([' ', '"'])
+        .filter(|word| word.len() > 3 && !word.starts_with('-'))
+        .collect();
+    let mut files = Vec::new();
+    collect(&root, &root, &mut files);
+    let ignored = format!("#[{}", "ignore");
+    let mut count = 0;
+    for file in files.iter().filter(|file| file.ends_with(".rs")) {
+        let text = fs::read_to_string(root.join(file)).expect("a source file");
+        for after in text.split(&ignored).skip(1) {
+            let name = after.split("fn ").nth(1).and_then(|rest| rest.split('(').next());
+            let name = name.expect("a test after its attribute");
+            assert!(words.iter().any(|word| name.contains(word)), "{file}: {name}: {words:?}");
+            count += 1;
+        }
+    }
+    assert!(count > 10, "{count}");
+}
+
 /// ARCHITECTURE.md and the pages of decisions name a file by its path from the root, or by the end of that path.
 #[test]
 fn source_files_that_architecture_names_are_there() {

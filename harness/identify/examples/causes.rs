@@ -30,7 +30,7 @@ struct Way {
     settings: &'static [(&'static str, &'static str)],
     /// Torque under which the effect shows.
     torque: &'static str,
-    /// What the gyro does to its reading.
+    /// Change of the gyro's reading by its own fault.
     gyro: fn(&mut Recording),
     /// Words of the verdict or of the notes that name it.
     named: &'static str,

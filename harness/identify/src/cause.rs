@@ -31,7 +31,7 @@ const LIMIT: f64 = 0.9;
 /// Cause of a misfit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
-    /// What acts, in words.
+    /// Effect that acts, in words.
     pub effect: String,
     /// Flags of `hubslosh identify` that fit it.
     pub flags: String,
@@ -50,7 +50,11 @@ impl Cause {
             let unit = if unit == "1" { String::new() } else { format!(" {}", prose(unit)) };
             format!(" ({name} = {value:.3e}{unit})")
         });
-        let leaves = if self.fits { "the residual is noise" } else { "the residual is smallest" };
+        let leaves = if self.fits {
+            "the residual is noise"
+        } else {
+            "less of the residual is left than with any other"
+        };
         format!(
             "The likeliest cause is {}: with it{size} {leaves}. {} fits it.",
             self.effect, self.flags

@@ -50,7 +50,7 @@ pub fn of_actuator(lag: f64, knots: &[f64], torque: &[f64], held: bool) -> (Vec<
     (time, values)
 }
 
-/// What a filter with this lag (s) reads at growing times (s) of a signal that is lines between them.
+/// Returns the output of a first-order filter with this lag (s) at growing times (s). Its input follows lines between the values.
 pub fn of_gyro(lag: f64, time: &[f64], lines: &[f64]) -> Vec<f64> {
     let mut y = lines[0];
     let mut read = vec![y];

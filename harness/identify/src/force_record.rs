@@ -479,7 +479,7 @@ fn records(
         }
         made.push(record);
     }
-    // an input that keeps its value at rest is no input
+    // a constant input does not drive the liquid
     let rest = Moved::default().inputs(up);
     let changes = |k: &usize| {
         let mut values = made.iter().flat_map(|record| record.inputs[*k].iter());

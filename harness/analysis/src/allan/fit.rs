@@ -76,9 +76,9 @@ pub struct Fit {
     pub from: f64,
     /// Misfit χ² and its degrees of freedom.
     pub chi_squared: (f64, usize),
-    /// True if noise of these terms explains the misfit (once in 1,000 records it does not).
+    /// True if noise of these terms explains the misfit, as it does in 999 of 1,000 records.
     pub fits: bool,
-    /// Where the fit is worst.
+    /// Averaging time at which the fit is worst.
     pub worst: Outlier,
 }
 

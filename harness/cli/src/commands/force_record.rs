@@ -20,7 +20,7 @@ use crate::{progress, terminal};
 
 /// The FMU that is fitted.
 const FMU: &str = "SloshTank";
-/// What `--tank` alone stands for.
+/// Value of `--tank` without a file.
 const NO_DRAWING: &str = "-";
 
 /// Options for records of force and moment.

@@ -43,7 +43,7 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
 /// Models of the liquid of the plan that seeks the onset of rotary slosh; a search takes seconds.
 const MODELS: &str = r#"["linear", "planar", "spherical", "paraboloid", "liquid"]"#;
 
-/// Of a plan that says so one run has to leave the range, of the others none may. The search for the onset of rotary slosh has
+/// At least one run of a plan that says so leaves the range, and no run of the others does. The search for the onset of rotary slosh has
 /// the linear liquid alone, which leaves the range.
 #[test]
 fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {

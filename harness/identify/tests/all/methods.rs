@@ -51,6 +51,12 @@ fn a_torque_that_is_held_is_averaged_as_it_was() {
     // 8.6° are a viscous friction of −1 N·m·s, which the bound of 0 does not allow; what is left does not fit
     let b = &linear.parameters["friction.b"];
     assert!(b.value < 1e-3 && linear.fits == Some(false), "{b:?}, {:?}", linear.verdict);
+    // only their combination is determined: correlation −0.98
+    let at_bound = &linear.details.at_bound;
+    assert!(
+        at_bound.iter().any(|name| name == "friction.b" || name == "friction.c"),
+        "{at_bound:?}"
+    );
 }
 
 #[test]
