@@ -37,7 +37,7 @@ pub struct AnyFmuArgs {
     /// absolute (5mm; ±0.1 in the variable's unit), and scales of inputs, outputs and clock, scale(NAME), scale(time). Of the bench,
     /// relative alone: torque (1%), clock (0.01%), g_axial (0.1%), tank.r (0.4%), fluid.rho (0.3%). 0 is exact. --method acceleration
     /// takes the torque's.
-    #[arg(long = "tolerance", value_name = "NAME=SIZE,…", conflicts_with = "tank")]
+    #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
     /// Inputs that the recordings drive.
     #[arg(long, value_name = "NAME,…", requires = "free")]

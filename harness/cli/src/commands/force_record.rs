@@ -31,7 +31,7 @@ pub struct ForceRecordArgs {
     /// the tank, of a balance or of CFD. x, y, z (m) is the displacement of the reference point, ax, ay, az (m/s²) its acceleration
     /// without gravity, rx, ry or rz (rad) a rotation. Without motion it is a free decay. With a drawing (=TANK.toml) the result is
     /// compared with `hubslosh tank`.
-    #[arg(long, value_name = "TANK.toml", group = "fit", num_args = 0..=1, require_equals = true, default_missing_value = NO_DRAWING)]
+    #[arg(long, value_name = "TANK.toml", group = "fit", conflicts_with = "tolerances", num_args = 0..=1, require_equals = true, default_missing_value = NO_DRAWING)]
     tank: Option<PathBuf>,
     /// Height of the free surface above the tank's lowest point, m, or per cent of the volume, of --tank=TANK.toml.
     #[arg(long, value_name = "METRES|PERCENT%", requires = "tank")]

@@ -71,7 +71,8 @@ pub struct IdentifyArgs {
     #[arg(conflicts_with = "fit", long, value_name = "SECONDS", default_value_t = 100.0)]
     period: f64,
     /// Slosh models to try.
-    #[arg(conflicts_with = "fit", 
+    #[arg(
+        conflicts_with = "fit",
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
@@ -80,7 +81,8 @@ pub struct IdentifyArgs {
     )]
     model: Vec<String>,
     /// Friction laws to try, the first with all slosh models, the others with the one that is chosen.
-    #[arg(conflicts_with = "fit", 
+    #[arg(
+        conflicts_with = "fit",
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
