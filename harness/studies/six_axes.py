@@ -15,7 +15,8 @@ compared with the page: 10 % apart at most, since compilers differ by some per c
 | one | 1180 kg under 2400 N, one tank, one mode, drag by the constant law, as in all releases |
 | two | the same, two tanks of one mode, as in the comparison with Basilisk |
 | four | the same, four tanks of three modes each |
-| planar | one tank, one mode that swings in one plane alone: the equations of tanks that drain |
+| planar | one tank, one mode that swings in one plane alone |
+| curved | one tank, one mode with s = 1.408, kappa = 0.734 |
 """
 
 import math
@@ -41,6 +42,7 @@ ROWS = [
     ("four", 1e-6, "the same with four tanks of three modes"),
     ("two", 1e-8, "two tanks at a tolerance of 1e-8"),
     ("planar", 1e-6, "one tank, one planar mode"),
+    ("curved", 1e-6, "one tank, one mode with s and κ"),
 ]
 
 
@@ -74,6 +76,9 @@ def parameters(case: str) -> dict[str, float | str]:
         p.update({"tank[1].g_ref": 9.81, "tank[1].diameter": 0.163, "tank[1].depth": 0.10})
     elif case == "planar":
         p["tank[1].direction[1,1]"] = 1.0
+    elif case == "curved":
+        p["tank[1].nonlinear_inertia[1]"] = 1.408
+        p["tank[1].nonlinear_stiffness[1]"] = 0.734
     elif case == "two":
         p.update({"tanks": 2, "tank[2].damping_law": "constant"})
         bob(2, 1, (-0.02, 0.05, -0.99))

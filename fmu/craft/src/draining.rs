@@ -1,5 +1,6 @@
 //! A craft with tanks that drain, have planar modes or other bobs than pendulums (`surface.rs`), each with its contents
-//! from `contents.rs`.
+//! from `contents.rs`. Outputs and derivatives are of these equations. Steps are, too, if a tank drains; otherwise
+//! `motion.rs` takes them.
 //!
 //! ```text
 //! M [a; w'] = [ f - w x (w x S) + sum of force ; tau - h_w' - w x (I w + h_w) + sum of torque ]
@@ -213,6 +214,11 @@ impl Draining {
             Some(mounted) => Tank { liquid_0: x[index::LIQUID + i], ..mounted.tank }.resolve(),
             None => Tank::default(),
         })
+    }
+
+    /// Returns true if any tank follows a table.
+    pub fn drains(&self) -> bool {
+        self.tanks.iter().any(MountedTank::drains)
     }
 
     fn outflows<'a>(&'a self, flow: &'a [Line; TANKS]) -> impl Iterator<Item = Outflow<'a>> {

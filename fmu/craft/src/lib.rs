@@ -22,7 +22,7 @@
 //! ```
 //!
 //! `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees them. `motion.rs` has the craft's
-//! equations, `bob.rs` those of one slosh mode, and `rigid.rs` the mass matrix. `lump.rs` describes detached liquid,
+//! equations, `bob.rs` and `constrained.rs` those of one slosh mode, and `rigid.rs` the mass matrix. `lump.rs` describes detached liquid,
 //! `handover.rs` its impulses on the carrier. `outputs.rs` has energy and momentum. `contents.rs` describes a tank that
 //! drains by a table (`table.rs`), `draining.rs` a craft with such tanks. The crate `taylor` integrates.
 
@@ -31,6 +31,7 @@
 extern crate alloc;
 
 mod bob;
+mod constrained;
 mod contents;
 mod damping;
 mod draining;

@@ -25,12 +25,15 @@
 //! With O on a pivot a = -C^T g is given, a' = -w x a. Only the lower half of the system remains, and tau includes the
 //! pivot's torque (pivot.rs), with the pivot's axis Z = C^T e_z, Z' = -w x Z.
 //!
+//! Bobs on other surfaces than spheres or in planes add matrices of rank one to M (constrained.rs).
+//!
 //! A tank whose liquid has detached has neither rigid liquid nor bobs, but a lump and the inertia that rotates with the
 //! tank (lump.rs). Changes between the two are impulses at the roots of event functions.
 //!
 //! Source: Newton-Euler about O with the bobs' tensions eliminated.
 
 use alloc::vec::Vec;
+use alloc::{format, vec};
 use core::ops::ControlFlow;
 
 use taylor::at_each_order;
@@ -47,6 +50,7 @@ use taylor::vector::{
 };
 
 use crate::bob::{Bob, BobNow};
+use crate::constrained::ConstrainedBob;
 use crate::handover::Carrier;
 use crate::lump::{Directions, Due, Lump};
 use crate::parameters::{Limits, Mount, Parameters, Tank};
@@ -107,12 +111,18 @@ pub struct CraftMotion {
     mass_matrix: Mat6,
     pub liquids: Vec<Rigid>,
     pub bobs: Vec<Bob>,
+    /// Bobs that are not pendulums or are guided in a plane.
+    constrained: Vec<ConstrainedBob>,
     /// Bobs of the tanks whose liquid has detached.
     parked: Vec<Bob>,
     /// Detached liquid of each tank that models it.
     pub lumps: Vec<Lump>,
-    /// True if any liquid is detached.
-    any_loose: bool,
+    /// True if any liquid is detached, or any bob is constrained.
+    any_apart: bool,
+    /// True if an expansion may end with an event.
+    has_events: bool,
+    /// Index of the constrained bob that reaches the bound of its surface at the end of the expansion.
+    beyond: Option<usize>,
     /// Lump and event at the end of the expansion.
     due: Option<(usize, Due)>,
     /// True if any bob's drag follows the acceleration.
@@ -156,11 +166,15 @@ impl CraftMotion {
         let tanks: Vec<Tank> = p.tank[..p.tanks].iter().map(Tank::resolve).collect();
         let liquids: Vec<Rigid> = tanks.iter().map(Tank::rigid).collect();
         let rigid = liquids.iter().fold(p.craft.rigid(), |sum, tank| sum.and(tank));
-        let bobs: Vec<Bob> = tanks
-            .iter()
-            .enumerate()
-            .flat_map(|(i, tank)| (0..tank.modes).map(move |n| Bob::new(tank, i, n)))
-            .collect();
+        let modes = || {
+            let tanks = tanks.iter().enumerate();
+            tanks.flat_map(|(i, tank)| (0..tank.modes).map(move |n| (tank, i, n)))
+        };
+        let constrained: Vec<_> =
+            modes().filter_map(|(tank, i, n)| ConstrainedBob::new(tank, i, n)).collect();
+        let free = |(tank, _, n): &(&Tank, usize, usize)| !tank.is_constrained(*n);
+        let bobs: Vec<Bob> =
+            modes().filter(free).map(|(tank, i, n)| Bob::new(tank, i, n)).collect();
         let mass_matrix = rigid.mass_matrix();
         let pivot = if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() };
         let axes = if pivot.friction.acts() { 0..3 } else { 0..0 };
@@ -179,9 +193,10 @@ impl CraftMotion {
             rigid,
             mass_matrix,
             liquids,
-            follows: bobs.iter().any(Bob::follows),
+            follows: bobs.iter().any(Bob::follows)
+                || constrained.iter().any(ConstrainedBob::follows),
             whole: rigid,
-            along: bobs.iter().map(Bob::along_axis).collect(),
+            along: vec![[[0.0; 3]; 2]; bobs.len() + constrained.len()],
             matrix: mass_matrix,
             factors: Factors::of(&mass_matrix),
             force: [[0.0; 3]; 2],
@@ -199,19 +214,23 @@ impl CraftMotion {
             work: ZERO,
             dissipation: ZERO,
             inv_allowed: [0.0; 4],
-            longest: bobs.iter().fold(0.0, |longest, bob| bob.l.max(longest)),
+            longest: modes().fold(0.0, |longest, (tank, _, n)| tank.length[n].max(longest)),
             parked: Vec::with_capacity(bobs.len()),
             bobs,
+            any_apart: !constrained.is_empty(),
+            has_events: false,
+            beyond: None,
+            constrained,
             lumps: match p.mount {
                 Mount::Free => {
                     (0..).zip(&tanks).filter_map(|(i, tank)| Lump::new(tank, i)).collect()
                 }
                 Mount::Pivot => Vec::new(),
             },
-            any_loose: false,
             due: None,
             lumps_allowed: 0.0,
         };
+        motion.has_events = !motion.lumps.is_empty() || !motion.constrained.is_empty();
         motion.freeze();
         motion.arrange();
         motion
@@ -219,20 +238,23 @@ impl CraftMotion {
 
     /// Sets up craft and liquids at rest as one rigid body. The bobs' drag follows its acceleration along their tanks.
     fn freeze(&mut self) {
-        let point = |bob: &Bob| Rigid::new(bob.m, bob.at_rest(), &[[0.0; 3]; 3]);
-        self.whole = self.bobs.iter().fold(self.rigid, |sum, bob| sum.and(&point(bob)));
+        let point = |m: f64, at: Vec3| Rigid::new(m, at, &[[0.0; 3]; 3]);
+        let constrained = self.constrained.iter().map(|bob| point(bob.m, bob.at_rest()));
+        let bobs = self.bobs.iter().map(|bob| point(bob.m, bob.at_rest())).chain(constrained);
+        self.whole = bobs.fold(self.rigid, |sum, bob| sum.and(&bob));
         let mut matrix = self.whole.mass_matrix();
         if self.mount == Mount::Pivot {
             hold_upper_rows(&mut matrix);
         }
         let factors = Factors::of(&matrix);
-        for (along, bob) in self.along.iter_mut().zip(&self.bobs) {
-            *along = factors.solve(bob.along_axis());
+        let constrained = self.constrained.iter().map(ConstrainedBob::along_axis);
+        let axes = self.bobs.iter().map(Bob::along_axis).chain(constrained);
+        for (along, axis) in self.along.iter_mut().zip(axes) {
+            *along = factors.solve(axis);
         }
     }
 
-    /// Replaces rigid liquids and bobs by those of `tanks`, with as many tanks and modes. Bobs of planar modes and
-    /// those that are not pendulums count at their current positions.
+    /// Replaces rigid liquids and bobs by those of `tanks`, with as many tanks and modes.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
@@ -244,8 +266,12 @@ impl CraftMotion {
             if let Some(tank) = tanks.clone().nth(bob.tank) {
                 *bob = Bob::new(tank, bob.tank, bob.mode);
             }
-            let at = index::bob(bob.tank, bob.mode);
-            bob.add_held(&mut self.mass_matrix, &self.state.x[at..at + 3]);
+        }
+        for bob in &mut self.constrained {
+            let tank = tanks.clone().nth(bob.tank);
+            if let Some(now) = tank.and_then(|tank| ConstrainedBob::new(tank, bob.tank, bob.mode)) {
+                *bob = now;
+            }
         }
         self.freeze();
     }
@@ -257,10 +283,8 @@ impl CraftMotion {
         for bob in &self.bobs {
             add_rank_one(&mut self.matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
         }
-        for lump in &self.lumps {
-            if let Some(u) = lump.along_normal() {
-                add_rank_one(&mut self.matrix, lump.m, &u);
-            }
+        if self.any_apart {
+            self.add_inertia_apart();
         }
         match self.mount {
             Mount::Free => self.factors.set(&self.matrix),
@@ -303,6 +327,10 @@ impl CraftMotion {
             x[index::VELOCITY + i] += velocity_change[i];
         }
         for bob in &self.bobs {
+            let at = index::bob(bob.tank, bob.mode);
+            bob.after_impulse((&mut x[at..at + 6]).try_into().unwrap(), dv, dw);
+        }
+        for bob in &self.constrained {
             let at = index::bob(bob.tank, bob.mode);
             bob.after_impulse((&mut x[at..at + 6]).try_into().unwrap(), dv, dw);
         }
@@ -408,8 +436,8 @@ impl CraftMotion {
             force = add(force, f);
             torque = add(torque, tau);
         }
-        if self.any_loose {
-            [force, torque] = self.add_reactions_of_lumps(N, [force, torque]);
+        if self.any_apart {
+            [force, torque] = self.add_reactions_apart(N, w2, [force, torque]);
         }
         if N == 0 {
             self.factorise();
@@ -441,8 +469,8 @@ impl CraftMotion {
             bob.accelerate::<N>(self.a[N], w_d);
             dissipation += bob.dissipation::<N>();
         }
-        if self.any_loose {
-            dissipation = self.accelerate_lumps(N, dissipation);
+        if self.any_apart {
+            dissipation = self.accelerate_apart(N, dissipation);
         }
         self.dissipation[N] = dissipation;
     }
@@ -484,6 +512,9 @@ impl CraftMotion {
             bob.set_axial::<N>(
                 vector::dot(*by_force, force) + vector::dot(*by_torque, torque) + turning,
             );
+        }
+        if self.any_apart {
+            self.set_axial_apart(N, w2, [force, torque]);
         }
     }
 
@@ -550,8 +581,8 @@ impl Motion for CraftMotion {
             let at = index::bob(bob.tank, bob.mode);
             bob.start(x[at..at + 6].try_into().unwrap(), self.w[0]);
         }
-        if self.any_loose {
-            self.start_lumps();
+        if self.any_apart {
+            self.start_apart();
         }
     }
 
@@ -570,8 +601,8 @@ impl Motion for CraftMotion {
         // The force may pass zero, too.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
-        if self.any_loose {
-            self.set_error_scale_of_lumps(time, allowed);
+        if self.any_apart {
+            self.set_error_scale_apart(time, allowed, rate);
         }
         if self.rubbing.is_empty() { h } else { h.min(self.friction_convergence_radius()) }
     }
@@ -592,12 +623,12 @@ impl Motion for CraftMotion {
         let v = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger);
         let body = larger(q * attitude, largest(self.w[n]) * rate);
         let norm = larger(body, larger(v * swing, largest(self.gain[n]) * speed));
-        if self.any_loose { larger(norm, self.coefficient_norm_of_lumps(n)) } else { norm }
+        if self.any_apart { larger(norm, self.coefficient_norm_apart(n)) } else { norm }
     }
 
     #[inline(always)]
     fn event(&mut self, n: usize, h: f64) -> Option<f64> {
-        if self.lumps.is_empty() { None } else { self.next_of_lumps(n, h) }
+        if self.has_events { self.next_event(n, h) } else { None }
     }
 
     #[inline(always)]
@@ -631,8 +662,8 @@ impl Motion for CraftMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        if self.any_loose {
-            finite &= self.take_lumps(n, h, w);
+        if self.any_apart {
+            finite &= self.take_apart(n, h, w)?;
         }
         if !finite {
             return Err(StepError::NotFinite { time: self.state.time + t });
@@ -644,24 +675,58 @@ impl Motion for CraftMotion {
     }
 }
 
-// Detached liquid (lump.rs), apart from the equations of a craft without it, which then take fewer instructions.
+// Constrained bobs and detached liquid (lump.rs), apart from the equations of a craft without them, which then take fewer
+// instructions.
 impl CraftMotion {
     #[inline(never)]
-    fn start_lumps(&mut self) {
-        let CraftMotion { lumps, state, w, .. } = self;
+    fn add_inertia_apart(&mut self) {
+        for lump in &self.lumps {
+            if let Some(u) = lump.along_normal() {
+                add_rank_one(&mut self.matrix, lump.m, &u);
+            }
+        }
+        for bob in &self.constrained {
+            bob.add_inertia(&mut self.matrix);
+        }
+    }
+
+    #[inline(never)]
+    fn start_apart(&mut self) {
+        let CraftMotion { lumps, constrained, state, w, .. } = self;
+        for bob in constrained {
+            let at = index::bob(bob.tank, bob.mode);
+            bob.start(state.x[at..at + 6].try_into().unwrap(), w[0]);
+        }
         for lump in lumps.iter_mut().filter(|lump| lump.is_loose()) {
             let at = index::ball(lump.tank);
             lump.start(state.x[at..at + 6].try_into().unwrap(), w[0]);
         }
     }
 
-    /// Adds coefficient n of the lumps' force and torque on the craft, about O.
     #[inline(never)]
-    fn add_reactions_of_lumps(
+    fn set_axial_apart(&mut self, n: usize, w2: Mat3, [force, torque]: [Vec3; 2]) {
+        let along = &self.along[self.bobs.len()..];
+        for (bob, [by_force, by_torque]) in self.constrained.iter_mut().zip(along) {
+            let [e, _] = bob.along_axis();
+            let turning = vector::dot(e, times(&w2, bob.hinge));
+            let x = vector::dot(*by_force, force) + vector::dot(*by_torque, torque) + turning;
+            bob.set_axial(n, x);
+        }
+    }
+
+    /// Adds coefficient n of force and torque of constrained bobs and lumps on the craft, about O.
+    // w2 by value: a reference would keep the caller's in memory.
+    #[inline(never)]
+    fn add_reactions_apart(
         &mut self,
         n: usize,
+        w2: Mat3,
         [mut force, mut torque]: [Vec3; 2],
     ) -> [Vec3; 2] {
+        for bob in &mut self.constrained {
+            let [f, tau] = bob.reaction(n, self.w[n], &w2);
+            (force, torque) = (add(force, f), add(torque, tau));
+        }
         for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
             let [f, tau] = lump.reaction(n, &self.w, &self.w_d);
             force = add(force, f);
@@ -676,10 +741,14 @@ impl CraftMotion {
         [force, torque]
     }
 
-    /// Computes coefficient n of the lumps' accelerations from those of the craft. Adds their
+    /// Computes coefficient n of the accelerations of constrained bobs and lumps from those of the craft. Adds their
     /// dissipation.
     #[inline(never)]
-    fn accelerate_lumps(&mut self, n: usize, mut dissipation: f64) -> f64 {
+    fn accelerate_apart(&mut self, n: usize, mut dissipation: f64) -> f64 {
+        for bob in &mut self.constrained {
+            bob.accelerate(n, self.a[n], self.w_d[n]);
+            dissipation += bob.dissipation(n);
+        }
         for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
             lump.accelerate(n, self.a[n], self.w_d[n]);
             dissipation += lump.dissipation(n);
@@ -688,7 +757,14 @@ impl CraftMotion {
     }
 
     #[inline(never)]
-    fn set_error_scale_of_lumps(&mut self, time: f64, allowed: f64) {
+    fn set_error_scale_apart(&mut self, time: f64, allowed: f64, rate: f64) {
+        let larger = |a: f64, b: f64| if b > a { b } else { a };
+        let swing = self.constrained.iter().map(ConstrainedBob::rate_scale).fold(0.0, larger);
+        // One scale for all bobs, and the speed that it gives the craft.
+        let [_, _, swings, speed] = &mut self.inv_allowed;
+        let fastest = 1.0 / (allowed * (rate + swing));
+        *swings = swings.min(fastest);
+        *speed = speed.min(fastest / self.longest);
         let loose = self.lumps.iter().filter(|lump| lump.is_loose());
         let fastest =
             loose.fold(RATE_FLOOR, |most, lump| most.max(lump.speed_scale(self.w[0], time)));
@@ -696,10 +772,12 @@ impl CraftMotion {
     }
 
     #[inline(never)]
-    fn coefficient_norm_of_lumps(&self, n: usize) -> f64 {
+    fn coefficient_norm_apart(&self, n: usize) -> f64 {
         let loose = self.lumps.iter().filter(|lump| lump.is_loose());
-        let norms = loose.map(|lump| lump.coefficient_norm(n) * self.lumps_allowed);
-        norms.fold(0.0, |most, norm| if norm > most { norm } else { most })
+        let lumps = loose.map(|lump| lump.coefficient_norm(n) * self.lumps_allowed);
+        let swing = self.inv_allowed[2];
+        let bobs = self.constrained.iter().map(|bob| bob.coefficient_norm(n) * swing);
+        lumps.chain(bobs).fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
     /// Sets up rigid liquids and bobs for the states of the liquids. Does not allocate.
@@ -719,7 +797,7 @@ impl CraftMotion {
                 changed = true;
             }
         }
-        self.any_loose = self.lumps.iter().any(Lump::is_loose);
+        self.any_apart = self.lumps.iter().any(Lump::is_loose) || !self.constrained.is_empty();
         if !changed {
             return;
         }
@@ -740,17 +818,43 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Advances the lumps' states by a step of length h. Returns true if they are finite and within bounds.
+    /// Advances the states of constrained bobs and lumps by a step of length h. Returns true if they are finite and within
+    /// bounds.
+    ///
+    /// # Errors
+    /// A bob is at the bound of its surface.
     #[inline(never)]
-    fn take_lumps(&mut self, n: usize, h: f64, w: Vec3) -> bool {
+    fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
+        if let Some(bob) = self.beyond.take() {
+            let bob = &self.constrained[bob];
+            return Err(StepError::Model(bob.beyond(&format!("tank[{}]", bob.tank + 1))));
+        }
         let (x, mut finite) = (&mut self.state.x, true);
+        for bob in &self.constrained {
+            let moved = bob.at(n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[index::bob(bob.tank, bob.mode)..][..6].copy_from_slice(&moved);
+        }
         for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
             let at = index::ball(lump.tank);
             let moved = lump.at(x[at..at + 6].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        finite
+        Ok(finite)
+    }
+
+    /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound of its surface.
+    #[inline(never)]
+    fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
+        let mut first = self.next_of_lumps(n, h);
+        self.beyond = None;
+        for (i, bob) in self.constrained.iter().enumerate() {
+            if let Some(t) = bob.bound(n, first.unwrap_or(h)) {
+                (first, self.beyond) = (Some(t), Some(i));
+            }
+        }
+        first
     }
 
     #[inline(never)]

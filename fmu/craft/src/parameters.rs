@@ -15,7 +15,7 @@ use taylor::vector::{
 use crate::pivot::Pivot;
 use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod, smallest_pivot};
 use crate::sizes::{MODES, POINTS, TANKS, modes_of};
-use crate::surface::Surface;
+use crate::surface::{self, Surface};
 use crate::table::{FillTable, LIGHTEST, SHORTEST};
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
@@ -341,16 +341,12 @@ impl Tank {
 
     /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface; `name` is that of the tank.
     pub(crate) fn beyond(&self, n: usize, name: &str) -> String {
-        let (s, kappa) = (self.nonlinear_inertia[n], self.nonlinear_stiffness[n]);
-        let most = self.surface(n).map_or(0.0, |surface| surface.largest_angle().to_degrees());
-        format!(
-            "the slosh angle of mode {} of {name} exceeds {most:.1} degrees, where {name}.nonlinear_inertia[{}] = {s:?} and \
-             {name}.nonlinear_stiffness[{}] = {kappa:?} leave too little inertia for the third order to be valid (allowed: \
-             smaller angles)",
-            n + 1,
-            n + 1,
-            n + 1
-        )
+        surface::beyond([self.nonlinear_inertia[n], self.nonlinear_stiffness[n]], n, name)
+    }
+
+    /// Returns true if mode n (from 0) is planar, or its bob is not a pendulum.
+    pub(crate) fn is_constrained(&self, n: usize) -> bool {
+        self.surface(n).is_some() || self.across(n).is_some()
     }
 
     /// Returns true if the motion is integrated by extrapolation (`contents.rs`): the tank can drain, or has planar

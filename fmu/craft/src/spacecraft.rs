@@ -21,7 +21,7 @@ use crate::state::{BallState, INPUTS, Inputs, Ranges, STATES, State, index};
 #[derive(Clone, Debug)]
 pub struct Spacecraft {
     motion: Box<CraftMotion>,
-    /// Equations for draining tanks or planar modes, if there are any.
+    /// Equations for draining tanks, planar modes or other bobs than pendulums, if there are any.
     draining: Option<Box<Draining>>,
     limits: Limits,
     /// Bounds of the tanks in use.
@@ -123,11 +123,11 @@ impl Spacecraft {
         self.motion.inputs = *inputs;
         self.take_jumps(inputs);
         let done = match &self.draining {
-            None => self.motion.advance(h, self.limits),
-            Some(craft) => {
+            Some(craft) if craft.drains() => {
                 let x = &mut self.motion.state.x;
                 Run { craft, inputs }.advance(x, before.time, h, self.limits)
             }
+            _ => self.motion.advance(h, self.limits),
         };
         let state = &mut self.motion.state;
         match done {
@@ -282,7 +282,7 @@ impl Spacecraft {
 
     /// Applies the impulses of jumped inputs. Returns true if any input has jumped.
     fn take_jumps(&mut self, inputs: &Inputs) -> bool {
-        let Some(draining) = &self.draining else {
+        let Some(draining) = self.draining.as_ref().filter(|craft| craft.drains()) else {
             return self.motion.set_wheels(inputs.h_wheels.value);
         };
         let turned = inputs.h_wheels.value != self.motion.state.h_wheels;

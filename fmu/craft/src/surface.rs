@@ -49,11 +49,17 @@
 //! Source: the coefficients are those of `formulas::third_order`. The equations are Lagrange's for these energies.
 //! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint.
 
+use alloc::format;
+use alloc::string::String;
+
 use taylor::number::Number;
 use taylor::vector::{Vec3, add, dot, scale, sub};
 
 /// Smallest inertia along the meridian, relative to a pendulum's, at which the model is used.
 pub(crate) const LEAST_INERTIA: f64 = 0.5;
+
+/// Angle between the checks of [`Surface::largest_angle`], rad.
+const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
 /// The two coefficients of a mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +71,39 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
+    /// The surface of a pendulum.
+    pub const SPHERE: Surface = Surface { inertia: 0.0, stiffness: 0.0 };
+
+    /// Returns s - 1.
+    pub fn inner(&self) -> f64 {
+        self.inertia
+    }
+
+    /// Returns true if the bob moves on a sphere.
+    pub fn is_sphere(&self) -> bool {
+        self.stiffness == 0.0
+    }
+
+    /// Returns z/(l u^2).
+    pub fn lift_of_square(&self) -> f64 {
+        0.125 * self.stiffness
+    }
+
+    /// Returns z/l.
+    pub fn lift(&self, u: f64) -> f64 {
+        self.lift_of_square() * u * u
+    }
+
+    /// Returns beta/u.
+    pub fn bend(&self) -> f64 {
+        0.5 * self.stiffness
+    }
+
+    /// Returns beta: z' = l beta p_perp.p'.
+    pub fn rise(&self, u: f64) -> f64 {
+        self.bend() * u
+    }
+
     /// Returns the surface of a mode, `None` for a pendulum.
     pub fn new(s: f64, kappa: f64) -> Option<Surface> {
         (s != 1.0 || kappa != 1.0).then_some(Surface { inertia: s - 1.0, stiffness: kappa - 1.0 })
@@ -93,16 +132,46 @@ impl Surface {
         (0..=64).map_while(at).fold(0.0, f64::max)
     }
 
-    /// Returns the smallest angle from the axis at which the model ends, rad.
-    pub fn largest_angle(&self) -> f64 {
-        let steps = 1800_u32;
-        let angle = |k: u32| core::f64::consts::PI * f64::from(k) / f64::from(steps);
-        let holds = |angle: &f64| {
-            let (sin, cos) = libm::sincos(*angle);
-            self.meridian_inertia(-cos, sin * sin) >= LEAST_INERTIA
-        };
-        (0..=steps).map(angle).take_while(holds).fold(0.0, f64::max)
+    /// Returns true if the inertia along the meridian is large enough at an angle from the axis, rad.
+    fn holds(&self, angle: f64) -> bool {
+        let (sin, cos) = libm::sincos(angle);
+        self.meridian_inertia(-cos, sin * sin) >= LEAST_INERTIA
     }
+
+    /// Returns the smallest angle from the axis at which the model ends, rad, rounded down to tenths of a degree.
+    pub fn largest_angle(&self) -> f64 {
+        let angle = |k: u32| ANGLE_STEP * f64::from(k);
+        (0..=1800).map(angle).take_while(|angle| self.holds(*angle)).fold(0.0, f64::max)
+    }
+
+    /// Returns the smallest eta = p.e at which the model ends, if it ends at any angle.
+    pub fn highest(&self) -> Option<f64> {
+        let low = self.largest_angle();
+        let (mut low, mut high) = (low, low + ANGLE_STEP);
+        if high > core::f64::consts::PI {
+            return None;
+        }
+        // Bisection to rounding.
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            (low, high) = if self.holds(middle) { (middle, high) } else { (low, middle) };
+        }
+        Some(-libm::cos(low))
+    }
+}
+
+/// Returns the message for a bob of mode n (from 0) beyond the bound of its surface, with s and kappa; `name` is that of the
+/// tank.
+pub(crate) fn beyond([s, kappa]: [f64; 2], n: usize, name: &str) -> String {
+    let most = Surface::new(s, kappa).map_or(0.0, |surface| surface.largest_angle().to_degrees());
+    format!(
+        "the slosh angle of mode {} of {name} exceeds {most:.1} degrees, where {name}.nonlinear_inertia[{}] = {s:?} and \
+         {name}.nonlinear_stiffness[{}] = {kappa:?} leave too little inertia for the third order to be valid (allowed: \
+         smaller angles)",
+        n + 1,
+        n + 1,
+        n + 1
+    )
 }
 
 /// The surface at the bob.

@@ -168,6 +168,31 @@ pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     sum
 }
 
+/// Returns the same as [`cross_pair`], as a loop over any order n.
+pub fn cross_pair_of(n: usize, a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
+    let mut sum = [[EMPTY; 2]; 3];
+    for ([ax, ay, az], [bx, by, bz]) in a.0[..=n].iter().zip(b.0[..=n].iter().rev()) {
+        for k in 0..2 {
+            sum[0][k] += ay[k] * bz[k] - az[k] * by[k];
+            sum[1][k] += az[k] * bx[k] - ax[k] * bz[k];
+            sum[2][k] += ax[k] * by[k] - ay[k] * bx[k];
+        }
+    }
+    sum
+}
+
+/// Returns the same as [`cross`], as a loop over any order n.
+pub fn cross_of(n: usize, a: &Vector, b: &Vector) -> Vec3 {
+    let terms = a[..=n].iter().zip(b[..=n].iter().rev());
+    terms.fold([EMPTY; 3], |sum, (a, b)| vector::add(sum, vector::cross(*a, *b)))
+}
+
+/// Returns the same as [`square_vector`], as a loop over any order n.
+pub fn square_of(n: usize, a: &Vector) -> f64 {
+    let terms = a[..=n].iter().zip(a[..=n].iter().rev());
+    terms.fold(EMPTY, |sum, (a, b)| sum + vector::dot(*a, *b))
+}
+
 /// Returns coefficient N of a + a' t.
 #[inline(always)]
 pub fn ramp<const N: usize>(a: &[Vec3; 2]) -> Vec3 {

@@ -1,0 +1,455 @@
+//! A bob whose motion is not that of a pendulum: on another surface than a sphere (`surface.rs`) or guided in a plane
+//! (`contents.rs`), as power series. The tank keeps its liquid.
+//!
+//! ```text
+//! r   position of the bob from its hinge P over l, tank axes, e = e_z: rho = P + l r,  r = p + (kappa - 1) u^2/8 e
+//! q   p_perp = (r_x, r_y, 0),   u = q.q,   eta = p.e = r_z - (kappa - 1) u^2/8
+//! n   normal of the surface, p - beta eta q,   beta = (kappa - 1) u/2
+//! d   q - (n.q/n.n) n, along the meridian
+//! V = r' + w x r
+//! B = a + w' x P + w x (w x P)     specific force at the hinge
+//! V' = -w x V - B/l - f
+//! f  = T n + S q + N b + (c/m) r' + (k/m) q        the craft takes m l f at rho
+//! S  = (s - 1) sigma',   sigma = q.r'
+//! ```
+//!
+//! T holds the bob on its surface, N in the plane across b. S q is the kinetic energy within the liquid as a force: both
+//! do the same work in every motion on the surface. The multipliers of order n follow from the coefficients n + 1 of n.r'
+//! = 0, b.r' = 0 and sigma. All other terms are products, so every order solves the same equations:
+//!
+//! ```text
+//! f = H Y + known terms,   r'' = Y - T n - S q - N b,   H = n n^T/n.n + (s - 1) (n.n/I) d d^T + b b^T
+//! ```
+//!
+//! I is the inertia along the meridian relative to a pendulum's. H is N of `surface.rs`, so the craft's mass matrix
+//! contains m J^T H J.
+//!
+//! Source: Lagrange's equations of the first kind for the energies in `surface.rs`. tests/craft/independent.rs checks
+//! them against Newton's law in other variables, exchange.rs against `contents.rs`.
+
+use alloc::string::String;
+
+use taylor::root::first_root;
+use taylor::series::{Series, ZERO, mul, square};
+use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR};
+use taylor::vector::{
+    Mat3, Vec3, add, cross, dot, largest, on_sphere, rotation, scale, sub, times, transposed_times,
+    unit_quaternion,
+};
+
+use crate::damping::Drag;
+use crate::parameters::Tank;
+use crate::rigid::{Mat6, add_rank_one, along_rod};
+use crate::surface::{self, LEAST_INERTIA, Surface};
+
+/// One bob: its parameters and the power series of its motion, in tank axes.
+#[derive(Clone, Debug)]
+pub(crate) struct ConstrainedBob {
+    /// Tank and mode of the bob, from 0.
+    pub tank: usize,
+    pub mode: usize,
+    pub m: f64,
+    pub l: f64,
+    inv_l: f64,
+    c_m: f64,
+    k_m: f64,
+    /// True if c depends on acceleration or amplitude. The series of c and c r' are then in use.
+    follows: bool,
+    drag: Drag,
+    dragged: Vector,
+    /// p'
+    p_d: Vector,
+    /// Tank axes to body axes, and the hinge from O, body axes.
+    axes: Mat3,
+    pub hinge: Vec3,
+    /// b of a planar mode.
+    across: Option<Vec3>,
+    surface: Surface,
+    /// s and kappa
+    coefficients: [f64; 2],
+    /// eta at which the model ends, if it does.
+    highest: Option<f64>,
+    /// w and w; r from coefficient 1 on and V.
+    w: Pair,
+    both: Pair,
+    r: Vector,
+    v: Vector,
+    r_d: Vector,
+    u: Series,
+    u2: Series,
+    eta: Series,
+    /// beta eta
+    slope: Series,
+    n: Vector,
+    /// T and S
+    tension: Series,
+    inner: Series,
+    f: Vector,
+    /// n.n, n.q/n.n, (s - 1) n.n/I and d at the start of the expansion.
+    n2: f64,
+    ratio: f64,
+    share: f64,
+    d: Vec3,
+    /// Terms of the current order that do not depend on [a; w'] of this order: -w x V - w x (w x P)/l, Y, what [n; q; b]
+    /// contribute to the multipliers, f without these, and w x r of the next order without the newest w.
+    fall: Vec3,
+    known: Vec3,
+    multipliers: [f64; 2],
+    rest: Vec3,
+    ahead: Vec3,
+    /// B/l at the start of the expansion.
+    specific_force: Vec3,
+}
+
+/// Returns the sum of a_j.b_(n-j) from j = 1 on.
+fn dot_from_1(n: usize, a: &Vector, b: &Vector) -> f64 {
+    let mut sum = [0.0; 3];
+    for (a, b) in a[1..=n].iter().zip(b[..n].iter().rev()) {
+        for i in 0..3 {
+            sum[i] += a[i] * b[i];
+        }
+    }
+    sum[0] + sum[1] + sum[2]
+}
+
+/// Returns the square of a across the axis.
+fn square_across(n: usize, a: &Vector) -> f64 {
+    let mut sum = [0.0; 2];
+    for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
+        sum = [sum[0] + a[0] * b[0], sum[1] + a[1] * b[1]];
+    }
+    sum[0] + sum[1]
+}
+
+impl ConstrainedBob {
+    /// Creates the bob of mode `mode` of tank number `index`, both from 0; `None` for a pendulum that swings in every
+    /// direction.
+    pub fn new(tank: &Tank, index: usize, mode: usize) -> Option<ConstrainedBob> {
+        let (surface, across) = (tank.surface(mode), tank.across(mode));
+        if surface.is_none() && across.is_none() {
+            return None;
+        }
+        let surface = surface.unwrap_or(Surface::SPHERE);
+        let (m, l) = (tank.mass[mode], tank.length[mode]);
+        Some(ConstrainedBob {
+            tank: index,
+            mode,
+            m,
+            l,
+            inv_l: 1.0 / l,
+            c_m: tank.drag(mode) / m,
+            k_m: tank.k[mode] / m,
+            follows: tank.follows(mode),
+            drag: Drag::new(tank, mode),
+            dragged: ZERO_VECTOR,
+            p_d: ZERO_VECTOR,
+            axes: rotation(&unit_quaternion(tank.q)),
+            hinge: tank.hinge_and_across(mode).0,
+            across,
+            surface,
+            coefficients: [tank.nonlinear_inertia[mode], tank.nonlinear_stiffness[mode]],
+            highest: surface.highest(),
+            w: ZERO_PAIR,
+            both: ZERO_PAIR,
+            r: ZERO_VECTOR,
+            v: ZERO_VECTOR,
+            r_d: ZERO_VECTOR,
+            u: ZERO,
+            u2: ZERO,
+            eta: ZERO,
+            slope: ZERO,
+            n: ZERO_VECTOR,
+            tension: ZERO,
+            inner: ZERO,
+            f: ZERO_VECTOR,
+            n2: 1.0,
+            ratio: 0.0,
+            share: 0.0,
+            d: [0.0; 3],
+            fall: [0.0; 3],
+            known: [0.0; 3],
+            multipliers: [0.0; 2],
+            rest: [0.0; 3],
+            ahead: [0.0; 3],
+            specific_force: [0.0; 3],
+        })
+    }
+
+    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates with `w`. Normalises both
+    /// first.
+    #[inline(never)]
+    pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
+        let [p, p_d] = self.projected([x[0], x[1], x[2]], [x[3], x[4], x[5]]);
+        let q = [p[0], p[1], 0.0];
+        let (u, sigma) = (dot(q, q), dot(q, p_d));
+        self.r[0] = [p[0], p[1], p[2] + self.surface.lift(u)];
+        (self.u[0], self.u2[0], self.eta[0]) = (u, u * u, p[2]);
+        let r_d = [p_d[0], p_d[1], p_d[2] + self.surface.rise(u) * sigma];
+        let turned = cross(transposed_times(&self.axes, w), self.r[0]);
+        self.v[0] = add(r_d, turned);
+        self.ahead = [0.0; 3];
+        self.set_normal(0);
+        let n = self.n[0];
+        let (n2, nq) = (dot(n, n), dot(n, q));
+        let inertia = self.surface.meridian_inertia(p[2], u);
+        (self.n2, self.ratio) = (n2, nq / n2);
+        self.share = self.surface.inner() * n2 / f64::max(inertia, 0.5 * LEAST_INERTIA);
+        self.d = sub(q, scale(self.ratio, n));
+    }
+
+    /// Returns direction and rate on the unit sphere, and in the plane of a planar mode.
+    fn projected(&self, p: Vec3, p_d: Vec3) -> [Vec3; 2] {
+        let flat = |x: Vec3| match self.across {
+            Some(b) => sub(x, scale(dot(b, x), b)),
+            None => x,
+        };
+        on_sphere(flat(p), flat(p_d))
+    }
+
+    /// Sets coefficient n of beta eta and of the normal from those of r, u and eta.
+    #[inline(always)]
+    fn set_normal(&mut self, n: usize) {
+        self.n[n] = [self.r[n][0], self.r[n][1], self.eta[n]];
+        if self.surface.is_sphere() {
+            return;
+        }
+        self.slope[n] = self.surface.bend() * mul(n, &self.u, &self.eta);
+        let mut bent = [0.0; 2];
+        for (s, r) in self.slope[..=n].iter().zip(self.r[..=n].iter().rev()) {
+            bent = [bent[0] + s * r[0], bent[1] + s * r[1]];
+        }
+        self.n[n][0] -= bent[0];
+        self.n[n][1] -= bent[1];
+    }
+
+    /// Returns the position of the bob from O at the start of the expansion.
+    fn place(&self) -> Vec3 {
+        add(self.hinge, scale(self.l, times(&self.axes, self.r[0])))
+    }
+
+    /// Returns H x.
+    fn held(&self, x: Vec3) -> Vec3 {
+        let n = self.n[0];
+        let mut held = scale(dot(n, x) / self.n2, n);
+        held = add(held, scale(self.share * dot(self.d, x), self.d));
+        match self.across {
+            Some(b) => add(held, scale(dot(b, x), b)),
+            None => held,
+        }
+    }
+
+    /// Adds m J^T H J, J [a; w'] = a + w' x rho, to the craft's mass matrix.
+    pub fn add_inertia(&self, matrix: &mut Mat6) {
+        let rho = self.place();
+        let mut add = |share: f64, direction: Vec3| {
+            let u = along_rod(times(&self.axes, direction), rho);
+            add_rank_one(matrix, self.m * share, &u);
+        };
+        add(1.0 / self.n2, self.n[0]);
+        if self.share != 0.0 {
+            add(self.share, self.d);
+        }
+        if let Some(b) = self.across {
+            add(1.0, b);
+        }
+    }
+
+    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this order. `w` is
+    /// coefficient n of the angular velocity, `w2` that of the matrix of y -> w x (w x y).
+    #[inline(never)]
+    pub fn reaction(&mut self, n: usize, w: Vec3, w2: &Mat3) -> [Vec3; 2] {
+        let w = transposed_times(&self.axes, w);
+        self.w.set(n, w, w);
+        let order = (n + 1) as f64;
+        let turned = add(self.ahead, cross(w, self.r[0]));
+        self.r_d[n] = sub(self.v[n], turned);
+        self.r[n + 1] = scale(1.0 / order, self.r_d[n]);
+        self.both.set(n, self.r[n + 1], self.v[n]);
+        self.u[n + 1] = square_across(n + 1, &self.r);
+        self.eta[n + 1] = self.r[n + 1][2];
+        if !self.surface.is_sphere() {
+            self.u2[n + 1] = square(n + 1, &self.u);
+            self.eta[n + 1] -= self.surface.lift_of_square() * self.u2[n + 1];
+        }
+        self.set_normal(n + 1);
+
+        let turned = space::cross_pair_of(n, &self.w, &self.both);
+        self.ahead = turned.map(|pair| pair[0]);
+        let centripetal = transposed_times(&self.axes, times(w2, self.hinge));
+        let fall = add(turned.map(|pair| pair[1]), scale(self.inv_l, centripetal));
+        self.fall = scale(-1.0, fall);
+
+        // f without the newest multipliers.
+        let mut f = if self.follows {
+            self.drag_of(n);
+            scale(1.0 / self.m, self.dragged[n])
+        } else {
+            scale(self.c_m, self.r_d[n])
+        };
+        f[0] += self.k_m * self.r[n][0];
+        f[1] += self.k_m * self.r[n][1];
+        for (t, normal) in self.tension[..n].iter().zip(self.n[1..=n].iter().rev()) {
+            for i in 0..3 {
+                f[i] += t * normal[i];
+            }
+        }
+        let normal = dot_from_1(n + 1, &self.n, &self.r_d);
+        let mut inwards = 0.0;
+        if self.surface.inner() != 0.0 {
+            for (s, r) in self.inner[..n].iter().zip(self.r[1..=n].iter().rev()) {
+                f[0] += s * r[0];
+                f[1] += s * r[1];
+            }
+            for (r, r_d) in self.r[1..=n + 1].iter().zip(self.r_d[..=n].iter().rev()) {
+                inwards += r[0] * r_d[0] + r[1] * r_d[1];
+            }
+        }
+        self.rest = f;
+        self.known = sub(sub(self.fall, f), scale(order, self.ahead));
+        self.multipliers = [order * normal, order * inwards];
+        let known = self.force(self.known);
+        self.f[n] = known;
+        let force = times(&self.axes, scale(self.m * self.l, known));
+        let arm = space::cross_of(n, &self.r, &self.f);
+        let twist = times(&self.axes, scale(self.m * self.l * self.l, arm));
+        [force, add(cross(self.hinge, force), twist)]
+    }
+
+    /// Returns T and S under Y.
+    fn multipliers(&self, y: Vec3) -> [f64; 2] {
+        let [normal, inwards] = self.multipliers;
+        let normal = normal + dot(self.n[0], y);
+        let inwards = inwards + self.r[0][0] * y[0] + self.r[0][1] * y[1];
+        let inner = self.share * (inwards - self.ratio * normal);
+        [normal / self.n2 - self.ratio * inner, inner]
+    }
+
+    /// Returns f under Y.
+    fn force(&self, y: Vec3) -> Vec3 {
+        let [tension, inner] = self.multipliers(y);
+        let mut f = add(self.rest, scale(tension, self.n[0]));
+        f[0] += inner * self.r[0][0];
+        f[1] += inner * self.r[0][1];
+        match self.across {
+            Some(b) => add(f, scale(dot(b, y), b)),
+            None => f,
+        }
+    }
+
+    /// Sets coefficient n of c r'.
+    #[inline(never)]
+    fn drag_of(&mut self, n: usize) {
+        self.p_d[n] = [self.r_d[n][0], self.r_d[n][1], (n + 1) as f64 * self.eta[n + 1]];
+        // |p + e|^2 = 2 + 2 p.e. At order 0 this form avoids cancellation near rest.
+        let chord2 = if n == 0 {
+            let above = self.eta[0] + 1.0;
+            self.u[0] + above * above
+        } else {
+            2.0 * self.eta[n]
+        };
+        self.drag.expand(n, chord2, space::square_of(n, &self.p_d));
+        let mut dragged = [0.0; 3];
+        for (c, r_d) in self.drag.c[..=n].iter().zip(self.r_d[..=n].iter().rev()) {
+            for i in 0..3 {
+                dragged[i] += c * r_d[i];
+            }
+        }
+        self.dragged[n] = dragged;
+    }
+
+    /// Sets coefficient n of the multipliers and f and n + 1 of V from coefficient n of [a; w'].
+    #[inline(never)]
+    pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
+        let at_hinge = add(a, cross(w_d, self.hinge));
+        let at_hinge = scale(self.inv_l, transposed_times(&self.axes, at_hinge));
+        let w_d = transposed_times(&self.axes, w_d);
+        let y = sub(sub(self.known, at_hinge), cross(w_d, self.r[0]));
+        [self.tension[n], self.inner[n]] = self.multipliers(y);
+        self.f[n] = self.force(y);
+        if n == 0 {
+            self.specific_force = sub(at_hinge, self.fall);
+        }
+        let rate = sub(sub(self.fall, at_hinge), self.f[n]);
+        self.v[n + 1] = scale(1.0 / (n + 1) as f64, rate);
+    }
+
+    /// Returns coefficient n of the dissipated power, c l^2 |r'|^2, W.
+    pub fn dissipation(&self, n: usize) -> f64 {
+        let l2 = self.l * self.l;
+        if !self.follows {
+            return self.m * self.c_m * l2 * space::square_of(n, &self.r_d);
+        }
+        l2 * (dot_from_1(n, &self.r_d, &self.dragged) + dot(self.r_d[0], self.dragged[n]))
+    }
+
+    /// Returns direction and rate at `t` after the start, tank axes, normalised, from the series up to order n. `w` is the
+    /// craft's angular velocity at that time.
+    pub fn at(&self, n: usize, t: f64, w: Vec3) -> [f64; 6] {
+        let (r, v) = (space::value(&self.r, n, t), space::value(&self.v, n, t));
+        let r_d = sub(v, cross(transposed_times(&self.axes, w), r));
+        let u = r[0] * r[0] + r[1] * r[1];
+        let sigma = r[0] * r_d[0] + r[1] * r_d[1];
+        let p = [r[0], r[1], r[2] - self.surface.lift(u)];
+        let p_d = [r_d[0], r_d[1], r_d[2] - self.surface.rise(u) * sigma];
+        let [p, p_d] = self.projected(p, p_d);
+        [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
+    }
+
+    /// Returns the first time within `h` at which the bob reaches the bound of its surface, from the series up to order n.
+    pub fn bound(&self, n: usize, h: f64) -> Option<f64> {
+        let highest = self.highest?;
+        let mut below = self.eta.map(|eta| -eta);
+        below[0] += highest;
+        first_root(&below[..=n], h)
+    }
+
+    /// Returns the message for a bob beyond the bound of its surface; `name` is that of the tank.
+    pub fn beyond(&self, name: &str) -> String {
+        surface::beyond(self.coefficients, self.mode, name)
+    }
+
+    /// Returns true if the drag depends on acceleration or amplitude.
+    pub fn follows(&self) -> bool {
+        self.follows
+    }
+
+    /// Sets coefficient n of the specific force along the tank's axis at the hinge, which the drag follows.
+    pub fn set_axial(&mut self, n: usize, x: f64) {
+        self.drag.set_axial(n, x);
+    }
+
+    /// Returns e and P x e, the direction along the tank's axis at the hinge.
+    pub fn along_axis(&self) -> [Vec3; 2] {
+        let e = self.axes.map(|row| row[2]);
+        [e, cross(self.hinge, e)]
+    }
+
+    /// Returns the position of the bob at rest from O.
+    pub fn at_rest(&self) -> Vec3 {
+        sub(self.hinge, scale(self.l, self.along_axis()[0]))
+    }
+
+    /// Returns the scale of V for error control, 1/s, as of a pendulum.
+    pub fn rate_scale(&self) -> f64 {
+        let stiffness = largest(self.specific_force) + self.k_m;
+        let [x, y, _] = self.r[0];
+        largest(self.r_d[0]) + libm::sqrt(stiffness) * f64::max(x.abs(), y.abs())
+    }
+
+    /// Magnitude of coefficient n of V.
+    pub fn coefficient_norm(&self, n: usize) -> f64 {
+        largest(self.v[n])
+    }
+
+    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes: l r' changes by
+    /// -(1 - H)(dV + dw x rho). `x` is the six numbers at the start of the expansion.
+    pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
+        let kick = transposed_times(&self.axes, add(dv, cross(dw, self.place())));
+        let change = scale(-self.inv_l, sub(kick, self.held(kick)));
+        let [r_x, r_y, _] = self.r[0];
+        let sigma = r_x * change[0] + r_y * change[1];
+        x[3] += change[0];
+        x[4] += change[1];
+        x[5] += change[2] - self.surface.rise(self.u[0]) * sigma;
+    }
+}
