@@ -39,8 +39,6 @@ use taylor::vector::{
 
 use crate::damping::Drag;
 use crate::parameters::Tank;
-use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod};
-use crate::surface::{Meridian, Surface};
 
 /// Values of one bob for the outputs.
 pub(crate) struct BobNow<T> {
@@ -78,10 +76,6 @@ pub struct Bob {
     inv_l: f64,
     e: Vec3,
     pub hinge: Vec3,
-    /// b of a planar mode (`contents.rs`), body axes, for impulses only: this file does not expand its motion.
-    across: Option<Vec3>,
-    /// Surface of a bob that is not a pendulum (`surface.rs`), for impulses only.
-    surface: Option<Surface>,
     /// Elevation at the wall per slosh angle, m/rad.
     pub wave: f64,
     /// Tank axes to body axes.
@@ -112,7 +106,7 @@ impl Bob {
         let axes = rotation(&unit_quaternion(tank.q));
         let e = axes.map(|row| row[2]);
         let (m, l, k, c) = (tank.mass[mode], tank.length[mode], tank.k[mode], tank.drag(mode));
-        let (hinge, across) = tank.hinge_and_across(mode);
+        let (hinge, _) = tank.hinge_and_across(mode);
         Bob {
             tank: index,
             mode,
@@ -128,8 +122,6 @@ impl Bob {
             inv_l: 1.0 / l,
             e,
             hinge,
-            across,
-            surface: tank.surface(mode),
             wave: tank.wave[mode],
             axes,
             p: ZERO_VECTOR,
@@ -251,52 +243,6 @@ impl Bob {
     /// Returns the position of the bob at rest from O.
     pub fn at_rest(&self) -> Vec3 {
         sub(self.hinge, scale(self.l, self.e))
-    }
-
-    /// Returns the body that represents the bob for hosts that solve with a constant matrix
-    /// (`slosh_tank.rs`).
-    pub fn lumped(&self) -> Rigid {
-        if let Some(surface) = self.surface {
-            let r = self.l * surface.reach();
-            let own = 2.0 * self.m * r * r;
-            let own = [[own, 0.0, 0.0], [0.0, own, 0.0], [0.0, 0.0, own]];
-            return Rigid::new(2.0 * self.m, self.hinge, &own);
-        }
-        let Some(b) = self.across else { return Rigid::new(self.m, self.hinge, &[[0.0; 3]; 3]) };
-        let own = 2.0 * self.m * self.l * self.l;
-        let element = |i: usize, j: usize| own * (if i == j { 1.0 } else { 0.0 } - b[i] * b[j]);
-        let own = [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j)));
-        Rigid::new(2.0 * self.m, self.hinge, &own)
-    }
-
-    /// Adds to a matrix what the craft carries of the bob beyond its inertia along the rod: m u u^T, u = [b; rho x b], of
-    /// a planar mode, or m J^T N J - m u u^T, u = [p; P x p], of a bob that is not a pendulum. `x` is its six numbers.
-    pub fn add_held(&self, matrix: &mut Mat6, x: &[f64]) {
-        let mut p = times(&self.axes, [x[0], x[1], x[2]]);
-        if let Some(surface) = self.surface {
-            if let Some(b) = self.across {
-                p = sub(p, scale(dot(b, p), b));
-            }
-            let [p, _] = on_sphere(p, [0.0; 3]);
-            let (meridian, rho) = self.on_surface(surface, p);
-            let held = meridian.mass_matrix(self.m, rho);
-            for i in 0..6 {
-                for k in 0..6 {
-                    matrix[i][k] += held[i][k];
-                }
-            }
-            add_rank_one(matrix, -self.m, &along_rod(p, self.hinge));
-        } else if let Some(b) = self.across {
-            let rho = add(self.hinge, scale(self.l, p));
-            add_rank_one(matrix, self.m, &along_rod(b, rho));
-        }
-    }
-
-    /// Returns the surface at p and the position of the bob from O.
-    fn on_surface(&self, surface: Surface, p: Vec3) -> (Meridian<f64>, Vec3) {
-        let meridian = Meridian::new(surface, self.e, p, self.across);
-        let lifted = add(p, scale(meridian.relative_lift(), self.e));
-        (meridian, add(self.hinge, scale(self.l, lifted)))
     }
 
     /// Sets coefficient N of c p'.
@@ -436,21 +382,13 @@ impl Bob {
     }
 
     /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes. The bob keeps
-    /// its velocity across the rod: l p' changes by -(1 - p p^T)(dV + dw x rho), in a planar mode by -(1 - p p^T - b
-    /// b^T)(dV + dw x rho), and of a bob that is not a pendulum by -M^-1 Pi D^T (dV + dw x rho) (`surface.rs`). `x` is the six
-    /// numbers at the start of the expansion.
+    /// its velocity across the rod: l p' changes by -(1 - p p^T)(dV + dw x rho). `x` is the six numbers at the start of the
+    /// expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let p = self.p[0];
         let rho = add(self.hinge, scale(self.l, p));
         let kick = add(dv, cross(dw, rho));
-        let mut across = sub(kick, scale(dot(p, kick), p));
-        if let Some(b) = self.across {
-            across = sub(across, scale(dot(b, kick), b));
-        }
-        if let Some(surface) = self.surface {
-            let (meridian, rho) = self.on_surface(surface, p);
-            across = meridian.free(meridian.back(add(dv, cross(dw, rho))));
-        }
+        let across = sub(kick, scale(dot(p, kick), p));
         let change = transposed_times(&self.axes, scale(-self.inv_l, across));
         for i in 0..3 {
             x[3 + i] += change[i];

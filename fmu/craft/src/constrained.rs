@@ -198,6 +198,7 @@ impl ConstrainedBob {
     }
 
     /// Returns direction and rate on the unit sphere, and in the plane of a planar mode.
+    #[inline(never)]
     fn projected(&self, p: Vec3, p_d: Vec3) -> [Vec3; 2] {
         let flat = |x: Vec3| match self.across {
             Some(b) => sub(x, scale(dot(b, x), b)),
@@ -207,7 +208,7 @@ impl ConstrainedBob {
     }
 
     /// Sets coefficient n of beta eta and of the normal from those of r, u and eta.
-    #[inline(always)]
+    #[inline(never)]
     fn set_normal(&mut self, n: usize) {
         self.n[n] = [self.r[n][0], self.r[n][1], self.eta[n]];
         if self.surface.is_sphere() {
@@ -241,16 +242,11 @@ impl ConstrainedBob {
     /// Adds m J^T H J, J [a; w'] = a + w' x rho, to the craft's mass matrix.
     pub fn add_inertia(&self, matrix: &mut Mat6) {
         let rho = self.place();
-        let mut add = |share: f64, direction: Vec3| {
+        let across = self.across.map(|b| (1.0, b));
+        let parts = [Some((1.0 / self.n2, self.n[0])), Some((self.share, self.d)), across];
+        for (share, direction) in parts.into_iter().flatten() {
             let u = along_rod(times(&self.axes, direction), rho);
             add_rank_one(matrix, self.m * share, &u);
-        };
-        add(1.0 / self.n2, self.n[0]);
-        if self.share != 0.0 {
-            add(self.share, self.d);
-        }
-        if let Some(b) = self.across {
-            add(1.0, b);
         }
     }
 
@@ -316,6 +312,7 @@ impl ConstrainedBob {
     }
 
     /// Returns T and S under Y.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn multipliers(&self, y: Vec3) -> [f64; 2] {
         let [normal, inwards] = self.multipliers;
         let normal = normal + dot(self.n[0], y);
@@ -325,6 +322,7 @@ impl ConstrainedBob {
     }
 
     /// Returns f under Y.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn force(&self, y: Vec3) -> Vec3 {
         let [tension, inner] = self.multipliers(y);
         let mut f = add(self.rest, scale(tension, self.n[0]));

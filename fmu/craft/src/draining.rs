@@ -11,7 +11,7 @@
 //! same equations give this impulse if only the flow's slope acts.
 
 use alloc::vec::Vec;
-use core::ops::{Mul, Range};
+use core::ops::Range;
 
 use taylor::error::StepError;
 use taylor::extrapolation::System;
@@ -90,8 +90,6 @@ pub struct Draining {
     tanks: Vec<MountedTank>,
     /// True if any drag follows acceleration or amplitude.
     follows: bool,
-    /// Craft and liquids at rest as one rigid body, and its equations, if no tank drains.
-    still: Option<(Rigid, Equations<f64>)>,
 }
 
 /// The system for [a; w'].
@@ -188,24 +186,18 @@ impl Draining {
     /// Creates the equations; `None` if all tanks keep their liquid and have pendulums that swing in every direction.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
-        if !tanks.iter().any(Tank::is_extrapolated) {
+        if !tanks.iter().any(Tank::has_contents) {
             return None;
         }
         let tanks: Vec<_> = tanks.iter().map(|tank| MountedTank::new(&tank.resolve())).collect();
-        let mut craft = Draining {
+        Some(Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,
             pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
             follows: tanks.iter().any(MountedTank::follows),
-            still: None,
             tanks,
-        };
-        if craft.tanks.iter().all(|mounted| mounted.still().is_some()) {
-            let whole: Rigid = craft.at_rest(&[0.0; STATES]);
-            craft.still = Some((whole, craft.equations(whole.mass_matrix())));
-        }
-        Some(craft)
+        })
     }
 
     /// Returns the tanks at the current masses of liquid.
@@ -307,9 +299,9 @@ impl Draining {
     }
 
     /// Solves the equations of motion for [a; w']; on a pivot a is given.
-    fn solve<T: Number + Mul<M, Output = T>, M: Copy>(
+    fn solve<T: Number>(
         &self,
-        Equations { matrix, factors }: &Equations<M>,
+        Equations { matrix, factors }: &Equations<T>,
         [mut force, mut torque]: [Vec3<T>; 2],
         axes: &Mat3<T>,
     ) -> [Vec3<T>; 2] {
@@ -345,20 +337,14 @@ impl Draining {
             return [zero; 2];
         }
         let w = vec_of(x, index::OMEGA);
-        let whole = match &self.still {
-            Some((whole, _)) => whole.lift(),
-            None => self.at_rest(x),
-        };
+        let whole = self.at_rest(x);
         let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
         let force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
         if self.pivot.acts() {
             torque = add(torque, of_pivot);
         }
-        match &self.still {
-            Some((_, equations)) => self.solve(equations, [force, torque], axes),
-            None => self.solve(&self.equations(whole.mass_matrix()), [force, torque], axes),
-        }
+        self.solve(&self.equations(whole.mass_matrix()), [force, torque], axes)
     }
 
     /// Solves the equations of motion, and evaluates the tanks' contents.

@@ -42,7 +42,7 @@ use taylor::integrator::{self, Convergence, MAX_MAGNITUDE, Motion, RATE_FLOOR, S
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{
     self, Attitude, Pair, Vector, ZERO_ATTITUDE, ZERO_PAIR, ZERO_VECTOR, cross, cross_pair,
-    cross_ramp, dot_ramp, next, products, quaternion_rate, ramp,
+    cross_ramp, dot_ramp, next, products, products_of, quaternion_rate, ramp,
 };
 use taylor::vector::{
     self, Mat3, Vec3, add, largest, part, rotation, scale, sub, times, transposed_times,
@@ -319,10 +319,22 @@ impl CraftMotion {
         self.start(0.0);
         self.factorise();
         let [dv, dw] = self.factors.solve([[0.0; 3], scale(-1.0, jump)]);
-        let velocity_change = times(&rotation(&self.q.get(0)), dv);
         let x = &mut self.state.x;
         for i in 0..3 {
             x[index::WORK] -= jump[i] * (x[index::OMEGA + i] + dw[i] / 2.0);
+        }
+        self.follow_impulse(dv, dw);
+        self.state.h_wheels = h;
+        true
+    }
+
+    /// After [`Motion::start`], updates the states for an impulse that changes the craft's velocity by dV (of O) and dw,
+    /// body axes.
+    #[inline(never)]
+    fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
+        let velocity_change = times(&rotation(&self.q.get(0)), dv);
+        let x = &mut self.state.x;
+        for i in 0..3 {
             x[index::OMEGA + i] += dw[i];
             x[index::VELOCITY + i] += velocity_change[i];
         }
@@ -337,8 +349,6 @@ impl CraftMotion {
         for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
             lump.after_impulse(&mut x[index::ball(lump.tank)..], dv, dw);
         }
-        self.state.h_wheels = h;
-        true
     }
 
     /// Evaluates the equations at the current instant.
@@ -437,7 +447,7 @@ impl CraftMotion {
             torque = add(torque, tau);
         }
         if self.any_apart {
-            [force, torque] = self.add_reactions_apart(N, w2, [force, torque]);
+            [force, torque] = self.add_reactions_apart(N, [force, torque]);
         }
         if N == 0 {
             self.factorise();
@@ -514,7 +524,7 @@ impl CraftMotion {
             );
         }
         if self.any_apart {
-            self.set_axial_apart(N, w2, [force, torque]);
+            self.set_axial_apart(N, [force, torque]);
         }
     }
 
@@ -704,7 +714,8 @@ impl CraftMotion {
     }
 
     #[inline(never)]
-    fn set_axial_apart(&mut self, n: usize, w2: Mat3, [force, torque]: [Vec3; 2]) {
+    fn set_axial_apart(&mut self, n: usize, [force, torque]: [Vec3; 2]) {
+        let w2 = twice_crossed(products_of(n, &self.w));
         let along = &self.along[self.bobs.len()..];
         for (bob, [by_force, by_torque]) in self.constrained.iter_mut().zip(along) {
             let [e, _] = bob.along_axis();
@@ -715,14 +726,9 @@ impl CraftMotion {
     }
 
     /// Adds coefficient n of force and torque of constrained bobs and lumps on the craft, about O.
-    // w2 by value: a reference would keep the caller's in memory.
     #[inline(never)]
-    fn add_reactions_apart(
-        &mut self,
-        n: usize,
-        w2: Mat3,
-        [mut force, mut torque]: [Vec3; 2],
-    ) -> [Vec3; 2] {
+    fn add_reactions_apart(&mut self, n: usize, [mut force, mut torque]: [Vec3; 2]) -> [Vec3; 2] {
+        let w2 = twice_crossed(products_of(n, &self.w));
         for bob in &mut self.constrained {
             let [f, tau] = bob.reaction(n, self.w[n], &w2);
             (force, torque) = (add(force, f), add(torque, tau));
@@ -975,19 +981,7 @@ impl Carrier for CraftMotion {
     fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
         self.evaluate_at(t);
         let [dv, dw] = self.factors.solve(impulse);
-        let velocity_change = times(&rotation(&self.q.get(0)), dv);
-        let x = &mut self.state.x;
-        for i in 0..3 {
-            x[index::OMEGA + i] += dw[i];
-            x[index::VELOCITY + i] += velocity_change[i];
-        }
-        for bob in &self.bobs {
-            let at = index::bob(bob.tank, bob.mode);
-            bob.after_impulse((&mut x[at..at + 6]).try_into().unwrap(), dv, dw);
-        }
-        for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
-            lump.after_impulse(&mut x[index::ball(lump.tank)..], dv, dw);
-        }
+        self.follow_impulse(dv, dw);
         [dv, dw]
     }
 

@@ -349,9 +349,9 @@ impl Tank {
         self.surface(n).is_some() || self.across(n).is_some()
     }
 
-    /// Returns true if the motion is integrated by extrapolation (`contents.rs`): the tank can drain, or has planar
-    /// modes or other coefficients of the third order than pendulums.
-    pub(crate) fn is_extrapolated(&self) -> bool {
+    /// Returns true if outputs and derivatives are those of `contents.rs`: the tank can drain, or has planar modes or
+    /// other coefficients of the third order than pendulums.
+    pub(crate) fn has_contents(&self) -> bool {
         self.fill.points > 0 || self.is_planar() || self.has_surface()
     }
 
@@ -378,6 +378,30 @@ impl Tank {
             Some(b) => (sub(on_axis, scale(self.arm[n], b)), Some(b)),
             None => (on_axis, None),
         }
+    }
+
+    /// Returns the hinge of mode n (from 0) from O, m, and the tank's axis; body axes.
+    pub(crate) fn hinge_and_axis(&self, n: usize) -> [Vec3; 2] {
+        let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
+        [self.hinge_and_across(n).0, e]
+    }
+
+    /// Returns the body that represents the bob of mode n (from 0) for hosts that solve with a constant matrix
+    /// (`slosh_tank.rs`).
+    pub(crate) fn lumped(&self, n: usize) -> Rigid {
+        let (m, l) = (self.mass[n], self.length[n]);
+        let (hinge, across) = self.hinge_and_across(n);
+        if let Some(surface) = self.surface(n) {
+            let r = l * surface.reach();
+            let own = 2.0 * m * r * r;
+            let own = [[own, 0.0, 0.0], [0.0, own, 0.0], [0.0, 0.0, own]];
+            return Rigid::new(2.0 * m, hinge, &own);
+        }
+        let Some(b) = across else { return Rigid::new(m, hinge, &[[0.0; 3]; 3]) };
+        let own = 2.0 * m * l * l;
+        let element = |i: usize, j: usize| own * (if i == j { 1.0 } else { 0.0 } - b[i] * b[j]);
+        let own = [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j)));
+        Rigid::new(2.0 * m, hinge, &own)
     }
 
     /// Adds the inertia of planar modes' bobs, perpendicular to their planes and along their rods, with rods at

@@ -47,9 +47,9 @@
 //! counts with 2 m at its hinge and the inertia 2 m r^2 about it, r its distance from the hinge within 45 degrees, because
 //! |a_P + w' x (rho - P)|^2 <= 2 |a_P|^2 + 2 r^2 |w'|^2.
 //!
-//! A tank that drains, has planar modes or such bobs (`contents.rs`) is integrated by extrapolation instead of power series, as in
-//! a craft. A jump of its flow is an impulse on the host, which a force cannot represent. The model leaves it out, for
-//! host and bobs.
+//! Outputs and derivatives of a tank that drains, has planar modes or such bobs are those of `contents.rs`. A tank that
+//! drains is integrated by extrapolation instead of power series, as in a craft. A jump of its flow is an impulse on the
+//! host, which a force cannot represent. The model leaves it out, for host and bobs.
 //!
 //! **Detached liquid** (`lump.rs`, `handover.rs`) acts on its host by impulses. M_a and bias belong to the liquid's
 //! state: in flight only the inertia that rotates with the tank, on the wall plus m u u^T, u = [n; rho x n]. The host's
@@ -85,10 +85,11 @@ use taylor::extrapolation::System;
 use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
 use taylor::number::{Dual, Number};
 use taylor::series::{self, ORDER, Series, ZERO};
-use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products};
+use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products, products_of};
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, largest, part, scale, sub, times};
 
 use crate::bob::{Bob, BobNow};
+use crate::constrained::ConstrainedBob;
 use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of};
 use crate::handover::Carrier;
 use crate::lump::{Directions, Due, Lump};
@@ -316,6 +317,12 @@ struct TankMotion {
     inputs: TankInputs,
     rigid: Rigid,
     bobs: Vec<Bob>,
+    /// Bobs that are not pendulums or are guided in a plane, and the one of them that reaches the bound of its surface at
+    /// the end of the expansion.
+    constrained: Vec<ConstrainedBob>,
+    beyond: Option<usize>,
+    /// True if the tank models detached liquid or has constrained bobs.
+    is_apart: bool,
     a: Vector,
     w: Vector,
     /// (w, w)
@@ -359,6 +366,8 @@ pub struct SloshTank {
     draining: Option<Box<MountedTank>>,
     limits: Limits,
     bounds: ranges::Bounds,
+    /// Hinge of the first mode from O and the tank's axis.
+    first: Option<[Vec3; 2]>,
 }
 
 /// The motion of a tank with the equations of `contents.rs` over one step.
@@ -472,8 +481,8 @@ impl Motion for TankMotion {
             let at = 6 * bob.mode;
             bob.start(self.state.x[at..at + 6].try_into().unwrap(), turned);
         }
-        if by_impulses.is_some() {
-            self.start_lump();
+        if self.is_apart {
+            self.start_apart();
         }
     }
 
@@ -488,9 +497,8 @@ impl Motion for TankMotion {
         let swing =
             self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
         self.inv_allowed = 1.0 / (allowed * (RATE_FLOOR + largest(self.w[0]) + swing));
-        if let Some(ball) = &mut self.ball {
-            let speed = ball.lump.speed_scale(self.w[0], h.min(SCALE_TIME));
-            ball.inv_allowed = 1.0 / (allowed * RATE_FLOOR.max(speed));
+        if self.is_apart {
+            self.set_error_scale_apart(h.min(SCALE_TIME), allowed);
         }
         h
     }
@@ -500,17 +508,12 @@ impl Motion for TankMotion {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let norm = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger)
             * self.inv_allowed;
-        match &self.ball {
-            Some(ball) if ball.lump.is_loose() => {
-                larger(norm, ball.lump.coefficient_norm(n) * ball.inv_allowed)
-            }
-            _ => norm,
-        }
+        if self.is_apart { larger(norm, self.coefficient_norm_apart(n)) } else { norm }
     }
 
     #[inline(always)]
     fn event(&mut self, n: usize, h: f64) -> Option<f64> {
-        if self.ball.is_none() { None } else { self.next_of_ball(n, h) }
+        if self.is_apart { self.next_event(n, h) } else { None }
     }
 
     #[inline(always)]
@@ -534,10 +537,8 @@ impl Motion for TankMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        if let Some(lump) = loose(&mut self.ball) {
-            let moved = lump.at(x[BALL..].try_into().unwrap(), n, h, w);
-            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
-            x[BALL..].copy_from_slice(&moved);
+        if self.is_apart {
+            finite &= self.take_apart(n, h, w)?;
         }
         if !finite {
             return Err(StepError::NotFinite { time: self.state.time + t });
@@ -607,8 +608,8 @@ impl TankMotion {
             bob.accelerate::<N>(self.a[N], self.w_d[N]);
             dissipation += bob.dissipation::<N>();
         }
-        if self.ball.is_some() {
-            dissipation += self.rates_of_ball(N);
+        if self.is_apart {
+            dissipation += self.rates_apart(N);
         }
         self.dissipation[N] = dissipation;
     }
@@ -686,11 +687,83 @@ impl TankMotion {
     /// Computes coefficient n of the detached liquid's loads and n + 1 of its motion. Returns its
     /// dissipation.
     #[inline(never)]
-    fn rates_of_ball(&mut self, n: usize) -> f64 {
-        let Some(lump) = loose(&mut self.ball) else { return 0.0 };
+    fn rates_apart(&mut self, n: usize) -> f64 {
+        let w2 = twice_crossed(products_of(n, &self.w));
+        let (a, w_d, mut dissipation) = (self.a[n], self.w_d[n], 0.0);
+        for bob in &mut self.constrained {
+            if bob.follows() {
+                let [e, turned] = bob.along_axis();
+                bob.set_axial(n, dot(e, add(a, times(&w2, bob.hinge))) + dot(turned, w_d));
+            }
+            bob.reaction(n, self.w[n], &w2);
+            bob.accelerate(n, a, w_d);
+            dissipation += bob.dissipation(n);
+        }
+        let Some(lump) = loose(&mut self.ball) else { return dissipation };
         lump.reaction(n, &self.w, &self.w_d);
-        lump.accelerate(n, self.a[n], self.w_d[n]);
+        lump.accelerate(n, a, w_d);
         lump.dissipation(n)
+    }
+
+    #[inline(never)]
+    fn set_error_scale_apart(&mut self, time: f64, allowed: f64) {
+        let swing = self.constrained.iter().map(ConstrainedBob::rate_scale).fold(0.0, f64::max);
+        let fastest = 1.0 / (allowed * (RATE_FLOOR + largest(self.w[0]) + swing));
+        self.inv_allowed = self.inv_allowed.min(fastest);
+        if let Some(ball) = &mut self.ball {
+            let speed = ball.lump.speed_scale(self.w[0], time);
+            ball.inv_allowed = 1.0 / (allowed * RATE_FLOOR.max(speed));
+        }
+    }
+
+    #[inline(never)]
+    fn coefficient_norm_apart(&self, n: usize) -> f64 {
+        let larger = |a: f64, b: f64| if b > a { b } else { a };
+        let bobs = self.constrained.iter().map(|bob| bob.coefficient_norm(n));
+        let norm = bobs.fold(0.0, larger) * self.inv_allowed;
+        match &self.ball {
+            Some(ball) if ball.lump.is_loose() => {
+                larger(norm, ball.lump.coefficient_norm(n) * ball.inv_allowed)
+            }
+            _ => norm,
+        }
+    }
+
+    /// Advances the states of constrained bobs and detached liquid by a step of length h. Returns true if they are finite
+    /// and within bounds.
+    ///
+    /// # Errors
+    /// A bob is at the bound of its surface.
+    #[inline(never)]
+    fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
+        if let Some(bob) = self.beyond.take() {
+            return Err(StepError::Model(self.constrained[bob].beyond("tank")));
+        }
+        let (x, mut finite) = (&mut self.state.x, true);
+        for bob in &self.constrained {
+            let moved = bob.at(n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[6 * bob.mode..][..6].copy_from_slice(&moved);
+        }
+        if let Some(lump) = loose(&mut self.ball) {
+            let moved = lump.at(x[BALL..].try_into().unwrap(), n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[BALL..].copy_from_slice(&moved);
+        }
+        Ok(finite)
+    }
+
+    /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound of its surface.
+    #[inline(never)]
+    fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
+        let mut first = self.next_of_ball(n, h);
+        self.beyond = None;
+        for (i, bob) in self.constrained.iter().enumerate() {
+            if let Some(t) = bob.bound(n, first.unwrap_or(h)) {
+                (first, self.beyond) = (Some(t), Some(i));
+            }
+        }
+        first
     }
 
     #[inline(never)]
@@ -716,12 +789,16 @@ impl TankMotion {
 
     /// Sets up detached liquid at the start of an expansion. After a change it holds a and w' of the host's response.
     #[inline(never)]
-    fn start_lump(&mut self) {
+    fn start_apart(&mut self) {
         let w = self.w[0];
+        for bob in &mut self.constrained {
+            let at = 6 * bob.mode;
+            bob.start(self.state.x[at..at + 6].try_into().unwrap(), w);
+        }
         if let Some(lump) = loose(&mut self.ball) {
             lump.start(self.state.x[BALL..].try_into().unwrap(), w);
         }
-        let Some(rest) = self.loose().rest else { return };
+        let Some(rest) = self.ball.as_ref().and_then(|ball| ball.rest) else { return };
         self.rates_of::<0>();
         self.factorise();
         let turning = self.rigid().inertial_wrench([0.0; 3], w, [0.0; 3]);
@@ -904,6 +981,10 @@ impl TankMotion {
             let at = 6 * bob.mode;
             bob.after_impulse((&mut self.state.x[at..at + 6]).try_into().unwrap(), dv, dw);
         }
+        for bob in &self.constrained {
+            let at = 6 * bob.mode;
+            bob.after_impulse((&mut self.state.x[at..at + 6]).try_into().unwrap(), dv, dw);
+        }
         if let Some(lump) = loose(&mut self.ball) {
             lump.after_impulse(&mut self.state.x[BALL..], dv, dw);
         }
@@ -995,8 +1076,11 @@ impl SloshTank {
     pub fn resume(p: &TankParameters, state: &TankState, tolerance: f64) -> SloshTank {
         let tank = p.tank.resolve();
         let rigid = tank.rigid();
-        let bobs: Vec<Bob> = (0..tank.modes).map(|n| Bob::new(&tank, 0, n)).collect();
-        let lumped = bobs.iter().fold(rigid, |sum, bob| sum.and(&bob.lumped()));
+        let free = (0..tank.modes).filter(|n| !tank.is_constrained(*n));
+        let bobs: Vec<Bob> = free.map(|n| Bob::new(&tank, 0, n)).collect();
+        let constrained = (0..tank.modes).filter_map(|n| ConstrainedBob::new(&tank, 0, n));
+        let constrained: Vec<_> = constrained.collect();
+        let lumped = (0..tank.modes).fold(rigid, |sum, n| sum.and(&tank.lumped(n)));
         let ball = Lump::new(&tank, 0).map(|lump| {
             let host = p.host.unwrap_or_default().rigid();
             Loose {
@@ -1015,6 +1099,9 @@ impl SloshTank {
             inputs: TankInputs::default(),
             rigid,
             bobs,
+            is_apart: ball.is_some() || !constrained.is_empty(),
+            constrained,
+            beyond: None,
             a: ZERO_VECTOR,
             w: ZERO_VECTOR,
             w_both: ZERO_PAIR,
@@ -1028,9 +1115,10 @@ impl SloshTank {
             coupling: p.coupling,
             host: p.host,
             lumped,
-            draining: tank.is_extrapolated().then(|| Box::new(MountedTank::new(&tank))),
+            draining: tank.has_contents().then(|| Box::new(MountedTank::new(&tank))),
             limits: Limits { tolerance, max_steps: p.max_steps },
             bounds: ranges::Bounds::new(&tank),
+            first: (tank.modes > 0).then(|| tank.hinge_and_axis(0)),
         }
     }
 
@@ -1067,7 +1155,7 @@ impl SloshTank {
         let mut given = given.chain(&inputs.omega_dot.value).chain(&inputs.omega_dot.slope);
         let done = if !given.all(|x| x.is_finite()) {
             Err(StepError::NotFinite { time: before.time })
-        } else if let Some(mounted) = &self.draining {
+        } else if let Some(mounted) = self.draining.as_ref().filter(|tank| tank.drains()) {
             let x = &mut self.motion.state.x;
             Run { mounted, inputs }.advance(x, before.time, h, self.limits)
         } else {
@@ -1105,14 +1193,14 @@ impl SloshTank {
     /// Returns true if the motion is in the tank's range at the end of its last step, of length `h`. Detached liquid
     /// has no range.
     pub fn is_in_range_after(&self, inputs: &TankInputs, h: f64) -> bool {
-        let TankMotion { state, bobs, ball, .. } = &*self.motion;
+        let TankMotion { state, ball, .. } = &*self.motion;
         if ball.is_some() {
             return true;
         }
         let [a, w, w_d] = [inputs.a.at(h), inputs.omega_at(h), inputs.omega_dot.at(h)];
-        let axial = bobs.first().map_or(0.0, |bob| {
-            let turning = add(cross(w_d, bob.hinge), cross(w, cross(w, bob.hinge)));
-            dot(bob.along_axis()[0], add(a, turning))
+        let axial = self.first.map_or(0.0, |[hinge, e]| {
+            let turning = add(cross(w_d, hinge), cross(w, cross(w, hinge)));
+            dot(e, add(a, turning))
         });
         self.bounds.contain(core::array::from_fn(|n| state.x[6 * n + 2]), axial)
     }
@@ -1319,11 +1407,16 @@ impl SloshTank {
     /// The impulse changes the velocity of O by `dv`, m/s, and the host's angular velocity by `dw`,
     /// rad/s, host axes.
     pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
-        let TankMotion { state, bobs, .. } = &mut *self.motion;
+        let TankMotion { state, bobs, constrained, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
             mounted.flatten(&mut state.x);
             let tank = Tank { liquid_0: state.x[LIQUID], ..mounted.tank }.resolve();
             bobs.iter_mut().for_each(|bob| *bob = Bob::new(&tank, 0, bob.mode));
+            for bob in constrained {
+                if let Some(now) = ConstrainedBob::new(&tank, 0, bob.mode) {
+                    *bob = now;
+                }
+            }
         }
         self.motion.start(0.0);
         self.motion.follow_impulse(dv, dw);
@@ -1340,7 +1433,9 @@ impl SloshTank {
         let mut matrix = self.motion.rigid.mass_matrix();
         for bob in &self.motion.bobs {
             add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
-            bob.add_held(&mut matrix, &self.motion.state.x[6 * bob.mode..]);
+        }
+        for bob in &self.motion.constrained {
+            bob.add_inertia(&mut matrix);
         }
         Some(largest_eigenvalue(&Factors::of(&host.rigid().mass_matrix()), &matrix))
     }

@@ -216,11 +216,6 @@ impl<T: Number> Meridian<T> {
         Meridian { surface, p, e, p_perp, u, eta, beta, eased: gamma / inertia, across }
     }
 
-    /// Returns z/l.
-    pub fn relative_lift(&self) -> T {
-        self.u * self.u * (0.125 * self.surface.stiffness)
-    }
-
     /// Returns D x.
     pub fn along(&self, x: Vec3<T>) -> Vec3<T> {
         add(x, scale(self.beta * dot(self.p_perp, x), self.e))

@@ -103,6 +103,18 @@ pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     sum
 }
 
+/// Returns the same as [`products`], as a loop over any order n.
+pub fn products_of(n: usize, a: &Vector) -> [f64; 6] {
+    let mut sum = [EMPTY; 6];
+    for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
+        let terms = [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[0] * b[1], a[0] * b[2], a[1] * b[2]];
+        for (sum, term) in sum.iter_mut().zip(terms) {
+            *sum += term;
+        }
+    }
+    sum
+}
+
 /// Returns coefficient N of a b, with b a vector.
 #[inline(always)]
 pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {

@@ -42,8 +42,9 @@ pub fn runge_kutta(
     }
 }
 
-/// Nothing is shared but the rates at an instant: Runge-Kutta at 0.2 ms against the power
-/// series, at 0.1 ms, where planar modes are faster, against the extrapolation. The fastest bobs move at 30 and 60 1/s:
+/// Runge-Kutta on the rates at an instant at 0.2 ms, at 0.1 ms where planar modes are faster, against the power series.
+/// The rates of planar modes and of other bobs than pendulums are those of contents.rs, not of the series. The fastest bobs
+/// move at 30 and 60 1/s:
 /// (30 h)^4/120 of what they do leaves 1e-11. In a quarter of a second these turn by one to two turns.
 #[test]
 fn a_host_that_integrates_itself_meets_the_crafts_own_steps() {

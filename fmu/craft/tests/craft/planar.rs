@@ -77,7 +77,7 @@ fn in_a_plane_of_symmetry_the_mode_across_is_rigid_liquid() {
         let same = (0..index::BOBS).map(|i| (i, i)).chain(bob(along).zip(bob(0)));
         for (i, k) in same {
             let (got, want) = (planar[i], around[k]);
-            // 1e-12 a step, grown over 4 s; power series against extrapolation.
+            // 1e-12 a step, grown over 4 s; bob.rs against constrained.rs.
             assert!((got - want).abs() < 1e-10 * (1.0 + want.abs()), "{along} [{i}]: {got} {want}");
         }
         // Across nothing moves.

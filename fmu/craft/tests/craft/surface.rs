@@ -252,7 +252,7 @@ fn a_surface_that_is_nearly_a_sphere_moves_as_a_pendulum() {
     });
     let [(x, bias, mass), (y, bias_y, mass_y)] = ends;
     for (a, b) in x.iter().chain(&bias).chain(&mass).zip(y.iter().chain(&bias_y).chain(&mass_y)) {
-        // Power series against extrapolation, 1e-12 a step.
+        // bob.rs against constrained.rs, 1e-12 a step.
         assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
     }
 }
