@@ -170,7 +170,7 @@ impl File {
             refuse_binary(path)?;
         }
         match ending.as_deref() {
-            Some("csv" | "txt" | "tsv" | "dat" | "asc" | "log") => {
+            Some("csv" | "txt" | "tsv" | "dat" | "asc" | "log" | "lvm") => {
                 Ok(File::Text(text::Layout::of(path)?))
             }
             Some("parquet") => {
@@ -179,7 +179,7 @@ impl File {
             }
             Some("mat") => Ok(File::Matlab(matlab::header(path)?)),
             _ => bail!(
-                "the name must end in .csv, .txt, .tsv, .dat, .asc or .log (text in columns), .parquet or .mat"
+                "the name must end in .csv, .txt, .tsv, .dat, .asc, .log or .lvm (text in columns), .parquet or .mat"
             ),
         }
     }
@@ -284,9 +284,10 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     }
     ensure!(
         problems.is_empty(),
-        "{} (columns in it: {}; --columns SIGNAL=COLUMN:UNIT,... says which is which{})",
+        "{} (columns in it: {}{}; --columns SIGNAL=COLUMN:UNIT,... says which is which{})",
         problems.join("; "),
         header.names.join(", "),
+        if let File::Text(layout) = &file { &layout.texts } else { "" },
         if timeless { "; --rate HZ takes equally spaced rows without times" } else { "" }
     );
     ensure!(!places.is_empty(), "it has no signal that is wanted");

@@ -19,6 +19,8 @@ const SAMPLE: usize = 200;
 const LONGEST_LINE: u64 = 1 << 20;
 /// Faults that are named before the rest is only counted.
 const NAMED: usize = 5;
+/// Names of a last column that rows may leave out.
+const COMMENT_COLUMNS: [&str; 4] = ["comment", "comments", "note", "notes"];
 /// Beginnings of lines of comment.
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
 
@@ -40,26 +42,30 @@ impl Separator {
     /// The fields of a line, without blanks and quotes around them; whether one was quoted.
     fn split<'a>(self, line: &'a str, fields: &mut Vec<(&'a str, bool)>) {
         fields.clear();
+        let is_separator = |c: char| match self {
+            Separator::Char(separator) => c == separator,
+            Separator::Blanks => c.is_whitespace(),
+        };
+        if line.contains('"') {
+            let mut quoted = false;
+            let parts = line.split(|c| {
+                quoted ^= c == '"';
+                is_separator(c) && !quoted
+            });
+            fields.extend(parts.map(|field| {
+                let field = field.trim();
+                let inner = field.strip_prefix('"').and_then(|f| f.strip_suffix('"'));
+                (inner.unwrap_or(field).trim(), inner.is_some())
+            }));
+        } else {
+            fields.extend(line.split(is_separator).map(|field| (field.trim(), false)));
+        }
         match self {
-            Separator::Blanks => fields.extend(line.split_whitespace().map(|f| (f, false))),
-            Separator::Char(c) if !line.contains('"') => {
-                fields.extend(line.split(c).map(|field| (field.trim(), false)));
-            }
-            Separator::Char(c) => {
-                let (mut from, mut quoted) = (0, false);
-                let mut add = |field: &'a str| {
-                    let field = field.trim();
-                    let inner = field.strip_prefix('"').and_then(|f| f.strip_suffix('"'));
-                    fields.push((inner.unwrap_or(field).trim(), inner.is_some()));
-                };
-                for (at, byte) in line.char_indices() {
-                    quoted ^= byte == '"';
-                    if byte == c && !quoted {
-                        add(&line[from..at]);
-                        from = at + c.len_utf8();
-                    }
+            Separator::Blanks => fields.retain(|(field, quoted)| *quoted || !field.is_empty()),
+            Separator::Char(_) => {
+                if let Some((stamp, rest)) = fields.first().and_then(|(field, _)| stamped(field)) {
+                    fields.splice(..1, [(stamp, false), (rest, false)]);
                 }
-                add(&line[from..]);
             }
         }
     }
@@ -131,6 +137,19 @@ fn clock(field: &str) -> Option<i64> {
     Some(i64::from(time.num_seconds_from_midnight()) * 1_000_000_000 + i64::from(time.nanosecond()))
 }
 
+/// Divides a field into the date or clock time that a terminal program puts before each line, and the rest:
+/// `12:00:00.020 -> 5`, `[12:00:00.020] 5`, `12:00:00.020 5`.
+fn stamped(field: &str) -> Option<(&str, &str)> {
+    if !field.contains(':') {
+        return None;
+    }
+    let bracketed = field.strip_prefix('[').and_then(|field| field.split_once(']'));
+    let (stamp, rest) =
+        bracketed.or_else(|| field.split_once('>')).or_else(|| field.rsplit_once(' '))?;
+    let (stamp, rest) = (stamp.trim_end_matches([' ', '-']), rest.trim());
+    (!rest.is_empty() && (date(stamp).is_some() || clock(stamp).is_some())).then_some((stamp, rest))
+}
+
 /// Returns true for a field that marks a missing value, or what C's library and spreadsheets print for NaN.
 fn missing(field: &str) -> bool {
     const WORDS: [&str; 17] = [
@@ -181,6 +200,16 @@ fn values(line: &str, separator: Separator) -> Vec<Value> {
     fields.into_iter().map(|field| value(field, separator, &mut Style::default())).collect()
 }
 
+/// Returns true if the first fields of rows are names of rows, which have no name in the header: quoted ones, or numbers
+/// from 1 on, as R writes them.
+fn are_row_names(rows: &[(usize, String)], separator: Separator) -> bool {
+    let mut fields = Vec::new();
+    rows.iter().enumerate().all(|(k, (_, row))| {
+        separator.split(row, &mut fields);
+        fields.first().is_some_and(|(name, quoted)| *quoted || *name == (k + 1).to_string())
+    })
+}
+
 /// The separator of a line `sep=;`, with which Excel begins a file.
 fn excels(line: &str) -> Option<Separator> {
     let line = line.trim_matches(['"', ' ']);
@@ -197,6 +226,10 @@ struct Division {
     width: usize,
     /// The columns of text.
     texts: Vec<usize>,
+    /// True if most rows have text in a column.
+    is_wordy: bool,
+    /// The columns with a value in most rows; if there are none, all but those of text.
+    dense: Vec<usize>,
     /// Lines whose columns hold values, but for those of text.
     rows: usize,
 }
@@ -212,11 +245,21 @@ impl Division {
         rows().for_each(|line| *widths.entry(line.len()).or_insert(0_usize) += 1);
         let width = widths.iter().max_by_key(|(_, count)| **count).map_or(0, |(width, _)| *width);
         let count = widths.get(&width).copied().unwrap_or(0);
-        let others = |k: &usize| {
-            rows().filter(|line| line.len() == width && line[*k] == Value::Other).count()
+        let of = |k: usize, wanted: fn(&Value) -> bool| {
+            rows().filter(|line| line.len() == width && wanted(&line[k])).count()
         };
-        let texts = (0..width).filter(|k| 2 * others(k) > count).collect();
-        let mut found = Division { separator, width, texts, rows: 0 };
+        let others = |k| of(k, |value| *value == Value::Other);
+        let there = |k| of(k, Value::is_there);
+        let is_wordy = (0..width).any(|k| 2 * others(k) > count);
+        // words in some rows only, where the others have nothing, are text as well
+        let is_text = |k: &usize| 2 * others(*k) > count || others(*k) > 0 && there(*k) == 0;
+        let (texts, numbers): (Vec<_>, Vec<_>) = (0..width).partition(is_text);
+        let mut dense: Vec<usize> =
+            numbers.iter().copied().filter(|k| 2 * there(*k) > count).collect();
+        if dense.is_empty() {
+            dense = numbers;
+        }
+        let mut found = Division { separator, width, texts, is_wordy, dense, rows: 0 };
         found.rows = lines.iter().filter(|line| found.is_sound(line)).count();
         found
     }
@@ -233,13 +276,80 @@ impl Division {
             && self.numbers(line).any(Value::is_there)
     }
 
-    /// Returns true for a row, even if a few of its values are none; a row of units may have a 1.
+    /// Number of values and of words in the columns that have values in most rows.
+    fn count(&self, line: &[Value]) -> (usize, usize) {
+        let dense = || self.dense.iter().filter_map(|k| line.get(*k));
+        let others = dense().filter(|value| **value == Value::Other).count();
+        (dense().filter(|value| value.is_there()).count(), others)
+    }
+
+    /// Returns true for a row, even if a few of its values are none; a row of units may have a 1. A field more than the
+    /// others have makes no other line of it.
     fn is_row(&self, line: &str) -> bool {
         let line = values(line, self.separator);
-        let count = |wanted: fn(&Value) -> bool| self.numbers(&line).filter(|v| wanted(v)).count();
-        let first = self.numbers(&line).next().is_some_and(Value::is_there);
-        let mostly = first && count(|v| *v == Value::Other) < count(Value::is_there);
-        self.is_sound(&line) || line.len() == self.width && mostly
+        let (there, others) = self.count(&line);
+        let first = self.dense.first().and_then(|k| line.get(*k)).is_some_and(Value::is_there);
+        let mostly = first && others < there;
+        self.is_sound(&line) || [self.width, self.width + 1].contains(&line.len()) && mostly
+    }
+
+    /// The fields of a line.
+    fn texts(&self, line: &str) -> Vec<String> {
+        let mut fields = Vec::new();
+        self.separator.split(line, &mut fields);
+        fields.iter().map(|(field, _)| field.to_string()).collect()
+    }
+
+    /// Returns true for a line that has as many fields as the rows, or one more or less, which is the last of a row, or
+    /// the first.
+    fn fits(&self, line: &str) -> bool {
+        self.width > 1 && self.texts(line).len().abs_diff(self.width) < 2
+            || self.width == 1 && self.texts(line).len() == 1
+    }
+
+    /// Units of the columns, if a line is a row of units. A label before them says what they are: `unit`, `Y_Unit_Label`.
+    fn units(&self, line: &str) -> Option<(Vec<String>, bool)> {
+        let mut fields = self.texts(line);
+        let labelled = fields.first().is_some_and(|field| field.to_lowercase().contains("unit"));
+        if labelled {
+            fields[0].clear();
+        }
+        let there =
+            fields.iter().enumerate().filter(|(k, f)| !self.texts.contains(k) && !f.is_empty());
+        let (known, unknown): (Vec<_>, Vec<_>) =
+            there.partition(|(_, field)| super::unit::is_unit(field));
+        (known.len() > unknown.len()).then_some((fields, labelled))
+    }
+
+    /// Fails for a file whose lines are records of several kinds, each with a name and columns of its own.
+    fn refuse_kinds(&self, sample: &[(usize, String)], has_header: bool) -> Result<()> {
+        if !self.texts.contains(&0) {
+            return Ok(());
+        }
+        let mut kinds = std::collections::BTreeMap::new();
+        for (line, text) in sample {
+            let values = values(text, self.separator);
+            let fields = self.texts(text);
+            if fields.len() > 1 && !fields[0].is_empty() && values.iter().any(Value::is_there) {
+                let kind = (fields[0].trim_end_matches([',', ';']).to_string(), fields.len());
+                kinds.entry(kind).or_insert_with(Vec::new).push(*line);
+            }
+        }
+        kinds.retain(|_, lines| lines.len() > 1);
+        let mut kinds: Vec<_> = kinds.into_iter().collect();
+        kinds.sort_by_key(|(_, lines)| lines[0]);
+        if let [((word, width), lines), .., ((other, rest), more)] = &kinds[..]
+            && (!has_header || kinds.iter().any(|((_, fields), _)| fields != width))
+        {
+            bail!(
+                "its lines are records of several kinds: line {} begins with \"{word}\" and has {width} fields, line {} begins \
+                 with \"{other}\" and has {rest} (allowed: rows of one kind; export those of one kind, as \
+                 mavlogdump.py --types IMU --format csv does for ArduPilot's logs)",
+                lines[0],
+                more[0]
+            );
+        }
+        Ok(())
     }
 }
 
@@ -316,10 +426,14 @@ pub(super) struct Layout {
     separator: Separator,
     /// Names and units of its columns.
     pub header: Header,
+    /// True if the last column holds comments, which rows may leave out.
+    has_comments: bool,
     /// First line of data, counted from 1.
     first: usize,
     /// Notes on the detected layout.
     pub notes: Vec<String>,
+    /// Columns of text, for the message that a column is missing.
+    pub texts: String,
 }
 
 impl Layout {
@@ -347,7 +461,7 @@ impl Layout {
         let best = |divisions: Vec<Division>| {
             let found = divisions.into_iter().filter(|d| d.rows > 0 && d.texts.len() < d.width);
             found.reduce(|best, other| {
-                let key = |d: &Division| (d.texts.is_empty(), d.rows);
+                let key = |d: &Division| (!d.is_wordy, d.rows);
                 if key(&other) > key(&best) { other } else { best }
             })
         };
@@ -364,54 +478,85 @@ impl Layout {
             );
         };
         let (separator, width) = (division.separator, division.width);
-        let is_row = |line: &str| division.is_row(line);
-        let at = sample.iter().position(|(_, line)| is_row(line)).unwrap_or(0);
+        let at = sample.iter().position(|(_, line)| division.is_row(line)).unwrap_or(0);
         let first = sample[at].0;
-        // the header: the first line above with as many fields, or one less where rows end in a separator
-        let texts = |line: &str| -> Vec<String> {
-            let mut fields = Vec::new();
-            separator.split(line, &mut fields);
-            fields.iter().map(|(field, _)| field.to_string()).collect()
-        };
-        let fits = |line: &str| {
-            let count = texts(line).len();
-            count == width || count + 1 == width
-        };
+        let (above, rows) = sample.split_at(at);
         let mut notes = Vec::new();
-        let head = sample[..at].iter().position(|(_, line)| fits(line));
-        let (names, units) = match head {
-            Some(head) => {
-                let names = texts(&sample[head].1);
-                if names.len() < width {
-                    let closed = texts(&sample[at].1).last().is_some_and(String::is_empty);
+        // the lines right above the first row that may be its header: names, and units below or above them
+        let fitting = above.iter().rev().take_while(|(_, line)| division.fits(line)).count();
+        let block = &above[at - fitting..];
+        division.refuse_kinds(&sample, fitting > 0)?;
+        let is_cut = |line: &str| {
+            let line = values(line, separator);
+            line.len() < width && line.iter().all(|value| *value != Value::Other)
+        };
+        // without a label it stands right above the rows, and names above it
+        let units = (0..block.len()).rev().find_map(|k| {
+            let (units, labelled) = division.units(&block[k].1)?;
+            (labelled || k > 0 && k + 1 == block.len()).then_some((k, (units, labelled)))
+        });
+        let (head, units) = match units {
+            Some((k, (units, labelled))) => {
+                let below = block.len().checked_sub(1).filter(|last| labelled && *last > k);
+                (below.or(k.checked_sub(1)), Some((k, units)))
+            }
+            None => (block.len().checked_sub(1), None),
+        };
+        let mut has_comments = false;
+        let (names, units) = match head.map(|head| &block[head]) {
+            // a capture that begins within a line
+            Some((line, text)) if at == 1 && is_cut(text) => {
+                notes.push(format!("its first line, {line}, is not complete and was left out"));
+                (Vec::new(), None)
+            }
+            Some((line, text)) => {
+                let (there, others) = division.count(&values(text, separator));
+                ensure!(
+                    there <= others,
+                    "line {line}, \"{}\", is neither a row of numbers nor a header (allowed: names above the rows)",
+                    text.chars().take(60).collect::<String>()
+                );
+                let mut names = division.texts(text);
+                let count = names.len();
+                let last = names.last().map(|name| name.to_lowercase()).unwrap_or_default();
+                if count > width && last.is_empty() {
+                    names.pop();
+                } else if count > width && COMMENT_COLUMNS.contains(&last.as_str()) {
+                    has_comments = true;
+                } else if count < width && are_row_names(rows, separator) {
+                    names.insert(0, String::new());
+                } else {
+                    let closed = division.texts(&rows[0].1).last().is_some_and(String::is_empty);
                     ensure!(
-                        closed,
-                        "its header, line {}, has {} names, its rows have {width} fields (allowed: as many, or one more that is \
-                         empty)",
-                        sample[head].0,
-                        names.len()
+                        count == width || count < width && closed,
+                        "its header, line {line}, has {count} names, its rows have {width} fields (allowed: as many, or one more that is \
+                         empty; above the rows no other line with separators)"
                     );
                 }
-                let row = sample[head + 1..at].iter().rev().find(|(_, line)| fits(line));
-                if head > 0 {
-                    notes.push(format!("the {head} lines above its header were passed over"));
+                let passed = above.iter().position(|(other, _)| other == line).unwrap_or(0);
+                if passed > 0 {
+                    notes.push(format!("the {passed} lines above its header were passed over"));
                 }
-                if let Some((line, _)) = row {
-                    notes.push(format!("line {line} was taken for a row of units"));
+                if let Some((k, _)) = units {
+                    notes.push(format!("line {} was taken for a row of units", block[k].0));
                 }
-                (names, row.map(|(_, line)| texts(line)))
+                (names, units.map(|(_, units)| units))
             }
             None => {
-                if let Some((line, text)) = at.checked_sub(1).map(|above| &sample[above]) {
-                    let count = texts(text).len();
+                if let Some((line, text)) = above.last() {
+                    let count = division.texts(text).len();
                     ensure!(
-                        count < 2,
+                        count < 2 || at == 1 && is_cut(text),
                         "its header, line {line}, has {count} fields, its rows have {width} (decimal commas need \
                          another separator than commas, or quotes)"
                     );
+                    notes.push(match count {
+                        0 | 1 => format!("the {at} lines above its first row were passed over"),
+                        _ => format!("its first line, {line}, is not complete and was left out"),
+                    });
                 }
-                let comment = comment.map(|comment| texts(&comment)).filter(|c| c.len() == width);
-                (comment.unwrap_or_default(), None)
+                let comment = comment.map(|comment| division.texts(&comment));
+                (comment.filter(|names| names.len() == width).unwrap_or_default(), None)
             }
         };
         if separator != Separator::Char(',') {
@@ -419,12 +564,20 @@ impl Layout {
         }
         let mut header = Header::of(names, units);
         header.widen(width);
+        let mut texts = String::new();
         if !division.texts.is_empty() {
+            let fields = division.texts(&rows[0].1);
+            let example = |k: &usize| {
+                let field = fields.get(*k).map_or("", String::as_str);
+                format!("{} (\"{}\")", header.names[*k], field.chars().take(40).collect::<String>())
+            };
+            let examples: Vec<_> = division.texts.iter().map(example).collect();
+            texts = format!("; of text, as line {first} shows: {}", examples.join(", "));
             let names: Vec<&str> =
                 division.texts.iter().map(|k| header.names[*k].as_str()).collect();
             notes.push(format!("columns of text are skipped: {}", names.join(", ")));
         }
-        Ok(Layout { separator, header, first, notes })
+        Ok(Layout { separator, header, has_comments, first, notes, texts })
     }
 
     /// Reads the columns at these places, that of the time first if the file has `times`: dates and clock times are
@@ -449,6 +602,7 @@ impl Layout {
             }
         };
         let width = self.header.names.len();
+        let least = width - usize::from(self.has_comments);
         while lines.next(&mut text)? {
             let line = lines.number;
             if line < self.first {
@@ -457,17 +611,18 @@ impl Layout {
             let mut fields = Vec::with_capacity(width + 1);
             self.separator.split(&text, &mut fields);
             let closed = fields.len() == width + 1 && fields[width].0.is_empty();
-            if fields.len() < width && !lines.ended {
+            if fields.len() < least && !lines.ended {
                 done(format!("its last line, {line}, is not complete and was left out"));
                 break;
             }
-            if fields.len() != width && !closed {
+            if !(least..=width).contains(&fields.len()) && !closed {
                 fault(format!(
-                    "line {line}: {} fields, where the others have {width}",
+                    "line {line}: {} fields, where the others have {least}",
                     fields.len()
                 ));
                 continue;
             }
+            fields.resize(fields.len().max(width), ("", false));
             budget::reading(columns.first().map_or(0, Vec::len) + 1, places.len(), size)?;
             for (k, &place) in places.iter().enumerate() {
                 let is_time = times && k == 0;

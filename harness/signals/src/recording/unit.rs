@@ -77,6 +77,19 @@ fn plain(text: &str) -> String {
     }
 }
 
+/// Units of what no signal measures, by which a row of units is known.
+const OTHERS: [&str; 38] = [
+    "-", "1", "%", "V", "mV", "A", "mA", "W", "J", "ohm", "K", "C", "degC", "degF", "Pa", "hPa",
+    "kPa", "MPa", "bar", "mbar", "psi", "Hz", "kHz", "kg", "l", "m/s", "km/h", "mph", "km", "T",
+    "uT", "mT", "G", "rad/s2", "deg/s2", "dB", "counts", "raw",
+];
+
+/// Returns true for the name of a unit, which may stand in brackets.
+pub(super) fn is_unit(text: &str) -> bool {
+    let name = plain(text.trim_matches(['[', ']', '(', ')', ' ']));
+    UNITS.iter().any(|(_, unit, _)| *unit == name) || OTHERS.contains(&name.as_str())
+}
+
 /// Factor from one unit to another; `None` unless both are known units of one quantity.
 pub fn conversion(from: &str, to: &str) -> Option<f64> {
     let (from, to) = (plain(from), plain(to));

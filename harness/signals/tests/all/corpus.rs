@@ -536,9 +536,209 @@ fn programs() -> Vec<Case> {
     ]
 }
 
+/// Files with words before the rows or in them, after the tools' own.
+fn with_words() -> Vec<Case> {
+    let row = |k: usize| format!("{},{},{}", millis(k), torque(k), rate(k));
+    let numbered = || of("#1:ms", "#2:mNm", "#3:deg/s");
+    let plain = || of("t:ms", "T_cmd:mNm", "gyro z:deg/s");
+    let labview = |decimal: char, comment: &str| {
+        let digits = move |text: String| text.replace('.', &decimal.to_string());
+        let head = format!(
+            "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t{decimal}\n\
+             Multi_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\nOperator\tA\nDate\t2026/01/31\nTime\t12:00:00{decimal}5\n\
+             ***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t40\t40\t\nDate\t2026/01/31\t2026/01/31\t\n\
+             Time\t12:00:00{decimal}5\t12:00:00{decimal}5\t\nY_Unit_Label\tmN.m\tdeg/s\t\nX_Dimension\tTime\tTime\t\n\
+             X0\t0{decimal}0E+0\t0{decimal}0E+0\t\nDelta_X\t0{decimal}020000\t0{decimal}020000\t\n***End_of_Header***\t\t\t\n\
+             X_Value\tT_cmd\tgyro z\tComment\n"
+        );
+        crlf(&lines(&head, |k| {
+            let comment = if k == 0 { comment } else { "" };
+            digits(format!("{}\t{}.000000\t{}00000{comment}", seconds(k), torque(k), rate(k)))
+        }))
+    };
+    let labels = of("X_Value", "T_cmd", "gyro z");
+    let dspace = lines(
+        "type,ControlDesk measurement,,\nrecorder,Recorder 1,,\nname,t,T_cmd,gyro z\nunit,ms,mN·m,deg/s\n",
+        |k| format!("{},{}", if k == 0 { "trace_values" } else { "" }, row(k)),
+    );
+    let tektronix = lines("", |k| {
+        let before = [
+            "Record Length,2.5e+03,",
+            "Sample Interval,2.0e-02,",
+            "Trigger Point,1.0e+00,",
+            ",,",
+            ",,",
+            "Source,CH1,",
+            "Vertical Units,V,",
+        ];
+        let before = before.get(k).copied().unwrap_or(",,");
+        format!("{before},{},  {},  {},", seconds(k), torque(k), rate(k))
+    });
+    let motec = lines(
+        "\"Format\",\"MoTeC CSV File\",,,\"Workbook\",\"\"\n\"Venue\",\"Bench\",,,\"Worksheet\",\"\"\n\
+         \"Log Date\",\"31/01/2026\",,,\"Origin Time\",\"0.000\",\"s\"\n\"Log Time\",\"12:00:00\",,,\"Start Time\",\"0\",\"s\"\n\
+         \"Sample Rate\",\"50.000\",\"Hz\"\n\"Duration\",\"1\",\"s\"\n\"Range\",\"entire outing\"\n\n\n\
+         \"Time\",\"T_cmd\",\"gyro z\"\n\"s\",\"mN.m\",\"deg/s\"\n\n\n",
+        |k| format!("\"{}\",\"{}\",\"{}\"", seconds(k), torque(k), rate(k)),
+    );
+    let boot = "ets Jul 29 2019 12:21:46\r\nrst:0x1 (POWERON_RESET),boot:0x13\r\n";
+    let capture = |begin: &str| [begin.as_bytes(), &crlf(&lines("", row)), b"800,-1"].concat();
+    let data_flash = |rows: &dyn Fn(usize) -> String| {
+        let head = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+                    FMT, 129, 31, PARM, QNff, TimeUS,Name,Value,Default\n\
+                    FMT, 150, 50, IMU, QBff, TimeUS,I,GyrZ,Tq\nFMT, 151, 40, ATT, Qff, TimeUS,Roll,Pitch\n\
+                    PARM, 100, ARSPD_TYPE, 0, 0\nPARM, 101, BARO_GND, 0, 0\n";
+        lines(head, rows)
+    };
+    vec![
+        ("LabVIEW", "lvm", labview('.', ""), labels.clone(), None),
+        ("LabVIEW, Germany, with a comment", "lvm", labview(',', "\tstart"), labels, None),
+        ("dSPACE ControlDesk", "csv", dspace, of("t", "T_cmd", "gyro z"), None),
+        ("Tektronix TDS", "csv", tektronix, of("#4:s", "#5:mNm", "#6:deg/s"), None),
+        (
+            "Tektronix MSO",
+            "csv",
+            lines(
+                "Model,MSO44\nFirmware Version,2.0.3\n\nWaveform Type,ANALOG,,\nHorizontal Units,s,,\n\
+                 Horizontal Scale,0.1,,\nSample Interval,0.02,,\nRecord Length,40,,\nGating,0.0% to 100.0%,,\n\
+                 Probe Attenuation,1,1,\nVertical Units,V,V,\nVertical Offset,0,0,\nLabel,,,\n\nTIME,CH1,CH2\n",
+                |k| format!("{},{},{}", seconds(k), torque(k), rate(k)),
+            ),
+            of("TIME:s", "CH1:mNm", "CH2:deg/s"),
+            None,
+        ),
+        ("MoTeC i2", "csv", motec, of("Time", "T_cmd", "gyro z"), None),
+        (
+            "Arduino serial monitor with times",
+            "txt",
+            lines("", |k| format!("{} -> {},{}", clock(k), torque(k), rate(k))),
+            of("#1", "#2:mNm", "#3:deg/s"),
+            None,
+        ),
+        (
+            "Arduino serial monitor with times and names",
+            "txt",
+            lines("11:59:59.990 -> t,T_cmd,gyro z\n", |k| format!("{} -> {}", clock(k), row(k))),
+            plain(),
+            None,
+        ),
+        (
+            "Arduino serial monitor, names in the rows",
+            "txt",
+            lines("", |k| format!("{} -> T_cmd:{},gyro:{}", clock(k), torque(k), rate(k))),
+            of("#1", "T_cmd:mNm", "gyro:deg/s"),
+            Some("of text, as line 1 shows: #2 (\"T_cmd:-100,gyro:-2.5\")"),
+        ),
+        (
+            "Tera Term with times",
+            "log",
+            lines("", |k| format!("[2026-01-31 {}] {}\t{}", clock(k), torque(k), rate(k))),
+            of("#1", "#2:mNm", "#3:deg/s"),
+            None,
+        ),
+        (
+            "R write.csv",
+            "csv",
+            lines("\"\",\"t\",\"T_cmd\",\"gyro z\"\n", |k| format!("\"{}\",{}", k + 1, row(k))),
+            plain(),
+            None,
+        ),
+        (
+            "R write.table",
+            "txt",
+            lines("\"t\" \"T_cmd\" \"gyro z\" \"state\"\n", |k| {
+                format!("\"{}\" {} \"slow sweep\"", k + 1, row(k).replace(',', " "))
+            }),
+            plain(),
+            None,
+        ),
+        (
+            "R write.table, no quotes",
+            "txt",
+            lines("t T_cmd gyro\n", |k| format!("{} {}", k + 1, row(k).replace(',', " "))),
+            of("t:ms", "T_cmd:mNm", "gyro:deg/s"),
+            None,
+        ),
+        (
+            "R write.csv2",
+            "csv",
+            lines("\"\";\"t\";\"T_cmd\";\"gyro z\"\n", |k| {
+                format!("\"{}\";{};{};{}", k + 1, millis(k), torque(k), commas(&rate(k)))
+            }),
+            plain(),
+            None,
+        ),
+        ("serial capture, cut at both ends", "log", capture("3,-1.2\r\n"), numbered(), None),
+        (
+            "PuTTY",
+            "log",
+            capture("=~=~=~=~= PuTTY log 2026.01.31 12:00:00 =~=~=~=~=\r\n"),
+            numbered(),
+            None,
+        ),
+        (
+            "serial capture with names after a start",
+            "log",
+            capture("ready\r\nt,T_cmd,gyro z\r\n"),
+            plain(),
+            None,
+        ),
+        (
+            "serial capture of a start",
+            "log",
+            capture(boot),
+            numbered(),
+            Some("its header, line 2, has 2 names, its rows have 3 fields"),
+        ),
+        (
+            "serial capture, its first row damaged",
+            "log",
+            capture("\u{fffd}20,5,1.5\r\n"),
+            numbered(),
+            Some("line 1, \"\u{fffd}20,5,1.5\", is neither a row of numbers nor a header"),
+        ),
+        (
+            "serial capture with a second start",
+            "log",
+            [lines("t,T_cmd,gyro z\n", row), lines("t,T_cmd,gyro z\n", row)].concat(),
+            plain(),
+            Some("line 42, column t: \"t\" is not a number"),
+        ),
+        (
+            "ArduPilot DataFlash",
+            "log",
+            data_flash(&|k| match k % 2 {
+                0 => format!("IMU, {}, 0, {}, {}", 1000 * millis(k), rate(k), torque(k)),
+                _ => format!("ATT, {}, 0.1, 0.2", 1000 * millis(k)),
+            }),
+            of("#2:us", "#5:mNm", "#4:deg/s"),
+            Some("line 5 begins with \"PARM\" and has 5 fields, line 8 begins with \"ATT\""),
+        ),
+        (
+            "ArduPilot DataFlash, its formats alone at the beginning",
+            "log",
+            data_flash(&|k| {
+                format!("FMT, {k}, 50, A{k}, Q{}, T{}", "f".repeat(k % 3), ",x".repeat(k % 3))
+            }),
+            of("#2:us", "#5:mNm", "#4:deg/s"),
+            Some("its lines are records of several kinds"),
+        ),
+        (
+            "NMEA and rows of its own",
+            "log",
+            lines("", |k| match k % 2 {
+                0 => format!("$IMU,{},{},{}", millis(k), torque(k), rate(k)),
+                _ => format!("$GPS,{},48.1,11.5", millis(k)),
+            }),
+            of("#2:ms", "#3:mNm", "#4:deg/s"),
+            Some("line 1 begins with \"$IMU\" and has 4 fields, line 2 begins with \"$GPS\""),
+        ),
+    ]
+}
+
 #[test]
 fn the_files_of_tools_are_read_with_the_right_values_or_refused_with_the_words_that_help() {
-    let cases = [spreadsheets(), robots(), laboratories(), programs()].concat();
+    let cases = [spreadsheets(), robots(), laboratories(), programs(), with_words()].concat();
     let time: Vec<f64> = (0..ROWS).map(|k| millis(k) as f64 * 1e-3).collect();
     let torques: Vec<f64> = (0..ROWS).map(|k| torque(k) as f64 * 1e-3).collect();
     let rates: Vec<f64> = (0..ROWS).map(|k| (tenths(k) as f64 / 10.0).to_radians()).collect();
