@@ -45,7 +45,7 @@ impl Variable {
             .map(|e| Variable {
                 name: e.get("name").unwrap().into(),
                 reference: number(e.get("valueReference").unwrap()),
-                kind: e.name.clone(),
+                kind: e.name.to_string(),
                 causality: e.get("causality").unwrap().into(),
                 dimensions: e
                     .children

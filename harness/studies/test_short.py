@@ -25,6 +25,7 @@ import compare_releases
 import damping_over_fill
 import flight_twin
 import identify_twins
+import large_fmu
 import mode_errors
 import planar_stability
 import reversal
@@ -263,3 +264,15 @@ def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -
         row = next(line for line in section.splitlines() if f"`{unknown}`" in line)
         median = float(row.strip("| ").split("|")[-1])
         assert 0.5 < np.median(deviations) / median < 2
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
+def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
+    """The FMU of book/check_ci.md with 1000 variables: every rule of calls finds it without an error."""
+    fmu = tmp_path / "large.fmu"
+    large_fmu.write(fmu, 1000)
+    done = subprocess.run([program, "check", fmu, "--json"], capture_output=True, check=False)
+    report = json.loads(done.stdout)
+    assert done.returncode == 0, report
+    checked = {rule["rule"] for rule in report["rules"] if not rule.get("skipped")}
+    assert checked >= {"steps.run", "exchange.run", "values.start", "states.rollback", "life.reset"}

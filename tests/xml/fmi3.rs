@@ -36,7 +36,7 @@ fn every_variable_is_as_in_fmi_2<M: Model>() {
             ("Boolean", "Boolean"),
             ("Enumeration", "Enumeration"),
         ];
-        assert!(types.contains(&(kind.name.as_str(), new.name.as_str())), "{name}: {}", new.name);
+        assert!(types.contains(&(&*kind.name, &*new.name)), "{name}: {}", new.name);
         for attribute in ["name", "description", "causality", "variability"] {
             assert_eq!(old.get(attribute), new.get(attribute), "{name}");
         }
@@ -125,7 +125,7 @@ fn the_structure_is_as_in_fmi_2<M: Model>() {
         assert_eq!(indicator.get("valueReference"), Some(&*(first + n).to_string()));
         assert!(indicator.get("dependencies").is_some());
     }
-    let order: Vec<_> = new.children.iter().map(|child| child.name.as_str()).collect();
+    let order: Vec<_> = new.children.iter().map(|child| &*child.name).collect();
     let mut sorted = order.clone();
     let rank = |name: &str| {
         ["Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator"]
@@ -183,7 +183,7 @@ fn the_root_of_fmi_3_has_its_own_token_and_the_form_of_the_schema() {
         assert_eq!(two.get(attribute), three.get(attribute));
     }
     assert!(three.get("generationDateAndTime").unwrap().ends_with('Z'));
-    let order: Vec<_> = three.children.iter().map(|child| child.name.as_str()).collect();
+    let order: Vec<_> = three.children.iter().map(|child| &*child.name).collect();
     assert_eq!(
         order,
         [
@@ -208,7 +208,8 @@ fn capabilities_are_shown<M: Model>() {
     let (two, three) = (two::<M>(), three::<M>());
     let flags = |interface: &str| -> BTreeMap<String, String> {
         let element = three.child(interface).unwrap();
-        element.attributes.iter().filter(|(name, _)| name != "modelIdentifier").cloned().collect()
+        let others = element.attributes.iter().filter(|(name, _)| name != "modelIdentifier");
+        others.map(|(name, value)| (name.to_string(), value.to_string())).collect()
     };
     let both = [
         ("needsExecutionTool", "false"),

@@ -59,7 +59,7 @@ fn start_values_are_the_binarys_to_the_last_bit() {
     for (variable, kind) in variables() {
         let Some(start) = kind.get("start") else { continue };
         let reference = variable.get("valueReference").unwrap().parse().unwrap();
-        match kind.name.as_str() {
+        match &*kind.name {
             "Real" => {
                 let Value::Real(x) = fresh.get(&GET_REAL, reference).unwrap() else { panic!() };
                 assert_eq!(start.parse::<f64>().unwrap().to_bits(), x.to_bits());
@@ -83,7 +83,7 @@ fn start_values_are_the_binarys_to_the_last_bit() {
 #[test]
 fn start_values_are_within_min_and_max() {
     for (variable, kind) in variables() {
-        if !matches!(kind.name.as_str(), "Real" | "Integer") {
+        if !matches!(&*kind.name, "Real" | "Integer") {
             continue;
         }
         let (min, max) = (number(&kind, "min"), number(&kind, "max"));

@@ -227,7 +227,7 @@ pub fn types(d: &Description, findings: &mut Findings) {
     let types: BTreeMap<&str, &str> = d
         .root
         .list("TypeDefinitions")
-        .filter_map(|t| Some((t.get("name")?, t.children.first()?.name.as_str())))
+        .filter_map(|t| Some((t.get("name")?, t.children.first()?.name.as_ref())))
         .collect();
     d.each(findings, |v| {
         let declared = v.typed.get("declaredType")?;

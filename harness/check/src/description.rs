@@ -245,7 +245,7 @@ fn variable(element: &Element, index: usize, types: &BTreeMap<&str, &Element>) -
         variability,
         kind,
         typed,
-        written: Element { children: Vec::new(), ..element.clone() },
+        written: element.alone(),
     }
 }
 

@@ -42,11 +42,13 @@ pub mod values;
 pub mod variables;
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
+use files::temporary;
 use host::fmi2::PLATFORM;
+use host::xml::Element;
 use rayon::prelude::*;
 
 use self::rules::fmi3;
@@ -156,7 +158,11 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         (_, None) if binaries.own().is_none() => {
             Err(format!("it has no binary for this platform, {PLATFORM}"))
         }
-        (Ok(_), _) => Ok(()),
+        (Ok(description), _) => Ok(&description.root),
+    };
+    let callable = match callable {
+        Ok(root) => Ok(packed(root)?),
+        Err(why) => Err(why),
     };
     let so_far = process::SoFar::default();
     let one = |rule: &&'static Rule| {
@@ -175,14 +181,11 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
             (Check::Binaries3(check), _) => check(&libraries, &mut findings),
             (Check::Calls(_) | Check::Calls3(_), _) => {
                 match &callable {
-                    Ok(()) => process::check(
-                        rule,
-                        archive.directory(),
-                        path,
-                        options,
-                        &so_far,
-                        &mut findings,
-                    ),
+                    Ok((_, description)) => {
+                        let directory = archive.directory();
+                        let fmu = process::Unpacked { path, directory, description };
+                        process::check(rule, fmu, options, &so_far, &mut findings);
+                    }
                     Err(why) => findings.skip(why.clone()),
                 }
                 progress(calls);
@@ -214,6 +217,16 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     }
     let bug = so_far.bug.into_inner();
     Ok(Report { path: path.to_path_buf(), outcomes, unchecked, bug })
+}
+
+/// Writes the packed description to a file in a temporary folder, for the processes of rules.
+fn packed(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
+    let folder = temporary::Folder::new()?;
+    let path = folder.path().join("description");
+    let mut bytes = Vec::new();
+    root.pack(&mut bytes);
+    std::fs::write(&path, bytes).context("the description cannot be handed to the rules")?;
+    Ok((folder, path))
 }
 
 /// The error that no rule of `outcomes`, those selected by `only`, was checked.

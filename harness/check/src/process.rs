@@ -12,7 +12,7 @@ use host::xml::Element;
 
 use super::trace::{self, Answer, Crash};
 use super::under_test::{FmuUnderTest, Unusable};
-use super::{Check, Findings, Options, RULES, Rule, life, v3};
+use super::{Check, Description, Findings, Options, RULES, Rule, life, v3};
 
 /// The hidden subcommand of `hubslosh`.
 pub const SUBCOMMAND: &str = "check-calls";
@@ -40,12 +40,21 @@ pub struct SoFar {
     pub bug: OnceLock<String>,
 }
 
-/// Looks at one rule in a process of its own; `path` is what the FMU is called, `directory` where it
-/// is unpacked.
+/// Place of an FMU whose binary is called.
+#[derive(Clone, Copy, Debug)]
+pub struct Unpacked<'a> {
+    /// Name of the FMU.
+    pub path: &'a Path,
+    /// Folder in which it is unpacked.
+    pub directory: &'a Path,
+    /// File with its description, packed ([`Element::pack`]): a large one takes longer to parse than most rules.
+    pub description: &'a Path,
+}
+
+/// Checks one rule in a process of its own.
 pub fn check(
     rule: &'static Rule,
-    directory: &Path,
-    path: &Path,
+    fmu: Unpacked,
     options: &Options,
     so_far: &SoFar,
     findings: &mut Findings,
@@ -56,7 +65,7 @@ pub fn check(
     if let Some(why) = so_far.lost.get().filter(|_| rule.id != OPENS) {
         return findings.skip(why);
     }
-    match run(rule, directory, path, options, so_far, findings) {
+    match run(rule, fmu, options, so_far, findings) {
         Ok(true) => {
             so_far.hung.fetch_add(1, Ordering::Relaxed);
         }
@@ -68,8 +77,7 @@ pub fn check(
 /// True if it had to be killed.
 fn run(
     rule: &'static Rule,
-    directory: &Path,
-    path: &Path,
+    fmu: Unpacked,
     options: &Options,
     so_far: &SoFar,
     findings: &mut Findings,
@@ -79,8 +87,9 @@ fn run(
         guard::OPTION.as_ref(),
         SUBCOMMAND.as_ref(),
         rule.id.as_ref(),
-        directory.as_os_str(),
-        path.as_os_str(),
+        fmu.directory.as_os_str(),
+        fmu.path.as_os_str(),
+        fmu.description.as_os_str(),
         seconds.as_ref(),
     ];
     let limits = Limits {
@@ -178,9 +187,11 @@ fn tell_crash(findings: &mut Findings, doing: String, text: String, crash: Crash
 const LOADING: &str = "loading the binary";
 
 /// The other side: looks at the rule and answers with what it finds; it is ended after `limit`.
-pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Result<()> {
-    let xml = std::fs::read(directory.join("modelDescription.xml"))?;
-    let root = Element::parse(&xml).map_err(anyhow::Error::msg)?;
+pub fn answer(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
+    let Unpacked { path, directory, description } = fmu;
+    // it is needed as long as the process lives
+    let mut packed: &'static [u8] = std::fs::read(description)?.leak();
+    let root = Element::unpack(&mut packed).context("the packed description has changed")?;
     let is_fmi3 = root.get("fmiVersion").is_some_and(|version| version.starts_with("3."));
     let rules = if is_fmi3 { super::rules::fmi3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
@@ -205,16 +216,19 @@ pub fn answer(id: &str, directory: &Path, path: &Path, limit: Duration) -> Resul
         false => findings.skip(format!("it cannot be loaded: {error:#}")),
     };
     match rule.check {
-        Check::Calls(check) => match FmuUnderTest::open(directory, path, root, deadline) {
-            Err(error) => lost(error, &mut findings),
-            Ok(mut fmu) => {
-                fmu.before = before;
-                if let Err(error) = check(&fmu, &mut findings) {
-                    failed(error, fmu.now(), &mut findings);
+        Check::Calls(check) => {
+            let description = Box::leak(Box::new(Description::new(root)));
+            match FmuUnderTest::open(directory, path, description, deadline) {
+                Err(error) => lost(error, &mut findings),
+                Ok(mut fmu) => {
+                    fmu.before = before;
+                    if let Err(error) = check(&fmu, &mut findings) {
+                        failed(error, fmu.now(), &mut findings);
+                    }
+                    fmu.doing("unloading the binary");
                 }
-                fmu.doing("unloading the binary");
             }
-        },
+        }
         Check::Calls3(check) => match v3::Subject::open(directory, path, root, deadline) {
             Err(error) => lost(error, &mut findings),
             Ok(subject) => {
@@ -258,8 +272,9 @@ mod tests {
         let options = Options { program: script, only: Vec::new(), limit };
         let rule = RULES.iter().find(|rule| rule.id == "steps.run").unwrap();
         let (so_far, mut findings) = (SoFar::default(), Findings::new(rule.severity));
-        let path = Path::new("a.fmu");
-        check(rule, folder.path(), path, &options, &so_far, &mut findings);
+        let (path, directory) = (Path::new("a.fmu"), folder.path());
+        let fmu = Unpacked { path, directory, description: path };
+        check(rule, fmu, &options, &so_far, &mut findings);
         assert_eq!(findings.list, []);
         let why = findings.skipped.unwrap();
         assert!(why.starts_with("this is a bug of hubslosh"), "{why}");

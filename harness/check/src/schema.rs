@@ -265,7 +265,7 @@ const ANY_ATTRIBUTE: [&str; 3] = ["ModelExchange", "CoSimulation", "ScheduledExe
 
 fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {
     let Some(kind) = find(kinds, parent, &element.name) else { return };
-    let is_open = !std::ptr::eq(kinds, KINDS) && ANY_ATTRIBUTE.contains(&element.name.as_str());
+    let is_open = !std::ptr::eq(kinds, KINDS) && ANY_ATTRIBUTE.contains(&&*element.name);
     for (attribute, _) in &element.attributes {
         let known = kind.needed.iter().chain(kind.optional).any(|(name, _)| name == attribute);
         // xsi:noNamespaceSchemaLocation belongs to XML itself
@@ -331,7 +331,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                 findings.add(place(element), "it is empty (allowed: one element or more)");
             }
             for child in &element.children {
-                if !names.contains(&child.name.as_str()) {
+                if !names.contains(&&*child.name) {
                     unknown(child, names, findings);
                 }
             }
@@ -353,7 +353,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                     unknown(child, names, findings);
                     continue;
                 };
-                if seen.contains(&child.name.as_str()) {
+                if seen.contains(&&*child.name) {
                     findings.add(place(child), "it is there twice (allowed: once)");
                 } else if at < reached && child.name != "ModelExchange" {
                     // the two interfaces may come in any order
@@ -376,8 +376,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
             }
         }
         Choice(choice, rest) => {
-            let chosen =
-                element.children.iter().filter(|child| choice.contains(&child.name.as_str()));
+            let chosen = element.children.iter().filter(|child| choice.contains(&&*child.name));
             let count = chosen.count();
             if !choice.is_empty() && count != 1 {
                 findings.add(

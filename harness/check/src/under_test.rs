@@ -71,7 +71,9 @@ pub struct FmuUnderTest {
     /// Reason why an existing binary cannot be loaded.
     broken: Option<String>,
     deadline: Instant,
-    description: Description,
+    description: &'static Description,
+    /// Places of the continuous inputs among the variables.
+    inputs: Vec<usize>,
     doing: RefCell<String>,
     crash: RefCell<Crash>,
     sessions: Cell<usize>,
@@ -132,15 +134,14 @@ pub struct Experiment {
 }
 
 impl FmuUnderTest {
-    /// Loads the FMU that is unpacked in `directory` and has this model description.
-    /// Makes no instances after `deadline`.
+    /// Loads the FMU that is unpacked in `directory` and has this model description, which lives as long as the process
+    /// of the rule. Makes no instances after `deadline`.
     pub fn open(
         directory: &Path,
         path: &Path,
-        root: Element,
+        description: &'static Description,
         deadline: Instant,
     ) -> Result<FmuUnderTest> {
-        let description = Description::new(root);
         let identifier = |interface: &Option<Element>| {
             interface.as_ref().and_then(|i| i.get("modelIdentifier")).map(str::to_string)
         };
@@ -183,6 +184,12 @@ impl FmuUnderTest {
             broken: broken.filter(|_| is_there),
             deadline,
             description,
+            inputs: (0..description.variables.len())
+                .filter(|k| {
+                    let v = &description.variables[*k];
+                    v.causality == Causality::Input && v.is_continuous()
+                })
+                .collect(),
             doing: RefCell::default(),
             crash: RefCell::new(Crash::Error),
             sessions: Cell::new(0),
@@ -195,8 +202,7 @@ impl FmuUnderTest {
     /// Copies the unpacked FMU to `directory` and loads the copy: a library of its own.
     pub fn copy(&self, directory: &Path) -> Result<FmuUnderTest> {
         copy_files(&self.directory, directory)?;
-        let root = self.description.root.clone();
-        FmuUnderTest::open(directory, &self.path, root, self.deadline)
+        FmuUnderTest::open(directory, &self.path, self.description, self.deadline)
     }
 
     /// The folder of the unpacked FMU.
@@ -285,7 +291,7 @@ impl FmuUnderTest {
 
     /// Model description of the FMU.
     pub fn description(&self) -> &Description {
-        &self.description
+        self.description
     }
 
     /// The variables.
@@ -295,7 +301,7 @@ impl FmuUnderTest {
 
     /// Each derivative with its state, in the order of ModelStructure: that of all state vectors.
     pub fn states(&self) -> Vec<(&Variable, &Variable)> {
-        let d = &self.description;
+        let d = self.description;
         let pair = |index| {
             let derivative: &Variable = d.at(index)?;
             Some((derivative, d.at(derivative.derivative_of()?)?))
@@ -682,9 +688,7 @@ impl<'f> Session<'f> {
     /// Sets all Real inputs to values that change from step to step.
     pub fn stimulate(&mut self) -> Called {
         let fmu = self.fmu;
-        let inputs =
-            fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_continuous());
-        for (n, v) in inputs.enumerate() {
+        for (n, v) in fmu.inputs.iter().map(|k| &fmu.variables()[*k]).enumerate() {
             let x = stimulus(v, self.count, n);
             self.set(v, &Reading::Real(x))?;
         }

@@ -260,7 +260,7 @@ fn unknown(element: &Element) -> Unknown {
         Some(words.map(str::to_string).collect::<Vec<_>>())
     };
     Unknown {
-        list: element.name.clone(),
+        list: element.name.to_string(),
         line: element.line,
         reference: element.get("valueReference").and_then(|r| r.trim().parse().ok()),
         dependencies: words("dependencies")

@@ -197,6 +197,6 @@ fn a_report_without_a_checked_rule_is_an_error_in_sarif_and_junit() {
         let root = Element::parse(&file).unwrap();
         assert_eq!((root.get("errors"), root.children[0].get("errors")), (Some("1"), Some("1")));
         let case = root.children[0].children.last().unwrap();
-        assert_eq!((case.get("name"), case.children[0].name.as_str()), (Some("check"), "error"));
+        assert_eq!((case.get("name"), &*case.children[0].name), (Some("check"), "error"));
     }
 }

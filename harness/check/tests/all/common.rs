@@ -81,10 +81,26 @@ pub fn broken(report: &Report) -> BTreeSet<&'static str> {
     report.all().map(|(rule, _)| rule.id).collect()
 }
 
+/// Keeps an FMU for `.ci/other_tools.py`, with the rules that it breaks, in the folder that
+/// HUBSLOSH_KEEP_MUTANTS names.
+pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
+    let Some(folder) = std::env::var_os("HUBSLOSH_KEEP_MUTANTS").map(PathBuf::from) else { return };
+    static COUNT: Mutex<usize> = Mutex::new(0);
+    let mut count = COUNT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    *count += 1;
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = format!("{:03}.fmu", *count);
+    std::fs::write(folder.join(&file), bytes).unwrap();
+    let index =
+        std::fs::OpenOptions::new().create(true).append(true).open(folder.join("index.tsv"));
+    writeln!(index.unwrap(), "{file}\t{}\t{}", name.escape_debug(), rules.join(" ")).unwrap();
+}
+
 /// Each FMU breaks exactly the rules that are meant, among those of the groups looked at.
 pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     let mut wrong = Vec::new();
     for (name, bytes, meant) in mutants {
+        keep(name, &bytes, meant);
         let report = look(&bytes, groups);
         let found = broken(&report);
         if found != meant.iter().copied().collect() {

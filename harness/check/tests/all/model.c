@@ -15,7 +15,8 @@
  * NOISE        no two runs are the same
  * FORGETS      a state that is set changes nothing
  * SINGULAR     no initialisation with another k than the declared one
- * MOVED        steps with another k than the declared one crash */
+ * MOVED        steps with another k than the declared one crash
+ * MANY=n       n further variables: every tenth is a parameter, the others are multiples of x (harness/studies/large_fmu.py) */
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -26,7 +27,12 @@
 #include "fmi2.h"
 
 enum mode { INSTANTIATED, INITIALIZATION, STEPPING, EVENT, CONTINUOUS, TERMINATED };
-enum { X, DER_X, K, U, COUNT };
+enum { X, DER_X, K, U, OWN };
+
+#ifndef MANY
+#define MANY 0
+#endif
+#define COUNT (OWN + MANY)
 
 #define MAGIC 0x6d6f64656c2e6331
 
@@ -37,6 +43,7 @@ struct state {
     int setup;
     double t, stop, x, k, u;
     double shown, held; /* of x and u */
+    double parameters[MANY / 10 + 1];
     unsigned long long check; /* of the above, so that noise is refused */
 };
 
@@ -82,6 +89,37 @@ static double rate(const struct state *s)
 #else
     return -s->k * (s->x - s->u);
 #endif
+}
+
+static double value(const struct state *s, unsigned reference)
+{
+    switch (reference) {
+    case X:
+        return s->shown;
+    case DER_X:
+        return rate(s);
+    case K:
+        return s->k;
+    case U:
+        return s->u;
+    default:
+        reference -= OWN;
+        return reference % 10 ? reference * s->shown : s->parameters[reference / 10];
+    }
+}
+
+/* The place of a value that a host sets; NULL where it may not. */
+static double *place(struct state *s, unsigned reference)
+{
+    int early = s->mode == INSTANTIATED || s->mode == INITIALIZATION;
+    if (reference == U)
+        return s->mode != TERMINATED ? &s->u : NULL;
+    if (!early || reference >= COUNT || reference == DER_X)
+        return NULL;
+    if (reference < OWN)
+        return reference == K ? &s->k : &s->x;
+    reference -= OWN;
+    return reference % 10 ? NULL : &s->parameters[reference / 10];
 }
 
 static void begin(struct state *s)
@@ -245,7 +283,7 @@ Status fmi2GetReal(Component m, const unsigned *r, size_t n, double *x)
             return refuse(m, "fmi2GetReal", "an unknown value reference");
 #endif
     for (i = 0; i < n; i++)
-        x[i] = r[i] == X ? m->s.shown : r[i] == DER_X ? rate(&m->s) : r[i] == K ? m->s.k : m->s.u;
+        x[i] = value(&m->s, r[i]);
     return OK;
 }
 
@@ -255,15 +293,13 @@ Status fmi2SetReal(Component m, const unsigned *r, size_t n, const double *x)
     if (!m)
         return ERROR;
     for (i = 0; i < n; i++) {
-        int early = m->s.mode == INSTANTIATED || m->s.mode == INITIALIZATION;
-        int allowed = r[i] == U ? m->s.mode != TERMINATED : (r[i] == K || r[i] == X) && early;
-        if (!allowed)
+        if (!place(&m->s, r[i]))
             return refuse(m, "fmi2SetReal", "it cannot be set now");
         if (!isfinite(x[i]) || (r[i] == K && x[i] < 0))
             return refuse(m, "fmi2SetReal", "a value outside its range");
     }
     for (i = 0; i < n; i++)
-        *(r[i] == U ? &m->s.u : r[i] == K ? &m->s.k : &m->s.x) = x[i];
+        *place(&m->s, r[i]) = x[i];
     if (m->s.mode == INSTANTIATED || m->s.mode == INITIALIZATION)
         m->s.shown = m->s.x;
     return OK;

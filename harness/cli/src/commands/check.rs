@@ -59,6 +59,7 @@ pub struct CheckCallsArgs {
     rule: String,
     directory: PathBuf,
     fmu: PathBuf,
+    description: PathBuf,
     limit: f64,
 }
 
@@ -119,6 +120,11 @@ impl CheckCallsArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let limit = Duration::try_from_secs_f64(self.limit).context("no time limit")?;
-        process::answer(&self.rule, &self.directory, &self.fmu, limit)
+        let fmu = process::Unpacked {
+            path: &self.fmu,
+            directory: &self.directory,
+            description: &self.description,
+        };
+        process::answer(&self.rule, fmu, limit)
     }
 }
