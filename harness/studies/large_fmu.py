@@ -3,8 +3,9 @@
     cargo build --release
     python3 harness/studies/large_fmu.py --variables 100044
 
-The FMU is that of harness/check/tests/all/model.c, with a C compiler: one state, both interfaces, every tenth variable a parameter,
-the others multiples of the state. The description has units, start values and a sentence a variable, about 270 bytes.
+A C compiler makes the FMU from harness/check/tests/all/model.c. It has one state and both
+interfaces. Every tenth variable is a parameter, the others are multiples of the state. Each has a
+unit and a sentence: about 300 bytes of the description.
 """
 
 import argparse
@@ -24,22 +25,28 @@ FLAGS = (
     'canGetAndSetFMUstate="true" canSerializeFMUstate="true"'
 )
 HEAD = f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="model" guid="{{model}}" numberOfEventIndicators="0">
+<fmiModelDescription fmiVersion="2.0" modelName="model" guid="{{model}}"
+    numberOfEventIndicators="0">
   <ModelExchange {FLAGS}/>
   <CoSimulation {FLAGS} canHandleVariableCommunicationStepSize="true"/>
   <UnitDefinitions><Unit name="N.m"><BaseUnit kg="1" m="2" s="-2"/></Unit></UnitDefinitions>
   <LogCategories><Category name="logStatusError"/></LogCategories>
   <DefaultExperiment startTime="0" stopTime="10" stepSize="0.01"/>
   <ModelVariables>
-    <ScalarVariable name="x" valueReference="0" causality="output" variability="continuous" initial="exact"><Real start="1"/></ScalarVariable>
-    <ScalarVariable name="der(x)" valueReference="1" variability="continuous" initial="calculated"><Real derivative="1"/></ScalarVariable>
-    <ScalarVariable name="k" valueReference="2" causality="parameter" variability="fixed" initial="exact"><Real min="0" start="1"/></ScalarVariable>
-    <ScalarVariable name="u" valueReference="3" causality="input" variability="continuous"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="x" valueReference="0" causality="output" initial="exact">
+      <Real start="1"/></ScalarVariable>
+    <ScalarVariable name="der(x)" valueReference="1" initial="calculated">
+      <Real derivative="1"/></ScalarVariable>
+    <ScalarVariable name="k" valueReference="2" causality="parameter" variability="fixed">
+      <Real min="0" start="1"/></ScalarVariable>
+    <ScalarVariable name="u" valueReference="3" causality="input">
+      <Real start="0"/></ScalarVariable>
 """
 TAIL = """  </ModelVariables>
   <ModelStructure>
     <Outputs><Unknown index="1" dependencies="1" dependenciesKind="constant"/></Outputs>
-    <Derivatives><Unknown index="2" dependencies="1 4" dependenciesKind="fixed fixed"/></Derivatives>
+    <Derivatives>
+      <Unknown index="2" dependencies="1 4" dependenciesKind="fixed fixed"/></Derivatives>
     <InitialUnknowns><Unknown index="2" dependencies="1 3 4"/></InitialUnknowns>
   </ModelStructure>
 </fmiModelDescription>

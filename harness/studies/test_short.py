@@ -268,7 +268,7 @@ def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
 def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
-    """The FMU of book/check_ci.md with 1000 variables: every rule of calls finds it without an error."""
+    """The FMU of book/check_ci.md, with 1000 variables, has no error."""
     fmu = tmp_path / "large.fmu"
     large_fmu.write(fmu, 1000)
     done = subprocess.run([program, "check", fmu, "--json"], capture_output=True, check=False)

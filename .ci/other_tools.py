@@ -1,0 +1,79 @@
+"""Compares what fmpy and fmutool report of FMUs 2.0 with one fault each.
+
+    HUBSLOSH_KEEP_MUTANTS=target/mutants cargo test --release -p check --test all
+    python3 harness/python/environment.py target/python/importers .ci/requirements-importers.txt
+    target/python/importers/bin/python .ci/other_tools.py target/mutants
+
+Prints a table in Markdown. The tests of `check` write the FMUs and expect `check` to find each
+fault by the intended rule. A fault counts as reported if a tool reports anything: neither reports
+anything on the faultless FMUs. A fault is in the archive (`zip`), the description (`xml`), the
+binaries as files (`bin`), or in the behaviour of the binary.
+"""
+
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+from fmpy.validation import validate_fmu
+
+# what fmutool says of an FMU in which it finds nothing
+WELL = (
+    "seems to be compliant with FMI-2.0",
+    "No semantic error against the FMI-2 standard",
+)
+IN_FILES = ("zip", "xml", "bin")
+
+
+def of_fmpy(fmu: Path) -> bool:
+    """Return True if ``fmpy.validation.validate_fmu`` reports anything."""
+    try:
+        return bool(validate_fmu(str(fmu)))
+    except Exception:
+        return True
+
+
+def of_fmutool(fmu: Path) -> bool:
+    """Return True if ``fmutool -check`` reports anything."""
+    program = Path(sys.executable).with_name("fmutool")
+    done = subprocess.run(
+        [program, "-input", fmu, "-check"], capture_output=True, text=True, check=False
+    )
+    lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+    others = [line for line in lines if not line.startswith("INFO")]
+    return bool(others) or done.returncode != 0 or not all(words in done.stdout for words in WELL)
+
+
+TOOLS = {"`fmpy validate`": of_fmpy, "`fmutool -check`": of_fmutool}
+
+
+def main() -> None:
+    """Print a row a group of rules, and what each tool reports."""
+    folder = Path(sys.argv[1])
+    rows = [
+        row.split("\t") for row in (folder / "index.tsv").read_text(encoding="utf-8").splitlines()
+    ]
+    total: Counter[str] = Counter()
+    reported: Counter[tuple[str, str]] = Counter()
+    for file, name, rules in rows:
+        found = {tool: of(folder / file) for tool, of in TOOLS.items()}
+        if not rules:
+            assert not any(found.values()), f"{file}, {name}, is faultless: {found}"
+            continue
+        group = rules.split(".")[0]
+        group = f"`{group}`" if group in IN_FILES else "behaviour"
+        total[group] += 1
+        for tool, is_found in found.items():
+            reported[tool, group] += is_found
+        print(
+            file, name, rules, *(tool for tool in TOOLS if found[tool]), sep="\t", file=sys.stderr
+        )
+    print(f"| faults | FMUs | {' | '.join(TOOLS)} |")
+    print("| --- |" + " --- |" * (1 + len(TOOLS)))
+    for group in sorted(total):
+        cells = [total[group], *(reported[tool, group] for tool in TOOLS)]
+        print(f"| {group} | {' | '.join(map(str, cells))} |")
+
+
+if __name__ == "__main__":
+    main()
