@@ -144,6 +144,8 @@ fn fuzz(
     });
     for _ in 0..count {
         let bytes = mutated(seeds, &mut dice);
+        // a new file: some file systems write what replaces an old one to the disk at once
+        let _ = std::fs::remove_file(&path);
         std::fs::write(&path, &bytes).unwrap();
         now.1.lock().unwrap().clone_from(&bytes);
         now.0.store(began.elapsed().as_secs() + 1, Ordering::SeqCst);
@@ -201,6 +203,11 @@ fn csv(count: u64) {
         "t [ms];T;omega\r\nms;mN·m;°/s\r\n0;100;0\r\n20;250;1\r\n40;-300;-1,5\r\n",
         "# bench\ntime\ttau_cmd\tomega\n2026-01-31T23:59:59.990Z\t1\t0\n2026-02-01T00:00:00.010Z\t2\t1\n",
         "\"time\",\"omega\"\n\"0\",\"1,5\"\n\"1\",\"\"\n\"2\",\"3\"\n",
+        "Channels\t2\t\nY_Unit_Label\tmN.m\tdeg/s\t\ntime\ttau_cmd\tomega\tComment\n0\t0\t1\tbegin\n1\t0\t2\n",
+        "name,time,tau_cmd,omega\nunit,ms,mNm,deg/s\ntrace_values,0,100,0\n,20,250,1\n,40,-300,-1.5\n",
+        "\"time\" \"omega\" \"state\"\n\"1\" 0 1.5 \"slow sweep\"\n\"2\" 1 2 NA\n",
+        "3,-1.2\n[12:00:00.020] 1,2,3\n12:00:00.040 -> 1,2,3\n12:00:00.060 1,2,3\n",
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length\nIMU, 20, 0, 0.1, 1\nATT, 20, 0.1\nIMU, 40, 0, 0.1, 1\nATT, 40, 0.1\n",
     ];
     let seeds: Vec<Vec<u8>> = texts.iter().map(|text| text.as_bytes().to_vec()).collect();
     fuzz("csv", "csv", &seeds, count, |path, _| {

@@ -342,9 +342,9 @@ impl Division {
             && (!has_header || kinds.iter().any(|((_, fields), _)| fields != width))
         {
             bail!(
-                "its lines are records of several kinds: line {} begins with \"{word}\" and has {width} fields, line {} begins \
-                 with \"{other}\" and has {rest} (allowed: rows of one kind; export those of one kind, as \
-                 mavlogdump.py --types IMU --format csv does for ArduPilot's logs)",
+                "its lines are records of several kinds: line {} begins with \"{word}\" and has {width} fields. Line {} begins \
+                 with \"{other}\" and has {rest} (allowed: rows of one kind). Export one kind, for ArduPilot's logs by \
+                 mavlogdump.py --types IMU --format csv",
                 lines[0],
                 more[0]
             );

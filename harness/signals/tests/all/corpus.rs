@@ -543,14 +543,30 @@ fn with_words() -> Vec<Case> {
     let plain = || of("t:ms", "T_cmd:mNm", "gyro z:deg/s");
     let labview = |decimal: char, comment: &str| {
         let digits = move |text: String| text.replace('.', &decimal.to_string());
-        let head = format!(
-            "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t{decimal}\n\
-             Multi_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\nOperator\tA\nDate\t2026/01/31\nTime\t12:00:00{decimal}5\n\
-             ***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t40\t40\t\nDate\t2026/01/31\t2026/01/31\t\n\
-             Time\t12:00:00{decimal}5\t12:00:00{decimal}5\t\nY_Unit_Label\tmN.m\tdeg/s\t\nX_Dimension\tTime\tTime\t\n\
-             X0\t0{decimal}0E+0\t0{decimal}0E+0\t\nDelta_X\t0{decimal}020000\t0{decimal}020000\t\n***End_of_Header***\t\t\t\n\
-             X_Value\tT_cmd\tgyro z\tComment\n"
-        );
+        let head = [
+            "LabVIEW Measurement\t",
+            "Writer_Version\t2",
+            "Reader_Version\t2",
+            "Separator\tTab",
+            "Multi_Headings\tNo",
+            "X_Columns\tOne",
+            "Time_Pref\tRelative",
+            "Date\t2026/01/31",
+            "Time\t12:00:00.5",
+            "***End_of_Header***\t",
+            "\t",
+            "Channels\t2\t\t",
+            "Samples\t40\t40\t",
+            "Date\t2026/01/31\t2026/01/31\t",
+            "Time\t12:00:00.5\t12:00:00.5\t",
+            "Y_Unit_Label\tmN·m\tdeg/s\t",
+            "X_Dimension\tTime\tTime\t",
+            "X0\t0.0E+0\t0.0E+0\t",
+            "Delta_X\t0.020000\t0.020000\t",
+            "***End_of_Header***\t\t\t",
+            "X_Value\tT_cmd\tgyro z\tComment\n",
+        ];
+        let head = digits(head.join("\n"));
         crlf(&lines(&head, |k| {
             let comment = if k == 0 { comment } else { "" };
             digits(format!("{}\t{}.000000\t{}00000{comment}", seconds(k), torque(k), rate(k)))
@@ -574,20 +590,34 @@ fn with_words() -> Vec<Case> {
         let before = before.get(k).copied().unwrap_or(",,");
         format!("{before},{},  {},  {},", seconds(k), torque(k), rate(k))
     });
-    let motec = lines(
-        "\"Format\",\"MoTeC CSV File\",,,\"Workbook\",\"\"\n\"Venue\",\"Bench\",,,\"Worksheet\",\"\"\n\
-         \"Log Date\",\"31/01/2026\",,,\"Origin Time\",\"0.000\",\"s\"\n\"Log Time\",\"12:00:00\",,,\"Start Time\",\"0\",\"s\"\n\
-         \"Sample Rate\",\"50.000\",\"Hz\"\n\"Duration\",\"1\",\"s\"\n\"Range\",\"entire outing\"\n\n\n\
-         \"Time\",\"T_cmd\",\"gyro z\"\n\"s\",\"mN.m\",\"deg/s\"\n\n\n",
-        |k| format!("\"{}\",\"{}\",\"{}\"", seconds(k), torque(k), rate(k)),
-    );
+    let motec = [
+        r#""Format","MoTeC CSV File",,,"Workbook","""#,
+        r#""Venue","Bench",,,"Worksheet","""#,
+        r#""Log Date","31/01/2026",,,"Origin Time","0.000","s""#,
+        r#""Log Time","12:00:00",,,"Start Time","0","s""#,
+        r#""Sample Rate","50.000","Hz""#,
+        r#""Duration","1","s""#,
+        r#""Range","entire outing""#,
+        "\n",
+        r#""Time","T_cmd","gyro z""#,
+        r#""s","mN.m","deg/s""#,
+        "\n\n",
+    ];
+    let motec = lines(&motec.join("\n"), |k| {
+        format!("\"{}\",\"{}\",\"{}\"", seconds(k), torque(k), rate(k))
+    });
     let boot = "ets Jul 29 2019 12:21:46\r\nrst:0x1 (POWERON_RESET),boot:0x13\r\n";
     let capture = |begin: &str| [begin.as_bytes(), &crlf(&lines("", row)), b"800,-1"].concat();
     let data_flash = |rows: &dyn Fn(usize) -> String| {
-        let head = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
-                    FMT, 129, 31, PARM, QNff, TimeUS,Name,Value,Default\n\
-                    FMT, 150, 50, IMU, QBff, TimeUS,I,GyrZ,Tq\nFMT, 151, 40, ATT, Qff, TimeUS,Roll,Pitch\n\
-                    PARM, 100, ARSPD_TYPE, 0, 0\nPARM, 101, BARO_GND, 0, 0\n";
+        let head = [
+            "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+            "FMT, 129, 31, PARM, QNff, TimeUS,Name,Value,Default",
+            "FMT, 150, 50, IMU, QBff, TimeUS,I,GyrZ,Tq",
+            "FMT, 151, 40, ATT, Qff, TimeUS,Roll,Pitch",
+            "PARM, 100, ARSPD_TYPE, 0, 0",
+            "PARM, 101, BARO_GND, 0, 0\n",
+        ];
+        let head = &head.join("\n");
         lines(head, rows)
     };
     vec![
@@ -599,9 +629,24 @@ fn with_words() -> Vec<Case> {
             "Tektronix MSO",
             "csv",
             lines(
-                "Model,MSO44\nFirmware Version,2.0.3\n\nWaveform Type,ANALOG,,\nHorizontal Units,s,,\n\
-                 Horizontal Scale,0.1,,\nSample Interval,0.02,,\nRecord Length,40,,\nGating,0.0% to 100.0%,,\n\
-                 Probe Attenuation,1,1,\nVertical Units,V,V,\nVertical Offset,0,0,\nLabel,,,\n\nTIME,CH1,CH2\n",
+                &[
+                    "Model,MSO44",
+                    "Firmware Version,2.0.3",
+                    "",
+                    "Waveform Type,ANALOG,,",
+                    "Horizontal Units,s,,",
+                    "Horizontal Scale,0.1,,",
+                    "Sample Interval,0.02,,",
+                    "Record Length,40,,",
+                    "Gating,0.0% to 100.0%,,",
+                    "Probe Attenuation,1,1,",
+                    "Vertical Units,V,V,",
+                    "Vertical Offset,0,0,",
+                    "Label,,,",
+                    "",
+                    "TIME,CH1,CH2\n",
+                ]
+                .join("\n"),
                 |k| format!("{},{},{}", seconds(k), torque(k), rate(k)),
             ),
             of("TIME:s", "CH1:mNm", "CH2:deg/s"),
@@ -712,7 +757,7 @@ fn with_words() -> Vec<Case> {
                 _ => format!("ATT, {}, 0.1, 0.2", 1000 * millis(k)),
             }),
             of("#2:us", "#5:mNm", "#4:deg/s"),
-            Some("line 5 begins with \"PARM\" and has 5 fields, line 8 begins with \"ATT\""),
+            Some("line 5 begins with \"PARM\" and has 5 fields. Line 8 begins with \"ATT\""),
         ),
         (
             "ArduPilot DataFlash, its formats alone at the beginning",
@@ -731,7 +776,7 @@ fn with_words() -> Vec<Case> {
                 _ => format!("$GPS,{},48.1,11.5", millis(k)),
             }),
             of("#2:ms", "#3:mNm", "#4:deg/s"),
-            Some("line 1 begins with \"$IMU\" and has 4 fields, line 2 begins with \"$GPS\""),
+            Some("line 1 begins with \"$IMU\" and has 4 fields. Line 2 begins with \"$GPS\""),
         ),
     ]
 }
