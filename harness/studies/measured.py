@@ -534,50 +534,6 @@ def box_forced() -> tuple[list[Row], str]:
     return rows, svg(title, panels, (850, 440))
 
 
-def box_crests() -> tuple[list[Row], str]:
-    """Height of the crest at the wall over the amplitude of the centre of mass."""
-    name = "Bäuerlein and Avila (2021), crests"
-    data, forced = table("box_crests.csv"), table("box_forced.csv")
-    _, found = tank(BOX, 0.4)
-    mode, finite = found["modes"][0], found["finite_amplitude"]["mode"]
-    share_of_bob = mode["m"] / found["m_liq"]
-
-    def heights(x: np.ndarray) -> np.ndarray:
-        """First order and second order, over the length, at X in %."""
-        angle = x / 100 * 0.5 / (share_of_bob * mode["l"])
-        first = mode["wave"] * angle / 0.5
-        return np.array([first, first + finite["wave_second"] * angle**2 / 0.5])
-
-    panel = Panel(
-        (70, 50, 600, 330),
-        (0, 6),
-        (0, 0.35),
-        ((0, 2, 4, 6), (0, 0.1, 0.2, 0.3)),
-        ("amplitude X, %", "crest at the wall over the length"),
-    )
-    rows = []
-    for a, part in data.groupby("A_percent"):
-        those = forced[forced["A_percent"] == a]
-        for _, point in part.iterrows():
-            # the same frequency; of two branches the one with the nearer height
-            close = those[np.abs(those["Omega"] - point["Omega"]) < 5e-4]["X_percent"].to_numpy()
-            if len(close):
-                by = np.abs(np.log(heights(close)[1] / point["crest_over_length"]))
-                dots(panel, [close[np.argmin(by)]], [point["crest_over_length"]], "b")
-        x, crest = float(those["X_percent"].max()), float(part["crest_over_length"].max())
-        low, ours, high = heights(x * np.array([0.95, 1.0, 1.05]))[1]
-        quantity = f"A = {a} %: largest crest over the length, ours at the measured largest X"
-        error, half = UNSTATED["amplitude"] * crest, float(high - low) / 2
-        rows.append(Row(name, quantity, "nonlinear", "1", crest, error, float(ours), half, 2))
-    line = np.linspace(0, 6, 61)
-    first, second = heights(line)
-    panel.line(line, second, "a")
-    panel.line(line, first, "c")
-    words = [("measured", "b"), ("hubslosh tank, second order", "a"), ("first order", "c")]
-    legend(panel, words, 300, 70)
-    return rows, svg("The same box: crests at the wall", [panel], (640, 390))
-
-
 def box_transient() -> tuple[list[Row], str]:
     """Elevation near the wall of a box that is moved from rest, 10 s."""
     name = "Faltinsen et al. (2000), figure 7"
@@ -1002,7 +958,6 @@ EXPERIMENTS: dict[str, Callable[[], tuple[list[Row], str]]] = {
     "rectangular_tanks": rectangular_tanks,
     "box_decay": box_decay,
     "box_forced": box_forced,
-    "box_crests": box_crests,
     "box_transient": box_transient,
     "cylinder_decay": cylinder_decay,
     "cylinder_heights": cylinder_heights,
