@@ -24,6 +24,7 @@ use crate::any_fmu::question::{Bias, Free, Prior, Question, Setting, Solver, rea
 use crate::any_fmu::record::Record;
 use crate::any_fmu::simulate::{Model, Setup};
 use crate::any_fmu::{self, Identification};
+use crate::breaking;
 use crate::estimate::Estimated;
 use crate::news::News;
 use start::Start;
@@ -32,8 +33,6 @@ use start::Start;
 const TOLD: f64 = 0.3;
 /// The same where the residual is not noise: the errors of the model may then be ten times those that the fit states.
 const TOLD_WITHOUT_FIT: f64 = 0.03;
-/// Steepness at which waves break, and its standard deviation: 0.60 to 0.66 in water.
-const BREAKING: (f64, f64) = (0.63, 0.03);
 /// Phase of the first mode from one input to the next: the error of the line between them is a 12th of its square.
 const PHASE: f64 = 0.05;
 /// Largest number of inputs from one row to the next.
@@ -370,9 +369,26 @@ pub fn identify(
     for raw in &mut loads {
         into_frame(&task.frame, raw, window)?;
     }
-    let (question, records) = question(task, &loads, &start, window)?;
-    let found = any_fmu::identify(model, &question, &records, news)?;
-    interpret(model, task, &question, &records, &start, found)
+    // waves that never break show no breaking: as an unknown it would bias the other damping
+    let growth = tank::ZETA_BREAKING.at([start.mode]);
+    let is_own = task.priors.iter().any(|prior| prior.name == growth);
+    let is_settled = is_own || task.settings.iter().any(|setting| setting.name == growth);
+    let (mut asked, records) = question(task, &loads, &start, window, is_own)?;
+    let mut found = any_fmu::identify(model, &asked, &records, news)?;
+    let angles_of = |asked: &Question, found: &Identification| {
+        angles(model, asked, &records, found, start.mode)
+    };
+    let mut angles = angles_of(&asked, &found)?;
+    let largest = angles.iter().flatten().copied().fold(0.0, f64::max);
+    let breaks =
+        has_scale(task, &start, &found) && breaking::steepness(largest) >= breaking::least();
+    if breaks && !is_settled {
+        news(&News::Step(format!("waves break: k a reaches {:.2}", breaking::steepness(largest))));
+        (asked, _) = question(task, &loads, &start, window, true)?;
+        found = any_fmu::identify(model, &asked, &records, news)?;
+        angles = angles_of(&asked, &found)?;
+    }
+    interpret(task, &asked, &records, &start, found, &angles)
 }
 
 /// Turns the loads into those on the tank, in axes and about a point that move with it.
@@ -492,12 +508,27 @@ fn records(
     Ok((kept, made))
 }
 
-/// The question for the engine.
+/// Returns true if the records tell the size of the slosh angle. A free decay without a known angle or mass shows their product alone.
+fn has_scale(task: &Task, start: &Start, found: &Identification) -> bool {
+    let mass = tank::MASS.at([start.mode]);
+    start.is_moved
+        || !found.parameters.contains_key(&mass)
+        || task.release.is_some()
+        || task.priors.iter().any(|prior| prior.name == mass)
+}
+
+/// Names of the parameters of waves that break.
+fn of_breaking(mode: usize) -> [String; 2] {
+    [tank::ZETA_BREAKING.at([mode]), tank::BREAKING_STEEPNESS.at([mode])]
+}
+
+/// The question for the engine, with or without waves that break.
 fn question(
     task: &Task,
     raws: &[Raw],
     start: &Start,
     window: f64,
+    breaks: bool,
 ) -> Result<(Question, Vec<Record>)> {
     let (inputs, records) = records(task, raws, start, window)?;
     let outputs: Vec<usize> = (0..6).filter(|k| raws[0].loads[*k].is_some()).collect();
@@ -521,6 +552,9 @@ fn question(
     }
     let (mut free, mut priors) = (Vec::new(), Vec::new());
     for unknown in start.unknowns(task, raws, !inputs.is_empty()) {
+        if !breaks && of_breaking(start.mode).contains(&unknown.name) {
+            continue;
+        }
         real(unknown.name.clone(), unknown.start);
         let known = task.settings.iter().any(|setting| setting.name == unknown.name);
         if unknown.is_free && !known {
@@ -550,6 +584,11 @@ fn question(
     each.retain(|prior| !task.priors.iter().any(|own| own.name == prior.name));
     each.extend(task.priors.iter().cloned());
     let mut biases = Vec::new();
+    ensure!(
+        task.biases.is_empty() || !task.frame.is_fixed || inputs.is_empty(),
+        "--bias with --fixed (allowed: one of them if the tank moves): an offset in fixed axes changes in those of the tank. Give the \
+         loads in the tank's axes"
+    );
     for bias in &task.biases {
         let place = LOADS.iter().position(|(name, _)| *name == bias.output);
         let place = place.filter(|k| outputs.contains(k)).with_context(|| {
@@ -608,27 +647,21 @@ fn angles(
 
 /// The mechanical model, with reasons for what the record does not tell.
 fn interpret(
-    model: &Model,
     task: &Task,
     question: &Question,
     records: &[Record],
     start: &Start,
     mut found: Identification,
+    angles: &[Vec<f64>],
 ) -> Result<ForceRecord> {
     let n = start.mode;
-    let angles = angles(model, question, records, &found, n)?;
     let largest_angle: Vec<f64> =
         angles.iter().map(|angles| angles.iter().copied().fold(0.0, f64::max)).collect();
     let prior = |name: &str| question.priors.iter().find(|prior| prior.name == name).map(|p| p.std);
     let trusted = found.fits == Some(true) && found.converged;
     let most = if trusted { TOLD } else { TOLD_WITHOUT_FIT };
     let is_own = |name: &str| task.priors.iter().any(|prior| prior.name == name);
-    // a free decay without a known angle or mass shows their product alone: no effect of the angle can be scaled
-    let mass = tank::MASS.at([n]);
-    let has_scale = start.is_moved
-        || !found.parameters.contains_key(&mass)
-        || task.release.is_some()
-        || is_own(&mass);
+    let has_scale = has_scale(task, start, &found);
     let scaled = [tank::LENGTH.at([n]), tank::HINGE.at([n]), tank::ZETA.at([n]), tank::M_0.into()];
     let is_told = |name: &str, e: &Estimated| {
         if !has_scale && !scaled.iter().any(|other| other == name) {
@@ -655,7 +688,7 @@ fn interpret(
         task,
         question,
         start,
-        angles: &angles,
+        angles,
         told: &told,
         has_scale,
         at_bound: &found.details.at_bound,
@@ -663,8 +696,34 @@ fn interpret(
     };
     let mut quantities = Vec::new();
     let predicted = |name: &str| task.prediction.as_ref().and_then(|p| p.values.get(name).copied());
+    // no load depends on a wave that does not break
+    let unbroken = Estimated {
+        value: 0.0,
+        std: f64::INFINITY,
+        std_noise: f64::INFINITY,
+        interval: [0.0, f64::INFINITY],
+        determined: false,
+        unit: "1".into(),
+    };
+    let is_unbroken = |name: &String| {
+        of_breaking(n).contains(name) && !task.settings.iter().any(|setting| setting.name == *name)
+    };
     for (label, name) in start.labels() {
-        let Some(e) = found.parameters.get(&name) else { continue };
+        let Some(e) = found.parameters.get(&name) else {
+            if is_unbroken(&name) {
+                quantities.push(Quantity {
+                    label,
+                    unit: unbroken.unit.clone(),
+                    value: None,
+                    interval: None,
+                    predicted: predicted(&name).map(|p| p.value),
+                    predicted_interval: None,
+                    reason: Some(context.reason(&name, &unbroken)),
+                    name,
+                });
+            }
+            continue;
+        };
         let theory = predicted(&name);
         let is_told = told[&name];
         quantities.push(Quantity {
@@ -702,6 +761,7 @@ fn interpret(
             });
         }
     }
+    quantities.extend(offsets(task, records, &mut found, trusted));
     let untold: Vec<&String> =
         told.iter().filter(|(_, told)| !**told).map(|(name, _)| name).collect();
     // their remarks state values
@@ -720,6 +780,36 @@ fn interpret(
     found.verdict.extend(reasons.map(|(q, reason)| format!("{} is not stated: {reason}", q.label)));
     let largest_angle = has_scale.then_some(largest_angle);
     Ok(ForceRecord { found, tank: quantities, trusted, largest_angle })
+}
+
+/// Takes the offsets of the loads out of the fit, by the names and in the signs of the records.
+fn offsets(
+    task: &Task,
+    records: &[Record],
+    found: &mut Identification,
+    trusted: bool,
+) -> Vec<Quantity> {
+    let sign = if task.frame.is_reaction { -1.0 } else { 1.0 };
+    let mut all = Vec::new();
+    for (k, (load, unit)) in LOADS.iter().enumerate() {
+        for (number, record) in records.iter().enumerate() {
+            let name_of = |load: &str| format!("bias({load})@{}", number + 1);
+            let Some(e) = found.measurement.remove(&name_of(&load_name(k))) else { continue };
+            let mut interval = e.interval.map(|end| sign * end);
+            interval.sort_by(f64::total_cmp);
+            all.push(Quantity {
+                label: format!("offset of {load} in {}", record.name),
+                name: name_of(load),
+                unit: (*unit).into(),
+                value: Some(sign * e.value),
+                interval: trusted.then_some(interval),
+                predicted: None,
+                predicted_interval: None,
+                reason: None,
+            });
+        }
+    }
+    all
 }
 
 /// Quantities that follow from several estimates.

@@ -2,6 +2,7 @@
 
 pub mod any_fmu;
 pub mod between;
+pub mod breaking;
 pub mod budget;
 pub mod candidate;
 pub mod cause;

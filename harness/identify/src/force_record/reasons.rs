@@ -4,13 +4,11 @@ use std::collections::BTreeMap;
 
 use names::sloshtank::tank;
 
+use super::Task;
 use super::start::Start;
-use super::{BREAKING, Task};
 use crate::any_fmu::question::Question;
+use crate::breaking;
 use crate::estimate::{Estimated, prose};
-
-/// Steepness k a of an upright cylinder's first mode over its slosh angle, 1/rad (SloshTank's rule for all tanks).
-const STEEPNESS: f64 = 1.54;
 
 /// Facts behind the reasons.
 pub struct Context<'a> {
@@ -75,12 +73,10 @@ impl Context<'_> {
             false => format!("the residual is not noise, so that {width} or ten times that"),
         };
         if breaks {
-            let steepness = STEEPNESS * largest;
-            let (begins, _) = BREAKING;
-            return if steepness < begins - 0.03 {
-                format!(
-                    "the record never breaks: its steepness k a reaches {steepness:.2} ({degrees:.1}°), and waves break from 0.60 on"
-                )
+            let steepness = breaking::steepness(largest);
+            let (begins, _) = breaking::BEGINS;
+            return if steepness < breaking::least() {
+                breaking::never(largest)
             } else {
                 format!(
                     "too little of the record lies above the steepness of breaking (k a reaches {steepness:.2}, breaking begins at \

@@ -6,7 +6,8 @@ use nalgebra::{Matrix3, Vector3};
 use names::sloshtank::tank;
 use signals::fourier::Forward;
 
-use super::{BREAKING, LOADS, Raw, Task, lateral};
+use super::{LOADS, Raw, Task, lateral};
+use crate::breaking;
 
 /// Standard deviation of the wide priors of s and κ. Liquids have 0.9 to 1.5 and 0.3 to 8.
 pub const WIDE_SHIFT: f64 = 2.0;
@@ -213,7 +214,7 @@ impl Start {
         add(tank::ZETA.at([n]), self.zeta, (10.0 * self.zeta).max(0.05), None, true);
         add(tank::ZETA_AMPLITUDE.at([n]), 0.0, 0.1, Some((0.0, 1.0)), true);
         add(tank::ZETA_BREAKING.at([n]), 0.04, 0.2, Some((0.0, 1.0)), true);
-        let (begins, known) = BREAKING;
+        let (begins, known) = breaking::BEGINS;
         add(tank::BREAKING_STEEPNESS.at([n]), begins, known, Some((0.3, 1.0)), true);
         let [s, kappa] = self.third_order;
         let about = |value: f64| Some((value - 4.0, value + 6.0));
