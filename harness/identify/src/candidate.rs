@@ -250,6 +250,10 @@ fn unknowns(
         list.extend((0..recordings.len()).map(Unknown::gyro_bias));
     }
     list.extend(options.effects.iter().cloned());
+    if options.breaking && !frozen {
+        let is_free = |u: &Unknown| !u.quantity.parameter().is_some_and(setting);
+        list.extend(Unknown::breaking().into_iter().filter(is_free));
+    }
     // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise
     let nonlinear = !frozen && model != SloshModel::Linear.name();
     if options.gyro_scale > 0.0 && (nonlinear || recordings.iter().any(|r| r.angle.is_some())) {

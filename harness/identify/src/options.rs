@@ -28,6 +28,8 @@ pub struct Options {
     pub sensor_errors: bool,
     /// Effects of the bench that the FMU does not have and that are estimated: [`Unknown::actuator_lag`] and others.
     pub effects: Vec<Unknown>,
+    /// True to estimate the damping by waves that break, if the fit reaches them.
+    pub breaking: bool,
     /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
     pub gyro_scale: f64,
     /// Tolerances of values that are not estimated.
@@ -52,6 +54,7 @@ impl Default for Options {
             starts: Vec::new(),
             sensor_errors: true,
             effects: Vec::new(),
+            breaking: false,
             gyro_scale: 0.01,
             tolerances: Tolerances::default(),
             intersample: None,

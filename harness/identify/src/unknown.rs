@@ -1,8 +1,10 @@
 //! Unknowns: parameters of the FMU, and properties of sensors and data link.
 
 use host::description::{ModelDescription, Variable};
-use names::hubslosh::{friction, init};
+use names::hubslosh::{friction, init, slosh};
 use serde::Serialize;
+
+use crate::breaking;
 
 /// One unknown number.
 #[derive(Clone, Debug, PartialEq)]
@@ -242,6 +244,16 @@ impl Unknown {
     /// The drift of the friction.
     pub fn friction_drift() -> Self {
         Unknown::new(Quantity::FrictionDrift, "1", 0.1, Scale::Linear(0.1))
+    }
+
+    /// Damping by waves that break, and the steepness at which they begin to.
+    pub fn breaking() -> [Self; 2] {
+        let (begins, deviation) = breaking::BEGINS;
+        let growth = Unknown::positive(slosh::ZETA_BREAKING, "1", 0.04);
+        let growth =
+            Unknown { scale: Scale::Softplus(0.004), vague: true, ..growth.known(0.04, 0.2) };
+        let onset = Unknown::positive(slosh::BREAKING_STEEPNESS, "1", begins);
+        [growth, onset.known(begins, deviation)]
     }
 
     /// The stiffness of LuGre's bristles. Stiffer than the upper end, bristles move less than 1/100 of what a gyro of this kind sees.

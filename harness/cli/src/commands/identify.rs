@@ -116,6 +116,10 @@ pub struct IdentifyArgs {
     /// Also estimates the relative change of the friction over a recording.
     #[arg(conflicts_with = "fit", long)]
     friction_drift: bool,
+    /// Also estimates the damping by waves that break, slosh.zeta_breaking and slosh.breaking_steepness, of --method output-error.
+    /// If the fit does not reach such waves, the verdict says so.
+    #[arg(conflicts_with = "fit", long)]
+    breaking: bool,
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
     #[arg(conflicts_with = "fit", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
@@ -373,6 +377,7 @@ impl IdentifyArgs {
             .into_iter()
             .filter_map(|(is_asked, unknown)| is_asked.then_some(unknown))
             .collect(),
+            breaking: self.breaking,
             gyro_scale: self.gyro_scale,
             start_study: self.start_study,
             tolerances: self.tolerances()?,

@@ -36,6 +36,8 @@ pub struct Details {
     /// Ends of searches from other starts, if requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub starts: Vec<Trial>,
+    /// Largest slosh angle of the fit, rad; 0 without slosh.
+    pub slosh_angle: f64,
     /// Wall time, s.
     pub seconds: f64,
 }

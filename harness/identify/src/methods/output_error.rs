@@ -19,6 +19,7 @@ use super::identification::{Details, Identification};
 use super::page::{RATE, Sections};
 use super::{Identified, Method, Needs, Residual, Task};
 use crate::between::{self, Others};
+use crate::breaking;
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::cause;
@@ -89,6 +90,24 @@ pub fn identify(
     progress: &mut dyn FnMut(&News),
 ) -> Result<Identification> {
     let mut found = identify_whole(fmu, recordings, options, progress)?;
+    let angle = found.details.slosh_angle;
+    let breaks = breaking::steepness(angle) >= breaking::least();
+    let is_asked = options.breaking;
+    let options = &Options { breaking: is_asked && breaks, ..options.clone() };
+    let is_set = |name: &str| options.settings.iter().any(|(other, _)| other == name);
+    if is_asked && !breaks {
+        found = identify_whole(fmu, recordings, options, progress)?;
+        found
+            .verdict
+            .push(format!("slosh.zeta_breaking is not estimated: {}.", breaking::never(angle)));
+    } else if breaks && !is_asked && !is_set(hubslosh::slosh::ZETA_BREAKING) {
+        found.verdict.push(format!(
+            "The fit's waves reach a steepness k a of {:.2} ({:.1}°), and waves break from {:.2} on: --breaking estimates this damping.",
+            breaking::steepness(angle),
+            angle.to_degrees(),
+            breaking::least()
+        ));
+    }
     if let ([recording], Some(false), true) = (recordings, found.fits, found.details.fit.poor) {
         found.verdict.extend(fitting_beginning(fmu, recording, options, progress));
     }
@@ -442,7 +461,8 @@ fn finish(
         verdict::words(question, &findings, &fit, &combinations, &parameters, &error_budget);
     verdict.extend(shares);
     verdict.extend(start_study::words(&starts));
-    verdict.extend(regime(&fit.model, &answer));
+    let slosh_angle = if fit.model == Frozen.name() { 0.0 } else { largest_angle(&answer) };
+    verdict.extend(regime(&fit.model, slosh_angle));
     let (converged, condition) = (fit.converged, covariance.condition);
     let (missing, cause) = (findings.missing, findings.cause);
     let details = Details {
@@ -453,6 +473,7 @@ fn finish(
         missing,
         cause,
         starts,
+        slosh_angle,
         ..Details::default()
     };
     Ok(Identification {
@@ -561,11 +582,15 @@ fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>
     Ok(Some(OneWay { way, range, place }))
 }
 
+/// Returns the largest slosh angle, rad.
+fn largest_angle(answer: &Answer) -> f64 {
+    let angles = answer.motion.iter().flat_map(|motion| &motion.slosh_angle);
+    angles.fold(0.0_f64, |most, angle| most.max(angle.abs()))
+}
+
 /// Returns a warning if the fit leaves the range of linear slosh: the wave at the wall, 2 α R/(ξ² − 1), relative to the radius R
 /// of an upright cylinder.
-fn regime(model: &str, answer: &Answer) -> Option<String> {
-    let angles = answer.motion.iter().flat_map(|motion| &motion.slosh_angle);
-    let angle = angles.fold(0.0_f64, |most, angle| most.max(angle.abs()));
+fn regime(model: &str, angle: f64) -> Option<String> {
     let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
     let (is, advice) = match Regime::of(wave) {
         Regime::Nonlinear => ("nonlinear", "less torque is better known"),

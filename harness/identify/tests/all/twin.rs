@@ -89,6 +89,49 @@ fn damping_that_grows_with_the_amplitude_comes_back() {
     }
 }
 
+/// Waves break at a steepness of 0.63, which is 23°.
+const BREAKS: [(&str, &str); 2] =
+    [("slosh.zeta_breaking", "0.04"), ("slosh.breaking_steepness", "0.63")];
+
+#[test]
+#[ignore = "half a minute"]
+fn damping_by_waves_that_break_comes_back() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = SHORT.replace("0.1", "0.25");
+    let of = |settings: &[(&str, &str)], breaking: bool| {
+        let recordings = [sweep(&fmu, &torque, settings)];
+        identify(&fmu, &recordings, &Options { breaking, ..options() }, &mut |_| {}).unwrap()
+    };
+    let found = of(&BREAKS, true);
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    for (name, truth) in
+        [("slosh.zeta", 0.003), ("slosh.zeta_breaking", 0.04), ("slosh.breaking_steepness", 0.63)]
+    {
+        let p = &found.parameters[name];
+        println!("{name}: {p:?}");
+        // As above; and known to a quarter, or the fit has learnt nothing.
+        assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.25 * truth, "{name}: {p:?}");
+    }
+    // waves as large of a liquid that does not break
+    let without = of(&[], false);
+    assert!(
+        without.verdict.iter().any(|line| line.contains("--breaking")),
+        "{:?}",
+        without.verdict
+    );
+}
+
+#[test]
+fn waves_that_do_not_break_show_no_damping_by_breaking() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.05,duration=60,f0=2,f1=2.8";
+    let recordings = [sweep(&fmu, torque, &BREAKS)];
+    let options = Options { breaking: true, ..options() };
+    let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
+    assert!(!found.parameters.contains_key("slosh.zeta_breaking"));
+    assert!(found.verdict.iter().any(|line| line.contains("never breaks")), "{:?}", found.verdict);
+}
+
 /// The recording has 2 % too little torque: the liquid is taken for too light, and no residual shows it.
 #[test]
 fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals() {
