@@ -1,5 +1,5 @@
 //! Is the cause of a misfit named? Recordings of a bench with an effect that was not fitted, in ten ways, each with benches of its
-//! own. Prints the cause that the verdict names, and counts the right ones.
+//! own. Prints the cause that the verdict names, and counts the right ones and the wrong ones.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example causes -- [KEY=VALUE ...]
@@ -137,7 +137,7 @@ fn main() -> Result<()> {
         }
     }
     let fmu = Fmu::open(pack::packed_for_tests())?;
-    let (mut count, mut named, mut accepted) = (0, 0, 0);
+    let (mut count, mut named, mut wrong, mut accepted) = (0, 0, 0, 0);
     for seed in seeds {
         for way in WAYS.iter().filter(|way| some.iter().any(|name| *name == way.name)) {
             let torque = fmu_twin::torque(way.torque)?;
@@ -157,19 +157,23 @@ fn main() -> Result<()> {
                 }
             })?;
             let is_named = found.verdict.iter().chain(&notes).any(|line| line.contains(way.named));
+            let cause = found.details.cause.as_ref();
+            let is_wrong = cause.is_some_and(|cause| !cause.effect.contains(way.named));
             count += 1;
             named += usize::from(is_named);
+            wrong += usize::from(is_wrong);
             accepted += usize::from(found.fits == Some(true));
             println!(
-                "{} {seed}: {}, fits {:?}, {:.0} s, {:.0} simulations, cause {:?}",
+                "{} {seed}: {}{}, fits {:?}, {:.0} s, {:.0} simulations, cause {:?}",
                 way.name,
                 if is_named { "named" } else { "NOT NAMED" },
+                if is_wrong { ", WRONG CAUSE" } else { "" },
                 found.fits,
                 found.details.seconds,
                 found.details.fit.simulations,
                 found.details.cause
             );
-            if !is_named {
+            if !is_named || is_wrong || say {
                 notes.iter().chain(&found.verdict).for_each(|line| println!("  > {line}"));
                 let gains = ["−2 ln L falls", "at first order"];
                 let gains =
@@ -178,6 +182,6 @@ fn main() -> Result<()> {
             }
         }
     }
-    println!("{named} of {count} named; {accepted} fit");
+    println!("{named} of {count} named, {wrong} with a wrong cause; {accepted} fit");
     Ok(())
 }

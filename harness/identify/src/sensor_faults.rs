@@ -122,7 +122,8 @@ fn clipped(values: &[f64], sign: f64, noise: f64, rest: Rest) -> Vec<usize> {
 }
 
 /// First and last rows of runs of equal values that chance does not make, that are off the mean and that end in a jump. A hub at
-/// rest reads its gyro's bias, which is near the mean.
+/// rest reads its gyro's bias, which is near the mean. If a sensor freezes once, one of both is enough for its other runs: a rate
+/// may freeze near its mean, or come back near the frozen value.
 fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
     let runs = runs(values);
     let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= SHORTEST_RUN;
@@ -130,13 +131,24 @@ fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, u
     let repeats: usize = runs.iter().filter(|run| !is_long(run)).map(|(a, b)| b - a).sum();
     let chance = (repeats + 1) as f64 / values.len() as f64;
     let least = 1.0 + (CHANCE / values.len() as f64).ln() / chance.ln();
-    let is_frozen = |run: &&(usize, usize)| {
-        let (a, b) = **run;
+    let sign = |&(a, b): &(usize, usize)| {
         let jump = rest.jump(values, b).is_some_and(|jump| jump > LEAVES * noise);
-        let moves = (values[b] - mean).abs() > LEAVES * noise;
-        is_long(run) && (b - a + 1) as f64 >= least && jump && moves && !out[a] && !out[b]
+        (jump, (values[b] - mean).abs() > LEAVES * noise)
     };
-    runs.iter().filter(is_frozen).copied().collect()
+    let is_no_chance = |run: &&(usize, usize)| {
+        let (a, b) = **run;
+        is_long(run) && (b - a + 1) as f64 >= least && !out[a] && !out[b]
+    };
+    let runs: Vec<(usize, usize)> = runs.iter().filter(is_no_chance).copied().collect();
+    if !runs.iter().any(|run| sign(run) == (true, true)) {
+        return Vec::new();
+    }
+    // an angle at rest is off its mean
+    let is_frozen = |run: &(usize, usize)| {
+        let (jump, moves) = sign(run);
+        jump || moves && rest != Rest::Angle
+    };
+    runs.into_iter().filter(is_frozen).collect()
 }
 
 /// First and last rows of the runs of equal values.
@@ -258,6 +270,18 @@ mod tests {
             "{said}"
         );
         assert_eq!(rows, 58);
+        // another time near the mean, and a last time for a cycle, after which it comes back near the frozen value
+        let is_near_mean = |k: &usize| rate[*k].abs() < 1e-3 && rate[*k + 30].abs() > 0.01;
+        let is_met = |k: &usize| (rate[*k] - rate[*k + 25]).abs() < 1e-3 && rate[*k].abs() > 0.01;
+        let near_mean = (4000..4900).find(is_near_mean).unwrap();
+        let met = (8000..9000).find(is_met).unwrap();
+        for (from, rows) in [(near_mean, 30), (met, 25)] {
+            let value = frozen[from];
+            frozen[from..from + rows].fill(value);
+        }
+        let (rows, said) = words(&time, &frozen);
+        assert!(said.contains("omega is frozen 4 times"), "{said}");
+        assert_eq!(rows, 58 + 29 + 24);
         let mut repeats = rate.clone();
         (1..500).for_each(|k| repeats[20 * k] = repeats[20 * k - 1]);
         let (rows, said) = words(&time, &repeats);
