@@ -131,7 +131,7 @@ fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, u
     let repeats: usize = runs.iter().filter(|run| !is_long(run)).map(|(a, b)| b - a).sum();
     let chance = (repeats + 1) as f64 / values.len() as f64;
     let least = 1.0 + (CHANCE / values.len() as f64).ln() / chance.ln();
-    let sign = |&(a, b): &(usize, usize)| {
+    let sign = |&(_, b): &(usize, usize)| {
         let jump = rest.jump(values, b).is_some_and(|jump| jump > LEAVES * noise);
         (jump, (values[b] - mean).abs() > LEAVES * noise)
     };
