@@ -11,6 +11,8 @@ const CLIPPED: (usize, f64) = (20, 4.0);
 const INSIDE: f64 = 3.0;
 /// Step, in units of the noise, that a value takes when it comes back from being clipped or frozen.
 const LEAVES: f64 = 5.0;
+/// The same in units of the sensor's resolution, where it is at both ends.
+const STEPS: f64 = 2.0;
 /// First step of an angle that leaves its rest over the second, at most: it starts with zero rate, and its acceleration does not fall.
 const FROM_REST: f64 = 1.0 / 3.0;
 /// Probability that a run of equal values is chance.
@@ -64,8 +66,17 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let noise = noise_level(values);
     let mut out = vec![false; values.len()];
     let at = |k: usize| format!("{:.2} s", time[k]);
-    for (end, sign) in [("upper", 1.0), ("lower", -1.0)] {
-        let rows = clipped(values, sign, noise, rest);
+    let ends = [("upper", 1.0), ("lower", -1.0)];
+    let held = ends.map(|(_, sign)| held(values, sign, noise));
+    let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
+    let resolution = resolution(values);
+    // a hub rests at one end of its rates at most
+    let both = rest != Rest::Angle
+        && jumps.iter().all(|jump| jump.is_some_and(|jump| jump > STEPS * resolution));
+    for (((end, _), rows), jump) in ends.into_iter().zip(held).zip(jumps) {
+        if !both && jump.is_none_or(|jump| jump <= LEAVES * noise) {
+            continue;
+        }
         if let [first, .., last] = rows[..] {
             found.words.push(format!(
                 "{name} is clipped: {} values are {:.4e}, the {end} end of its range, between {} and {}; they are not fitted",
@@ -103,8 +114,8 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     found
 }
 
-/// Rows at an end of the range, if that clips.
-fn clipped(values: &[f64], sign: f64, noise: f64, rest: Rest) -> Vec<usize> {
+/// Rows at an end of the range, if they are many and stand together: the sensor clips there, or the hub rests.
+fn held(values: &[f64], sign: f64, noise: f64) -> Vec<usize> {
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
     let beside = |v: &&f64| (end - INSIDE * noise..end).contains(&(sign * **v));
@@ -114,11 +125,24 @@ fn clipped(values: &[f64], sign: f64, noise: f64, rest: Rest) -> Vec<usize> {
         **k > 0 && equal(**k - 1) || equal(**k + 1)
     };
     let in_runs = rows.iter().filter(is_run).count();
+    let many = rows.len() >= CLIPPED.0 && rows.len() as f64 > CLIPPED.1 * inside as f64;
+    if many && 2 * in_runs > rows.len() { rows } else { Vec::new() }
+}
+
+/// Median step with which values leave the end of the range that they have in these rows.
+fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
     let last = rows.iter().filter(|k| values.get(**k + 1) != Some(&values[**k]));
     let jumps: Vec<f64> = last.filter_map(|k| rest.jump(values, *k)).collect();
-    let leaves = median(&jumps).is_some_and(|jump| jump > LEAVES * noise);
-    let many = rows.len() >= CLIPPED.0 && rows.len() as f64 > CLIPPED.1 * inside as f64;
-    if many && leaves && 2 * in_runs > rows.len() { rows } else { Vec::new() }
+    median(&jumps)
+}
+
+/// Least difference of two values that differ.
+fn resolution(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rounding = ROUNDING * peak(values);
+    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > rounding);
+    steps.fold(f64::INFINITY, f64::min)
 }
 
 /// First and last rows of runs of equal values that chance does not make, that are off the mean and that end in a jump. A hub at
@@ -259,6 +283,18 @@ mod tests {
         assert!(said.contains("omega is clipped") && said.contains("the upper end"), "{said}");
         // 42 % of the rows from 120 s on, and a neighbour on each side of 320 runs
         assert!((2250..2450).contains(&rows), "{rows}");
+        // at 100 Hz a gyro comes back from both ends by less than five standard deviations of its noise
+        let half: Vec<f64> = clipped.iter().map(|w| 0.2 * w.clamp(-0.04, 0.04)).collect();
+        let mut random = Random::new(6, 0);
+        let slow = |k: usize| (half[k / 2] + half[k.div_ceil(2)]) / 2.0 + 4e-4 * random.normal();
+        let slow: Vec<f64> = (0..19_998)
+            .map(slow)
+            .map(|w| (w / LEAST).round() * LEAST)
+            .map(|w| w.clamp(-0.006, 0.006))
+            .collect();
+        let time_100: Vec<f64> = (0..19_998).map(|k| 0.01 * f64::from(k)).collect();
+        let (_, said) = words(&time_100, &slow);
+        assert!(said.contains("the upper end") && said.contains("the lower end"), "{said}");
         let mut frozen = rate.clone();
         for from in [5003, 7003] {
             let value = frozen[from];
