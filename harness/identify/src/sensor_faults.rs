@@ -5,7 +5,7 @@ use analysis::statistics::{mean, median, noise_level, peak};
 
 use crate::spikes;
 
-/// Fewest values at an end of the range that are clipped, and how many times as many they are as values just inside it.
+/// Fewest values at an end of the range that are clipped, and how many times as many they are as equal values just inside it.
 const CLIPPED: (usize, f64) = (20, 4.0);
 /// Width of that inside, in units of the noise.
 const INSIDE: f64 = 3.0;
@@ -67,9 +67,9 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let mut out = vec![false; values.len()];
     let at = |k: usize| format!("{:.2} s", time[k]);
     let ends = [("upper", 1.0), ("lower", -1.0)];
-    let held = ends.map(|(_, sign)| held(values, sign, noise));
-    let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
     let resolution = resolution(values);
+    let held = ends.map(|(_, sign)| held(values, sign, (noise, resolution)));
+    let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
     // a hub rests at one end of its rates at most
     let both = rest != Rest::Angle
         && jumps.iter().all(|jump| jump.is_some_and(|jump| jump > STEPS * resolution));
@@ -115,17 +115,19 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
 }
 
 /// Rows at an end of the range, if they are many and stand together: the sensor clips there, or the hub rests.
-fn held(values: &[f64], sign: f64, noise: f64) -> Vec<usize> {
+fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize> {
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
     let beside = |v: &&f64| (end - INSIDE * noise..end).contains(&(sign * **v));
-    let inside = values.iter().filter(beside).count();
+    // as many as one value of the sensor has of those just inside
+    let share = (resolution / (INSIDE * noise)).min(1.0);
+    let usual = share * values.iter().filter(beside).count() as f64;
     let is_run = |k: &&usize| {
         let equal = |j: usize| values.get(j) == Some(&values[**k]);
         **k > 0 && equal(**k - 1) || equal(**k + 1)
     };
     let in_runs = rows.iter().filter(is_run).count();
-    let many = rows.len() >= CLIPPED.0 && rows.len() as f64 > CLIPPED.1 * inside as f64;
+    let many = rows.len() >= CLIPPED.0 && rows.len() as f64 > CLIPPED.1 * usual;
     if many && 2 * in_runs > rows.len() { rows } else { Vec::new() }
 }
 
