@@ -64,7 +64,7 @@ const HARNESS: [(&str, &[&str]); 15] = [
     ),
     ("hubslosh-tank", &["formulas", "names"]),
     ("tank-page", &["hubslosh-tank"]),
-    ("hubslosh-native", &["host"]),
+    ("hubslosh-native", &["host", "hubslosh-tank"]),
     (
         "hubslosh",
         &[

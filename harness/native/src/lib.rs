@@ -1,6 +1,6 @@
 //! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and drives their instances by single calls
 //! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]). It also finds the [`crossings`]
-//! of loop gains.
+//! of loop gains, and computes the modal parameters of [`tanks`].
 //!
 //! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
 //! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.
@@ -11,6 +11,7 @@ mod fmu;
 mod instance;
 mod numbers;
 mod run;
+mod tanks;
 
 /// Functions of `hubslosh._native`.
 #[pyo3::pymodule]
@@ -21,4 +22,6 @@ mod _native {
     use crate::fmu::{Fmu, FmuError, FmuWarning, Variable};
     #[pymodule_export]
     use crate::instance::Instance;
+    #[pymodule_export]
+    use crate::tanks::{Liquid, Solved, Tank, solve, table};
 }

@@ -3,7 +3,6 @@
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,13 +10,23 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import temporary
+from . import native, temporary
 from .arguments import vector
 from .fmu import Fmu, FmuError, FmuWarning, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .simulation import outputs_of
-from .tanks import Tank, _from_z, _given, _toml, fill_table, solve
+from .tanks import (
+    Question,
+    Tank,
+    _from_z,
+    _given,
+    _toml,
+    checked_fill,
+    drawing,
+    fill_table,
+    solve,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,6 +43,9 @@ volume; ``(120, "kg")``; 0 if it is empty."""
 
 MOST_TANKS = 4
 """Number of tanks that Spacecraft has."""
+
+VARIANTS = ((1, 1), (2, 2))
+"""Tanks and modes of the variants of Spacecraft in this package, smallest first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +102,10 @@ class MountedTank:
                 found.append(f"{name} must be {count} finite numbers, not {getattr(self, name)!r}")
         if self.modes not in (1, 2, 3):
             found.append(f"modes must be 1, 2 or 3, not {self.modes!r}")
+        try:
+            native.Liquid(1.0, self.nu, self.sigma, self.contact_angle)
+        except (FmuError, TypeError) as error:
+            found.append(str(error))
         return found
 
     def __repr__(self) -> str:
@@ -140,8 +156,7 @@ Liquid = Literal["effective", "rigid"]
 class Craft:
     """A spacecraft with tanks: one object for all fills.
 
-    Body axes have the origin O. Nothing is computed before it is asked for; `tank` computes each
-    fill once. Needs the program ``hubslosh``; see `campaign`.
+    Body axes have the origin O. Nothing is computed before it is asked for, and each fill once.
     """
 
     mass: float
@@ -161,9 +176,8 @@ class Craft:
     """Specific force along the tanks' axes for frequencies and damping, m/s²; by default thrust
     over mass at the fill."""
     model: str | Path = "Spacecraft"
-    """The FMU, by name or file, as for `simulate`."""
-    program: str | Path | None = None
-    """Path of the program ``hubslosh``; None: it is searched for."""
+    """The FMU, by name or file, as for `simulate`; of "Spacecraft" the smallest variant that has
+    the tanks and modes, see `variant`."""
     _known: dict[Any, Any] = field(default_factory=dict, init=False)
     _said: list[str] = field(default_factory=list, init=False)
 
@@ -194,6 +208,24 @@ class Craft:
                 problems += [f"tank {name}: {problem}" for problem in tank.problems()]
         if problems:
             raise FmuError("; ".join(problems))
+
+    def variant(self, parameters: Mapping[str, Quantity] | None = None) -> str | Path:
+        """Return the smallest variant of Spacecraft here that has the tanks, modes and parameters.
+
+        Its results are bit-identical, and its steps cheaper. Another ``model`` is returned as is.
+        """
+        if self.model != "Spacecraft":
+            return self.model
+        modes = [self._drawing(name).modes(of.modes) for name, of in self.tanks.items()]
+        for tanks, most in VARIANTS:
+            if len(modes) <= tanks and max(modes, default=0) <= most:
+                try:
+                    fmu = Fmu.open(f"Spacecraft_{tanks}x{most}")
+                except FmuError:  # it is not packed here
+                    continue
+                if all(name in fmu.variables for name in parameters or ()):
+                    return f"Spacecraft_{tanks}x{most}"
+        return self.model
 
     def _inertia(self) -> Vector:
         try:
@@ -240,28 +272,49 @@ class Craft:
             )
         return dict(zip(names, values, strict=True))
 
-    def _solve(self, name: str, fill: Any, gravity: float) -> Tank | None:
-        """Return a tank at a fill; None if it is empty."""
-        if _is_empty(fill):
-            return None
-        key = (name, fill, gravity)
+    def _drawing(self, name: str) -> Any:
+        """Return the drawing of a tank, which is read once."""
+        key = ("drawing", name)
         if key not in self._known:
-            of = self.tanks[name]
-            amount = {"fill_mass": float(fill[0])} if _is_mass(fill) else {"fill": fill}
             try:
-                self._known[key], said = solve(
-                    of.source, **amount, modes=of.modes, gravity=gravity, nu=of.nu, sigma=of.sigma,
-                    contact_angle=of.contact_angle, program=self.program, spacecraft=True,
-                )  # fmt: skip
-                self._said.extend(f"tank {name}: {text}" for text in said)
+                self._known[key] = drawing(_given(self.tanks[name].source))
             except FmuError as error:
                 raise FmuError(f"tank {name}: {error}") from None
-        found: Tank = self._known[key]
-        return found
+        return self._known[key]
+
+    def _question(self, name: str, fill: Any, gravity: float) -> Question:
+        of = self.tanks[name]
+        return Question(
+            _given(of.source), fill, of.modes, gravity, of.nu, of.sigma, of.contact_angle
+        )
+
+    def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
+        """Return tanks by name, fill and gravity; None where they are empty.
+
+        Each is solved once, and all that are new are solved in one call, on all cores.
+        """
+        wanted = [key for key in dict.fromkeys(asked) if not _is_empty(key[1])]
+        new = [key for key in wanted if key not in self._known]
+        problems = []
+        questions = [self._question(*key) for key in new]
+        found = solve(questions, [self._drawing(key[0]) for key in new]) if new else []
+        for key, one in zip(new, found, strict=True):
+            try:
+                if isinstance(one, FmuError):
+                    raise one
+                said = one.prepare()
+            except FmuError as error:
+                problems.append(f"tank {key[0]}: {error}")
+                continue
+            self._known[key] = one
+            self._said.extend(f"tank {key[0]}: {text}" for text in said)
+        if problems:
+            raise FmuError(problems[0])
+        return [None if _is_empty(key[1]) else self._known[key] for key in asked]
 
     def _capacity(self, name: str) -> Tank:
         """Return the full tank, for its mass."""
-        full = self._solve(name, "100%", 1.0)
+        (full,) = self._solve([(name, "100%", 1.0)])
         assert full is not None
         return full
 
@@ -273,34 +326,46 @@ class Craft:
             return float(fill[0])
         if isinstance(fill, str) and fill.strip().endswith("%"):
             return float(fill.strip()[:-1]) / 100 * self._capacity(name).mass
-        found = self._solve(name, fill, 1.0)
-        assert found is not None
-        return found.mass
+        try:
+            return float(self._drawing(name).mass(checked_fill(fill)))
+        except FmuError as error:
+            raise FmuError(f"tank {name}: {error}") from None
 
     def tank_at(self, fill: Fill) -> dict[str, Tank]:
         """Return the tanks that are not empty at a fill, by name, as `tank` gives them."""
-        fills = self.fills(fill)
-        with ThreadPoolExecutor(MOST_TANKS) as pool:
+        return self._at([fill])[0]
+
+    def solve(self, fills: Sequence[Fill]) -> None:
+        """Solve the tanks at several fills at once, on all cores; later calls find them solved."""
+        self._at(fills)
+
+    def _at(self, fills: Sequence[Fill]) -> list[dict[str, Tank]]:
+        every = [self.fills(fill) for fill in fills]
+        asked = []
+        for of in every:
+            for fill in of.values():
+                checked_fill(fill)
             if self.gravity is None:
-                masses = pool.map(self._mass_of, fills, fills.values())
+                masses = (self._mass_of(name, fill) for name, fill in of.items())
                 acceleration = self._force() / (self.mass + sum(masses))
-
-            def solved(name: str) -> Tank | None:
-                if self.gravity is not None or _is_empty(fills[name]):
-                    return self._solve(name, fills[name], self.gravity or 1.0)
-                along = float(self.tanks[name].rotation[:, 2] @ acceleration)
-                if not along > 0:
-                    raise FmuError(
-                        f"tank {name}: the thrust gives {along:.3g} m/s² along its axis, which "
-                        "does not hold liquid at its bottom; give gravity=, m/s²"
-                    )
-                return self._solve(name, fills[name], along)
-
-            tanks = dict(zip(fills, pool.map(solved, fills), strict=True))
-        said, self._said[:] = self._said[:], []
-        for text in dict.fromkeys(said):
-            warnings.warn(text, FmuWarning, stacklevel=3)
-        return {name: tank for name, tank in tanks.items() if tank is not None}
+            for name, fill in of.items():
+                along = self.gravity or 1.0
+                if self.gravity is None and not _is_empty(fill):
+                    along = float(self.tanks[name].rotation[:, 2] @ acceleration)
+                    if not along > 0:
+                        raise FmuError(
+                            f"tank {name}: the thrust gives {along:.3g} m/s² along its axis, which "
+                            "does not hold liquid at its bottom; give gravity=, m/s²"
+                        )
+                asked.append((name, fill, along))
+        try:
+            found = iter(self._solve(asked))
+        finally:
+            said, self._said[:] = self._said[:], []
+            for text in dict.fromkeys(said):
+                warnings.warn(text, FmuWarning, stacklevel=4)
+        tanks = [{name: next(found) for name in of} for of in every]
+        return [{name: tank for name, tank in of.items() if tank is not None} for of in tanks]
 
     def mass_properties(self, fill: Fill, liquid: Liquid = "effective") -> MassProperties:
         """Return mass, centre of mass and inertia at a fill, every surface at rest.
@@ -385,13 +450,14 @@ class Craft:
                 continue
             if name not in tanks:
                 raise FmuError(f"tank {name} is empty: it cannot drain")
-            of, tank = self.tanks[name], tanks[name]
+            tank = tanks[name]
             key = (name, "table", tuple(between), tank.gravity)
             if key not in self._known:
-                self._known[key], said = fill_table(
-                    of.source, between, modes=of.modes, gravity=tank.gravity, nu=of.nu,
-                    sigma=of.sigma, contact_angle=of.contact_angle, program=self.program,
-                )  # fmt: skip
+                try:
+                    asked = self._question(name, None, tank.gravity)
+                    self._known[key], said = fill_table(asked, between)
+                except FmuError as error:
+                    raise FmuError(f"tank {name}: {error}") from None
                 self._said.extend(f"tank {name}: {text}" for text in said)
             table: dict[str, Quantity] = {
                 f"tank[{number}]{key.removeprefix('tank[1]')}": value
@@ -423,7 +489,7 @@ class Craft:
             full = self._capacity(name)
             gas, center = full.mass - tank.mass, float(full.all["z_cg"])
             if gas > 1e-6 * full.mass:
-                below = self._solve(name, (gas, "kg"), tank.gravity)
+                (below,) = self._solve([(name, (gas, "kg"), tank.gravity)])
                 assert below is not None
                 center = (full.mass * center - gas * float(below.all["z_cg"])) / tank.mass
             ways[name] = center - float(tank.all["z_cg"])
@@ -443,7 +509,7 @@ class Craft:
         * ``parameters``: Further parameters of the FMU, which override those of the craft.
         """
         every = self.parameters(fill, rigid=rigid) | dict(parameters or {})
-        return linearize(self.model, every, inputs, outputs)
+        return linearize(self.variant(every), every, inputs, outputs)
 
     def loop(
         self,
@@ -468,7 +534,8 @@ class Craft:
         """
         every = self.parameters(fill, rigid=rigid, mass_flow=mass_flow, between=between)
         every |= dict(parameters or {})
-        return Loop(controller, period, self.model, every, measured, command, latency, delay)
+        model = self.variant(every)
+        return Loop(controller, period, model, every, measured, command, latency, delay)
 
     def review(
         self,
@@ -542,7 +609,7 @@ class Craft:
                 of = (float(row["zeta_low"]), float(row["zeta_high"]))
             named[full] = of
         every = self.parameters(fill) | dict(parameters or {})
-        return uncertain(every, named, outputs=outputs, model=self.model, **options)
+        return uncertain(every, named, outputs=outputs, model=self.variant(every), **options)
 
     def columns(self, fill: Fill) -> list[str]:
         """Return the columns by which `view` draws craft and liquid, for ``outputs``."""

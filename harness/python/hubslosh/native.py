@@ -41,3 +41,4 @@ FmuError = _native.FmuError
 FmuWarning = _native.FmuWarning
 """Python warning that passes on a warning of an FMU or of the program ``hubslosh``."""
 Model = _native.Model
+Liquid, Tank, solve, table = _native.Liquid, _native.Tank, _native.solve, _native.table

@@ -9,6 +9,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -350,6 +351,8 @@ class _Space:
         loops, tanks, problems = [], [], []
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
+            with suppress(FmuError):  # the loop below names the fill
+                craft.solve(fills)
             for k, fill in enumerate(fills):
                 try:
                     loop = craft.loop(controller, period, fill, parameters=parameters, **options)

@@ -1,26 +1,21 @@
-"""From a tank's drawing and a fill to modal parameters, by the program ``hubslosh tank``."""
+"""From a tank's drawing and a fill to modal parameters, by linear potential flow."""
 
 import json
 import os
-import subprocess
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import temporary
+from . import native
 from .fmu import FmuError, FmuWarning
-from .program import find_program
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from .fmu import Value
-
-_TEMPORARY = ".hubslosh-tank.toml"
 
 SIX_AXES = ("Spacecraft", "SloshTank")
 """FMUs in six axes; their tanks differ in the beginning of a name alone."""
@@ -32,14 +27,19 @@ class Tank:
 
     all: dict[str, Any]
     """Result that ``hubslosh tank --out`` writes: ``m_liq`` (kg), ``z_cg``, ``I_eff_cg``, …"""
-    picture: str
-    """Tank, free surface and mode shapes, SVG; a notebook shows it."""
     gravity: float
     """m/s² along the tank's axis."""
-    _source: "dict[str, Any] | Path" = field(repr=False)
-    _flags: list[str] = field(repr=False)
-    _liquid: list[str] = field(repr=False)
-    _program: Path = field(repr=False)
+    _solved: Any = field(repr=False)
+    _question: "Question" = field(repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what a copy in another process is solved from."""
+        return _solved_again, (self._question,)
+
+    @cached_property
+    def picture(self) -> str:
+        """Tank, free surface and mode shapes, SVG; a notebook shows it."""
+        return str(self._solved.picture())
 
     @property
     def mass(self) -> float:
@@ -102,7 +102,7 @@ class Tank:
 
         * ``model``: Spacecraft, with the ``number`` of the tank, 1 to 4; SloshTank; or HubSlosh, a
           table of modes. Damping ratios and centring stiffnesses are there if `tank` was given
-          viscosity and surface tension; what the program warns of is a `FmuWarning`.
+          viscosity and surface tension. Raises FmuWarning where a formula leaves its range.
         * ``position``: Position of the tank's zero (of a ``shape`` its lowest point), body axes, m.
         * ``axis``: Direction of the tank's axis, upwards, in body axes; by default z.
         * ``rigid``: The same liquid without slosh, at its centre, with the inertia that it has
@@ -124,16 +124,14 @@ class Tank:
             if number not in (1, 2, 3, 4):
                 raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
             prefix = f"tank[{number}]"
-            found = {
-                prefix + name.removeprefix("tank[1]"): value
-                for name, value in self._of_spacecraft.items()
-            }
+            of = self._of_spacecraft if rigid or self.all["modes"] else self._parameters(model)
+            found = {prefix + name.removeprefix("tank[1]"): value for name, value in of.items()}
         elif model == "SloshTank":
-            prefix, found = "tank", self._files("SloshTank")
+            prefix, found = "tank", self._parameters("SloshTank")
         elif model == "HubSlosh":
             if rigid:
                 raise FmuError("HubSlosh has the rigid liquid as slosh.model = frozen")
-            return self._files("HubSlosh")
+            return self._parameters("HubSlosh")
         else:
             raise FmuError(f"there are no parameters of a tank for {model!r} (for: Spacecraft, "
                            "SloshTank, HubSlosh)")  # fmt: skip
@@ -153,18 +151,77 @@ class Tank:
 
     @cached_property
     def _of_spacecraft(self) -> "dict[str, Value]":
-        return self._files("Spacecraft")
+        if not self.all["modes"]:  # a full tank has the parameters of rigid liquid alone
+            return {"tank[1].I_z": 0.0}
+        return self._parameters("Spacecraft")
 
-    def _files(self, model: str) -> "dict[str, Value]":
-        from .tables import read_parameters
+    def prepare(self) -> list[str]:
+        """Compute the parameters of Spacecraft, if it has modes, and return warnings."""
+        if not self.all["modes"]:
+            return list(self._solved.warnings())
+        found, said = self._solved.parameters("Spacecraft")
+        self.__dict__["_of_spacecraft"] = found
+        return list(said)
 
-        with _folder(self._source) as (folder, file):
-            out = folder / "parameters.toml"
-            flags = ["--model", model, "--parameters", str(out), "--out", str(folder / "r.json")]
-            said = _call(self._program, [str(file), *self._flags, *self._liquid, *flags])
-            for warning in said:
-                warnings.warn(warning, FmuWarning, stacklevel=3)
-            return read_parameters(out)
+    def _parameters(self, model: str) -> "dict[str, Value]":
+        found, said = self._solved.parameters(model)
+        for warning in said:
+            warnings.warn(warning, FmuWarning, stacklevel=4)
+        return dict(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A tank, its fill and its liquid."""
+
+    source: "dict[str, Any] | Path"
+    """File, or what stands in one."""
+    fill: Any
+    """Height, m; ``"60%"``; or (120, "kg")."""
+    modes: int
+    gravity: float
+    """m/s²."""
+    nu: float | None
+    sigma: float | None
+    contact_angle: float | None
+
+
+def drawing(source: "dict[str, Any] | Path") -> Any:
+    """Read a tank file, or what stands in one."""
+    if isinstance(source, Path):
+        return native.Tank.read(source)
+    return native.Tank.parse("".join(f"{_key(k)} = {_toml(v)}\n" for k, v in source.items()))
+
+
+def solve(
+    questions: Sequence[Question], drawings: Sequence[Any] | None = None
+) -> "list[Tank | FmuError]":
+    """Return what is found of each question, or its error; computed on all cores.
+
+    * ``drawings``: What `drawing` has read for each.
+    """
+    drawings = drawings or [drawing(asked.source) for asked in questions]
+    found = native.solve(
+        [
+            (tank, asked.fill, asked.modes, _liquid(asked))
+            for asked, tank in zip(questions, drawings, strict=True)
+        ]
+    )
+    return [
+        one if isinstance(one, FmuError) else Tank(one.result(), float(asked.gravity), one, asked)
+        for asked, one in zip(questions, found, strict=True)
+    ]
+
+
+def _liquid(asked: Question) -> Any:
+    return native.Liquid(asked.gravity, asked.nu, asked.sigma, asked.contact_angle)
+
+
+def _solved_again(question: Question) -> Tank:
+    (found,) = solve([question])
+    if isinstance(found, FmuError):
+        raise found
+    return found
 
 
 def tank(
@@ -177,12 +234,11 @@ def tank(
     nu: float | None = None,
     sigma: float | None = None,
     contact_angle: float | None = None,
-    program: str | Path | None = None,
 ) -> Tank:
     """Return masses, lengths and hinges of a tank's slosh modes, by linear potential flow.
 
     * ``source``: A tank file (.toml), or what stands in one: ``{"density": 1010, "shape":
-      {"sphere": {"radius": 0.4}}}``.
+      {"sphere": {"radius": 0.4}}}``. The page on tanks has every shape.
     * ``fill``: Height above the lowest point, m, or ``"60%"`` of the volume.
     * ``fill_mass``: Mass of the liquid instead of ``fill``, kg.
     * ``modes``: Number of modes.
@@ -190,101 +246,46 @@ def tank(
     * ``nu``: Kinematic viscosity, m²/s, for damping ratios.
     * ``sigma``: Surface tension, N/m, for centring stiffnesses; they go into `Tank.parameters`.
     * ``contact_angle``: Contact angle of the liquid at the wall, degrees.
-
-    Needs the program ``hubslosh``; see `campaign`. Its page on tanks has every shape.
     """
-    found, said = solve(
-        source, fill, fill_mass=fill_mass, modes=modes, gravity=gravity, nu=nu, sigma=sigma,
-        contact_angle=contact_angle, program=program,
-    )  # fmt: skip
-    for warning in said:
-        warnings.warn(warning, FmuWarning, stacklevel=2)
-    return found
-
-
-def solve(
-    source: str | Path | Mapping[str, Any],
-    fill: float | str | None = None,
-    *,
-    fill_mass: float | None = None,
-    modes: int = 3,
-    gravity: float = 9.80665,
-    nu: float | None = None,
-    sigma: float | None = None,
-    contact_angle: float | None = None,
-    program: str | Path | None = None,
-    spacecraft: bool = False,
-) -> tuple[Tank, list[str]]:
-    """Return the result of `tank` and the program's warnings.
-
-    * ``spacecraft``: Also compute the parameters of Spacecraft. A full tank has no modes, and only
-      the parameters of rigid liquid.
-    """
-    from .tables import read_parameters
-
     if (fill is None) == (fill_mass is None):
         raise FmuError('give the fill: a height in m, "60%" of the volume, or fill_mass in kg')
-    if isinstance(fill, str) and not fill.strip().endswith("%"):
-        raise FmuError(f'fill is a height in m, or a text such as "60%", not {fill!r}')
+    if fill is not None:
+        checked_fill(fill)
     numbers = {
-        "fill": None if isinstance(fill, str) else fill, "fill_mass": fill_mass, "modes": modes,
-        "gravity": gravity, "nu": nu, "sigma": sigma, "contact_angle": contact_angle,
+        "fill_mass": fill_mass, "modes": modes, "gravity": gravity, "nu": nu, "sigma": sigma,
+        "contact_angle": contact_angle,
     }  # fmt: skip
     for name, value in numbers.items():
         if value is not None and (isinstance(value, bool) or not _is_number(value)):
             raise FmuError(f"{name} must be a number, not {value!r}")
-    given = _given(source)
-    amount = ["--fill", str(fill)] if fill is not None else ["--fill-mass", str(fill_mass)]
-    flags = [*amount, "--modes", str(modes), "--gravity", repr(float(gravity))]
-    liquid = _liquid_flags(nu, sigma, contact_angle)
-    found = find_program(program)
-    with _folder(given) as (folder, file):
-        out, picture = folder / "result.json", folder / "picture.svg"
-        written = ["--out", str(out), "--picture", str(picture)]
-        parameters = folder / "parameters.toml"
-        full = isinstance(fill, str) and fill.strip() == "100%"
-        if spacecraft and not full:
-            written += ["--model", "Spacecraft", "--parameters", str(parameters)]
-        said = _call(found, [str(file), *flags, *liquid, *written])
-        result = json.loads(out.read_text(encoding="utf-8"))
-        drawing = picture.read_text(encoding="utf-8")
-        solved = Tank(result, drawing, float(gravity), given, flags, liquid, found)
-        if parameters.exists():
-            solved.__dict__["_of_spacecraft"] = read_parameters(parameters)
-        elif not result["modes"]:
-            solved.__dict__["_of_spacecraft"] = {"tank[1].I_z": 0.0}
-    return solved, said
+    if modes < 1 or modes != int(modes):
+        raise FmuError(f"modes must be a whole number from 1 on, not {modes!r}")
+    amount = (float(fill_mass), "kg") if fill_mass is not None else fill
+    (found,) = solve(
+        [Question(_given(source), amount, int(modes), gravity, nu, sigma, contact_angle)]
+    )
+    if isinstance(found, FmuError):
+        raise found
+    for warning in found._solved.warnings():
+        warnings.warn(warning, FmuWarning, stacklevel=2)
+    return found
 
 
 def fill_table(
-    source: str | Path | Mapping[str, Any],
-    between: Sequence[float | str],
-    *,
-    modes: int = 3,
-    gravity: float = 9.80665,
-    nu: float | None = None,
-    sigma: float | None = None,
-    contact_angle: float | None = None,
-    program: str | Path | None = None,
+    asked: Question, between: Sequence[float | str]
 ) -> "tuple[dict[str, Value], list[str]]":
     """Return the fill table of tank 1 of Spacecraft, which lets it drain, and warnings.
 
-    * ``between``: Lowest and highest fill of the table, as ``fill`` of `tank`. The program places
-      up to 12 points between them, in some 5 s of CPU time.
-
-    The other arguments are those of `tank`.
+    * ``between``: Lowest and highest fill of the table. Up to 12 points are placed between them, in
+      some 5 s of CPU time.
     """
-    from .tables import read_parameters
-
-    ends = ",".join(str(end) for end in between)
-    flags = ["--sweep", ends, "--modes", str(modes), "--gravity", repr(float(gravity))]
-    flags += _liquid_flags(nu, sigma, contact_angle)
-    with _folder(_given(source)) as (folder, file):
-        out = folder / "parameters.toml"
-        flags += ["--model", "Spacecraft", "--parameters", str(out)]
-        flags += ["--out", str(folder / "sweep.csv")]
-        said = _call(find_program(program), [str(file), *flags])
-        return read_parameters(out), said
+    ends = tuple(between)
+    if len(ends) != 2:
+        raise FmuError(f"between must be the lowest and the highest fill, not {between!r}")
+    found: tuple[dict[str, Value], list[str]] = native.table(
+        drawing(asked.source), ends, asked.modes, _liquid(asked)
+    )
+    return found
 
 
 def _given(source: Any) -> "dict[str, Any] | Path":
@@ -300,10 +301,17 @@ def _given(source: Any) -> "dict[str, Any] | Path":
     raise FmuError(f"a tank is a file or a dict of what stands in one, not {source!r}")
 
 
-def _liquid_flags(nu: float | None, sigma: float | None, contact_angle: float | None) -> list[str]:
-    options = {"--nu": nu, "--sigma": sigma, "--contact-angle": contact_angle}
-    given = {name: repr(float(value)) for name, value in options.items() if value is not None}
-    return [text for pair in given.items() for text in pair]
+def checked_fill(fill: Any) -> Any:
+    """Return a fill, or say what is wrong with it."""
+    if isinstance(fill, str):
+        right = fill.strip().endswith("%") and _is_number(fill.strip()[:-1])
+    elif isinstance(fill, tuple):
+        right = len(fill) == 2 and _is_number(fill[0]) and fill[1] == "kg"
+    else:
+        right = not isinstance(fill, bool) and _is_number(fill)
+    if not right:
+        raise FmuError(f'fill is a height in m, or a text such as "60%", not {fill!r}')
+    return fill
 
 
 def _is_number(value: Any) -> bool:
@@ -311,21 +319,6 @@ def _is_number(value: Any) -> bool:
         return float(value) == float(value)
     except (TypeError, ValueError):
         return False
-
-
-@contextmanager
-def _folder(source: dict[str, Any] | Path) -> "Iterator[tuple[Path, Path]]":
-    """Yield a folder for results, and the tank's file, which is there if it was a dict."""
-    with temporary.folder() as name:
-        folder = Path(name)
-        if isinstance(source, Path):
-            yield folder, source
-            return
-        file = folder / _TEMPORARY
-        file.write_text(
-            "".join(f"{_key(k)} = {_toml(v)}\n" for k, v in source.items()), encoding="utf-8"
-        )
-        yield folder, file
 
 
 def _key(key: Any) -> str:
@@ -348,22 +341,6 @@ def _toml(value: Any) -> str:
     if isinstance(value, Sequence):
         return f"[{', '.join(_toml(v) for v in value)}]"
     raise FmuError(f"{value!r} cannot stand in a tank file")
-
-
-def _call(program: Path, arguments: list[str]) -> list[str]:
-    """Run ``hubslosh tank`` and return its warnings."""
-    try:
-        done = subprocess.run([program, "tank", *arguments], capture_output=True, check=False)
-    except OSError as error:
-        raise FmuError(f"{program} cannot be started: {error}") from None
-    said = done.stderr.decode(errors="replace").strip()
-    if done.returncode != 0:
-        text = said.removeprefix("error: ")
-        if Path(arguments[0]).name == _TEMPORARY:  # of a dict; where it was says nothing
-            text = text.replace(f"{arguments[0]}: ", "").replace(arguments[0], "the tank")
-        raise FmuError(f"hubslosh tank: {text}")
-    lines = (line for line in said.splitlines() if line.startswith("warning: "))
-    return [line.removeprefix("warning: ") for line in lines]
 
 
 def _from_z(axis: Sequence[float]) -> list[float]:

@@ -1,7 +1,13 @@
 """A craft's mass properties, parameters and loops against sums by hand and against the FMU."""
 
+import pickle
+import re
+import signal
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +15,8 @@ from conftest import option
 
 import hubslosh
 from hubslosh import Craft, FmuError, MountedTank, attitude
+from hubslosh.fmu import Fmu
+from hubslosh.tanks import Question, drawing, solve
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 CYLINDER = {"density": 875.0, "shape": {"cylinder": {"radius": 0.4, "height": 1.1}}}
@@ -17,7 +25,7 @@ TURNED = (np.sin(0.1), 0.0, np.cos(0.1))
 
 
 @pytest.fixture
-def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
+def craft(fmu: Path) -> Craft:
     """Return a craft with a sphere, and a cylinder whose axis leans."""
     tanks = {
         "ox": MountedTank(SPHERE, (0.1, 0.5, -0.3)),
@@ -25,7 +33,7 @@ def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
     }
     return Craft(
         1400.0, J, (0.01, -0.02, 1.05), tanks, 400.0, (1.0, 2.0, 3.0),
-        model=fmu.with_name("Spacecraft.fmu"), program=option(request, "--hubslosh"),
+        model=fmu.with_name("Spacecraft.fmu"),
     )  # fmt: skip
 
 
@@ -91,9 +99,7 @@ def test_loop_and_linear_model_are_those_of_parameters_by_hand(craft: Craft) -> 
     hand |= {f"craft.r[{i}]": x for i, x in zip((1, 2, 3), (0.01, -0.02, 1.05), strict=True)}
     hand |= {f"h_wheels[{i}]": float(i) for i in (1, 2, 3)}
     for number, (of, along) in enumerate(zip(craft.tanks.values(), (1, TURNED[2]), strict=True), 1):
-        own = hubslosh.tank(
-            of.source, fill, modes=of.modes, gravity=400 / mass * along, program=craft.program
-        )
+        own = hubslosh.tank(of.source, fill, modes=of.modes, gravity=400 / mass * along)
         hand |= own.parameters("Spacecraft", number, position=of.position, axis=of.axis)
     torques = ["torque[1]", "torque[2]", "torque[3]"]
     measured = ["q[2]", "q[3]", "q[4]", "omega[1]", "omega[2]", "omega[3]"]
@@ -142,12 +148,14 @@ def test_detached_liquid_travels_as_in_closed_forms(craft: Craft) -> None:
     assert craft.travel("100%")["ox"] == pytest.approx(0, abs=1e-12)
 
 
-def test_the_viewer_draws_a_loop_with_the_craft_s_columns(craft: Craft, tmp_path: Path) -> None:
+def test_the_viewer_draws_a_loop_with_the_craft_s_columns(
+    craft: Craft, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     """With the tanks' own contours."""
     loop = craft.loop(np.hstack([20 * np.eye(3), 300 * np.eye(3)]), 0.1, "60%")
     reference = attitude.slew(0.02, 1.0, axis=(0, 0, 1))
     run = loop.simulate(2, reference=reference, outputs=craft.columns("60%"))
-    page = craft.view(run, tmp_path / "craft.html", program=craft.program)
+    page = craft.view(run, tmp_path / "craft.html", program=option(request, "--hubslosh"))
     assert page.path.stat().st_size > 100_000
     assert "tank[2].angle_y[1]" in run and "tank[1].angle_x[2]" in run
 
@@ -162,7 +170,7 @@ def test_a_craft_names_everything_that_is_wrong_with_it(craft: Craft) -> None:
         assert text in str(error.value)
     for fill, text in {
         ("50%",): "one for each of ox, fuel",
-        "120%": "tank ox: hubslosh tank",
+        "120%": r"tank ox: The fill is 120 %; it must be 0 to 100 %",
     }.items():
         with pytest.raises(FmuError, match=text):
             craft.parameters(fill)
@@ -172,3 +180,68 @@ def test_a_craft_names_everything_that_is_wrong_with_it(craft: Craft) -> None:
         replace(craft, thrust=0.0).parameters("50%")
     assert replace(craft, thrust=0.0, gravity=0.1).parameters("50%")["tank[1].g_ref"] == 0.1
     assert len(str(craft).splitlines()) <= 10
+
+
+def test_a_craft_takes_the_smallest_variant_that_carries_it(
+    craft: Craft, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of those packed, with every parameter that is set; `.ci/check_wheel.py` runs them."""
+    whole = Fmu.open(craft.model)
+    packed = {"Spacecraft_1x1": "1x1", "Spacecraft_2x2": "2x2"}
+
+    def opened(name: str) -> SimpleNamespace:
+        if name not in packed:
+            raise FmuError("not packed")
+        tanks, modes = map(int, packed[name].split("x"))
+        beyond = re.compile(rf"tank\[[{tanks + 1}-4]\]|tank.*\[[{modes + 1}-3](,\d)?\]$")
+        return SimpleNamespace(variables={n for n in whole.variables if not beyond.match(n)})
+
+    monkeypatch.setattr(Fmu, "open", opened)
+    of_one = {"ox": replace(craft.tanks["ox"], modes=1)}
+    # a mode along each side
+    box = MountedTank({"density": 1.0, "box": [0.5, 0.8]}, (0, 0, 0), modes=1)
+    for size, wanted in {
+        "1x1": of_one,
+        "2x2": craft.tanks,
+        "4x3": {"ox": replace(craft.tanks["ox"], modes=3)},
+    }.items():
+        small = replace(craft, model="Spacecraft", tanks=wanted)
+        assert small.variant() == {"4x3": "Spacecraft"}.get(size, f"Spacecraft_{size}")
+    assert replace(small, tanks={"box": box}).variant() == "Spacecraft_2x2"
+    small = replace(small, tanks=of_one)
+    assert small.variant({"tank[2].zeta[2]": 0.1}) == "Spacecraft_2x2"
+    assert small.variant({"tank[4].mass[1]": 1.0}) == "Spacecraft"
+    assert craft.variant() == craft.model
+    packed.clear()
+    assert small.variant() == "Spacecraft"
+
+
+def test_many_fills_are_solved_as_each_is(craft: Craft) -> None:
+    """On all cores in one call, bit for bit; also after a copy to another process."""
+    fills = ["20%", ("35%", 0.4), {"ox": (120.0, "kg"), "fuel": 0}, "100%"]
+    apart = replace(craft)
+    craft.solve(fills)
+    for fill in fills:
+        assert craft.parameters(fill, rigid=fill == "100%") == apart.parameters(
+            fill, rigid=fill == "100%"
+        )
+    one = craft.tank_at("20%")["ox"]
+    again = pickle.loads(pickle.dumps(one))
+    assert again.all == one.all and again.picture == one.picture
+    assert again.parameters() == one.parameters()
+    # the mass without solving for modes is that with them
+    for tank in (SPHERE, CYLINDER, {"density": 1.0, "box": [0.5, 0.8]}):
+        for height in (0.1, 0.55, 1.0):
+            mass = drawing(tank).mass(height)
+            assert mass == hubslosh.tank(tank, height, modes=1).mass
+
+
+def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
+    """Within a second, of what takes minutes."""
+    timer = threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT))
+    question = Question(SPHERE, "50%", 3, 1.0, 1e-6, None, None)
+    start = time.monotonic()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        solve([question] * 10_000)
+    assert time.monotonic() - start < 30

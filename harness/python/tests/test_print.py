@@ -23,8 +23,7 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
     program, model = option(request, "--hubslosh"), fmu.with_name("Spacecraft.fmu")
     of = hubslosh.MountedTank(SPHERE, (0.1, 0.5, -0.3), nu=9e-7)
     tanks = {f"tank {i}": of for i in range(4)}
-    craft = hubslosh.Craft(650.0, (95, 80, 90), (0, 0, 0), tanks, 44.0, (1, 2, 3), 0.05, model,
-                           program)  # fmt: skip
+    craft = hubslosh.Craft(650.0, (95, 80, 90), (0, 0, 0), tanks, 44.0, (1, 2, 3), 0.05, model)
     fill = ("60%", "60%", "60%", "60%")
     gains = np.hstack([2 * np.eye(3), 40 * np.eye(3)])
     loop = craft.loop(gains, 0.1, fill, delay=0.15)
@@ -49,7 +48,7 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
         "Craft": lambda: craft,
         "MountedTank": lambda: of,
         "MassProperties": lambda: craft.mass_properties(fill),
-        "Tank": lambda: hubslosh.tank(SPHERE, "50%", modes=20, program=program),
+        "Tank": lambda: hubslosh.tank(SPHERE, "50%", modes=20),
         "Loop": lambda: loop,
         "LinearModel": lambda: many,
         "Review": lambda: craft.review(gains, 0.1, [fill], damping="nominal"),

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import option
 from scipy.optimize import brentq
 
 import hubslosh
@@ -24,12 +23,12 @@ pytestmark = pytest.mark.filterwarnings("ignore:tank.*outside the measured")
 
 
 @pytest.fixture
-def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
+def craft(fmu: Path) -> Craft:
     """Return a craft with one sphere on the axis."""
     return Craft(
         DRY, (INERTIA, INERTIA, 700.0), (0, 0, 1.0),
         {"ox": MountedTank(SPHERE, (0, 0, 0.2), modes=1, nu=3e-7)}, 400.0,
-        model=fmu.with_name("Spacecraft.fmu"), program=option(request, "--hubslosh"),
+        model=fmu.with_name("Spacecraft.fmu"),
     )  # fmt: skip
 
 
@@ -248,7 +247,6 @@ inertia = [900.0, 900.0, 700.0]
 center_of_mass = [0.0, 0.0, 1.0]
 thrust = 400.0
 model = {model}
-program = {program}
 
 [craft.tanks.ox]
 source = "ox.toml"
@@ -271,9 +269,9 @@ def test_a_plan_is_the_same_call(craft: Craft, tmp_path: Path, capsys, monkeypat
     direct = craft.review(gains(), PERIOD, ["50%"], **options)
 
     def plan(controller: str, text: str = PLAN) -> Path:
-        names = {"model": f"'{craft.model}'", "program": f"'{craft.program}'"}
+        model = f"'{craft.model}'"
         file = tmp_path / "plan.toml"
-        file.write_text(text.format(controller=controller, **names))
+        file.write_text(text.format(controller=controller, model=model))
         return file
 
     for controller in (str(rows), matrices, '"law.py:law"'):

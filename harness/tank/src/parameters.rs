@@ -14,7 +14,7 @@ use crate::finite_amplitude;
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
 use crate::table::{short, significant};
-use crate::tank::{Geometry, Shape, Tank};
+use crate::tank::{Fill, Geometry, Shape, Tank};
 use crate::{damping, modal};
 
 /// Largest share of capillarity in the stiffness of mode 1 at which the coefficients of finite amplitude hold.
@@ -59,6 +59,16 @@ pub struct Liquid {
     pub sigma: Option<f64>,
     /// Angle between surface and wall in the liquid, degrees; 90 is a flat surface.
     pub contact_angle: f64,
+}
+
+impl Liquid {
+    /// Returns whether `data` was solved with this viscosity at this gravity, surface tension and contact angle.
+    fn damped(&self, data: &ModalData) -> bool {
+        let damping = data.damping.as_ref().map(|of| (of.nu, of.gravity));
+        let surface = data.capillarity.as_ref().map(|of| (of.sigma, of.contact_angle));
+        damping == self.nu.map(|nu| (nu, self.gravity))
+            && surface == self.sigma.map(|sigma| (sigma, self.contact_angle))
+    }
 }
 
 /// A parameter's value.
@@ -215,6 +225,21 @@ pub fn capillarity_of(tank: &Tank, data: &ModalData, liquid: Liquid) -> Option<m
     })
 }
 
+/// Solves a tank at a fill, and adds what depends on the liquid's other properties: capillarity, damping, and the
+/// amplitude dependence of the first mode.
+///
+/// # Errors
+/// Those of [`Tank::height_of`], [`Tank::solve`] and [`damping_of`].
+pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<ModalData, Problems> {
+    let mut data = tank.solve(tank.height_of(fill)?, modes)?;
+    data.capillarity = capillarity_of(tank, &data, liquid);
+    if !data.modes.is_empty() {
+        data.finite_amplitude = Some(finite_amplitude::of_tank(tank, &data));
+        data.damping = liquid.nu.map(|nu| damping_of(tank, &data, nu, liquid)).transpose()?;
+    }
+    Ok(data)
+}
+
 /// Returns the damping of a tank's modes with the capillarity of the liquid, see
 /// [`damping::of_tank`].
 ///
@@ -312,7 +337,10 @@ impl ParameterSet {
         });
         let ratios: Vec<f64> = match liquid.nu {
             Some(nu) => {
-                let found = damping_of(tank, data, nu, liquid)?;
+                let found = match &data.damping {
+                    Some(known) if liquid.damped(data) => known.clone(),
+                    _ => damping_of(tank, data, nu, liquid)?,
+                };
                 notes.push(format!("damping ratio of mode 1: {}", found.taken));
                 let of_axes = [&found.modes, &found.modes_y];
                 let found_of = chosen.iter().map(|&(axis, n)| &of_axes[axis][n]);
@@ -333,7 +361,8 @@ impl ParameterSet {
                 vec![0.0; modes.len()]
             }
         };
-        let mut found = finite_amplitude::of_tank(tank, data);
+        let known = data.finite_amplitude.clone();
+        let mut found = known.unwrap_or_else(|| finite_amplitude::of_tank(tank, data));
         // Potential flow without surface tension gives them.
         let stiff = modes[0].m * modes[0].lambda * liquid.gravity * MOST_CAPILLARY;
         if springs[0].first().is_some_and(|spring| spring.abs() > stiff) {

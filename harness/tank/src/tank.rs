@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::closed_form;
-use crate::contour::{Contour, Problems};
+use crate::contour::{Contour, Problems, Volume};
 use crate::curve::{Curve, Point, Segment};
 use crate::modal::{self, ModalData};
 use crate::spline::spline;
@@ -406,6 +406,26 @@ impl Tank {
             Geometry::Revolution { contour, .. } => contour.fill_of(volume),
             Geometry::Box { length_x, length_y } => volume / (length_x * length_y),
         })
+    }
+
+    /// Returns the mass of the liquid at `fill`, m above the lowest point, kg: that of [`Tank::solve`], without solving
+    /// for modes where these take time.
+    ///
+    /// # Errors
+    /// A fill outside the tank.
+    pub fn mass(&self, fill: f64) -> Result<f64, Problems> {
+        let wall = match &self.geometry {
+            Geometry::Revolution {
+                shape: Some(Shape::Cylinder { .. } | Shape::Annulus { .. }),
+                ..
+            }
+            | Geometry::Box { .. } => None,
+            Geometry::Revolution { contour, .. } => contour.cut(fill).ok(),
+        };
+        match wall {
+            Some(wall) => Ok(self.density * Volume::of(&wall).volume),
+            None => Ok(self.solve(fill, 1)?.m_liq),
+        }
     }
 
     /// Solves for the modal parameters at `fill`, m above the lowest point, with `modes` modes. A full closed tank has

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use files::output::atomically;
-use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, capillarity_of, damping_of};
-use hubslosh_tank::{Fill, Problems, Tank, fill_table, finite_amplitude, picture, sweep, table};
+use hubslosh_tank::parameters::{self, Liquid, ParameterSet, Target};
+use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
 
 use crate::terminal;
 
@@ -122,24 +122,16 @@ impl TankArgs {
         }
         let read = || self.tank.display().to_string();
         let tank = Tank::read(&self.tank).with_context(read)?;
-        let parameters;
+        let set;
         let (text, json, picture, as_table) = match self.fill.or(self.fill_mass.map(Fill::Mass)) {
             Some(fill) => {
-                let fill = tank.height_of(fill).with_context(read)?;
-                let mut data = tank.solve(fill, self.modes).with_context(read)?;
-                data.capillarity = capillarity_of(&tank, &data, self.liquid());
+                let data = parameters::solve(&tank, fill, self.modes, self.liquid());
+                let data = data.with_context(read)?;
                 let found = data.capillarity.iter().flat_map(|found| &found.warnings);
                 // The table has them, and --parameters warns of its own.
                 let is_read = self.parameters.is_some() || !(self.json || self.out.is_some());
                 found.filter(|_| !is_read).for_each(terminal::warn);
-                if !data.modes.is_empty() {
-                    data.finite_amplitude = Some(finite_amplitude::of_tank(&tank, &data));
-                }
-                if let Some(nu) = self.nu.filter(|_| !data.modes.is_empty()) {
-                    let liquid = self.liquid();
-                    data.damping = Some(damping_of(&tank, &data, nu, liquid).with_context(read)?);
-                }
-                parameters = self
+                set = self
                     .set_file(|target, liquid| ParameterSet::new(&tank, &data, target, liquid))?;
                 let json = serde_json::to_string_pretty(&data)? + "\n";
                 let drawn = picture::tank(&tank, &data, self.gravity);
@@ -157,7 +149,7 @@ impl TankArgs {
                     }
                     _ => (sweep::sweep(&tank, &fills, self.modes).with_context(read)?, None),
                 };
-                parameters = self.set_file(|target, liquid| {
+                set = self.set_file(|target, liquid| {
                     fill_table::parameters(&tank, &swept, error, target, liquid)
                 })?;
                 if let Some(nu) = self.nu {
@@ -176,7 +168,7 @@ impl TankArgs {
             None if self.json => print!("{json}"),
             None => print!("{as_table}"),
         }
-        if let Some((path, text)) = &parameters {
+        if let Some((path, text)) = &set {
             atomically(path, |file| Ok(file.write_all(text.as_bytes())?))?;
             done!("{}", path.display());
         }

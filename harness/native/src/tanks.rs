@@ -1,0 +1,324 @@
+//! Tanks: from drawings and fills to modal parameters, many fills at a time.
+//!
+//! Threads compute, without Python's lock. The thread that called only waits, so that it hears Ctrl-C.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use hubslosh_tank::parameters::{self, ParameterSet, Target, Value};
+use hubslosh_tank::tank::Geometry;
+use hubslosh_tank::{Fill, ModalData, Problems, fill_table, picture};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::fmu::FmuError;
+
+/// Time between two looks for Ctrl-C.
+const SILENCE: Duration = Duration::from_millis(100);
+
+/// A tank file, read.
+#[pyclass(frozen, module = "hubslosh")]
+pub struct Tank {
+    tank: hubslosh_tank::Tank,
+    /// The file, if there is one: errors begin with it.
+    file: Option<PathBuf>,
+}
+
+impl Tank {
+    fn error(&self, why: &Problems) -> PyErr {
+        error(self.file.as_deref(), why)
+    }
+}
+
+fn error(file: Option<&Path>, why: impl std::fmt::Display) -> PyErr {
+    let prefix = file.map_or(String::new(), |file| format!("{}: ", file.display()));
+    FmuError::new_err(format!("{prefix}{why}"))
+}
+
+/// Amount of liquid as Python gives it.
+#[derive(FromPyObject)]
+pub enum Amount {
+    /// m
+    Height(f64),
+    /// `60%`, or a height
+    Text(String),
+    /// (120, "kg")
+    Mass(f64, String),
+}
+
+impl Amount {
+    fn fill(&self) -> PyResult<Fill> {
+        match self {
+            Amount::Height(height) => Ok(Fill::Height(*height)),
+            Amount::Text(text) => text.parse().map_err(FmuError::new_err),
+            Amount::Mass(mass, unit) if unit == "kg" => Ok(Fill::Mass(*mass)),
+            Amount::Mass(_, unit) => {
+                Err(FmuError::new_err(format!("a fill is a mass in kg, not in {unit}")))
+            }
+        }
+    }
+}
+
+/// Properties of a liquid other than its density, and the specific force along the axis.
+#[pyclass(frozen, module = "hubslosh")]
+#[derive(Clone, Copy)]
+pub struct Liquid(parameters::Liquid);
+
+#[pymethods]
+impl Liquid {
+    /// Take gravity (m/s²), kinematic viscosity (m²/s), surface tension (N/m) and contact angle (degrees).
+    #[new]
+    fn new(
+        gravity: f64,
+        nu: Option<f64>,
+        sigma: Option<f64>,
+        contact_angle: Option<f64>,
+    ) -> PyResult<Liquid> {
+        let mut problems = Vec::new();
+        let given = [("gravity", Some(gravity)), ("nu", nu), ("sigma", sigma)];
+        for (name, value) in given.into_iter().filter_map(|(name, of)| Some((name, of?))) {
+            if !(value >= 0.0 && value.is_finite()) {
+                problems.push(format!("{name} = {value} (allowed: 0 or more, finite)"));
+            }
+        }
+        match contact_angle {
+            Some(angle) if !(0.0..=180.0).contains(&angle) => {
+                problems.push(format!("contact_angle = {angle} (allowed: 0 to 180 degrees)"));
+            }
+            Some(_) if sigma.is_none() => {
+                problems.push("contact_angle goes with sigma, the surface tension".to_string());
+            }
+            _ => {}
+        }
+        if !problems.is_empty() {
+            return Err(FmuError::new_err(problems.join("; ")));
+        }
+        let contact_angle = contact_angle.unwrap_or(90.0);
+        Ok(Liquid(parameters::Liquid { gravity, nu, sigma, contact_angle }))
+    }
+}
+
+#[pymethods]
+impl Tank {
+    /// Read a tank file.
+    #[staticmethod]
+    fn read(path: PathBuf) -> PyResult<Tank> {
+        match hubslosh_tank::Tank::read(&path) {
+            Ok(tank) => Ok(Tank { tank, file: Some(path) }),
+            Err(why) => Err(error(Some(&path), why)),
+        }
+    }
+
+    /// Read the text of a tank file; the files that it names have absolute paths.
+    #[staticmethod]
+    fn parse(text: &str) -> PyResult<Tank> {
+        match hubslosh_tank::Tank::parse(text, Path::new("")) {
+            Ok(tank) => Ok(Tank { tank, file: None }),
+            Err(why) => Err(error(None, why)),
+        }
+    }
+
+    /// Return the number of modes that Spacecraft has of it if `modes` are asked for: a box with two lengths has those
+    /// along both.
+    fn modes(&self, modes: usize) -> usize {
+        match &self.tank.geometry {
+            Geometry::Box { length_x, length_y } if length_x != length_y => modes.min(2) + 1,
+            _ => modes,
+        }
+    }
+
+    /// Return the mass of liquid at a fill, kg.
+    fn mass(&self, py: Python, fill: Amount) -> PyResult<f64> {
+        let fill = fill.fill()?;
+        py.detach(|| self.tank.mass(self.tank.height_of(fill)?)).map_err(|why| self.error(&why))
+    }
+}
+
+/// A tank with liquid at a fill.
+#[pyclass(frozen, module = "hubslosh")]
+pub struct Solved {
+    tank: Py<Tank>,
+    data: ModalData,
+    liquid: Liquid,
+}
+
+#[pymethods]
+impl Solved {
+    /// Return everything that was found, as `hubslosh tank --json` prints it.
+    fn result<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = serde_json::to_string(&self.data)
+            .map_err(|why| PyRuntimeError::new_err(why.to_string()))?;
+        py.import("json")?.call_method1("loads", (text,))
+    }
+
+    /// Draw tank, free surface and mode shapes, SVG.
+    fn picture(&self, py: Python) -> String {
+        let tank = &self.tank.get().tank;
+        py.detach(|| picture::tank(tank, &self.data, self.liquid.0.gravity))
+    }
+
+    /// Return warnings about the surface tension.
+    fn warnings(&self) -> Vec<String> {
+        self.data.capillarity.as_ref().map_or(Vec::new(), |found| found.warnings.clone())
+    }
+
+    /// Return the parameters of a model by name, and warnings.
+    fn parameters<'py>(&self, py: Python<'py>, model: &str) -> PyResult<Parameters<'py>> {
+        let target = target(model)?;
+        let of = self.tank.get();
+        let found =
+            py.detach(|| ParameterSet::new(&of.tank, &self.data, target, checked(self.liquid)?));
+        handed_over(py, found.map_err(|why| of.error(&why))?)
+    }
+}
+
+/// Parameters by name, and warnings.
+pub type Parameters<'py> = (Bound<'py, PyDict>, Vec<String>);
+
+fn target(model: &str) -> PyResult<Target> {
+    match model {
+        "HubSlosh" => Ok(Target::HubSlosh),
+        "SloshTank" => Ok(Target::SloshTank),
+        "Spacecraft" => Ok(Target::Spacecraft { tank: 1 }),
+        _ => Err(FmuError::new_err(format!("there are no parameters of a tank for {model}"))),
+    }
+}
+
+/// Returns a liquid whose gravity the FMUs take as g_ref.
+fn checked(liquid: Liquid) -> Result<parameters::Liquid, Problems> {
+    let gravity = liquid.0.gravity;
+    if gravity > 0.0 && gravity < 1e-9 {
+        let text = format!(
+            "gravity = {gravity:e}: for parameters 0, or 1e-9 or more, which the FMUs take as g_ref"
+        );
+        return Err(text.into());
+    }
+    Ok(liquid.0)
+}
+
+fn handed_over(py: Python, set: ParameterSet) -> PyResult<Parameters> {
+    if !set.unknown.is_empty() {
+        let text = format!("{} (without sigma k is 0)", set.unknown.join("; "));
+        return Err(FmuError::new_err(text));
+    }
+    let found = PyDict::new(py);
+    for (name, value) in &set.values {
+        match value {
+            Value::Real(x) => found.set_item(name, x)?,
+            Value::Integer(n) => found.set_item(name, n)?,
+            Value::Boolean(is) => found.set_item(name, is)?,
+            Value::Item(item) => found.set_item(name, item)?,
+        }
+    }
+    Ok((found, set.warnings))
+}
+
+/// A tank, its fill, the number of modes, and the liquid.
+pub type Question = (Py<Tank>, Amount, usize, Py<Liquid>);
+
+/// Solve tanks at fills, each a tuple (tank, fill, modes, liquid); one after the other on each core.
+///
+/// Returns for each what was found, or the FmuError.
+#[pyfunction]
+pub fn solve(py: Python, questions: Vec<Question>) -> PyResult<Vec<Py<PyAny>>> {
+    let mut asked = Vec::with_capacity(questions.len());
+    for (tank, fill, modes, liquid) in questions {
+        asked.push((tank, fill.fill(), modes, *liquid.get()));
+    }
+    let questions = Arc::new(asked);
+    let theirs = questions.clone();
+    let found = in_threads(py, questions.len(), move |i| {
+        let (tank, fill, modes, liquid) = &theirs[i];
+        let (of, fill) = (tank.get(), fill.as_ref().ok()?);
+        Some(parameters::solve(&of.tank, *fill, *modes, liquid.0))
+    })?;
+    found
+        .into_iter()
+        .zip(&*questions)
+        .map(|(found, (tank, fill, _, liquid))| match (found, fill) {
+            (Some(Ok(data)), _) => {
+                let solved = Solved { tank: tank.clone_ref(py), data, liquid: *liquid };
+                Ok(Py::new(py, solved)?.into_any())
+            }
+            (Some(Err(why)), _) => Ok(tank.get().error(&why).into_value(py).into_any()),
+            (None, Err(why)) => Ok(why.value(py).clone().unbind().into_any()),
+            (None, Ok(_)) => unreachable!("a fill that was read was solved"),
+        })
+        .collect()
+}
+
+/// Return the fill table of tank 1 of Spacecraft, which lets it drain, and warnings.
+#[pyfunction]
+pub fn table<'py>(
+    py: Python<'py>,
+    tank: Py<Tank>,
+    between: (Amount, Amount),
+    modes: usize,
+    liquid: Py<Liquid>,
+) -> PyResult<Parameters<'py>> {
+    let (low, high) = (between.0.fill()?, between.1.fill()?);
+    let (of, liquid) = (tank.clone_ref(py), *liquid.get());
+    let found = in_threads(py, 1, move |_| {
+        let tank = &of.get().tank;
+        let (low, high) = (tank.height_of(low)?, tank.height_of(high)?);
+        if low >= high {
+            return Err(format!("The table's ends must ascend: {low} m, then {high} m.").into());
+        }
+        let placed = fill_table::place(tank, low, high, modes)?;
+        let error = Some(placed.error);
+        let target = Target::Spacecraft { tank: 1 };
+        fill_table::parameters(tank, &placed.sweep, error, target, checked(liquid)?)
+    })?;
+    let set = found.into_iter().next().expect("one question has one answer");
+    handed_over(py, set.map_err(|why: Problems| tank.get().error(&why))?)
+}
+
+/// Returns `of(0)` to `of(count - 1)`, computed by a thread for each core.
+///
+/// On Ctrl-C it returns at once; the threads end with what they are at.
+fn in_threads<T: Send + 'static>(
+    py: Python,
+    count: usize,
+    of: impl Fn(usize) -> T + Send + Sync + 'static,
+) -> PyResult<Vec<T>> {
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let shared = Arc::new((of, AtomicUsize::new(0), AtomicBool::new(false)));
+    let (sender, receiver) = mpsc::channel();
+    for _ in 0..cores.min(count) {
+        let (shared, sender) = (shared.clone(), sender.clone());
+        thread::spawn(move || {
+            let (of, next, stop) = &*shared;
+            while !stop.load(Ordering::Relaxed) {
+                let i = next.fetch_add(1, Ordering::Relaxed);
+                if i >= count || sender.send((i, of(i))).is_err() {
+                    break;
+                }
+            }
+        });
+    }
+    drop(sender);
+    let mut found: Vec<Option<T>> = (0..count).map(|_| None).collect();
+    py.detach(|| -> PyResult<()> {
+        let receiver = receiver;
+        let mut heard = Instant::now();
+        loop {
+            match receiver.recv_timeout(SILENCE) {
+                Ok((i, answer)) => found[i] = Some(answer),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+            }
+            if heard.elapsed() >= SILENCE {
+                heard = Instant::now();
+                Python::attach(|py| py.check_signals())
+                    .inspect_err(|_| shared.2.store(true, Ordering::Relaxed))?;
+            }
+        }
+    })?;
+    let lost = || PyRuntimeError::new_err("a thread of the tank's calculation ended early");
+    found.into_iter().map(|answer| answer.ok_or_else(lost)).collect()
+}
