@@ -792,6 +792,7 @@ impl Model {
     /// If the matrices do not fit each other.
     #[new]
     fn read(
+        py: Python,
         a: &Bound<PyAny>,
         b: &Bound<PyAny>,
         c: &Bound<PyAny>,
@@ -799,7 +800,7 @@ impl Model {
         period: f64,
     ) -> PyResult<Model> {
         let (matrices, size) = matrices([a, b, c, d])?;
-        Ok(Model::new(matrices, size, period))
+        Ok(py.detach(|| Model::new(matrices, size, period)))
     }
 
     /// Returns the crossings of a loop gain with one input between `low` and `high`, rad/s, and its least distance to -1.
