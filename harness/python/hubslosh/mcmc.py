@@ -47,10 +47,10 @@ def posterior(
         import emcee
     except ImportError:
         raise FmuError("posterior() needs emcee: pip install emcee") from None
-    names = list(found.all["correlations"][0])
+    table = found.covariance
+    names, covariance = list(table.index), table.to_numpy()
     estimates = found.parameters | found.measurement
     middle = np.array([estimates[name].value for name in names])
-    covariance = np.array(found.all["covariance"], dtype=float)
     if not np.isfinite(covariance).all():
         raise FmuError("an unknown is not determined: there is nothing to start the walkers from")
     walkers = walkers or 4 * len(names)

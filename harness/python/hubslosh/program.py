@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 
 from . import temporary
@@ -178,6 +179,19 @@ class Identification:
     """The verdict in words."""
     all: dict[str, Any]
     """The whole result.json."""
+
+    @property
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the unknowns of ``free=``, their names as index and columns, SI units.
+
+        It is that of the noise; `Estimated.std` includes tolerances too.
+        `uncertain` takes it as ``covariance=`` if all unknowns are uncertain parameters there;
+        ``found.covariance.loc[names, names]`` chooses some.
+        """
+        if "covariance" not in self.all:
+            raise FmuError("a result of identify has a covariance if it was found with free=")
+        names = list(self.all["correlations"][0])
+        return pd.DataFrame(np.array(self.all["covariance"], float), names, names)
 
     def __repr__(self) -> str:
         """Return verdict and estimates."""

@@ -219,6 +219,12 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
     truth = {"friction.b": VISCOUS, "init.omega@1": 1.0, "init.omega@2": -0.5}
     for name, estimate in found.parameters.items():
         assert abs(estimate.value - truth[name]) < 4 * estimate.std, name
+    spread = found.covariance
+    deviations = dict(zip(spread.index, np.sqrt(np.diag(spread)), strict=True))
+    for name, estimate in found.parameters.items():
+        # the search ends near the minimum, not at it
+        widened = np.hypot(1, found.all["decrement"])
+        assert widened * deviations[name] == pytest.approx(estimate.std_noise, rel=1e-9)
     with pytest.raises(FmuError, match=r"friction\.z"):
         hubslosh.identify(
             tables,

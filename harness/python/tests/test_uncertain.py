@@ -12,7 +12,7 @@ from scipy.io import loadmat
 from scipy.optimize import brentq
 
 import hubslosh
-from hubslosh import FmuError, Loop, UncertainModel, linearize, uncertain
+from hubslosh import FmuError, Identification, Loop, UncertainModel, linearize, uncertain
 from hubslosh.uncertainty import mu_upper
 
 TURN = 2 * np.pi
@@ -106,6 +106,9 @@ def test_a_covariance_gives_its_principal_axes(spacecraft: Path) -> None:
     """Along each axis ±2 standard deviations; the quadratic form of the covariance is 4."""
     names = ["tank[1].frequency[1]", "craft.Jxx"]
     matrix = pd.DataFrame([[4e-6, 1.2e-2], [1.2e-2, 100.0]], names, names)
+    of_fit = {"correlations": [dict.fromkeys(names)], "covariance": matrix.to_numpy().tolist()}
+    found = Identification({}, {}, None, {}, True, True, (), of_fit)
+    pd.testing.assert_frame_equal(found.covariance, matrix)
     model = uncertain(POINT, {"tank[1].mass[1]": "5%"}, covariance=matrix, model=spacecraft)
     assert model.deltas == ("tank[1].mass[1]", "axis[1]", "axis[2]")
     for delta in np.eye(3)[1:]:

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common::{solve, tank};
-use hubslosh_tank::parameters::{Liquid, ParameterSet, Target};
+use hubslosh_tank::parameters::{self, Liquid, ParameterSet, Target};
 use hubslosh_tank::tank::Geometry;
 use hubslosh_tank::{Fill, Tank, table};
 
@@ -704,4 +704,46 @@ fn a_file_of_points_joins_at_most_201_by_lines() {
     assert!(read(201).is_ok(), "{:?}", read(201));
     let said = read(202).unwrap_err().to_string();
     assert!(said.contains("202 points are joined by straight lines, at most 200"), "{said}");
+}
+
+/// A result with its damping gives the same file as one without, and the file of another liquid's damping is its own.
+#[test]
+fn parameters_are_those_of_the_liquid_and_not_of_the_result() {
+    let text = "density = 875.0\n\
+        shape = { domed_cylinder = { radius = 0.45, height = 0.9, bottom = 0.45, top = 0.45 } }\n";
+    let tank = tank(text);
+    let liquid = Liquid { gravity: 0.2, nu: Some(8.9e-7), sigma: Some(0.03), contact_angle: 90.0 };
+    let whole = parameters::solve(&tank, Fill::Share(0.4), 2, liquid).unwrap();
+    let fill = tank.height_of(Fill::Share(0.4)).unwrap();
+    let plain = tank.solve(fill, 2).unwrap();
+    assert!(whole.damping.is_some() && plain.damping.is_none());
+    for other in [
+        liquid,
+        Liquid { nu: Some(1e-6), ..liquid },
+        Liquid { gravity: 0.3, ..liquid },
+        Liquid { sigma: None, ..liquid },
+        Liquid { sigma: Some(0.02), ..liquid },
+        Liquid { nu: None, ..liquid },
+    ] {
+        let [known, new] =
+            [&whole, &plain].map(|data| ParameterSet::new(&tank, data, Target::SloshTank, other));
+        assert_eq!(known.unwrap(), new.unwrap(), "{other:?}");
+    }
+}
+
+/// Bit for bit, at every fill; also of a full tank.
+#[test]
+fn the_mass_is_that_of_the_solution() {
+    for text in [
+        "shape = { sphere = { radius = 0.4 } }",
+        "shape = { cylinder = { radius = 0.4, height = 0.8 } }",
+        "shape = { annulus = { inner_radius = 0.1, outer_radius = 0.4, height = 0.8 } }",
+        "box = [0.3, 0.5]",
+    ] {
+        let tank = tank(&format!("density = 1000.0\n{text}\n"));
+        for fill in [0.01, 0.4, 0.7, 0.8] {
+            assert_eq!(tank.mass(fill).unwrap(), tank.solve(fill, 1).unwrap().m_liq, "{text}");
+        }
+        assert!(tank.mass(-0.1).is_err(), "{text}");
+    }
 }
