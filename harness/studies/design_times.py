@@ -123,7 +123,7 @@ def now(fills: int, points: int, runs: int, stop: float) -> tuple[list[Time], di
     loop = telecom.loop("50%")
     times = [*loop_steps(loop, 1150.0, runs, stop)]
     draws = max(points - 214, 0)
-    of_review, review = timed("review", points, lambda: design_review.review(draws=draws))
+    of_review, review = timed("review", points, lambda: design_review.review(telecom.FILLS, draws))
     of_review = Time(
         "review: margins at points", len(review.points), of_review.cpu, of_review.elapsed
     )

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from numpy.random import default_rng
 import bench_damping
 import compare_releases
 import damping_over_fill
+import design_times
 import flight_twin
 import identify_twins
 import large_fmu
@@ -276,3 +278,22 @@ def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, report
     checked = {rule["rule"] for rule in report["rules"] if not rule.get("skipped")}
     assert checked >= {"steps.run", "exchange.run", "values.start", "states.rollback", "life.reset"}
+
+
+@pytest.mark.filterwarnings("ignore:tank.*outside the measured")
+def test_the_times_of_a_design_count_what_was_made(
+    fmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A row for each step; the loop's file gives the same loop."""
+    import hubslosh
+
+    telecom, _ = design_times.satellite()
+    craft = replace(telecom.craft, model=fmu.with_name("Spacecraft.fmu"))
+    monkeypatch.setattr(telecom, "craft", craft)
+    monkeypatch.setattr(telecom, "FILLS", ["50%"])
+    times, given = design_times.now(2, 0, 2, 1.0)
+    assert [time.count for time in times[:2]] + [times[3].count] == [10, 2, 2]
+    assert times[2].count > 5 and all(time.elapsed > 0 for time in times)
+    given["model"] = str(craft.model)
+    again, first = design_times.loop_of(given), telecom.loop("50%")
+    assert hubslosh.margins(again).delay_margin == hubslosh.margins(first).delay_margin
