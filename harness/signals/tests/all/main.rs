@@ -3,4 +3,5 @@
 mod corpus;
 mod fourier;
 mod recording;
+mod scale;
 mod table;

@@ -1,0 +1,275 @@
+//! Valid files whose times are known, in every unit, type and layout: the reader gives these times or refuses the file. A factor
+//! between units that is lost or taken twice is never silent.
+
+use std::sync::Arc;
+
+use fastrand::Rng;
+use parquet::basic::{LogicalType, Repetition, TimeUnit, Type as Physical};
+use parquet::data_type::{DoubleType, Int64Type};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+use signals::recording::{self, Between, Columns, Signal, Wanted};
+
+/// Units of times, ns.
+const UNITS: [(&str, i64); 6] = [
+    ("s", 1_000_000_000),
+    ("ms", 1_000_000),
+    ("us", 1000),
+    ("ns", 1),
+    ("min", 60_000_000_000),
+    ("h", 3_600_000_000_000),
+];
+/// Steps, ms.
+const STEPS: [i64; 7] = [1, 2, 10, 20, 25, 100, 250];
+/// 2026-01-31T12:00:00Z, s since 1970.
+const BEGIN: i64 = 1_769_860_800;
+/// Largest share of files that may be refused: the target would test nothing.
+const REFUSED: f64 = 0.1;
+
+/// A file with what is known of it.
+#[derive(Clone, Default)]
+struct Truth {
+    /// Value of --columns.
+    columns: String,
+    /// Times from the first, s; rows at the end may be cut off.
+    time: Vec<f64>,
+    /// True if the file does not state the unit.
+    is_unstated: bool,
+}
+
+/// Reads files that `make` has made, and compares; few may be refused.
+fn judge(ending: &str, count: u64, make: fn(&mut Rng) -> (Vec<u8>, Truth)) {
+    let seed = std::env::var("HUBSLOSH_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok());
+    let mut dice = Rng::with_seed(seed.unwrap_or(1));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("input.{ending}"));
+    let mut refused = Vec::new();
+    for n in 0..count {
+        let (bytes, Truth { columns, time, is_unstated }) = make(&mut dice);
+        // a new file: some file systems write what replaces an old one to the disk at once
+        let _ = std::fs::remove_file(&path);
+        std::fs::write(&path, &bytes).unwrap();
+        let text = || format!("file {n}, {columns}:\n{}", String::from_utf8_lossy(&bytes));
+        let signal = Signal { name: "omega", required: true, between: Between::Held, unit: None };
+        let columns: Columns = columns.parse().unwrap();
+        let wanted = Wanted { signals: &[signal], columns: &columns };
+        let table = match recording::read(&path, &wanted, &mut |_| {}) {
+            Ok(table) => table,
+            Err(_) if is_unstated => continue,
+            Err(error) => {
+                refused.push(format!("{error:#}\n{}", text()));
+                continue;
+            }
+        };
+        assert!(!is_unstated, "times without a unit were read: {}", text());
+        let (found, omega) = (table.column("time").unwrap(), table.column("omega").unwrap());
+        assert!(found.len() + 1 >= time.len(), "{} rows: {}", found.len(), text());
+        for (k, (found, time)) in found.iter().map(|t| t - found[0]).zip(&time).enumerate() {
+            let off = (found - time).abs() / (1.0 + time);
+            assert!(off < 1e-5, "row {k} is at {found} s, not at {time} s: {}", text());
+            assert_eq!(omega[k], k as f64 + 0.5, "row {k}: {}", text());
+        }
+    }
+    let share = refused.len() as f64 / count as f64;
+    println!("{ending}: {count} files, {:.2} % refused", 100.0 * share);
+    assert!(share <= REFUSED, "{share} of the files are refused, one as\n{}", refused[0]);
+}
+
+/// A whole number of ns in a unit.
+fn number(ns: i64, unit: i64) -> String {
+    match ns % unit {
+        0 => (ns / unit).to_string(),
+        _ => format!("{:.9}", ns as f64 / unit as f64),
+    }
+}
+
+/// A clock time.
+fn clock(ns: i64) -> String {
+    let ms = ns / 1_000_000;
+    format!(
+        "{:02}:{:02}:{:02}.{:03}",
+        12 + ms / 3_600_000,
+        ms / 60_000 % 60,
+        ms / 1000 % 60,
+        ms % 1000
+    )
+}
+
+/// A text in one of the ways of loggers.
+fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
+    let (step, rows) = (STEPS[dice.usize(..STEPS.len())] * 1_000_000, dice.usize(5..40));
+    let time = |k: usize| step * k as i64;
+    let (unit, ns) = UNITS[dice.usize(..UNITS.len())];
+    let form = dice.u8(..10);
+    let separator = match dice.u8(..4) {
+        0 => ";",
+        1 => "\t",
+        2 if form < 6 => " ",
+        _ => ",",
+    };
+    let has_commas = separator != "," && dice.bool();
+    let decimal = |text: String| if has_commas { text.replace('.', ",") } else { text };
+    let quotes = if separator != " " && dice.u8(..4) == 0 { "\"" } else { "" };
+    let (mut name, mut below, mut columns) = ("t".to_string(), None, "time=t".to_string());
+    match form {
+        0 => name = format!("t [{unit}]"),
+        1 => name = format!("t ({unit})"),
+        2 => below = Some(""),
+        3 => below = Some("unit"),
+        4 | 5 => columns = format!("time=t:{unit}"),
+        _ => {}
+    }
+    if separator == " " && form < 2 {
+        name = format!("\"{name}\"");
+    }
+    let stamp = |k: usize| match form {
+        6 => format!("2026-01-31T{}Z", clock(time(k))),
+        7 => format!("31.01.2026 {}", clock(time(k))),
+        8 => clock(time(k)),
+        9 => number(time(k), 1_000_000_000),
+        _ => number(time(k), ns),
+    };
+    // a column before the time: row names, or a keyword in the first row
+    let first = match dice.u8(..4) {
+        0 => Some("rows"),
+        1 if below != Some("") => Some("keyword"),
+        _ if below == Some("unit") => Some("keyword"),
+        _ => None,
+    };
+    let (is_closed, has_words) = (separator != " " && dice.u8(..5) == 0, dice.u8(..4) == 0);
+    let row = |fields: &[String], closed: bool| {
+        let mut line = fields.join(separator);
+        if closed {
+            line += separator;
+        }
+        line + "\n"
+    };
+    let quoted = |text: String| format!("{quotes}{text}{quotes}");
+    let mut out = String::new();
+    for _ in 0..dice.usize(..3) {
+        out += ["Logger 3000\n", "# bench\n", "\n", "Date: 31.01.2026\n", "***\n"][dice.usize(..5)];
+    }
+    let mut head = Vec::new();
+    let mut units = Vec::new();
+    if first == Some("rows") && (dice.bool() || separator == " ") {
+        // R leaves the name of row names out, or empty
+        units.push(String::new());
+    } else if let Some(first) = first {
+        head.push(if first == "rows" { "\"\"".to_string() } else { "name".into() });
+        units.push(if below == Some("unit") { "unit".into() } else { String::new() });
+    }
+    head.extend([name, "omega".into()]);
+    units.extend([unit.to_string(), "rad/s".into()]);
+    if has_words {
+        head.push("state".into());
+        units.push(String::new());
+    }
+    out += &row(&head, false);
+    if below.is_some() {
+        // with as many fields as the rows
+        let cells =
+            units.iter().map(|unit| if separator == " " && unit.is_empty() { "-" } else { unit });
+        out += &row(&cells.map(String::from).collect::<Vec<_>>(), false);
+    }
+    for k in 0..rows {
+        let mut cells = Vec::new();
+        match first {
+            Some("rows") => cells.push(format!("\"{}\"", k + 1)),
+            Some(_) if separator == " " => cells.push("\"\"".into()),
+            Some(_) => cells.push(if k == 0 { "trace_values".into() } else { String::new() }),
+            None => {}
+        }
+        cells.push(quoted(decimal(stamp(k))));
+        cells.push(quoted(decimal(format!("{k}.5"))));
+        if has_words {
+            cells.push("\"idle\"".into());
+        }
+        out += &row(&cells, is_closed);
+    }
+    if dice.u8(..5) == 0 {
+        out.truncate(out.len() - 1);
+    }
+    let time = (0..rows).map(|k| time(k) as f64 * 1e-9).collect();
+    (out.into_bytes(), Truth { columns, time, is_unstated: false })
+}
+
+/// A Parquet file with times of a random type.
+fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
+    let (step, rows) = (STEPS[dice.usize(..STEPS.len())] * 1_000_000, dice.usize(5..40));
+    let (unit, ns) = UNITS[dice.usize(..4)];
+    let kind = dice.u8(..6);
+    let logical = |unit: &str| match unit {
+        "ms" => TimeUnit::MILLIS,
+        "us" => TimeUnit::MICROS,
+        _ => TimeUnit::NANOS,
+    };
+    // timestamps and times of day know no seconds
+    let ns = if kind < 2 && unit == "s" { 1 } else { ns };
+    let name = if kind == 3 { format!("t [{unit}]") } else { "t".to_string() };
+    let first = Type::primitive_type_builder(
+        &name,
+        if kind == 5 { Physical::DOUBLE } else { Physical::INT64 },
+    );
+    let first = match kind {
+        0 => first.with_logical_type(Some(LogicalType::timestamp(dice.bool(), logical(unit)))),
+        1 if unit != "ms" => {
+            first.with_logical_type(Some(LogicalType::time(dice.bool(), logical(unit))))
+        }
+        _ => first,
+    };
+    // a time of day in ms is an i32, which is left out here: a plain integer without a unit
+    let is_unstated = kind == 2 || kind == 1 && unit == "ms";
+    let omega = Type::primitive_type_builder("omega", Physical::DOUBLE);
+    let fields =
+        [first, omega].map(|f| Arc::new(f.with_repetition(Repetition::REQUIRED).build().unwrap()));
+    let schema = Type::group_type_builder("schema").with_fields(fields.to_vec()).build().unwrap();
+    let mut bytes = Vec::new();
+    let properties = Arc::new(WriterProperties::builder().build());
+    let mut writer = SerializedFileWriter::new(&mut bytes, Arc::new(schema), properties).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let origin = if kind == 0 { BEGIN * 1_000_000_000 } else { 0 };
+    // whole numbers of the unit
+    let step = (step / ns).max(1) * ns;
+    let times: Vec<i64> = (0..rows).map(|k| (origin + step * k as i64) / ns).collect();
+    let mut column = group.next_column().unwrap().unwrap();
+    if kind == 5 {
+        let seconds: Vec<f64> = times.iter().map(|t| *t as f64 * ns as f64 * 1e-9).collect();
+        column.typed::<DoubleType>().write_batch(&seconds, None, None).unwrap();
+    } else {
+        column.typed::<Int64Type>().write_batch(&times, None, None).unwrap();
+    }
+    column.close().unwrap();
+    let omega: Vec<f64> = (0..rows).map(|k| k as f64 + 0.5).collect();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<DoubleType>().write_batch(&omega, None, None).unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    let columns = if kind == 4 { format!("time=t:{unit}") } else { "time=t".to_string() };
+    let time = (0..rows).map(|k| (step * k as i64) as f64 * 1e-9).collect();
+    (bytes, Truth { columns, time, is_unstated })
+}
+
+/// Files of the short form.
+const FEW: u64 = 1000;
+
+#[test]
+fn times_of_a_text_are_read_in_their_unit_or_refused() {
+    judge("csv", FEW, text);
+}
+
+#[test]
+fn times_of_a_parquet_file_are_read_in_their_unit_or_refused() {
+    judge("parquet", FEW, columns);
+}
+
+/// The long form.
+#[test]
+#[ignore = "takes long: .ci/fuzz-readers"]
+fn scale_campaign() {
+    let count =
+        std::env::var("HUBSLOSH_FUZZ_INPUTS").unwrap_or_default().parse().unwrap_or(100_000);
+    judge("csv", count, text);
+    judge("parquet", count, columns);
+}
