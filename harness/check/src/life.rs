@@ -97,7 +97,7 @@ pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let with = Instantiation { guid: Some(&wrong), ..arguments(fmu, interface) };
     let place = "fmi2Instantiate with another GUID";
     fmu.doing(place);
-    expect_null(findings, place, fmu.binary(interface).instantiate_with(&with));
+    expect_null(findings, place, fmu.instantiate(interface, &with)?);
     Ok(())
 }
 
@@ -122,7 +122,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     // the standard asks for a URI: only a FMU that needs no resources can do without
     let place = "fmi2Instantiate with the resource location NULL";
     let with = Instantiation { resources: None, ..arguments(fmu, interface) };
-    let answer = fmu.left_open(place, findings, || fmu.binary(interface).instantiate_with(&with));
+    let answer = fmu.left_open(place, findings, || fmu.instantiate(interface, &with))?;
     if let Err(error) = answer
         && fmu.description().co_simulation.is_some()
     {
@@ -136,8 +136,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         ("the GUID NULL", Instantiation { guid: None, ..good() }),
     ] {
         let place = format!("fmi2Instantiate with {what}");
-        let answer =
-            fmu.left_open(&place, findings, || fmu.binary(interface).instantiate_with(&with));
+        let answer = fmu.left_open(&place, findings, || fmu.instantiate(interface, &with))?;
         expect_null(findings, &place, answer);
     }
     Ok(())
@@ -152,13 +151,15 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     let interface = first(fmu)?;
     let run = |location: Option<&str>| -> Result<Vec<Reading>> {
-        let mut session = fmu.session(interface)?;
-        if location.is_some() {
-            fmu.doing("fmi2Instantiate with another resource location");
-            let with =
-                Instantiation { resources: location, logging: false, ..arguments(fmu, interface) };
-            session.instance = fmu.binary(interface).instantiate_with(&with)?;
-        }
+        let mut session = match location {
+            None => fmu.session(interface)?,
+            Some(_) => {
+                fmu.doing("fmi2Instantiate with another resource location");
+                let with = arguments(fmu, interface);
+                let with = Instantiation { resources: location, logging: false, ..with };
+                fmu.session_with(interface, &with)?
+            }
+        };
         session.initialise()?;
         session.advance(STEPS)?;
         let mut all = session.readings()?;
@@ -216,7 +217,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let place = "fmi2Instantiate with NULL for the memory functions";
     fmu.doing(place);
     let with = Instantiation { callbacks: Callbacks::Logger, ..arguments(fmu, interface) };
-    let made = fmu.binary(interface).instantiate_with(&with);
+    let made = fmu.instantiate(interface, &with)?;
     match made.map_err(anyhow::Error::from).and_then(|instance| live(fmu, instance)) {
         Ok(()) => {}
         Err(error) => {
@@ -227,7 +228,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let with = Instantiation { callbacks: Callbacks::Empty, ..arguments(fmu, interface) };
     let place = "fmi2Instantiate with callbacks that are all NULL";
     let answer = fmu.left_open(place, findings, || {
-        fmu.binary(interface).instantiate_with(&with).map_or(Ok(()), |instance| live(fmu, instance))
+        fmu.instantiate(interface, &with)?.map_or(Ok(()), |instance| live(fmu, instance))
     });
     if let Err(error) = answer {
         findings.add(fmu.now(), format!("{error} (allowed: no instance, or one that works)"));
@@ -253,7 +254,7 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let logs = refuse_as_usual(fmu, interface)?;
     fmu.doing("fmi2Instantiate with callbacks that are wiped afterwards");
     let with = Instantiation { callbacks: Callbacks::Fleeting, ..arguments(fmu, interface) };
-    let mut instance = fmu.binary(interface).instantiate_with(&with)?;
+    let mut instance = fmu.instantiate(interface, &with)??;
     fmu.doing("a refused call after the callbacks' struct was wiped");
     if let Err(error) = instance.get_real(&[u32::MAX], &mut [0.0])
         && error.messages.is_empty()

@@ -18,7 +18,7 @@ fn complaints(fmu: &FmuUnderTest) -> Result<(Vec<Message>, usize)> {
         guid: Some("another"),
         ..fmu.binary(interface).instantiation("check")
     };
-    if let Err(error) = fmu.binary(interface).instantiate_with(&with) {
+    if let Err(error) = fmu.instantiate(interface, &with)? {
         all.extend(error.messages);
     }
     let mut session = fmu.session(interface)?;
@@ -55,7 +55,7 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         guid: Some(TEXT),
         ..fmu.binary(interface).instantiation(TEXT)
     };
-    if let Err(error) = fmu.binary(interface).instantiate_with(&with) {
+    if let Err(error) = fmu.instantiate(interface, &with)? {
         told.extend(error.messages);
     }
     let mut session = fmu.session(interface)?;
@@ -134,8 +134,7 @@ fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<
     fmu.doing("fmi2Instantiate, loggingOn");
     let with =
         Instantiation { kind: interface.kind(), ..fmu.binary(interface).instantiation("check") };
-    let mut session = fmu.session(interface)?;
-    session.instance = fmu.binary(interface).instantiate_with(&with)?;
+    let mut session = fmu.session_with(interface, &with)?;
     session.initialise()?;
     if changing {
         session.advance(STEPS)?

@@ -15,7 +15,8 @@ use super::trace::{self, Crash};
 use host::causality::Causality;
 use host::description::Type;
 use host::fmi2::{
-    CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, PLATFORM, Status,
+    CO_SIMULATION, CallError, Called, Fmu, Instance, Instantiation, MODEL_EXCHANGE, PLATFORM,
+    Status,
 };
 use host::xml::Element;
 
@@ -131,6 +132,18 @@ pub struct Experiment {
     pub stop: Option<f64>,
     /// Communication step, s.
     pub step: f64,
+}
+
+/// An error if a rule may not make another instance: the FMU can have one in a process, or time is over.
+pub fn allowed(made: usize, is_once: bool, deadline: Instant) -> Result<()> {
+    let why = if made > 0 && is_once {
+        "it can be instantiated only once per process".into()
+    } else if Instant::now() > deadline {
+        format!("the time for its calls is over after {made} instances (--limit gives more)")
+    } else {
+        return Ok(());
+    };
+    Err(Unusable { rule: "", why }.into())
 }
 
 impl FmuUnderTest {
@@ -338,27 +351,31 @@ impl FmuUnderTest {
         Experiment { start, tolerance: number("tolerance").filter(above_0), stop, step }
     }
 
+    /// Instantiates the FMU as `with` says, unless it may have one instance per process and had it.
+    pub fn instantiate(
+        &self,
+        interface: Interface,
+        with: &Instantiation,
+    ) -> Result<Result<Instance<'_>, CallError>> {
+        let is_once = self.can(interface, "canBeInstantiatedOnlyOncePerProcess");
+        allowed(self.sessions.get(), is_once, self.deadline)?;
+        let made = self.binary(interface).instantiate_with(with);
+        self.sessions.set(self.sessions.get() + usize::from(made.is_ok()));
+        Ok(made)
+    }
+
     /// A new instance.
     pub fn session(&self, interface: Interface) -> Result<Session<'_>> {
-        if self.sessions.get() > 0 && self.can(interface, "canBeInstantiatedOnlyOncePerProcess") {
-            let why = "it can be instantiated only once per process".into();
-            return Err(Unusable { rule: "", why }.into());
-        }
-        if Instant::now() > self.deadline {
-            let why = format!(
-                "the time for its calls is over after {} instances (--limit gives more)",
-                self.sessions.get()
-            );
-            return Err(Unusable { rule: "", why }.into());
-        }
-        self.sessions.set(self.sessions.get() + 1);
         self.doing("fmi2Instantiate");
-        let binary = self.binary(interface);
-        let mut with = binary.instantiation("check");
-        with.kind = interface.kind();
+        let mut with = self.binary(interface).instantiation("check");
         with.logging = false;
-        let instance = binary
-            .instantiate_with(&with)
+        self.session_with(interface, &Instantiation { kind: interface.kind(), ..with })
+    }
+
+    /// A new instance that is made with these arguments.
+    pub fn session_with(&self, interface: Interface, with: &Instantiation) -> Result<Session<'_>> {
+        let instance = self
+            .instantiate(interface, with)?
             .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
         let Experiment { start, stop, step, .. } = self.experiment();
         // The step is the FMU's wish in Co-Simulation only. A run of Model Exchange ends before the

@@ -46,11 +46,10 @@ pub fn initialises(subject: &Subject, _: &mut Findings) -> Result<()> {
 /// `instantiate.token`
 pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
-        let Some(binary) = subject.binary(using.interface) else { continue };
         let mut with = subject.instantiation(using)?;
         with.token = Some("{another token of another FMU}");
         subject.doing("making an instance with another instantiationToken");
-        match binary.instantiate_with(&with) {
+        match subject.instantiate(&with)? {
             Ok(_) => findings.add(
                 subject.now(),
                 "it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)",
@@ -67,12 +66,11 @@ pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
 /// `instantiate.callbacks`
 pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
-        let Some(binary) = subject.binary(using.interface) else { continue };
         let mut with = subject.instantiation(using)?;
         with.logger = false;
         with.intermediate_update = false;
         subject.doing("making an instance without callbacks, and a step");
-        match binary.instantiate_with(&with) {
+        match subject.instantiate(&with)? {
             Ok(_) => {}
             Err(error) => {
                 findings.add(subject.now(), error.to_string());

@@ -1,6 +1,6 @@
 //! The FMU 3.0 under test, loaded and called as hosts do, and what rules need to do so shortly.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::time::Instant;
 
@@ -8,8 +8,8 @@ use anyhow::{Result, bail};
 
 use super::{Description, Variable};
 use crate::trace::{self, Crash};
-use crate::under_test::Unusable;
-use host::c_abi::Called;
+use crate::under_test::{Unusable, allowed};
+use host::c_abi::{CallError, Called};
 use host::causality::Causality;
 use host::description::{Type, Value};
 use host::fmi3::{EventInfo, Fmu, Instance, Instantiation, Interface, Step, Update};
@@ -32,6 +32,7 @@ pub struct Subject {
     pub description: Description,
     doing: RefCell<String>,
     deadline: Instant,
+    sessions: Cell<usize>,
 }
 
 /// Use of an instance.
@@ -100,7 +101,8 @@ impl Subject {
             bail!("it offers neither Co-Simulation nor Model Exchange, which alone are called");
         }
         let doing = RefCell::default();
-        Ok(Subject { binaries, description, doing, deadline })
+        let sessions = Cell::new(0);
+        Ok(Subject { binaries, description, doing, deadline, sessions })
     }
 
     /// Announces the next call: a crash or a hang is then reported at this place.
@@ -195,17 +197,21 @@ impl Subject {
         Ok(with)
     }
 
+    /// Instantiates the FMU as `with` says, unless it may have one instance per process and had it.
+    pub fn instantiate(&self, with: &Instantiation) -> Result<Result<Instance<'_>, CallError>> {
+        let Some(binary) = self.binary(with.interface) else { bail!("no such interface") };
+        let is_once = self.can(with.interface, "canBeInstantiatedOnlyOncePerProcess");
+        allowed(self.sessions.get(), is_once, self.deadline)?;
+        let made = binary.instantiate_with(with);
+        self.sessions.set(self.sessions.get() + usize::from(made.is_ok()));
+        Ok(made)
+    }
+
     /// A new instance.
     pub fn session(&self, using: Use) -> Result<Session<'_>> {
-        if Instant::now() > self.deadline {
-            let why = "the time for its calls is over (--limit gives more)".into();
-            return Err(Unusable { rule: "", why }.into());
-        }
         self.doing(format!("making an instance for {}", using.name()));
-        let with = self.instantiation(using)?;
-        let Some(binary) = self.binary(using.interface) else { bail!("no such interface") };
-        let instance = binary
-            .instantiate_with(&with)
+        let instance = self
+            .instantiate(&self.instantiation(using)?)?
             .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
         let (time, h) = (self.start(), self.step());
         Ok(Session {

@@ -220,3 +220,19 @@ fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule() {
     let report = report(&files(35), &["log", "instantiate", "intermediate", "steps", "values"]);
     assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
 }
+
+/// Its library makes one instance in each process (fault 36). That is a fault if it is not declared.
+#[test]
+fn an_fmu_3_with_one_instance_per_process_keeps_the_rules_if_it_says_so() {
+    let undeclared = files(36);
+    let xml = XML
+        .replace("<ModelExchange ", "<ModelExchange canBeInstantiatedOnlyOncePerProcess=\"true\" ");
+    let xml = xml
+        .replace("<CoSimulation ", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\" ");
+    let mut declared = undeclared.clone();
+    declared[0].1 = xml.into_bytes();
+    let report = report(&declared, &[]);
+    assert_eq!(report.all().count(), 0, "{}", report.text());
+    let report = self::report(&undeclared, &["load.instance"]);
+    assert_eq!(broken(&report), BTreeSet::from(["load.instance"]), "{}", report.text());
+}

@@ -15,6 +15,7 @@
  * NOISE        no two runs are the same
  * FORGETS      a state that is set changes nothing
  * SINGULAR     no initialisation with another k than the declared one
+ * ONCE         one instance in each process
  * MOVED        steps with another k than the declared one crash
  * MANY=n       n further variables: every tenth is a parameter, the others are multiples of x (harness/studies/large_fmu.py) */
 #include <math.h>
@@ -178,6 +179,9 @@ static int is_text(const char *text) { return text && *text; }
 Component fmi2Instantiate(String name, int type, String guid, String resources,
                           const struct callbacks *host, int visible, int logging)
 {
+#ifdef ONCE
+    static int made;
+#endif
     Component m;
     String why = NULL;
     (void)resources, (void)visible, (void)logging;
@@ -185,6 +189,10 @@ Component fmi2Instantiate(String name, int type, String guid, String resources,
         why = "no instance name";
     else if (!guid || strcmp(guid, "{model}") != 0)
         why = "another GUID";
+#ifdef ONCE
+    else if (made)
+        why = "a second instance";
+#endif
 #ifndef CO_SIMULATION
     else if (type == 1)
         why = "no Co-Simulation";
@@ -208,6 +216,9 @@ Component fmi2Instantiate(String name, int type, String guid, String resources,
                          why ? why : "no memory");
         return NULL;
     }
+#ifdef ONCE
+    made = 1;
+#endif
     m->type = type;
     snprintf(m->name, sizeof m->name, "%s", name);
     if (host)

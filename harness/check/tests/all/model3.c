@@ -73,7 +73,13 @@ static void advance(struct state *s, double h, double slope)
 static Instance make(String name, String token, bool exchange, bool events, bool early, size_t required, void *environment,
                      Log log, Update update)
 {
+    static bool made;
     Instance m;
+    if (IS(36) && made) {
+        if (log)
+            log(environment, ERROR, "logStatusError", "a second instance");
+        return NULL;
+    }
     if (!name || !token || (strcmp(token, TOKEN) && !IS(1))) {
         if (log)
             log(environment, ERROR, "logStatusError", "another token");
@@ -83,6 +89,7 @@ static Instance make(String name, String token, bool exchange, bool events, bool
     m->exchange = exchange, m->events = events, m->early = early, m->required = required;
     m->environment = environment, m->log = log, m->update = update;
     begin(&m->s);
+    made = true;
     return m;
 }
 

@@ -27,6 +27,8 @@ impl Small<'_> {
     fn xml(&self) -> String {
         let flags = "canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" \
                      canSerializeFMUstate=\"true\"";
+        let once = self.offers("-DONCE").then_some(" canBeInstantiatedOnlyOncePerProcess=\"true\"");
+        let flags = flags.to_string() + once.unwrap_or_default();
         let exchange = match self.offers("-DMODEL_EXCHANGE") {
             true => format!("<ModelExchange modelIdentifier=\"model\" {flags}/>"),
             false => String::new(),
@@ -85,6 +87,7 @@ impl Small<'_> {
 }
 
 const BOTH: &[&str] = &["-DCO_SIMULATION", "-DMODEL_EXCHANGE"];
+const ONCE: &[&str] = &["-DCO_SIMULATION", "-DMODEL_EXCHANGE", "-DONCE"];
 const USUAL: &str = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"";
 
 #[cfg(target_os = "linux")]
@@ -104,6 +107,7 @@ fn good_fmus_get_no_finding_however_stiff_and_whatever_they_offer() {
         ("short steps", BOTH, 1.0, "stopTime=\"1e-3\" stepSize=\"1e-6\""),
         ("Co-Simulation only", &BOTH[..1], 1.0, USUAL),
         ("Model Exchange only", &BOTH[1..], 1.0, USUAL),
+        ("one instance per process", ONCE, 1.0, USUAL),
     ] {
         let small = Small { definitions, rate, experiment };
         let report = look(&small.packed(), &[]);
