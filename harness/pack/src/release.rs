@@ -16,7 +16,7 @@ use crate::{Fmi, Model, pack_built, platforms, wheel};
 pub const MANIFEST: &str = "SHA256SUMS";
 
 /// Bytes up to which the wheel for Linux is in the release, for it lies in the project's history forever. Of 21.4 MB the command
-/// has 8.8, the FMUs 8.9, the book 2 and the package's compiled half 1.4, of which solving tanks in Python takes 0.6. An FMU 3.0
+/// has 8.8, the FMUs 8.9, the book 2 and the package's compiled half 1.4. Solving tanks in Python takes 0.6 of these. An FMU 3.0
 /// repeats the binary of the FMU 2.0, 3 MB in all: a zip archive cannot share it.
 pub const LARGEST_WHEEL: u64 = 22_000_000;
 
