@@ -183,7 +183,7 @@ fn momentum_angular_momentum_and_energy_balance_over_100_s_of_random_craft() {
 }
 
 #[test]
-#[ignore = "a quarter of a minute: .ci/run --nightly"]
+#[ignore = "20 s: .ci/run --nightly"]
 fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
     random_craft(END);
 }

@@ -595,7 +595,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "minutes: the nightly run has it"]
+    #[ignore = "minutes: .ci/run --nightly"]
     fn allan_intervals_hold_the_truth_in_95_of_100() {
         let white = Noise { flicker: 0.0, rrw: 0.0, ..ALL };
         let walk = Noise { flicker: 0.0, ..ALL };

@@ -221,7 +221,7 @@ fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule() {
     assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
 }
 
-/// Its library makes one instance in each process (fault 36). That is a fault if it is not declared.
+/// With fault 36 the library makes one instance in each process, which is a fault if it is not declared.
 #[test]
 fn an_fmu_3_with_one_instance_per_process_keeps_the_rules_if_it_says_so() {
     let undeclared = files(36);

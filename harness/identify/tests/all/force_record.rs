@@ -180,7 +180,7 @@ fn is_untold(result: &ForceRecord, name: &str, words: &str) {
 const FORCED: Tank = Tank { drive: [0.1, 2.2, 0.03], growth: 0.01, ..TANK };
 
 #[test]
-#[ignore = "8 s of CPU time"]
+#[ignore = "8 s of CPU time: .ci/run --nightly"]
 fn a_forced_record_of_another_integration_gives_the_whole_model() {
     let raw = FORCED.record(10.0, 0.02, 0.0, 0.01, 1);
     let result = found(&task(), &[raw]);
@@ -203,7 +203,7 @@ fn a_forced_record_of_another_integration_gives_the_whole_model() {
 }
 
 #[test]
-#[ignore = "11 s of CPU time"]
+#[ignore = "11 s of CPU time: .ci/run --nightly"]
 fn a_small_free_decay_does_not_state_mass_and_angle_but_their_product() {
     let raw = TANK.record(12.0, 0.02, 0.035, 0.02, 2);
     let mut raw = raw;
@@ -457,7 +457,7 @@ fn offsets_of_a_balance_are_found_in_the_signs_of_its_record() {
 /// Coverage of the 95 % intervals over 20 draws of noise. Statements of one draw are correlated, so that 90 % is two standard deviations
 /// below 95 %. Minutes: `-- --ignored --nocapture intervals_of_force`. `HUBSLOSH_DRAWS=21-100` names other draws.
 #[test]
-#[ignore = "20 fits"]
+#[ignore = "20 fits: .ci/run --nightly"]
 fn intervals_of_force_records_hold_the_truth_in_95_percent_of_20_draws() {
     let draws = std::env::var("HUBSLOSH_DRAWS").unwrap_or_else(|_| "1-20".into());
     let (from, to) = draws.split_once('-').expect("HUBSLOSH_DRAWS is FROM-TO");

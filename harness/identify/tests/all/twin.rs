@@ -94,7 +94,7 @@ const BREAKS: [(&str, &str); 2] =
     [("slosh.zeta_breaking", "0.04"), ("slosh.breaking_steepness", "0.63")];
 
 #[test]
-#[ignore = "half a minute"]
+#[ignore = "half a minute: .ci/run --nightly"]
 fn damping_by_waves_that_break_comes_back() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = SHORT.replace("0.1", "0.25");
