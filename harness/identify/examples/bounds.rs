@@ -12,10 +12,10 @@ mod fmu_twin;
 use analysis::gauss_markov::Noise;
 use anyhow::Result;
 use host::fmu::Fmu;
-use identify::fit::{Differences, Problem};
-use identify::recording::Recording;
-use identify::simulate::{Intersample, Setup};
-use identify::unknown::Unknown;
+use identify::fit::bench::problem::{Differences, Problem};
+use identify::input::recording::Recording;
+use identify::model::bench::simulate::{Intersample, Setup};
+use identify::model::bench::unknown::Unknown;
 
 const TRUTH: [(&str, &str, f64); 8] = [
     ("tank.d", "m", 0.163),

@@ -33,14 +33,14 @@ use anyhow::{Context, Result, bail};
 use experiments::rest;
 use fmu_twin::{SensorErrors, Twin, Unmodelled};
 use host::fmu::Fmu;
+use identify::fit::bench::options::Options;
+use identify::fit::bench::start::PARAMETERS;
+use identify::input::reading;
+use identify::input::tolerance::Tolerances;
 use identify::methods::identification::Identification;
 use identify::methods::output_error::identify;
-use identify::nominal::COARSEST;
-use identify::options::Options;
-use identify::reading;
-use identify::simulate::Intersample;
-use identify::start::PARAMETERS;
-use identify::tolerance::Tolerances;
+use identify::model::bench::nominal::COARSEST;
+use identify::model::bench::simulate::Intersample;
 
 /// Command-line arguments.
 struct Arguments {

@@ -20,12 +20,12 @@ use names::sloshtank::{A, FORCE, OMEGA, OMEGA_DOT, TORQUE};
 use serde::Serialize;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
-use crate::any_fmu::question::{Bias, Free, Prior, Question, Setting, Solver, real};
-use crate::any_fmu::record::Record;
-use crate::any_fmu::simulate::{Model, Setup};
 use crate::any_fmu::{self, Identification};
-use crate::breaking;
 use crate::estimate::Estimated;
+use crate::input::question::{Bias, Free, Prior, Question, Setting, Solver, real};
+use crate::input::record::Record;
+use crate::model::bench::breaking;
+use crate::model::simulate::{Model, Setup};
 use crate::news::News;
 use start::Start;
 

@@ -1,43 +1,15 @@
 //! Estimates the FMU's parameters, with their uncertainty, from recordings of torque and hub rate.
+//!
+//! Each stage uses the ones before it: [`input`], [`model`], [`fit`], [`uncertainty`], [`words`]. The methods join them:
+//! [`methods`] for the bench, [`any_fmu`] and [`force_record`] for other FMUs. A folder `bench` holds the parts of a stage that only the bench needs.
 
 pub mod any_fmu;
-pub mod between;
-pub mod breaking;
-pub mod budget;
-pub mod candidate;
-pub mod cause;
-pub mod clocks;
-pub mod decomposition;
-pub mod deep_tank;
-pub mod design;
-pub mod effect;
 pub mod estimate;
-pub mod evidence;
 pub mod fit;
 pub mod force_record;
-pub mod friction;
-pub mod gaps;
-pub mod goodness;
+pub mod input;
 pub mod methods;
-pub mod minimum;
-pub mod missing;
-pub mod names;
+pub mod model;
 pub mod news;
-pub mod nominal;
-pub mod options;
-pub mod overridden;
-pub mod plausible;
-pub mod reading;
-pub mod recording;
-pub mod search;
-pub mod sensor_faults;
-pub mod simulate;
-pub mod spikes;
-pub mod start;
-pub mod start_study;
-pub mod stribeck;
-pub mod tank;
-pub mod tolerance;
 pub mod uncertainty;
-pub mod unknown;
-pub mod verdict;
+pub mod words;

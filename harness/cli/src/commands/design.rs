@@ -9,10 +9,10 @@ use anyhow::{Result, bail, ensure};
 use experiments::profile::Written;
 use files::budget;
 use host::fmu::Fmu;
-use identify::design::{self, Multisine, Wheel};
-use identify::nominal;
-use identify::simulate::{Intersample, Setup};
-use identify::unknown::Unknown;
+use identify::model::bench::nominal;
+use identify::model::bench::simulate::{Intersample, Setup};
+use identify::model::bench::unknown::Unknown;
+use identify::uncertainty::bench::design::{self, Multisine, Wheel};
 use names::hubslosh::{TAU_CMD, friction, hub, imu, slosh, tank, wheel};
 use serde_json::json;
 use signals::table::{self, Table};
@@ -247,7 +247,7 @@ impl<'f> Bench<'f> {
         let mut fitted = setup.clone();
         fitted.settings.push((slosh::ZETA_FROM_CORRELATION.into(), "false".into()));
         let mut unknowns = Vec::new();
-        for name in identify::start::PARAMETERS {
+        for name in identify::fit::bench::start::PARAMETERS {
             let unit =
                 fmu.description().variable(name)?.attributes().unit.clone().unwrap_or_default();
             let damping = slosh::DAMPING.at([1]);

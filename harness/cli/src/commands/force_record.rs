@@ -7,9 +7,9 @@ use anyhow::{Context, Result, ensure};
 use files::output::atomically;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, damping_of};
 use hubslosh_tank::{Fill, Tank, finite_amplitude};
-use identify::any_fmu::simulate::Model;
 use identify::force_record::{self, Frame, Predicted, Prediction, Raw, Task};
-use identify::names::list;
+use identify::input::names::list;
+use identify::model::simulate::Model;
 use identify::news::News;
 use names::sloshtank::tank::{HINGE, LENGTH, MASS, NONLINEAR_INERTIA, NONLINEAR_STIFFNESS, ZETA};
 use signals::recording::Columns;
@@ -202,7 +202,7 @@ impl ForceRecordArgs {
     pub fn identify(&self, any: &AnyFmuArgs, told: &Told, out: &Out) -> Result<()> {
         let task = self.task(any, told)?;
         let model =
-            Model::open(&crate::fmu::find(told.fmu)?, identify::any_fmu::question::Solver::Own)?;
+            Model::open(&crate::fmu::find(told.fmu)?, identify::input::question::Solver::Own)?;
         let columns = Columns::of_variables(list(told.columns))?.with_rate(told.rate)?;
         let (mut notes, mut raws) = (Vec::new(), Vec::new());
         for path in told.data {

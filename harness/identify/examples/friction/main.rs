@@ -21,12 +21,12 @@ use analysis::statistics::mean;
 use anyhow::{Context, Result, bail};
 use host::fmu::Fmu;
 use identify::estimate::Estimated;
+use identify::fit::bench::options::Options;
+use identify::input::recording::Recording;
+use identify::input::tolerance::Tolerances;
 use identify::methods::acceleration::{self, Acceleration};
 use identify::methods::output_error;
 use identify::methods::{Method, Task};
-use identify::options::Options;
-use identify::recording::Recording;
-use identify::tolerance::Tolerances;
 
 /// Bias of the gyro, rad/s.
 const BIAS: f64 = 0.002;

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use analysis::random::Random;
-use identify::recording::Recording;
+use identify::input::recording::Recording;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 

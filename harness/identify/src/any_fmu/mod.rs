@@ -1,43 +1,31 @@
 //! Identification of any FMU by output error: which values of its parameters and starts make its outputs those of the recordings.
 //!
-//! [`question`] defines the unknowns, [`record`] reads recordings, and [`simulate`] runs the FMU with its own solver or the
-//! host's ([`host::exchange`]). [`problem`] computes the sum of squares, [`search`] minimises it, [`profile`] finds intervals, and
-//! [`solver_error`] estimates the effect of the solver's errors. [`page`] writes the report. What a planned recording will tell
-//! is in [`foresee`], the likelihood at other points in [`likelihood`].
+//! A [`Question`] names the unknowns, [`Record`]s hold the recordings, and a [`Model`] runs the FMU with its own solver or the
+//! host's ([`host::exchange`]). The stages are those of the folders.
 
-pub mod foresee;
-pub mod likelihood;
 mod page;
-pub mod problem;
-pub mod profile;
-pub mod question;
-pub mod record;
-pub mod search;
-pub mod simulate;
-pub mod solver_error;
-pub mod unknown;
 
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 use maud::Markup;
-use nalgebra::DMatrix;
 use serde::Serialize;
 
-use self::problem::{Channel, Motion, Problem};
-use self::profile::Interval;
-use self::question::Question;
-use self::record::Record;
-use self::search::{DECREMENT, Minimum};
-use self::simulate::{Model, Setup};
-use self::solver_error::{ADDED, DECIDES, SolverError};
-use self::unknown::{Unknown, What};
-use crate::decomposition::Curvature;
 use crate::estimate::{Estimated, prose};
-use crate::methods::{Identified, Residual};
+use crate::fit::decomposition::Curvature;
+use crate::fit::problem::{Channel, Motion, Problem};
+use crate::fit::search::{self, DECREMENT, Minimum};
+use crate::input::question::Question;
+use crate::input::record::Record;
+use crate::input::tolerance::{self, Share};
+use crate::model::simulate::{Model, Setup};
+use crate::model::unknown::{Unknown, What};
 use crate::news::News;
-use crate::tolerance::{self, Share};
-use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
+use crate::uncertainty::knowledge::{Inseparable, Knowledge, finite, knowledge};
+use crate::uncertainty::profile::{self, Interval};
+use crate::uncertainty::solver_error::{self, ADDED, SolverError};
+use crate::words::identified::{Identified, Residual};
+use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use analysis::innovations::{LIMIT, Tests, crossed};
 use analysis::statistics::{mean, variance};
 
@@ -45,8 +33,6 @@ use analysis::statistics::{mean, variance};
 const CORRELATED: f64 = 0.98;
 /// Part of the prior's standard deviation that is left where the recordings say nothing.
 const PRIOR_ALONE: f64 = 0.9;
-/// Part of a unit direction from which on an unknown belongs to it.
-const PART: f64 = 1e-2;
 /// Turns of noise and fit.
 const TURNS: usize = 4;
 
@@ -75,28 +61,6 @@ pub struct Details {
     pub decrement: f64,
     /// Covariance of the estimates, in the order of the correlations' names.
     pub covariance: Vec<Vec<f64>>,
-}
-
-/// Unknowns that change together without a change of any output.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Inseparable {
-    /// The change of each, in its unit; the largest relative to its steepness is positive.
-    pub direction: BTreeMap<String, f64>,
-}
-
-impl Inseparable {
-    fn words(&self) -> String {
-        let names: Vec<&str> = self.direction.keys().map(String::as_str).collect();
-        let changes: Vec<String> =
-            self.direction.iter().map(|(name, by)| format!("{name} {by:+.3e}")).collect();
-        format!(
-            "{} cannot be distinguished: no output changes when they change together ({}). Give one of them a value with --set \
-             in place of --free, or a prior with --prior. Otherwise record an output that depends on them differently, or \
-             another motion.",
-            names.join(", "),
-            changes.join(", ")
-        )
-    }
 }
 
 /// One output of one recording.
@@ -189,64 +153,6 @@ pub fn identify(
     found.details.starts = starts;
     found.done = done;
     Ok(found)
-}
-
-/// Information about the unknowns at a point.
-pub(crate) struct Knowledge {
-    /// The covariance of all unknowns; rows of those at a bound are 0, and what is not resolved has an infinite variance.
-    pub covariance: DMatrix<f64>,
-    /// Directions that no output shows.
-    pub inseparable: Vec<Inseparable>,
-    /// Unknowns whose derivatives are lost in the solver's errors, or which these move by more than [`DECIDES`] of the standard
-    /// deviation.
-    pub decided_by_solver: Vec<bool>,
-}
-
-pub(crate) fn knowledge(
-    problem: &Problem,
-    jacobian: &DMatrix<f64>,
-    which: &[usize],
-    solver: &SolverError,
-) -> Result<Knowledge> {
-    let n = problem.unknowns.len();
-    let curvature = Curvature::of(jacobian, &problem.names(), which)?;
-    let inverse = curvature.inverse();
-    let mut covariance = DMatrix::zeros(n, n);
-    for (a, &i) in which.iter().enumerate() {
-        for (b, &j) in which.iter().enumerate() {
-            covariance[(i, j)] = inverse[(a, b)];
-        }
-    }
-    let (noise, both): (Vec<f64>, Vec<f64>) = which.iter().map(|&j| solver.derivative[j]).unzip();
-    // what curvature alone leaves unresolved is a property of the model; what noise adds is one of the solver
-    let curved: Vec<f64> =
-        both.iter().zip(&noise).map(|(b, n)| (b * b - n * n).max(0.0).sqrt()).collect();
-    let of_model = curvature.unresolved(&curved);
-    let of_both = curvature.unresolved(&both);
-    let mut decided_by_solver = vec![false; n];
-    if of_both.len() > of_model.len() {
-        for direction in &of_both {
-            let of = which.iter().zip(direction.iter()).filter(|(_, part)| part.abs() > PART);
-            of.for_each(|(&j, _)| decided_by_solver[j] = true);
-        }
-    }
-    let inseparable = of_model.iter().map(|direction| {
-        let own = curvature.unscaled(direction);
-        let sign = direction[direction.iamax()].signum();
-        let of = which.iter().zip(direction.iter().zip(own.iter()));
-        let of = of.filter(|(_, (part, _))| part.abs() > PART);
-        for (&j, _) in of.clone() {
-            covariance[(j, j)] = f64::INFINITY;
-        }
-        let of = of.map(|(&j, (_, by))| (problem.unknowns[j].name.clone(), sign * by));
-        Inseparable { direction: of.collect() }
-    });
-    let inseparable = inseparable.collect();
-    for &j in which {
-        let std = covariance[(j, j)].sqrt();
-        decided_by_solver[j] |= std.is_finite() && solver.shift[j] > DECIDES * std;
-    }
-    Ok(Knowledge { covariance, inseparable, decided_by_solver })
 }
 
 /// Advice on how to make the solver's errors smaller.
@@ -503,11 +409,6 @@ impl Tolerated {
         let known: Vec<String> = self.effects.iter().map(size).collect();
         tolerance::shares(&known, &asked.filter_map(of).collect::<Vec<_>>())
     }
-}
-
-/// JSON knows no infinity.
-fn finite(value: f64) -> f64 {
-    if value.is_finite() { value } else { f64::NAN }
 }
 
 /// Writes remarks about one estimate.

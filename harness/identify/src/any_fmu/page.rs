@@ -5,7 +5,7 @@ use report::page::table;
 
 use super::Identification;
 use crate::estimate::prose;
-use crate::methods::page::{self, Sections};
+use crate::words::page::{self, Sections};
 
 /// The page; `first` comes before the verdict.
 pub fn of(found: &Identification, first: Markup) -> String {

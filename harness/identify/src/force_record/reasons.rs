@@ -6,9 +6,9 @@ use names::sloshtank::tank;
 
 use super::Task;
 use super::start::Start;
-use crate::any_fmu::question::Question;
-use crate::breaking;
 use crate::estimate::{Estimated, prose};
+use crate::input::question::Question;
+use crate::model::bench::breaking;
 
 /// Facts behind the reasons.
 pub struct Context<'a> {

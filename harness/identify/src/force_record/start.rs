@@ -7,7 +7,7 @@ use names::sloshtank::tank;
 use signals::fourier::Forward;
 
 use super::{LOADS, Raw, Task, lateral};
-use crate::breaking;
+use crate::model::bench::breaking;
 
 /// Standard deviation of the wide priors of s and κ. Liquids have 0.9 to 1.5 and 0.3 to 8.
 pub const WIDE_SHIFT: f64 = 2.0;

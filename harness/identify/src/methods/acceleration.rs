@@ -34,18 +34,20 @@ use names::hubslosh::{FrictionModel, SloshModel, friction, hub, slosh, tank};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::page::Sections;
-use super::{Identified, Method, Needs, Residual, Task};
-use crate::decomposition;
+use super::{Method, Needs, Task};
 use crate::estimate::{Estimated, prose};
+use crate::fit::covariance::{self, Covariance};
+use crate::fit::decomposition;
+use crate::input::plausible;
+use crate::input::recording::Recording;
+use crate::model::bench::nominal::{self, Nominal};
+use crate::model::bench::unknown::{self, Scale};
 use crate::news::News;
-use crate::nominal::{self, Nominal};
-use crate::plausible;
-use crate::recording::Recording;
-use crate::start_study::{self, Trial};
-use crate::uncertainty::{self, Combination, Covariance, ONE_WAY, Sources, one_way};
-use crate::unknown::{self, Scale};
-use crate::verdict::DOES_NOT_FIT;
+use crate::uncertainty::bench::sources::{Combination, ONE_WAY, Sources, one_way};
+use crate::words::identified::{Identified, Residual};
+use crate::words::page::Sections;
+use crate::words::start_study::{self, Trial};
+use crate::words::verdict::DOES_NOT_FIT;
 use analysis::least_squares::{self, Minimum};
 use starts::State;
 
@@ -715,7 +717,7 @@ impl Problem {
             let noise = &covariance.x * self.noise_scores(&jacobian) * &covariance.x;
             let sandwich = covariance.sandwich(&jacobian, &e, &windows(self));
             let scatter = Sources::least(&noise, &sandwich);
-            let of_values = uncertainty::spread_out(&scatter, &shown, p.len());
+            let of_values = covariance::spread_out(&scatter, &shown, p.len());
             Ok(Some(Known { covariance, jacobian, shown, scatter, of_values }))
         };
         Ok(match of(acting)? {
@@ -1044,7 +1046,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     };
     let e = problem.evaluate(&p, None);
     // a bearing may have no such friction at all, but it has none that drives the hub
-    let newton = uncertainty::spread_out(&covariance.x, &shown, n)
+    let newton = covariance::spread_out(&covariance.x, &shown, n)
         * problem.jacobian(&p).tr_mul(&DVector::from_column_slice(&e));
     let is_none = |j: usize| {
         problem.is_zero(j, p[j]) && p[j] - newton[j] > -DRIVING * of_values[(j, j)].sqrt()
@@ -1208,7 +1210,7 @@ fn unit(name: &str) -> &'static str {
 /// Rows of the windows, over all recordings.
 fn windows(problem: &Problem) -> Vec<(usize, usize)> {
     let rows = problem.rows.iter().map(|rows| (rows.inner().len(), rows.step));
-    uncertainty::windows(rows, WINDOW)
+    covariance::windows(rows, WINDOW)
 }
 
 /// Torque below which nothing drives the hub, over the largest torque.

@@ -13,10 +13,11 @@ use rayon::prelude::*;
 use report::page::table;
 use serde::Serialize;
 
-use super::page::{RATE, Sections};
-use super::{Identified, Method, Needs, Residual, Task};
+use super::{Method, Needs, Task};
+use crate::input::recording::Recording;
 use crate::news::News;
-use crate::recording::Recording;
+use crate::words::identified::{Identified, Residual};
+use crate::words::page::{RATE, Sections};
 
 /// Orders of ARX that are tried.
 const ARX: [usize; 9] = [2, 3, 4, 6, 8, 12, 16, 24, 32];
@@ -174,7 +175,7 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
     let (Some(arx), Some(armax)) = (best("ARX"), best("ARMAX")) else {
         anyhow::bail!("{}: no ARX or ARMAX could be fitted", recording.name)
     };
-    let band = crate::start::excited_band(step, &u, &y).unwrap_or((0.1, 0.4 / step));
+    let band = crate::fit::bench::start::excited_band(step, &u, &y).unwrap_or((0.1, 0.4 / step));
     let wide = (0.8 * band.0, 1.2 * band.1);
     let poles = models.iter().map(|m| m.model.poles(step, wide)).collect();
     let line = |m: &Judged| {

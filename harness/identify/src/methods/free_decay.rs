@@ -6,10 +6,11 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use signals::recording::{Quantity, quantity};
 
-use super::{Identified, Method, Needs, Residual, Task};
+use super::{Method, Needs, Task};
 use crate::estimate::Estimated;
+use crate::input::recording::Recording;
 use crate::news::News;
-use crate::recording::Recording;
+use crate::words::identified::{Identified, Residual};
 use analysis::statistics::noise_level;
 
 /// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.

@@ -24,16 +24,17 @@ use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use signals::fourier::{Forward, Inverse};
 
-use super::page::{RATE, Sections};
-use super::{Identified, Method, Needs, Residual, Task};
+use super::{Method, Needs, Task};
 use crate::estimate::Estimated;
+use crate::fit::bench::start::{self, Plant};
+use crate::fit::covariance::Covariance;
+use crate::input::recording::Recording;
+use crate::model::bench::nominal::{Bench, Nominal};
+use crate::model::bench::simulate::Intersample;
 use crate::news::News;
-use crate::nominal::{Bench, Nominal};
-use crate::recording::Recording;
-use crate::simulate::Intersample;
-use crate::start::{self, Plant};
-use crate::uncertainty::Covariance;
-use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
+use crate::words::identified::{Identified, Residual};
+use crate::words::page::{RATE, Sections};
+use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM};
 use analysis::least_squares::{differences, minimise};
 use names::hubslosh::{FrictionModel, SloshModel, friction, hub, slosh, tank};
 
@@ -358,7 +359,7 @@ fn words(fit: &Fit, fits: bool, converged: bool) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::Multisine;
+    use crate::uncertainty::bench::design::Multisine;
     use analysis::linear::Linear;
     use analysis::random::Random;
 

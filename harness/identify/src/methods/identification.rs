@@ -2,15 +2,15 @@
 
 use serde::Serialize;
 
-use super::Identified;
-use crate::budget::Effect;
-use crate::candidate::ModelFit;
-use crate::cause::Cause;
-use crate::missing::Missing;
-use crate::nominal::Start;
-use crate::start::Response;
-use crate::start_study::Trial;
-use crate::uncertainty::Combination;
+use crate::fit::bench::candidate::ModelFit;
+use crate::fit::bench::start::Response;
+use crate::model::bench::nominal::Start;
+use crate::uncertainty::bench::budget::Effect;
+use crate::uncertainty::bench::cause::Cause;
+use crate::uncertainty::bench::missing::Missing;
+use crate::uncertainty::bench::sources::Combination;
+use crate::words::identified::Identified;
+use crate::words::start_study::Trial;
 
 /// Results that only the output-error method has.
 #[derive(Clone, Debug, Default, Serialize)]

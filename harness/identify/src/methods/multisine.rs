@@ -1,5 +1,5 @@
 //! Noise and nonlinear distortion, told apart at each frequency, from several periods of an odd multisine with
-//! detection lines ([`crate::design::Multisine`]; Pintelon & Schoukens, System Identification, 2nd ed., chapter 4).
+//! detection lines ([`crate::uncertainty::bench::design::Multisine`]; Pintelon & Schoukens, System Identification, 2nd ed., chapter 4).
 //!
 //! ```text
 //! σ_n²(k) = Σ_m |Y_m(k) − Ȳ(k)|²/(M(M − 1))     from period to period: noise
@@ -18,10 +18,11 @@ use report::svg::Style;
 use serde::Serialize;
 use signals::fourier::Forward;
 
-use super::page::Sections;
-use super::{Identified, Method, Needs, Task};
+use super::{Method, Needs, Task};
+use crate::input::recording::Recording;
 use crate::news::News;
-use crate::recording::Recording;
+use crate::words::identified::Identified;
+use crate::words::page::Sections;
 
 /// Beginning that is left out, s: slosh of a bare tank decays with 23 s, to a thousandth in this time.
 pub const SETTLING: f64 = 150.0;
@@ -265,7 +266,7 @@ fn words(levels: &Levels, (odd, even): (f64, f64)) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design;
+    use crate::uncertainty::bench::design;
     use analysis::linear::Linear;
     use analysis::random::Random;
 

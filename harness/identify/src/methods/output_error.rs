@@ -16,31 +16,33 @@ use names::hubslosh::{self, FrictionModel};
 use rayon::prelude::*;
 
 use super::identification::{Details, Identification};
-use super::page::{RATE, Sections};
-use super::{Identified, Method, Needs, Residual, Task};
-use crate::between::{self, Others};
-use crate::breaking;
-use crate::budget::{self, Effect};
-use crate::candidate::{self, Fitted, ModelFit};
-use crate::cause;
-use crate::deep_tank;
+use super::{Method, Needs, Task};
 use crate::estimate::Estimated;
-use crate::evidence::{self, ALIKE, DECIDES};
-use crate::fit::{self, Answer, Differences, Polished, Problem, ROUNDS};
-use crate::friction;
-use crate::goodness::{fit_pct, is_poor, tests};
-use crate::minimum::CONVERGED;
-use crate::missing;
+use crate::fit::bench::between::{self, Others};
+use crate::fit::bench::candidate::{self, Fitted, ModelFit};
+use crate::fit::bench::friction;
+use crate::fit::bench::goodness::{fit_pct, is_poor, tests};
+use crate::fit::bench::options::Options;
+use crate::fit::bench::problem::{self, Answer, Differences, Polished, Problem, ROUNDS};
+use crate::fit::bench::start::{self, Response};
+use crate::fit::covariance::{self, Covariance};
+use crate::fit::evidence::{self, ALIKE, DECIDES};
+use crate::fit::minimum::CONVERGED;
+use crate::input::plausible;
+use crate::input::recording::{self, Recording};
+use crate::input::tolerance::{self, Share};
+use crate::model::bench::breaking;
+use crate::model::bench::unknown::{Quantity, Unknown};
 use crate::news::{News, Since};
-use crate::options::Options;
-use crate::plausible;
-use crate::recording::{self, Recording};
-use crate::start::{self, Response};
-use crate::start_study::{self, Trial};
-use crate::tolerance::{self, Share};
-use crate::uncertainty::{self, Covariance, ONE_WAY, Sources};
-use crate::unknown::{Quantity, Unknown};
-use crate::verdict::{self, Findings};
+use crate::uncertainty::bench::budget::{self, Effect};
+use crate::uncertainty::bench::cause;
+use crate::uncertainty::bench::deep_tank;
+use crate::uncertainty::bench::missing;
+use crate::uncertainty::bench::sources::{self, ONE_WAY, Sources};
+use crate::words::identified::{Identified, Residual};
+use crate::words::page::{RATE, Sections};
+use crate::words::start_study::{self, Trial};
+use crate::words::verdict::{self, Findings};
 
 /// The FMU fitted in the time domain.
 pub struct OutputError {
@@ -402,7 +404,7 @@ fn finish(
     // of a residual that is more than noise the sandwich says more
     let deep = if fits { deep_tank::intervals(&problem, &deep)? } else { None };
     let of_values = DMatrix::from_fn(x.len(), x.len(), |i, j| full[(i, j)] * slopes[i] * slopes[j]);
-    let fastest = fit::fastest(&answer.motion);
+    let fastest = problem::fastest(&answer.motion);
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (i, unknown) in problem.unknowns.iter().enumerate() {
         let ends = |covariance: &DMatrix<f64>| {
@@ -452,9 +454,9 @@ fn finish(
             _ => measurement.insert(name, estimated),
         };
     }
-    let mut combinations = uncertainty::combinations(&problem.unknowns, &values, &of_values);
+    let mut combinations = sources::combinations(&problem.unknowns, &values, &of_values);
     if let Some(OneWay { way, range: bounds, .. }) = way {
-        combinations.extend(uncertainty::one_way(&mut parameters, way, bounds));
+        combinations.extend(sources::one_way(&mut parameters, way, bounds));
     }
     let shares = shares(&problem, &tolerances, &full, &error_budget);
     let names = problem.unknowns.iter().map(|u| u.quantity.name()).collect();
@@ -727,7 +729,7 @@ fn at_end(problem: &Problem, x: &[f64]) -> Vec<String> {
 fn residuals(problem: &Problem, answer: &Answer) -> Vec<Residual> {
     let rates = problem.channels.iter().zip(&answer.residual);
     rates
-        .filter(|(channel, _)| channel.signal == crate::fit::Signal::Rate)
+        .filter(|(channel, _)| channel.signal == crate::fit::bench::problem::Signal::Rate)
         .map(|(channel, residual)| {
             let recording = &problem.recordings[channel.recording];
             Residual {
@@ -746,7 +748,7 @@ fn residuals(problem: &Problem, answer: &Answer) -> Vec<Residual> {
 /// Rows of the windows of the sandwich.
 fn windows(problem: &Problem) -> Vec<(usize, usize)> {
     let recordings = problem.channels.iter().map(|channel| &problem.recordings[channel.recording]);
-    uncertainty::windows(recordings.map(|r| (r.time.len(), r.step())), uncertainty::WINDOW)
+    covariance::windows(recordings.map(|r| (r.time.len(), r.step())), covariance::WINDOW)
 }
 
 /// The covariance if the unknown at `place` were known exactly; its row and column are 0.

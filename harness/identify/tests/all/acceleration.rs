@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use analysis::random::Random;
 use host::fmu::Fmu;
 use identify::estimate::Estimated;
+use identify::input::recording::Recording;
 use identify::methods::acceleration::{self, Acceleration};
 use identify::methods::{Method, Task};
-use identify::recording::Recording;
-use identify::uncertainty::Combination;
+use identify::uncertainty::bench::sources::Combination;
 use pack::packed_for_tests;
 
 use crate::bench::{Bench, Drive};

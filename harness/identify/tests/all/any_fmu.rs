@@ -2,12 +2,12 @@
 
 use analysis::random::Random;
 use files::output::atomically;
-use identify::any_fmu::foresee::foresee;
-use identify::any_fmu::likelihood::deviances;
-use identify::any_fmu::question::{Question, Solver};
-use identify::any_fmu::record::Record;
-use identify::any_fmu::simulate::Model;
 use identify::any_fmu::{Identification, identify, page};
+use identify::input::question::{Question, Solver};
+use identify::input::record::Record;
+use identify::model::simulate::Model;
+use identify::uncertainty::foresee::foresee;
+use identify::uncertainty::likelihood::deviances;
 use pack::{Fmi, HUBSLOSH, packed_for_tests, packed_version_for_tests};
 use std::io::Write;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use analysis::innovations::LIMIT;
-use identify::any_fmu::question::{Question, Solver};
-use identify::any_fmu::simulate::Model;
 use identify::any_fmu::{Identification, identify};
+use identify::input::question::{Question, Solver};
+use identify::model::simulate::Model;
 use pack::{Fmi, HUBSLOSH, packed_for_tests, packed_version_for_tests};
 
 use crate::any_fmu::{self, record_with_stops};

@@ -8,9 +8,9 @@
 //! ```
 
 use analysis::random::Random;
-use identify::any_fmu::question::{Bias, Setting, Solver};
-use identify::any_fmu::simulate::Model;
 use identify::force_record::{ForceRecord, Frame, LOADS, Raw, Task, identify, lines, page};
+use identify::input::question::{Bias, Setting, Solver};
+use identify::model::simulate::Model;
 use ode_solvers::{Rk4, System, Vector2};
 use pack::{MODELS, packed_model_for_tests};
 

@@ -2,10 +2,10 @@
 
 use experiments::profile::Torque;
 use host::fmu::Fmu;
+use identify::input::recording::Recording;
 use identify::methods::acceleration::{self, Weights};
-use identify::recording::Recording;
-use identify::simulate::{Intersample, Setup};
-use identify::verdict::DOES_NOT_FIT;
+use identify::model::bench::simulate::{Intersample, Setup};
+use identify::words::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
 use crate::fmu_twin::{self, SensorErrors, Twin};

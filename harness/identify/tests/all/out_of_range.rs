@@ -3,15 +3,15 @@
 use experiments::profile::Torque;
 use host::fmu::Fmu;
 use identify::any_fmu::identify;
-use identify::any_fmu::question::{Question, Solver};
-use identify::any_fmu::simulate::Model;
+use identify::fit::bench::options::Options;
+use identify::input::question::{Question, Solver};
+use identify::input::recording::Recording;
 use identify::methods::free_decay::FreeDecay;
 use identify::methods::frequency::Frequency;
 use identify::methods::output_error::OutputError;
 use identify::methods::{Method, Task, acceleration, black_box, multisine};
-use identify::options::Options;
-use identify::recording::Recording;
-use identify::simulate::Intersample;
+use identify::model::bench::simulate::Intersample;
+use identify::model::simulate::Model;
 use pack::packed_for_tests;
 
 use crate::fmu_twin::{self, SensorErrors};

@@ -5,9 +5,9 @@ use experiments::run::{Run, TORQUE};
 use experiments::sensors::{Sensor, Sensors};
 use host::fmu::Fmu;
 use identify::any_fmu::identify;
-use identify::any_fmu::question::{Question, Solver};
-use identify::any_fmu::record::Record;
-use identify::any_fmu::simulate::Model;
+use identify::input::question::{Question, Solver};
+use identify::input::record::Record;
+use identify::model::simulate::Model;
 use pack::packed_for_tests;
 
 /// Known of both twins.

@@ -2,19 +2,19 @@
 
 use experiments::profile::{Profile, Torque};
 use host::fmu::Fmu;
-use identify::between;
-use identify::budget;
 use identify::estimate::Estimated;
-use identify::fit::{Differences, Problem, ROUNDS};
+use identify::fit::bench::between;
+use identify::fit::bench::options::Options;
+use identify::fit::bench::problem::{Differences, Problem, ROUNDS};
+use identify::input::reading::prepare;
+use identify::input::recording::Recording;
+use identify::input::tolerance::Tolerances;
 use identify::methods::output_error::identify;
-use identify::nominal::{self, COARSEST};
-use identify::options::Options;
-use identify::reading::prepare;
-use identify::recording::Recording;
-use identify::simulate::{Intersample, Setup};
-use identify::tolerance::Tolerances;
-use identify::unknown::{Scale, Unknown};
-use identify::verdict::DOES_NOT_FIT;
+use identify::model::bench::nominal::{self, COARSEST};
+use identify::model::bench::simulate::{Intersample, Setup};
+use identify::model::bench::unknown::{Scale, Unknown};
+use identify::uncertainty::bench::budget;
+use identify::words::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
 use crate::acceleration::{is_one_way, push};

@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 use experiments::campaign::{Campaign, recorded};
 use experiments::plan::{Plan, Recorded};
 use files::{input, output};
-use identify::tolerance::Tolerances;
+use identify::input::tolerance::Tolerances;
 use serde::Deserialize;
 use signals::recording::Columns;
 

@@ -8,8 +8,8 @@ use report::page::{axis_chart, drawn, series};
 use report::svg::{Axis, Style};
 
 use super::{Braking, Found, FrictionPoint};
-use crate::methods::page::Sections;
-use crate::start_study;
+use crate::words::page::Sections;
+use crate::words::start_study;
 
 /// Points of a curve.
 const POINTS: usize = 400;

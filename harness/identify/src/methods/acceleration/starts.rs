@@ -249,7 +249,7 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Recording;
+    use crate::input::recording::Recording;
     use analysis::random::Random;
 
     /// Readings of a gyro with a bias of 0.003 rad/s at 50 Hz for 12 s.

@@ -3,12 +3,12 @@
 use maud::{Markup, html};
 use report::page::table;
 
-use crate::budget::Effect;
-use crate::candidate::ModelFit;
 use crate::estimate::Estimated;
+use crate::fit::bench::candidate::ModelFit;
 use crate::methods::identification::Identification;
-use crate::methods::page::Sections;
-use crate::start_study;
+use crate::uncertainty::bench::budget::Effect;
+use crate::words::page::Sections;
+use crate::words::start_study;
 
 /// The sections.
 pub fn sections(found: &Identification) -> Sections {

@@ -1,0 +1,75 @@
+//! Options of an identification.
+
+use anyhow::Result;
+use host::fmu::Fmu;
+use names::hubslosh::FrictionModel;
+use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
+
+use crate::input::recording::Recording;
+use crate::input::tolerance::Tolerances;
+use crate::model::bench::nominal::Nominal;
+use crate::model::bench::simulate::Intersample;
+use crate::model::bench::unknown::Unknown;
+
+/// Options of an identification.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Slosh models to be tried, by the names of `slosh.model`'s items.
+    pub models: Vec<String>,
+    /// Friction laws to be tried, by the names of `friction.model`'s items.
+    pub friction: Vec<String>,
+    /// Known parameters of the bench, by FMU name; these are not estimated.
+    pub settings: Vec<(String, String)>,
+    /// Priors of estimated parameters: name, mean and standard deviation.
+    pub known: Vec<(String, f64, f64)>,
+    /// Starts in place of those from the data, by FMU name.
+    pub starts: Vec<(String, f64)>,
+    /// True to estimate delay, gyro bias and friction asymmetry as well.
+    pub sensor_errors: bool,
+    /// Effects of the bench that the FMU does not have and that are estimated: [`Unknown::actuator_lag`] and others.
+    pub effects: Vec<Unknown>,
+    /// True to estimate the damping by waves that break, if the fit reaches them.
+    pub breaking: bool,
+    /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
+    pub gyro_scale: f64,
+    /// Tolerances of values that are not estimated.
+    pub tolerances: Tolerances,
+    /// Intersample behaviour of the torque; `None` chooses the best fit.
+    pub intersample: Option<Intersample>,
+    /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
+    pub acausal: bool,
+    /// Number of other starts of each of the tank's parameters from which the chosen model is fitted again.
+    pub start_study: usize,
+    /// Recordings that are simulated, not fitted.
+    pub validation: Vec<Recording>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            models: [Frozen, Linear, Planar, Spherical].map(|model| model.name().into()).to_vec(),
+            friction: vec![FrictionModel::Stribeck.name().into()],
+            settings: Vec::new(),
+            known: Vec::new(),
+            starts: Vec::new(),
+            sensor_errors: true,
+            effects: Vec::new(),
+            breaking: false,
+            gyro_scale: 0.01,
+            tolerances: Tolerances::default(),
+            intersample: None,
+            acausal: false,
+            start_study: 0,
+            validation: Vec::new(),
+        }
+    }
+}
+
+impl Options {
+    /// The bench as the FMU is set up with these options.
+    pub fn nominal(&self, fmu: &Fmu) -> Result<Nominal> {
+        let known = self.known.iter().map(|(name, mean, _)| (name.clone(), *mean));
+        let expected: Vec<(String, f64)> = known.chain(self.starts.iter().cloned()).collect();
+        Nominal::of(fmu, &self.settings, &expected)
+    }
+}

@@ -1,0 +1,476 @@
+//! Starts from the data: frequency response, three poles and two zeros, and from these the tank, the
+//! inertia and the friction ([`Plant`]). The tank is the upright cylinder whose first mode has this frequency and mass.
+
+use std::f64::consts::{PI, TAU};
+
+use analysis::features::Features;
+use analysis::statistics::{mean, median, quantile};
+use analysis::transfer_function::TransferFunction;
+use analysis::{
+    Complex64, FrequencyResponse, logarithmic_grid, spa,
+    welch::{self, Spectra},
+};
+use anyhow::{Context, Result, ensure};
+use formulas::cylinder::tank_of_first_mode;
+use names::hubslosh::{friction, hub, slosh, tank};
+use signals::fourier::Forward;
+
+use crate::input::plausible;
+use crate::input::recording::Recording;
+use crate::model::bench::nominal::{Bench, Nominal, Start};
+
+/// Bench parameters from a frequency response.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Response {
+    /// Slosh frequency, Hz: of the zeros.
+    pub slosh_frequency: f64,
+    /// Slosh damping ratio: of the zeros.
+    pub slosh_damping: f64,
+    /// Resonance, Hz: of the pair of poles.
+    pub resonance_frequency: f64,
+    /// Slosh mass, kg.
+    pub slosh_mass: f64,
+    /// I0, inertia of hub and fixed mass, kg·m².
+    pub inertia: f64,
+    /// Fit of the transfer function, %.
+    pub fit: f64,
+}
+
+/// Parameters of the FMU that have a start from the data, in the order of [`Start`].
+pub const PARAMETERS: [&str; 8] = [
+    tank::D,
+    tank::H,
+    slosh::ZETA,
+    hub::I,
+    friction::B,
+    friction::C,
+    friction::D,
+    friction::OMEGA_S,
+];
+
+/// Frequencies between which the torque has its power, Hz.
+pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
+    let spectra = Spectra::of(step, torque, rate, welch::Segments::Seconds(60.0));
+    let total: f64 = spectra.input.iter().skip(1).sum();
+    let reached = |part: f64| {
+        let mut sum = 0.0;
+        spectra.input.iter().enumerate().skip(1).position(|(_, power)| {
+            sum += power;
+            sum >= part * total
+        })
+    };
+    let (low, high) = (reached(0.01)? as f64, reached(0.99)? as f64);
+    Some(((low + 1.0) * spectra.resolution, (high + 1.0) * spectra.resolution))
+}
+
+/// Frequency response of torque to rate over the band that the torque excites.
+pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
+    let (step, torque, rate) = recording.even()?;
+    let band = excited_band(step, &torque, &rate).context("the torque has no spectrum")?;
+    ensure!(
+        band.1 > 1.15 * band.0,
+        "{}: the torque excites {:.2} to {:.2} Hz alone. A frequency response needs a sweep, a multisine \
+         or noise around the slosh frequency",
+        recording.name,
+        band.0,
+        band.1
+    );
+    let lag = spa::LAG.min(recording.duration() / 4.0);
+    Ok(spa::frequency_response(step, &torque, &rate, &logarithmic_grid(band, 1200), lag))
+}
+
+/// A hub with one slosh mode and viscous friction as three poles and two zeros.
+///
+/// ```text
+/// Ω/τ = (b2 s² + b1 s + b0)/(s³ + a2 s² + a1 s + a0),   μ = m r²/I0
+/// b2 = 1/I0,  b1/b2 = 2ζω,  b0/b2 = ω²
+/// a0 = ω² b/I0,  a1 = ω²(1 + μ) + 2ζω b/I0,  a2 = b/I0 + 2ζω(1 + μ)
+/// ```
+///
+/// (thesis 6.7, corrected). Six coefficients, five unknowns: that a2 is what the others say tests the structure.
+#[derive(Clone, Copy, Debug)]
+pub struct Plant {
+    /// Slosh frequency ω, rad/s.
+    pub omega: f64,
+    /// Slosh damping ratio ζ.
+    pub zeta: f64,
+    /// I0, inertia of hub and fixed mass, kg·m².
+    pub inertia: f64,
+    /// μ.
+    pub mass_ratio: f64,
+    /// b, N·m·s.
+    pub friction: f64,
+    /// a2 less what the other coefficients make of it, 1/s.
+    pub structure: f64,
+}
+
+impl Plant {
+    /// Returns the hub's quantities from the coefficients; `None` if no such hub has them.
+    pub fn of([b2, b1, b0]: [f64; 3], [a2, a1, a0]: [f64; 3]) -> Option<Self> {
+        let omega = (b2 > 0.0 && b0 > 0.0).then(|| (b0 / b2).sqrt())?;
+        let zeta = b1 / b2 / (2.0 * omega);
+        let inertia = 1.0 / b2;
+        let friction = a0 / (omega * omega) * inertia;
+        let mass_ratio = (a1 - 2.0 * zeta * omega * friction / inertia) / (omega * omega) - 1.0;
+        let structure = a2 - friction / inertia - 2.0 * zeta * omega * (1.0 + mass_ratio);
+        Some(Plant { omega, zeta, inertia, mass_ratio, friction, structure })
+    }
+
+    /// Slosh mass m, kg.
+    pub fn mass(&self, bench: Bench) -> f64 {
+        self.mass_ratio * self.inertia / bench.inertia(1.0)
+    }
+}
+
+/// Poles and zeros of a measured response, as slosh and inertia.
+pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
+    let model = TransferFunction::fit(measured)?;
+    let plant = Plant::of(model.numerator, model.denominator())?;
+    let found = Response {
+        slosh_frequency: plant.omega / TAU,
+        slosh_damping: plant.zeta,
+        resonance_frequency: model.pole_frequency(),
+        slosh_mass: plant.mass(bench),
+        inertia: plant.inertia,
+        fit: model.fit_frequency(measured),
+    };
+    let (low, high) = (measured.frequency[0], *measured.frequency.last()?);
+    let within = found.slosh_frequency > low && found.resonance_frequency < high;
+    (found.slosh_mass > 0.0 && within).then_some(found)
+}
+
+/// The tank (d, h) whose first mode has this frequency (Hz) and mass (kg).
+pub fn tank(frequency: f64, mass: f64, bench: Bench) -> (f64, f64) {
+    let length = bench.gravity / (TAU * frequency).powi(2);
+    tank_of_first_mode(length, mass, bench.density)
+}
+
+/// Starts from the data, the likeliest first, and what the response says of the bench: nothing if there is no slosh in it,
+/// and one start then. Others than the first are for recordings where the first leads to no minimum: responses of other
+/// kinds, the balance of torques in parts of the band (a slew's torque has its power far below the slosh), and the FMU as
+/// it is set up.
+pub fn from_data(
+    recordings: &[Recording],
+    nominal: &Nominal,
+) -> Result<(Option<Response>, Vec<Start>)> {
+    let bench = nominal.bench;
+    let mut responses: Vec<Response> = Vec::new();
+    // a part of a slow sweep excites little; the others tell
+    let measured = recordings.iter().map(response);
+    let (measured, mut failed): (Vec<_>, Vec<_>) = measured.partition(Result::is_ok);
+    if measured.is_empty()
+        && let Some(Err(error)) = failed.pop()
+    {
+        return Err(error);
+    }
+    for measured in measured.into_iter().flatten() {
+        let found = [translate(&measured, bench), from_features(&measured, bench)];
+        responses.extend(found.into_iter().flatten());
+    }
+    // a step may have a response by chance: one with the inertia of the bench comes first
+    let key = |r: &Response| (!plausible::is_size(r.inertia, nominal.inertia), -r.fit);
+    responses.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+    let rough = friction(recordings);
+    let whole = balances(recordings, bench, &|r| excited(r).into_iter().collect());
+    let Some(first) = whole.into_iter().chain(responses.first().copied()).next() else {
+        return Ok((None, vec![rough]));
+    };
+    let parts = balances(recordings, bench, &|r| {
+        excited(r).map_or(Vec::new(), |band| octaves(band.0, 0.4 / r.step()))
+    });
+    let modes = [first].into_iter().chain(responses.iter().copied());
+    let mut modes: Vec<Response> = modes.chain(parts).collect();
+    let mut all = Vec::new();
+    while !modes.is_empty() {
+        let mode = modes.remove(0);
+        all.push(mode.start(bench, rough));
+        modes.retain(|other| !other.is_near(&mode));
+    }
+    let Start { d, h, zeta, hub_inertia, .. } = nominal.start;
+    all.push(Start { d, h, zeta, hub_inertia, ..rough });
+    Ok((responses.first().copied().or(Some(first)), all))
+}
+
+/// Balances of torques in bands of the recordings, the least residual first.
+fn balances(
+    recordings: &[Recording],
+    bench: Bench,
+    bands: &dyn Fn(&Recording) -> Vec<(f64, f64)>,
+) -> Vec<Response> {
+    let mut found: Vec<Balance> = Vec::new();
+    for recording in recordings {
+        found.extend(bands(recording).into_iter().filter_map(|b| balance(recording, bench, b)));
+    }
+    found.sort_by(|a, b| a.residual.total_cmp(&b.residual));
+    found.iter().map(|b| b.response(bench)).collect()
+}
+
+/// Frequencies between which the torque of a recording has its power, Hz.
+fn excited(recording: &Recording) -> Option<(f64, f64)> {
+    let (step, torque, rate) = recording.even().ok()?;
+    excited_band(step, &torque, &rate)
+}
+
+/// Pairs of octaves from a frequency to another one, Hz, each half over the one before.
+fn octaves(low: f64, high: f64) -> Vec<(f64, f64)> {
+    let count = ((high / low).log2() as u32).saturating_sub(1);
+    (0..count).map(|k| low * f64::from(1u32 << k)).map(|f| (f, 4.0 * f)).collect()
+}
+
+impl Response {
+    /// Description in one line.
+    pub fn line(&self) -> String {
+        format!(
+            "frequency response: slosh at {:.4} Hz, damping ratio {:.4}, resonance at {:.4} Hz, slosh mass {:.3} kg, \
+             inertia {:.4} kg·m²",
+            self.slosh_frequency,
+            self.slosh_damping,
+            self.resonance_frequency,
+            self.slosh_mass,
+            self.inertia
+        )
+    }
+
+    /// Returns true if a search from the other start would reach the same minimum.
+    fn is_near(&self, other: &Response) -> bool {
+        let ratio = |a: f64, b: f64| (a / b).ln().abs();
+        ratio(self.slosh_frequency, other.slosh_frequency) < 0.05
+            && ratio(self.slosh_mass, other.slosh_mass) < 0.5
+            && ratio(self.inertia, other.inertia) < 0.5
+    }
+
+    fn start(&self, bench: Bench, friction: Start) -> Start {
+        let (d, h) = tank(self.slosh_frequency, self.slosh_mass, bench);
+        let fixed = bench.liquid(d, h) - self.slosh_mass;
+        let hub_inertia = self.inertia - bench.inertia(fixed.max(0.0));
+        Start {
+            d,
+            h,
+            zeta: self.slosh_damping.clamp(1e-3, 0.1),
+            hub_inertia: hub_inertia.max(0.2 * self.inertia),
+            ..friction
+        }
+    }
+}
+
+/// Bench parameters from the balance of torques.
+#[derive(Clone, Copy, Debug)]
+pub struct Balance {
+    /// Slosh frequency, Hz, and damping ratio.
+    pub frequency: f64,
+    /// Slosh damping ratio.
+    pub damping: f64,
+    /// Slosh mass, kg.
+    pub mass: f64,
+    /// I0, kg·m².
+    pub inertia: f64,
+    /// Root mean square of the residual over that of the hub's motion.
+    pub residual: f64,
+}
+
+impl Balance {
+    fn response(&self, bench: Bench) -> Response {
+        let ratio = bench.inertia(self.mass) / self.inertia;
+        Response {
+            slosh_frequency: self.frequency,
+            slosh_damping: self.damping,
+            resonance_frequency: self.frequency * (1.0 + ratio).sqrt(),
+            slosh_mass: self.mass,
+            inertia: self.inertia,
+            fit: 0.0,
+        }
+    }
+}
+
+/// Damping ratios that are tried.
+const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
+/// Steps of the slosh frequency over the band, relatively: half the half-power width of the least damping.
+const FINENESS: f64 = 1e-3;
+
+/// The slosh mode from the balance of torques in the frequency domain, with the *measured* rate W in it:
+///
+/// ```text
+/// T = jΩ I0 W + jΩ m r² G(Ω) W + b W + c S − δ jΩ T,   G = (ω² + 2jζωΩ)/(ω² − Ω² + 2jζωΩ)
+/// ```
+///
+/// S is the spectrum of sgn ω, δ a delay (which stands for what dry friction does to the phase as well, and is not used). All but ω and ζ are linear; these are taken from a grid. The residual counts as
+/// motion: it is divided by |jΩ(I0 + m r² G)|. Since nothing is simulated, a multisine's lines make no wrong minima, and
+/// since dry friction is in it, small amplitudes do not pass for damping.
+pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<Balance> {
+    let (step, torque, rate) = recording.even().ok()?;
+    let n = rate.len();
+    let mean = mean(&rate);
+    let noise = recording.rate_noise();
+    let signs: Vec<f64> = rate.iter().map(|w| ((w - mean) / (3.0 * noise)).tanh()).collect();
+    let transform = Forward::new(n);
+    // Hann's window: what happened before the record and after it does not leak
+    let window = |k: usize| 1.0 - (TAU * k as f64 / n as f64).cos();
+    let spectrum = |x: &[f64]| transform.of((0..n).map(|k| x[k] * window(k)).collect());
+    let (t, w, s) = (spectrum(&torque), spectrum(&rate), spectrum(&signs));
+    let width = 1.0 / (n as f64 * step);
+    let (first, last) = ((0.9 * band.0 / width) as usize, (1.1 * band.1 / width) as usize);
+    // lines with more than noise in them
+    let floor = 9.0 * noise.powi(2) * 1.5 * n as f64;
+    let lines: Vec<usize> =
+        (first.max(1)..last.min(w.len() - 1)).filter(|&k| w[k].norm_sqr() > floor).collect();
+    if lines.len() < 30 {
+        return None;
+    }
+    // some 1500 of them say it as well
+    let lines: Vec<usize> = lines.iter().copied().step_by((lines.len() / 1500).max(1)).collect();
+    let all: f64 = lines.iter().map(|&k| w[k].norm_sqr()).sum();
+    let try_mode = |frequency: f64, damping: f64, before: (f64, f64)| {
+        let natural = TAU * frequency;
+        let mut normal = nalgebra::Matrix5::<f64>::zeros();
+        let mut right = nalgebra::Vector5::<f64>::zeros();
+        let mut total = 0.0;
+        for &k in &lines {
+            let omega = TAU * width * k as f64;
+            let j = Complex64::new(0.0, omega);
+            let stiff = Complex64::new(natural * natural, 2.0 * damping * natural * omega);
+            let g = stiff / (stiff - omega * omega);
+            let weight = 1.0 / (j * (before.0 + before.1 * g)).norm_sqr();
+            let terms = [j * w[k], j * g * w[k], w[k], s[k], -j * t[k]];
+            for a in 0..5 {
+                right[a] += weight * (terms[a].conj() * t[k]).re;
+                for b in a..5 {
+                    normal[(a, b)] += weight * (terms[a].conj() * terms[b]).re;
+                }
+            }
+            total += weight * t[k].norm_sqr();
+        }
+        normal.fill_lower_triangle_with_upper_triangle();
+        let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
+        let scaled = nalgebra::Matrix5::from_fn(|a, b| normal[(a, b)] * scale[a] * scale[b]);
+        let found = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
+        let residual = ((total - found.dot(&right)).max(0.0) / all).sqrt();
+        let plausible = found[0] > 0.0 && found[1] > 0.0;
+        plausible.then_some(Balance {
+            frequency,
+            damping,
+            mass: found[1] / bench.inertia(1.0),
+            inertia: found[0],
+            residual,
+        })
+    };
+    let steps = ((band.1 / band.0).ln() / FINENESS) as u32;
+    let grid = |damping: f64, low: f64, fineness: f64, count: u32| {
+        (0..count).map(move |k| (low * (fineness * f64::from(k)).exp(), damping))
+    };
+    let mut weights = (1.0, 0.1);
+    let mut best: Option<Balance> = None;
+    for _ in 0..3 {
+        let candidates: Vec<(f64, f64)> = match best {
+            None => DAMPINGS
+                .iter()
+                .flat_map(|&z| grid(z, band.0, (10.0 * z * FINENESS).sqrt().max(FINENESS), steps))
+                .filter(|(f, _)| *f < band.1)
+                .collect(),
+            Some(near) => [0.5, 0.7, 1.0, 1.4, 2.0]
+                .iter()
+                .flat_map(|z| grid(z * near.damping, near.frequency * 0.99, 2e-4, 100))
+                .collect(),
+        };
+        let found = candidates
+            .into_iter()
+            .filter_map(|(f, z)| try_mode(f, z, weights))
+            .min_by(|a, b| a.residual.total_cmp(&b.residual));
+        let Some(found) = found else { break };
+        weights = (found.inertia, bench.inertia(found.mass));
+        best = Some(found);
+    }
+    best.filter(|b| b.residual < 0.3)
+}
+
+/// Returns a start from antiresonance, resonance and the inertia at the band's ends, for recordings that the transfer function
+/// does not fit (large amplitudes bend its peak). For b = 0, ω_p² = ω²(1 + m r²/I0).
+fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
+    let features = Features::of(measured);
+    let (f, fp) = (features.f_dip?, features.f_res?);
+    let ratio = (fp / f).powi(2) - 1.0;
+    // far from both, Ω/τ = (ω² − Ω²)/(jΩ I0 (ω_p² − Ω²))
+    let inertias: Vec<f64> = measured
+        .frequency
+        .iter()
+        .zip(&measured.response)
+        .filter(|(g, _)| **g < 0.9 * f || **g > 1.1 * fp)
+        .map(|(g, h)| ((f * f - g * g) / (fp * fp - g * g)).abs() / (TAU * g * h.norm()))
+        .collect();
+    let inertia = median(&inertias)?;
+    Some(Response {
+        slosh_frequency: f,
+        slosh_damping: 0.005,
+        resonance_frequency: fp,
+        slosh_mass: ratio * inertia / bench.inertia(1.0),
+        inertia,
+        fit: 0.0,
+    })
+}
+
+/// Friction from the balance of mean power over windows of 20 s, ⟨τω⟩ = T⟨|ω|⟩ + δ⟨τ'ω⟩, with a delay δ, which near a quarter of a
+/// cycle between torque and rate makes power of nothing: least squares for T and δ, then the median torque T (in most windows
+/// the liquid takes as much as it gives), shared among b, c and d at the speeds of the recording. Rough, but of the right size and shape.
+fn friction(recordings: &[Recording]) -> Start {
+    // power and τ'ω over |ω|, and |ω|
+    let mut windows: Vec<[f64; 3]> = Vec::new();
+    for r in recordings {
+        let width = ((20.0 / r.step()) as usize).max(3);
+        for k in (1..r.rate.len().saturating_sub(width)).step_by(width) {
+            let mean = |f: &dyn Fn(usize) -> f64| (k..k + width).map(f).sum::<f64>() / width as f64;
+            let offset = mean(&|i| r.rate[i]);
+            let speed = mean(&|i| (r.rate[i] - offset).abs());
+            let power = mean(&|i| r.torque[i] * (r.rate[i] - offset));
+            let slope =
+                |i: usize| (r.torque[i + 1] - r.torque[i - 1]) / (r.time[i + 1] - r.time[i - 1]);
+            let late = mean(&|i| slope(i) * (r.rate[i] - offset));
+            if speed > 0.0 {
+                windows.push([power / speed, late / speed, speed]);
+            }
+        }
+    }
+    let delay = slope_of(&windows).filter(|delay| delay.abs() < LATEST).unwrap_or(0.0);
+    let torque = |[power, late, _]: &[f64; 3]| power - delay * late;
+    let (torques, speeds): (Vec<f64>, Vec<f64>) =
+        windows.iter().map(|w| (torque(w), w[2])).filter(|(torque, _)| *torque > 0.0).unzip();
+    let torque = median(&torques).unwrap_or(1e-3);
+    let middle = median(&speeds).unwrap_or(1e-2);
+    let fastest = quantile(&speeds, 0.99).unwrap_or(1e-2);
+    // the peak of a sine is π/2 times its mean
+    let (b, omega_s) = (0.1 * torque / middle, 0.5 * PI * fastest);
+    let (c, stribeck) = (0.55 * torque, 0.35 * torque);
+    Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck, omega_s }
+}
+
+/// Longest delay that the balance of power may show, s.
+const LATEST: f64 = 0.05;
+
+/// Slope of the line through points (y, x, …), least squares; `None` where they do not tell.
+fn slope_of(points: &[[f64; 3]]) -> Option<f64> {
+    let n = points.len() as f64;
+    let [y, x] = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);
+    let square: f64 = points.iter().map(|p| (p[1] - x).powi(2)).sum();
+    let product: f64 = points.iter().map(|p| (p[1] - x) * (p[0] - y)).sum();
+    (points.len() > 4 && square > 0.0).then(|| product / square)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use analysis::BAND;
+    use analysis::linear::Linear;
+
+    const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
+
+    #[test]
+    fn poles_and_zeros_of_the_exact_response_give_the_bench_back() {
+        let measured =
+            Linear::bench_10_cm(0.002_975_7).frequency_response(&logarithmic_grid(BAND, 1200));
+        let found = translate(&measured, BENCH).unwrap();
+        // the table of physics: 10 cm of water in a cylinder of 163 mm
+        assert!((found.slosh_frequency / 2.343_618_143_1 - 1.0).abs() < 1e-6, "{found:?}");
+        assert!((found.slosh_mass / 0.756_293_271_9 - 1.0).abs() < 1e-4, "{found:?}");
+        assert!((found.slosh_damping / 0.002_975_7 - 1.0).abs() < 1e-4, "{found:?}");
+        let (d, h) = tank(found.slosh_frequency, found.slosh_mass, BENCH);
+        assert!((d / 0.163 - 1.0).abs() < 1e-4 && (h / 0.1 - 1.0).abs() < 1e-3, "{d} {h}");
+    }
+}

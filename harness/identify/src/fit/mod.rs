@@ -1,0 +1,9 @@
+//! Third stage: the sum of squares and the search for its minimum.
+
+pub mod bench;
+pub mod covariance;
+pub mod decomposition;
+pub mod evidence;
+pub mod minimum;
+pub mod problem;
+pub mod search;

@@ -1,0 +1,269 @@
+//! Stretches in which no torque was recorded: filled where the torque itself foretells them, else the recording is cut there.
+//!
+//! A torque of limited bandwidth that is sampled often is predictable over a gap: an autoregressive model of the samples on
+//! either side, forwards and backwards, gives the missing ones by least squares (Janssen, Veldhuis & Vries, IEEE Trans. ASSP 34,
+//! 1986). Whether that is good enough is measured: as many samples are taken out where all are known, and filled. An error of the
+//! torque is a kick of the hub, ∫Δτ dt/I, which rings in the liquid for a thousand rows; it must be small against the gyro's noise.
+
+use analysis::statistics::{deviation, mean};
+use nalgebra::{DMatrix, DVector};
+
+use crate::input::clocks;
+use crate::input::recording::{Recording, Row, SHORTEST};
+
+/// Spacing of the torque's samples, in usual ones, from which on some were lost.
+const LOST: f64 = 1.75;
+/// Longest gap that is filled, s.
+const LONGEST_FILLED: f64 = 3.0;
+/// Longest gap that a line may join where the recording cannot be cut, s.
+const LONGEST_LINE: f64 = 0.25;
+/// Samples on either side of a gap that the model is fitted to, and its order.
+const SIDE: usize = 250;
+const ORDER: usize = 32;
+/// Places at which a filling is tried.
+const TRIALS: usize = 12;
+/// Kick of the hub by the errors of all fillings, over the gyro's noise.
+const KICK: f64 = 0.1;
+/// Gaps that are too few to make small parts of a recording.
+const FEW: usize = 5;
+/// Part of the usual step by which samples may be off an even grid.
+const EVEN: f64 = 0.02;
+
+/// Fills the gaps that can be filled, and returns the rows before the others.
+pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<usize>) {
+    let knots = all.commands();
+    let time: Vec<f64> = knots.iter().map(|k| all.time[*k]).collect();
+    let usual = clocks::usual(&time);
+    let span = |n: usize| time[n + 1] - time[n];
+    let gaps: Vec<usize> = (0..time.len() - 1).filter(|n| span(*n) > LOST * usual).collect();
+    if gaps.is_empty() {
+        return (all, Vec::new());
+    }
+    let near: Vec<f64> = (0..time.len() - 1).map(span).filter(|s| *s <= LOST * usual).collect();
+    let step = mean(&near);
+    let is_even = near.iter().all(|s| (s - step).abs() < EVEN * step);
+    let values: Vec<f64> = knots.iter().map(|k| all.torque[*k]).collect();
+    let kick = KICK * momentum(&all) / (gaps.len() as f64).sqrt();
+    let (mut filled, mut left) = (Vec::new(), Vec::new());
+    let mut tried: Vec<(usize, f64)> = Vec::new();
+    for &n in &gaps {
+        let lost = (span(n) / step).round() as usize - 1;
+        let is_on_grid = (span(n) - (lost + 1) as f64 * step).abs() < 0.1 * step;
+        if !is_even || !is_on_grid || span(n) > LONGEST_FILLED {
+            left.push(n);
+            continue;
+        }
+        let error = match tried.iter().find(|(count, _)| *count == lost) {
+            Some((_, error)) => *error,
+            None => {
+                let error = tried_out(&values, &gaps, lost) * step;
+                tried.push((lost, error));
+                error
+            }
+        };
+        match fill(before(&values, &gaps, n), after(&values, &gaps, n), lost) {
+            Some(values) if error < kick => filled.push((n, values)),
+            _ => left.push(n),
+        }
+    }
+    if !filled.is_empty() {
+        let count: usize = filled.iter().map(|(_, values)| values.len()).sum();
+        let longest = filled.iter().map(|(n, _)| span(*n)).fold(0.0, f64::max);
+        done(format!(
+            "{}: {count} samples of tau_cmd are missing in {} gaps of up to {longest:.2} s; the others foretell them well enough \
+             (trial fillings elsewhere), and omega is not fitted there",
+            all.name,
+            filled.len()
+        ));
+    }
+    // where the recording is cut: parts must be long enough, or the gap too long for a line
+    let mut cuts = Vec::new();
+    let few = left.len() <= FEW;
+    let end = time[time.len() - 1];
+    let mut from = time[0];
+    for (i, &n) in left.iter().enumerate() {
+        let is_long = span(n) > LONGEST_LINE.max(10.0 * usual);
+        let next = left[i + 1..].iter().find(|m| span(**m) > LONGEST_LINE.max(10.0 * usual));
+        let to = next.map_or(end, |m| time[*m]);
+        let fits = is_even && few && time[n] - from >= SHORTEST && to - time[n + 1] >= SHORTEST;
+        if is_long || fits {
+            cuts.push(n);
+            from = time[n + 1];
+        }
+    }
+    let joined = left.iter().filter(|n| !cuts.contains(n)).count();
+    if joined > 0 && is_even {
+        done(format!(
+            "{}: tau_cmd is missing for up to {LONGEST_LINE} s in {joined} places and cannot be foretold; lines join it, which may \
+             be wrong",
+            all.name
+        ));
+    }
+    let cuts: Vec<usize> = cuts.into_iter().map(|n| knots[n]).collect();
+    with_rows(all, &knots, filled, cuts)
+}
+
+/// Samples of the torque before and after gap `n` up to the next gaps, at most [`SIDE`].
+fn before<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
+    let from = gaps.iter().filter(|gap| **gap < n).max().map_or(0, |gap| gap + 1);
+    &values[from.max((n + 1).saturating_sub(SIDE))..=n]
+}
+
+fn after<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
+    let to = gaps.iter().filter(|gap| **gap > n).min().map_or(values.len(), |gap| gap + 1);
+    &values[n + 1..to.min(n + 1 + SIDE)]
+}
+
+/// Root mean square of the sums of errors where `lost` samples that are known are filled; infinite where that cannot be tried.
+fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
+    let side = 4 * ORDER;
+    let room = values.len().saturating_sub(2 * side + lost);
+    let mut squares = Vec::new();
+    for trial in 0..4 * TRIALS {
+        let from = side + (trial * 2 + 1) * room / (8 * TRIALS);
+        let (first, to) = (from.saturating_sub(SIDE), (from + lost + SIDE).min(values.len()));
+        // gap g is between g and g + 1
+        if squares.len() >= TRIALS && trial % 4 != 0 {
+            continue;
+        }
+        let lower = gaps.iter().filter(|g| **g < from).max().map_or(first, |g| first.max(g + 1));
+        let upper = gaps.iter().filter(|g| **g + 1 >= from + lost).min();
+        let upper = upper.map_or(to, |g| to.min(g + 1));
+        let broken = gaps.iter().any(|g| (from.saturating_sub(1)..from + lost).contains(g));
+        if broken || from < lower || upper < from + lost {
+            continue;
+        }
+        let truth = &values[from..from + lost];
+        match fill(&values[lower..from], &values[from + lost..upper], lost) {
+            Some(found) => {
+                let off: Vec<f64> = found.iter().zip(truth).map(|(a, b)| a - b).collect();
+                let sum: f64 = off.iter().sum();
+                let spread = off.iter().map(|e| e * e).sum::<f64>();
+                squares.push(spread.max(sum * sum));
+            }
+            None => return f64::INFINITY,
+        }
+    }
+    if squares.len() < TRIALS / 2 { f64::INFINITY } else { mean(&squares).sqrt() }
+}
+
+/// The `lost` samples between two stretches; `None` where these are too short.
+fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
+    let order = ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
+    if order < 4 {
+        return None;
+    }
+    // x_k = Σ a_i x_{k−i}, and the same backwards
+    let mut rows: Vec<(Vec<f64>, f64)> = Vec::new();
+    for side in [left, right] {
+        for window in side.windows(order + 1) {
+            rows.push((window[..order].iter().rev().copied().collect(), window[order]));
+            rows.push((window[1..].to_vec(), window[0]));
+        }
+    }
+    let size = deviation(left).max(deviation(right)).max(f64::MIN_POSITIVE);
+    let regressors = DMatrix::from_fn(rows.len(), order, |k, i| rows[k].0[i] / size);
+    let target = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.1 / size));
+    // the samples of a smooth torque are nearly dependent: normal equations with a little weight on small coefficients
+    let weight = 1e-9 * rows.len() as f64;
+    let mut normal = regressors.tr_mul(&regressors);
+    (0..order).for_each(|i| normal[(i, i)] += weight);
+    let a = normal.cholesky()?.solve(&regressors.tr_mul(&target));
+    // equations that contain lost samples, all linear in these
+    let (n, p) = (lost, order);
+    let known = |k: isize| -> Option<f64> {
+        if k < 0 {
+            return left.get((left.len() as isize + k) as usize).copied();
+        }
+        if (k as usize) < n { None } else { right.get(k as usize - n).copied() }
+    };
+    let count = n + p;
+    let mut matrix = DMatrix::<f64>::zeros(2 * count, n);
+    let mut rest = DVector::<f64>::zeros(2 * count);
+    for e in 0..count {
+        for (row, forwards) in [(2 * e, true), (2 * e + 1, false)] {
+            for i in 0..=p {
+                let k = if forwards {
+                    e as isize - i as isize
+                } else {
+                    e as isize - p as isize + i as isize
+                };
+                let factor = if i == 0 { 1.0 } else { -a[i - 1] };
+                match known(k) {
+                    Some(value) => rest[row] += factor * value / size,
+                    None if (0..n as isize).contains(&k) => matrix[(row, k as usize)] += factor,
+                    None => return None,
+                }
+            }
+        }
+    }
+    let found = matrix.clone().svd(true, true).solve(&-rest, 1e-12).ok()?;
+    Some(found.iter().map(|x| x * size).collect())
+}
+
+/// The gyro's noise as an angular momentum of the hub, N·m·s.
+fn momentum(all: &Recording) -> f64 {
+    let rate = all.of_fresh(&all.rate);
+    let time = all.of_fresh(&all.time);
+    let width = ((0.08 / clocks::usual(&time)) as usize).max(1);
+    let slopes: Vec<f64> = (width..rate.len())
+        .map(|k| (rate[k] - rate[k - width]) / (time[k] - time[k - width]))
+        .collect();
+    all.rate_noise() * deviation(&all.torque) / deviation(&slopes).max(f64::MIN_POSITIVE)
+}
+
+/// The recording with filled samples in rows of their own, and the rows after which it is cut.
+fn with_rows(
+    all: Recording,
+    knots: &[usize],
+    filled: Vec<(usize, Vec<f64>)>,
+    cuts: Vec<usize>,
+) -> (Recording, Vec<usize>) {
+    if filled.is_empty() {
+        return (all, cuts);
+    }
+    let own = |(k, time): (usize, &f64)| Row { time: *time, own: Some(k), filled: None };
+    let mut rows: Vec<Row> = all.time.iter().enumerate().map(own).collect();
+    for (n, values) in filled {
+        let (from, to) = (all.time[knots[n]], all.time[knots[n + 1]]);
+        let part = (to - from) / (values.len() + 1) as f64;
+        for (j, value) in values.into_iter().enumerate() {
+            let time = from + (j + 1) as f64 * part;
+            // a sensor may have gone on
+            let near = all.time.partition_point(|row| *row < time - 0.01 * part);
+            match all.time.get(near).filter(|row| (**row - time).abs() < 0.01 * part) {
+                Some(_) => rows[near].filled = Some(value),
+                None => rows.push(Row { time, own: None, filled: Some(value) }),
+            }
+        }
+    }
+    rows.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let place = |row: usize| rows.iter().position(|of| of.own == Some(row)).unwrap_or(row);
+    let cuts = cuts.into_iter().map(place).collect();
+    (all.with_rows(&rows), cuts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sweep(t: f64) -> f64 {
+        0.1 * (std::f64::consts::TAU * (1.5 + 0.005 * t) * t).sin()
+    }
+
+    #[test]
+    fn lost_samples_of_a_sweep_are_foretold() {
+        let values: Vec<f64> = (0..4000).map(|k| sweep(100.0 + 0.02 * f64::from(k))).collect();
+        for lost in [1, 10, 50] {
+            let found = fill(&values[1000..1250], &values[1250 + lost..1500 + lost], lost).unwrap();
+            let off = found.iter().zip(&values[1250..]).map(|(a, b)| (a - b).abs());
+            let worst = off.fold(0.0, f64::max);
+            assert!(worst < 1e-3 * 0.1, "{lost}: {worst:e}");
+        }
+        assert!(tried_out(&values, &[], 10) < 1e-4);
+        // one that jumps from row to row is not
+        let mut random = analysis::random::Random::new(1, 0);
+        let noise: Vec<f64> = (0..4000).map(|_| 0.1 * random.normal()).collect();
+        assert!(tried_out(&noise, &[], 10) > 0.1);
+    }
+}

@@ -1,0 +1,13 @@
+//! First stage: recordings, questions and tolerances, read and checked before any FMU runs.
+
+pub mod clocks;
+pub mod gaps;
+pub mod names;
+pub mod plausible;
+pub mod question;
+pub mod reading;
+pub mod record;
+pub mod recording;
+pub mod sensor_faults;
+pub mod spikes;
+pub mod tolerance;

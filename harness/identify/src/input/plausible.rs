@@ -1,0 +1,144 @@
+//! Plausibility of a recording for this bench: sizes that only a wrong unit produces, and evidence of further columns
+//! about the torque and other axes.
+
+use anyhow::{Result, bail};
+
+use crate::input::recording::Recording;
+use analysis::innovations;
+use analysis::statistics::{deviation, mean, median, noise_level};
+
+/// Returns true if an inertia is not off by a factor that only a wrong unit makes.
+pub fn is_size(inertia: f64, nominal: f64) -> bool {
+    // revolutions per minute are a factor of 9.5
+    (0.125..8.0).contains(&(nominal / inertia))
+}
+
+/// Refuses an inertia, kg·m², that is off by a factor that only a wrong unit makes.
+pub fn check_size(inertia: f64, nominal: f64) -> Result<()> {
+    let ratio = nominal / inertia;
+    if is_size(inertia, nominal) {
+        return Ok(());
+    }
+    let guess = match ratio {
+        r if (30.0..110.0).contains(&r) => {
+            "omega looks like degrees per second; it must be in rad/s"
+        }
+        r if r > 110.0 => {
+            "tau_cmd must be in N·m and omega in rad/s; omega looks like mrad/s or mdeg/s"
+        }
+        r if (300.0..3000.0).contains(&(1.0 / r)) => "tau_cmd looks like mN·m; it must be in N·m",
+        r if r > 1.0 => "omega looks like rpm; it must be in rad/s",
+        _ => "tau_cmd must be in N·m, omega in rad/s and time in s",
+    };
+    bail!(
+        "the recording shows an inertia of {:.3e} kg·m², the FMU with its settings has {nominal:.3e} kg·m²: \
+         {guess}. A torque with little power near the slosh frequency, such as a push, does not show the inertia either: record a \
+         sweep. If the bench really is that different, give its expected inertia: --known hub.I={:.1e}:{:.1e} estimates it all \
+         the same.",
+        inertia,
+        0.8 * inertia,
+        0.4 * inertia
+    )
+}
+
+/// Time over which wheel speed and torque are compared, s.
+const WINDOW: f64 = 0.1;
+
+/// Evidence of further columns: notes for the reader, and doubts that no fit can remove.
+pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
+    let (mut notes, mut doubts) = (Vec::new(), Vec::new());
+    if let Some(speed) = &recording.wheel_speed {
+        match actuator(recording, speed) {
+            Actuator { inertia, missing: None } => notes.push(format!(
+                "{}: the wheel gave the commanded torque, wheel.I = {inertia:.3e} kg·m² by its speed",
+                recording.name
+            )),
+            Actuator { inertia, missing: Some((from, seconds)) } => doubts.push(format!(
+                "{}: the wheel's speed (wheel.I = {inertia:.3e} kg·m²) does not go with tau_cmd for {seconds:.1} s, first \
+                 at {from:.1} s: the wheel did not give the commanded torque",
+                recording.name
+            )),
+        }
+    }
+    for (axis, name) in recording.off_axis.iter().zip(["omega_x", "omega_y"]) {
+        let Some(rate) = axis else { continue };
+        let noise = noise_level(rate);
+        let (mean, rms) = (mean(rate), deviation(rate));
+        let unit: Vec<f64> = rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();
+        let correlation = innovations::crossed(&unit, &recording.torque, recording.step());
+        let line = format!(
+            "{}: {name} is {rms:.2e} rad/s rms, {noise:.2e} rad/s of it noise",
+            recording.name
+        );
+        notes.push(match (rms > 2.0 * noise, correlation > innovations::LIMIT) {
+            (_, true) => format!(
+                "{line}; it is correlated with the torque ({correlation:.0} standard deviations): the hub's axis is not \
+                 a principal axis, or the liquid leaves its plane"
+            ),
+            (true, false) => format!("{line}; it is not correlated with the torque: nutation or vibration"),
+            _ => line,
+        });
+    }
+    (notes, doubts)
+}
+
+struct Actuator {
+    /// wheel.I, kg·m².
+    inertia: f64,
+    /// First time at which the speed does not follow the torque, s, and total duration.
+    missing: Option<(f64, f64)>,
+}
+
+/// I_w ΔΩ = −∫τ dt over windows: least squares of I_w, and windows that are off by more than a tenth of the
+/// largest and more than the speed's noise.
+fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
+    let width = ((WINDOW / recording.step()) as usize).max(2);
+    let noise = noise_level(speed);
+    let mut pairs = Vec::new();
+    for k in (0..speed.len().saturating_sub(width)).step_by(width) {
+        let (time, torque) = (&recording.time[k..=k + width], &recording.torque[k..=k + width]);
+        let areas = (0..width).map(|i| 0.5 * (torque[i] + torque[i + 1]) * (time[i + 1] - time[i]));
+        pairs.push((recording.time[k], areas.sum::<f64>(), speed[k] - speed[k + width]));
+    }
+    // the median of the ratios of large windows: a saturated part does not move it
+    let largest = pairs.iter().map(|p| p.2.abs()).fold(0.0, f64::max);
+    let ratios: Vec<f64> = pairs
+        .iter()
+        .filter(|p| p.2.abs() > 0.2 * largest)
+        .map(|(_, impulse, change)| impulse / change)
+        .collect();
+    let inertia = median(&ratios).unwrap_or(f64::NAN);
+    let allowed = 0.1 * largest + 6.0 * noise;
+    let off: Vec<f64> = pairs
+        .iter()
+        .filter(|(_, impulse, change)| (impulse / inertia - change).abs() > allowed)
+        .map(|p| p.0)
+        .collect();
+    Actuator { inertia, missing: off.first().map(|from| (*from, off.len() as f64 * WINDOW)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sweep of the torque and the wheel's speed under it, limited to `limit` N·m.
+    fn wheel(limit: f64) -> Recording {
+        let time: Vec<f64> = (0..20_000).map(|k| 0.01 * f64::from(k)).collect();
+        let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.02 * t)).sin()).collect();
+        let mut speed = vec![167.0];
+        for pair in torque.windows(2) {
+            let mean = 0.5 * (pair[0].clamp(-limit, limit) + pair[1].clamp(-limit, limit));
+            speed.push(speed[speed.len() - 1] - 0.01 * mean / 2.25e-3);
+        }
+        let rate = vec![0.0; time.len()];
+        Recording { wheel_speed: Some(speed), ..Recording::of("a", time, torque, rate) }
+    }
+
+    #[test]
+    fn a_wheel_that_gives_its_torque_shows_its_inertia_and_one_that_does_not_is_doubted() {
+        let (notes, doubts) = columns(&wheel(1.0));
+        assert!(notes[0].contains("wheel.I = 2.25") && doubts.is_empty(), "{notes:?} {doubts:?}");
+        let (notes, doubts) = columns(&wheel(0.05));
+        assert!(notes.is_empty() && doubts[0].contains("did not give the commanded torque"));
+    }
+}

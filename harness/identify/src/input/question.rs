@@ -1,0 +1,327 @@
+//! Input of an FMU's identification, as text and with the FMU's own names, units and bounds.
+
+use std::str::FromStr;
+
+use anyhow::{Context, Error, Result, bail, ensure};
+use experiments::sensors::Sensor;
+use experiments::sensors::quantity::Quantity;
+use host::description::{ModelDescription, Type, Variable};
+
+use crate::input::names::list;
+use crate::input::tolerance::part;
+
+/// Ends the name of an unknown that each recording has one of.
+pub const EACH: &str = "@each";
+
+/// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised, or the error of
+/// a scale, `scale(NAME)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Free {
+    /// Name in the FMU.
+    pub name: String,
+    /// Each recording has its own, as a start has.
+    pub each: bool,
+    /// Start of the search.
+    pub start: f64,
+    /// Bounds; `None`: the FMU's min and max.
+    pub bounds: Option<(f64, f64)>,
+}
+
+impl FromStr for Free {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text)?;
+        let values = numbers(value).with_context(|| format!("--free {text}"))?;
+        let (start, bounds) = match values[..] {
+            [start] => (start, None),
+            [start, low, high] if low < high => (start, Some((low, high))),
+            _ => {
+                bail!("--free {text} (allowed: NAME=START or NAME=START:LOW:HIGH with LOW < HIGH)")
+            }
+        };
+        ensure!(start.is_finite(), "--free {text}: START must be finite");
+        if let Some((low, high)) = bounds {
+            ensure!(
+                (low..=high).contains(&start),
+                "--free {text}: START must lie between LOW and HIGH"
+            );
+        }
+        let each = name.ends_with(EACH);
+        Ok(Free { name: name.trim_end_matches(EACH).into(), each, start, bounds })
+    }
+}
+
+/// `NAME=MEAN:STD`: what is known of an unknown beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    /// The unknown's name, as the result has it.
+    pub name: String,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub std: f64,
+}
+
+impl FromStr for Prior {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text)?;
+        match numbers(value).with_context(|| format!("--prior {text}"))?[..] {
+            [mean, std] if mean.is_finite() && std.is_finite() && std > 0.0 => {
+                Ok(Prior { name: name.into(), mean, std })
+            }
+            _ => bail!("--prior {text} (allowed: NAME=MEAN:STD with STD above 0)"),
+        }
+    }
+}
+
+/// `NAME=PART`, `NAME=PART%` or `NAME=NUMBER UNIT`: the standard deviation of a value that is known but not exact. PART is relative
+/// to the value, NUMBER is in the unit; `±NUMBER` is in the variable's own unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Name of a variable, of one with its recording (`NAME@2`), or of a scale (`scale(NAME)`, see [`scaled`]).
+    pub name: String,
+    /// Size.
+    pub size: Size,
+}
+
+/// Size of a tolerance.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Size {
+    /// Relative to the value.
+    Part(f64),
+    /// A number, with a unit if it is not the variable's own.
+    Absolute(String),
+}
+
+impl FromStr for Tolerance {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text).with_context(|| format!("--tolerance {text}"))?;
+        let absolute = value.strip_prefix('±').or_else(|| value.strip_prefix("+-"));
+        let size = match absolute {
+            Some(number) => Size::Absolute(number.trim().into()),
+            None => part(&format!("--tolerance {name}"), value)?
+                .map_or_else(|| Size::Absolute(value.into()), Size::Part),
+        };
+        Ok(Tolerance { name: name.into(), size })
+    }
+}
+
+/// Returns the input, output or `time` whose scale an unknown of this name is: `scale(NAME)`.
+pub fn scaled(name: &str) -> Option<&str> {
+    name.strip_prefix("scale(")?.strip_suffix(')')
+}
+
+/// `OUTPUT` or `OUTPUT=STD`: a sensor with a bias, another one in each recording, of which STD is known beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bias {
+    /// The output.
+    pub output: String,
+    /// Standard deviation about 0.
+    pub std: Option<f64>,
+}
+
+impl FromStr for Bias {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let Ok((output, value)) = named(text) else {
+            return Ok(Bias { output: text.trim().into(), std: None });
+        };
+        match numbers(value).with_context(|| format!("--bias {text}"))?[..] {
+            [std] if std.is_finite() && std > 0.0 => {
+                Ok(Bias { output: output.into(), std: Some(std) })
+            }
+            _ => bail!("--bias {text} (allowed: OUTPUT or OUTPUT=STD with STD above 0)"),
+        }
+    }
+}
+
+/// `A,B,C=SCALE:ANGLE`: three outputs read by one instrument with three axes. A reading is
+/// y_i = Σ (δ_ij + M_ij) ω_j; of the M_ii, errors of scale, SCALE is the standard deviation, of the others, alignment, ANGLE (rad).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Triad {
+    /// The outputs.
+    pub outputs: [String; 3],
+    /// Standard deviation of the errors of scale.
+    pub scale: f64,
+    /// Standard deviation of the alignment, rad.
+    pub angle: f64,
+}
+
+impl FromStr for Triad {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let allowed =
+            || format!("--triad {text} (allowed: OUTPUT,OUTPUT,OUTPUT=SCALE:ANGLE, both above 0)");
+        let (names, value) = named(text).with_context(allowed)?;
+        let outputs = list(names).map(String::from).collect::<Vec<_>>().try_into();
+        match (outputs, &numbers(value).with_context(allowed)?[..]) {
+            (Ok(outputs), [scale, angle]) if *scale > 0.0 && *angle > 0.0 => {
+                Ok(Triad { outputs, scale: *scale, angle: *angle })
+            }
+            _ => bail!(allowed()),
+        }
+    }
+}
+
+/// `NAME=VALUE` or, of the second recording alone, `NAME@2=VALUE`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Name in the FMU.
+    pub name: String,
+    /// The recording, from 0; `None`: all.
+    pub recording: Option<usize>,
+    /// The value as text.
+    pub value: String,
+}
+
+impl FromStr for Setting {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text)?;
+        let (name, recording) = match name.rsplit_once('@') {
+            None => (name, None),
+            Some((name, number)) => {
+                let number: usize = number.parse().ok().filter(|n| *n > 0).with_context(|| {
+                    format!("--set {text} (allowed: NAME=VALUE or NAME@RECORDING=VALUE, from 1)")
+                })?;
+                (name, Some(number - 1))
+            }
+        };
+        Ok(Setting { name: name.into(), recording, value: value.into() })
+    }
+}
+
+/// Whose solver steps the FMU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// The FMU's (Co-Simulation).
+    Own,
+    /// The host's (Model Exchange), with this relative tolerance.
+    Host(f64),
+}
+
+/// Input of an identification.
+#[derive(Clone, Debug)]
+pub struct Question {
+    /// Unknowns.
+    pub free: Vec<Free>,
+    /// Priors.
+    pub priors: Vec<Prior>,
+    /// Tolerances of known values: unknowns with a prior that are not asked for.
+    pub tolerances: Vec<Tolerance>,
+    /// Settings.
+    pub settings: Vec<Setting>,
+    /// Inputs that are driven.
+    pub inputs: Vec<String>,
+    /// Inputs that are held from row to row; the others are interpolated linearly.
+    pub held: Vec<String>,
+    /// Outputs that were recorded: of the FMU, or columns of `sensors`.
+    pub outputs: Vec<String>,
+    /// Sensors that read what is not an output of the FMU: a wave gauge, a camera.
+    pub sensors: Vec<Sensor>,
+    /// Sensors with a bias.
+    pub biases: Vec<Bias>,
+    /// Instruments with three axes.
+    pub triads: Vec<Triad>,
+    /// True if the noise of each output also drifts.
+    pub drift: bool,
+    /// Whose solver steps the FMU.
+    pub solver: Solver,
+    /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.
+    pub tolerance: Option<f64>,
+    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit.
+    pub starts: usize,
+}
+
+impl Question {
+    /// Returns the sensor of a column, its quantity and the number of the channel; `None` if no sensor has this column.
+    ///
+    /// # Errors
+    /// If the FMU lacks the quantity that the sensor measures.
+    pub fn sensor(
+        &self,
+        column: &str,
+        description: &ModelDescription,
+    ) -> Result<Option<(&Sensor, Quantity, usize)>> {
+        let Some(sensor) = self.sensors.iter().find(|sensor| sensor.has(column)) else {
+            return Ok(None);
+        };
+        let of_all = self.settings.iter().filter(|setting| setting.recording.is_none());
+        let settings: Vec<_> = of_all.map(|s| (s.name.clone(), s.value.clone())).collect();
+        let quantity = sensor.quantity(description, &settings)?;
+        let columns: Vec<String> =
+            quantity.channels.iter().map(|(channel, _)| sensor.column(channel)).collect();
+        let channel = columns.iter().position(|name| name == column).with_context(|| {
+            format!("sensor {} has no column {column} (it has {})", sensor.name, columns.join(", "))
+        })?;
+        Ok(Some((sensor, quantity, channel)))
+    }
+
+    /// The unit of an output.
+    ///
+    /// # Errors
+    /// If there is no such output.
+    pub fn unit(&self, output: &str, description: &ModelDescription) -> Result<String> {
+        Ok(match self.sensor(output, description)? {
+            Some((_, quantity, channel)) => quantity.channels[channel].1.clone(),
+            None => description.unit(real(description, output)?).into(),
+        })
+    }
+}
+
+/// A Real of the FMU.
+pub fn real<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
+    let variable = description.variable(name)?;
+    ensure!(variable.kind() == Type::Real, "{name} is a {:?} (allowed: Real)", variable.kind());
+    Ok(variable)
+}
+
+fn named(text: &str) -> Result<(&str, &str)> {
+    let (name, value) =
+        text.split_once('=').with_context(|| format!("\"{text}\" is not of the form NAME=…"))?;
+    Ok((name.trim(), value.trim()))
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>> {
+    let one = |part: &str| {
+        let number: Option<f64> = part.trim().parse().ok().filter(|x: &f64| !x.is_nan());
+        number.with_context(|| format!("\"{part}\" is not a number"))
+    };
+    text.split(':').map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_asked_is_read_from_text() {
+        let free: Free = "tank[1].mass[1]@each=2:0.5:inf".parse().unwrap();
+        assert_eq!((free.name.as_str(), free.each), ("tank[1].mass[1]", true));
+        assert_eq!((free.start, free.bounds), (2.0, Some((0.5, f64::INFINITY))));
+        let setting: Setting = "init.omega[1]@2=0.1".parse().unwrap();
+        assert_eq!((setting.name.as_str(), setting.recording), ("init.omega[1]", Some(1)));
+        let triad: Triad = "w[1],w[2],w[3]=0.01:5e-3".parse().unwrap();
+        assert_eq!((triad.outputs[2].as_str(), triad.angle), ("w[3]", 5e-3));
+        assert_eq!(list("a,inertia[1,2], b").collect::<Vec<_>>(), ["a", "inertia[1,2]", "b"]);
+        for wrong in ["k", "k=1:2", "k=3:4:5", "k=1:2:0", "k=x"] {
+            assert!(wrong.parse::<Free>().is_err(), "{wrong}");
+        }
+        let size = |text: &str| text.parse::<Tolerance>().unwrap().size;
+        assert_eq!(size("m=0.5%"), Size::Part(0.005));
+        assert_eq!(size("scale(force[3])=0.003"), Size::Part(0.003));
+        assert_eq!(size("tank.h=5mm"), Size::Absolute("5mm".into()));
+        assert_eq!(size("x=±0.1"), Size::Absolute("0.1".into()));
+        assert!("m=80%".parse::<Tolerance>().is_err() && "m".parse::<Tolerance>().is_err());
+        assert_eq!((scaled("scale(w[1])"), scaled("w[1]")), (Some("w[1]"), None));
+        assert!("k=1:0".parse::<Prior>().is_err() && "w=0".parse::<Bias>().is_err());
+    }
+}

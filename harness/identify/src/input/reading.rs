@@ -1,0 +1,604 @@
+//! Reads recordings of a bench, checks what must be true of them before anything is fitted, and cuts them.
+//!
+//! If torque is missing and cannot be predicted, the recording is cut ([`crate::input::gaps`]) and each part has a start of its own.
+
+use std::path::Path;
+
+use analysis::innovations;
+use analysis::statistics::{correlation, deviation, mean, noise_level, peak};
+use anyhow::{Context, Result, bail, ensure};
+use signals::recording::{self, Between, Columns, Signal, Wanted};
+use signals::table::Table;
+
+use crate::input::clocks::{self, Clocked, completed};
+use crate::input::recording::{LONG, Recording, SHORTEST, masked, take_out};
+use crate::input::sensor_faults::{self, Rest};
+use crate::input::{gaps, spikes};
+
+/// Time after the beginning of a part that is already moving in which no sensor is fitted, s: a sensor that is late shows
+/// what happened before the part's first torque.
+const LATE: f64 = 0.1;
+
+/// Rows of a free decay: the spectrum of its residual takes 400 sines a row.
+const DECAY_ROWS: usize = 1_000_000;
+
+/// Number of spikes whose times are listed.
+const LISTED: usize = 8;
+
+/// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.
+const MOVES: f64 = 2.0;
+
+/// Columns that a recording must have.
+pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
+/// Columns that are used if they are there.
+pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
+
+/// Columns of a file, and the rows to use.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Columns and units of the signals.
+    pub columns: Columns,
+    /// First and last time, s.
+    pub trim: Option<(f64, f64)>,
+}
+
+/// Reads a file with the signals [`REQUIRED`] and [`OPTIONAL`]. Rows outside `trim` are left out; rows may be
+/// `coarsest` (s) apart. `done` hears what was done to it.
+pub fn read(
+    path: &Path,
+    source: &Source,
+    coarsest: f64,
+    done: &mut dyn FnMut(String),
+) -> Result<Vec<Recording>> {
+    let signal = |name: &'static str| Signal {
+        name,
+        required: REQUIRED.contains(&name),
+        between: Between::Missing,
+        unit: None,
+    };
+    let signals: Vec<Signal> =
+        ["omega", "tau_cmd"].into_iter().chain(OPTIONAL).map(signal).collect();
+    let wanted = Wanted { signals: &signals, columns: &source.columns };
+    let table = recording::read(path, &wanted, done)?;
+    let name = path.display().to_string();
+    let all = assembled(&name, &table, done).with_context(|| format!("{name} cannot be used"))?;
+    prepare(trimmed(all, source.trim, done), coarsest, done)
+}
+
+/// The rows in which something was measured, from the first to the last value of the torque, with each signal on its own clock.
+fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<Recording> {
+    let column = |name: &str| table.column(name);
+    let (time, torque) = (column("time"), column("tau_cmd"));
+    let (time, torque) = time.zip(torque).context("columns that were read")?;
+    let measured: Vec<&[f64]> = ["omega", "theta"].into_iter().filter_map(column).collect();
+    let first = torque.iter().position(|v| !v.is_nan());
+    let last = torque.iter().rposition(|v| !v.is_nan());
+    let (Some(first), Some(last)) = (first, last) else { bail!("tau_cmd has no value") };
+    let is_of_use =
+        |k: &usize| !torque[*k].is_nan() || measured.iter().any(|values| !values[*k].is_nan());
+    let rows: Vec<usize> = (first..=last).filter(is_of_use).collect();
+    let at: Vec<f64> = rows.iter().map(|k| time[*k]).collect();
+    let mut of = |name: &str| -> Result<Option<Clocked>> {
+        let Some(values) = column(name) else { return Ok(None) };
+        let values: Vec<f64> = rows.iter().map(|k| values[*k]).collect();
+        let there = values.iter().filter(|v| !v.is_nan()).count();
+        ensure!(there > 1, "{name} has values in {there} rows (allowed: at least 2)");
+        if there < rows.len() {
+            let held: Vec<f64> =
+                at.iter().zip(&values).filter(|(_, v)| !v.is_nan()).map(|(t, _)| *t).collect();
+            done(format!(
+                "{name} has a value in {there} of {} rows, {:.4} s apart mostly; {}",
+                rows.len(),
+                clocks::usual(&held),
+                match name {
+                    "tau_cmd" => "the others are between its samples",
+                    "omega" | "theta" => "the others drive the model and are not fitted to it",
+                    _ => "lines join them",
+                }
+            ));
+        }
+        Ok(Some(completed(&at, values)))
+    };
+    let (rate, fresh) = of("omega")?.context("a column that was read")?;
+    let (torque, commanded) = of("tau_cmd")?.context("a column that was read")?;
+    let (angle, angle_fresh) = of("theta")?.map_or((None, None), |(v, mask)| (Some(v), mask));
+    let mut plain = |name: &str| -> Result<Option<Vec<f64>>> { Ok(of(name)?.map(|of| of.0)) };
+    Ok(Recording {
+        angle,
+        gravity: plain("g_axial")?,
+        wheel_speed: plain("wheel_speed")?,
+        off_axis: [plain("omega_x")?, plain("omega_y")?],
+        from_rest: false,
+        fresh,
+        angle_fresh,
+        commanded,
+        ..Recording::of(name, at.clone(), torque, rate)
+    })
+}
+
+/// Signals of a free decay, in the order of preference.
+pub const DECAYING: [&str; 4] = ["wave_height", "force", "theta", "omega"];
+
+/// Reads a free decay, one signal of [`DECAYING`] without a torque: that of `source.columns`, else the first that the
+/// file has. Its name, and its values as the recording's rate.
+pub fn read_decay(
+    path: &Path,
+    source: &Source,
+    done: &mut dyn FnMut(String),
+) -> Result<(&'static str, Recording)> {
+    let name = path.display().to_string();
+    let given = DECAYING.iter().filter(|name| source.columns.names(name)).collect::<Vec<_>>();
+    ensure!(given.len() < 2, "--columns names {} signals; a free decay is one", given.len());
+    let there = recording::names(path)?;
+    let found = given
+        .first()
+        .copied()
+        .or_else(|| DECAYING.iter().find(|name| there.iter().any(|n| n == *name)));
+    let Some(found) = found.copied() else {
+        bail!(
+            "{name} has no column {} (columns in it: {}; --columns time=COLUMN,wave_height=COLUMN:UNIT says which is \
+             which)",
+            DECAYING.join(", "),
+            there.join(", ")
+        )
+    };
+    let signals = [Signal { name: found, required: true, between: Between::Line, unit: None }];
+    let table =
+        recording::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
+    let column =
+        |name: &str| table.column(name).map(<[f64]>::to_vec).context("a column that was read");
+    let (time, signal) = (column("time")?, column(found)?);
+    let torque = vec![0.0; time.len()];
+    let all = trimmed(Recording::of(&name, time, torque, signal), source.trim, done);
+    ensure!(
+        all.time.len() <= DECAY_ROWS,
+        "{name}: {} rows are too many for a free decay (allowed: up to {DECAY_ROWS}); --trim takes a part of them",
+        all.time.len()
+    );
+    all.check()?;
+    let seconds = all.duration();
+    // the last row stands for a step too
+    ensure!(
+        seconds + all.step() >= SHORTEST * (1.0 - 1e-9),
+        "{name}: {seconds:.2} s are too few (allowed: at least {SHORTEST} s)"
+    );
+    ensure!(deviation(&all.rate) > 0.0, "{name}: {found} is constant ({})", all.rate[0]);
+    Ok((found, all))
+}
+
+/// The rows within two times.
+fn trimmed(all: Recording, trim: Option<(f64, f64)>, done: &mut dyn FnMut(String)) -> Recording {
+    let Some((from, to)) = trim else { return all };
+    let (before, part) = (all.time.len(), all.between(from, to));
+    let left_out = before - part.time.len();
+    done(format!("{}: {left_out} rows outside {from} to {to} s left out", part.name));
+    part
+}
+
+/// Checks a recording, whose rows may be `coarsest` (s) apart, and cuts it at its gaps.
+pub fn prepare(
+    all: Recording,
+    coarsest: f64,
+    done: &mut dyn FnMut(String),
+) -> Result<Vec<Recording>> {
+    let name = all.name.clone();
+    check_time(&all, coarsest)?;
+    let (all, gaps) = gaps::bridged(all, done);
+    // each part begins and ends with a torque
+    let mut cuts: Vec<(usize, usize)> = Vec::new();
+    let mut from = 0;
+    for row in gaps {
+        let next = all
+            .commanded
+            .as_ref()
+            .map_or(Some(row + 1), |commanded| (row + 1..all.time.len()).find(|k| commanded[*k]));
+        let Some(next) = next else { break };
+        let gap = all.time[next] - all.time[row];
+        done(format!(
+            "{name}: cut at {:.2} s, where tau_cmd is missing for {gap:.2} s and cannot be foretold",
+            all.time[row]
+        ));
+        cuts.push((from, row + 1));
+        from = next;
+    }
+    cuts.push((from, all.time.len()));
+    let mut parts = Vec::new();
+    for (index, (from, to)) in cuts.iter().enumerate() {
+        let mut part = all.rows(*from, *to);
+        let seconds = if part.time.len() > 1 { part.duration() } else { 0.0 };
+        let step = if part.time.len() > 1 { part.step() } else { 0.0 };
+        if seconds + step < SHORTEST * (1.0 - 1e-9) {
+            ensure!(
+                cuts.len() > 1,
+                "{name}: {seconds:.2} s of data are too few (allowed: at least {SHORTEST} s, and {LONG} s where the \
+                 damping of a bare tank is to be seen: its slosh decays in some 23 s, its resonance is 14 mHz wide)"
+            );
+            done(format!(
+                "{name}: {seconds:.1} s from {:.2} s on left out: too short",
+                part.time[0]
+            ));
+            continue;
+        }
+        let repeats = part.with_repeats();
+        part.from_rest = starts_at_rest(&part);
+        if cuts.len() > 1 {
+            part.name = format!("{name}, part {}", index + 1);
+        }
+        done(describe(&part));
+        if seconds < LONG {
+            done(format!(
+                "{}: {seconds:.0} s are short for a bare tank, whose resonance takes {LONG} s to be resolved; expect wide \
+                 intervals of damping and mass",
+                part.name
+            ));
+        }
+        if let (Some(fresh), true) = (&part.fresh, repeats) {
+            let new = fresh.iter().filter(|new| **new).count();
+            done(format!(
+                "{}: omega has a new value in {new} of {} rows; those are fitted",
+                part.name,
+                fresh.len()
+            ));
+        }
+        without_faults(&mut part, done);
+        without_spikes(&mut part, done);
+        if !part.from_rest {
+            let rows = part.time.len();
+            for row in (0..rows).take_while(|k| part.time[*k] < part.time[0] + LATE) {
+                take_out(&mut part.fresh, row, rows);
+                take_out(&mut part.angle_fresh, row, rows);
+            }
+        }
+        check_signals(&part)?;
+        parts.push(part);
+    }
+    ensure!(!parts.is_empty(), "{name}: no part between gaps is as long as {SHORTEST} s");
+    let torque = parts.iter().map(|part| peak(&part.torque)).fold(0.0, f64::max);
+    ensure!(
+        !parts.iter().all(is_stuck),
+        "{name}: the hub does not turn: omega is noise of {:.1e} rad/s and does not follow tau_cmd (up to {torque:.2e} N·m). The \
+         bearing sticks under so little torque, or omega is of another axis",
+        noise_level(&parts[0].rate)
+    );
+    Ok(parts)
+}
+
+/// Takes values that a sensor did not measure out of a part, and says which.
+fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
+    let rows = part.time.len();
+    let Recording { name, time, torque, rate, angle, fresh, angle_fresh, .. } = part;
+    // without torque at its beginning a hub rests
+    let rest = (torque[0] == 0.0).then_some(rate[0]);
+    let sensors = [
+        ("omega", Some(rate), fresh, Rest::Rate(rest)),
+        ("theta", angle.as_mut(), angle_fresh, Rest::Angle),
+    ];
+    for (sensor, whole, mask, rest) in sensors {
+        let Some(whole) = whole else { continue };
+        let places: Vec<usize> =
+            (0..rows).filter(|k| mask.as_ref().is_none_or(|mask| mask[*k])).collect();
+        let (at, values): (Vec<f64>, Vec<f64>) =
+            places.iter().map(|k| (time[*k], whole[*k])).unzip();
+        let found = sensor_faults::find(sensor, &at, &values, rest);
+        found.words.iter().for_each(|words| done(format!("{name}: {words}")));
+        found.rows.iter().for_each(|k| take_out(mask, places[*k], rows));
+        if let (Some(mask), false) = (&*mask, found.rows.is_empty()) {
+            // what stands there serves spectra and plots
+            let known =
+                mask.iter().zip(whole.iter()).map(|(new, v)| if *new { *v } else { f64::NAN });
+            let known = known.collect();
+            *whole = completed(time, known).0;
+        }
+    }
+}
+
+/// Takes single values that belong to no motion out of a part, and says which.
+fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
+    let found = spikes::find(&part.time, &part.rate, &part.torque, part.fresh.as_deref());
+    let Some(largest) = found.iter().map(|(k, y)| (part.rate[*k] - y).abs()).reduce(f64::max)
+    else {
+        return;
+    };
+    let at: Vec<String> =
+        found.iter().take(LISTED).map(|(k, _)| format!("{:.2}", part.time[*k])).collect();
+    let more = if found.len() > LISTED { ", …" } else { "" };
+    done(format!(
+        "{}: {} single values of omega differ from their neighbours by more than noise, by up to {largest:.2e} rad/s; they are \
+         not fitted (at {}{more} s)",
+        part.name,
+        found.len(),
+        at.join(", ")
+    ));
+    let rows = part.rate.len();
+    let fresh = part.fresh.get_or_insert_with(|| vec![true; rows]);
+    for (k, y) in found {
+        (part.rate[k], fresh[k]) = (y, false);
+    }
+}
+
+fn describe(part: &Recording) -> String {
+    let steps: Vec<f64> = part.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let step = part.step();
+    let uneven = steps.iter().fold(0.0, |worst: f64, s| worst.max((s - step).abs()));
+    let sampling = if uneven > 0.01 * step {
+        format!(
+            "uneven sampling ({:.1} ms on average, up to {:.1} ms off), used as it is",
+            1e3 * step,
+            1e3 * uneven
+        )
+    } else {
+        format!("{:.4} Hz", 1.0 / step)
+    };
+    let start = if part.from_rest { "starts at rest" } else { "initial state unknown, estimated" };
+    format!(
+        "{}: {} rows, {:.1} s, {sampling}, {start}",
+        part.name,
+        part.time.len(),
+        part.duration()
+    )
+}
+
+fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
+    let step = all.check()?;
+    let name = &all.name;
+    ensure!(
+        step <= coarsest,
+        "{name}: rows are {step} s apart, at most {coarsest:.3} s are allowed, a fifth of the slosh's expected period{}",
+        if step >= 1.0 {
+            ". Is time in milliseconds? It must be in seconds. (If the slosh really is that slow, --set g_axial, or \
+             --known tank.d and tank.h)"
+        } else {
+            ""
+        }
+    );
+    ensure!(step >= 1e-4, "{name}: rows are {step} s apart. Time must be in seconds");
+    let masks = [("tau_cmd", &all.commanded), ("omega", &all.fresh), ("theta", &all.angle_fresh)];
+    for (signal, mask) in masks {
+        let Some(mask) = mask else { continue };
+        let apart = clocks::usual(&masked(&all.time, Some(mask)));
+        ensure!(
+            apart <= coarsest,
+            "{name}: values of {signal} are {apart:.3} s apart, at most {:.3} s are allowed: the slosh must be seen between them. \
+             Leave its column out, or log it faster",
+            coarsest
+        );
+    }
+    Ok(())
+}
+
+/// Returns true if rate and torque allow a start at rest: neither exceeds what noise, bias and the first moment of motion
+/// explain. (If both pass zero by chance in the middle of a motion, the answer is wrong, and the residual tests show it.)
+fn starts_at_rest(part: &Recording) -> bool {
+    let rate = mean(&part.of_fresh(&part.rate).iter().take(2).copied().collect::<Vec<_>>());
+    // a gyro's bias is not motion: up to 3 % of the signal, or 5 times the noise
+    let slow = rate.abs() < 5.0 * part.rate_noise() + 0.03 * deviation(&part.rate);
+    slow && part.torque[0].abs() < 0.1 * deviation(&part.torque)
+}
+
+fn check_signals(part: &Recording) -> Result<()> {
+    let name = &part.name;
+    ensure!(
+        deviation(&part.torque) > 1e-9 * peak(&part.torque).max(1e-12),
+        "{name}: tau_cmd is constant ({} N·m). Without excitation nothing can be identified",
+        part.torque[0]
+    );
+    ensure!(deviation(&part.rate) > 0.0, "{name}: omega is constant ({} rad/s)", part.rate[0]);
+    // An inertia: torque goes with the rate's derivative, so torque leads the rate by 90 degrees.
+    let (torque, rate) = smoothed(part)?;
+    let slope = |x: &[f64]| -> Vec<f64> { (1..x.len() - 1).map(|k| x[k + 1] - x[k - 1]).collect() };
+    let inner = |x: &[f64]| x[1..x.len() - 1].to_vec();
+    let leading = correlation(&inner(&torque), &slope(&rate));
+    if leading < -0.3 {
+        // which one is the other's integral? The ratio of rate to torque falls with frequency
+        let rough = |x: &[f64]| deviation(&slope(x)) / deviation(x);
+        let swapped = rough(&torque) < rough(&rate);
+        let fault = if swapped {
+            "the columns tau_cmd and omega are swapped: omega leads tau_cmd"
+        } else {
+            "omega has the wrong sign, or tau_cmd and omega are swapped: the hub seems to turn against its torque"
+        };
+        bail!(
+            "{name}: {fault} (correlation of tau_cmd with the derivative of omega: {leading:.2})"
+        );
+    }
+    Ok(())
+}
+
+/// Returns true if the rate is noise that shows no effect of the torque.
+fn is_stuck(part: &Recording) -> bool {
+    let (mean, noise) = (mean(&part.rate), noise_level(&part.rate));
+    let unit: Vec<f64> = part.rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();
+    deviation(&unit) < MOVES
+        && innovations::crossed(&unit, &part.torque, part.step()) < innovations::LIMIT
+}
+
+/// Torque and rate averaged over 0.1 s, to tame the noise of differences.
+fn smoothed(part: &Recording) -> Result<(Vec<f64>, Vec<f64>)> {
+    let (step, torque, rate) = part.even()?;
+    let width = ((0.1 / step) as usize).max(1);
+    Ok((running_mean(&torque, width), running_mean(&rate, width)))
+}
+
+/// Returns the means of all stretches of `width` values, by sums from the first value on: the work does not grow with the
+/// width.
+fn running_mean(x: &[f64], width: usize) -> Vec<f64> {
+    let sums = x.iter().scan(0.0, |sum, x| {
+        *sum += x;
+        Some(*sum)
+    });
+    let sums: Vec<f64> = std::iter::once(0.0).chain(sums).collect();
+    (width..sums.len()).map(|end| (sums[end] - sums[end - width]) / width as f64).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::recording::fresh;
+    use crate::model::bench::nominal::COARSEST;
+    use std::f64::consts::TAU;
+
+    /// 300 s of a rigid body of 0.4 kg·m² under a sweep.
+    fn rigid() -> Recording {
+        let time: Vec<f64> = (0..15_000).map(|k| 0.02 * f64::from(k)).collect();
+        let phase = |t: f64| TAU * (1.0 + t / 300.0) * t;
+        let f = |t: f64| TAU * (1.0 + t / 150.0);
+        let torque = time.iter().map(|&t| 0.1 * phase(t).sin()).collect();
+        let rate = time.iter().map(|&t| -0.1 / 0.4 / f(t) * phase(t).cos()).collect();
+        Recording { from_rest: false, ..Recording::of("a.csv", time, torque, rate) }
+    }
+
+    fn refusal(change: impl Fn(&mut Recording)) -> String {
+        let mut bad = rigid();
+        change(&mut bad);
+        format!("{:#}", prepare(bad, COARSEST, &mut |_| {}).unwrap_err())
+    }
+
+    #[test]
+    fn a_sound_recording_passes() {
+        assert_eq!(prepare(rigid(), COARSEST, &mut |_| {}).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn each_fault_has_a_sentence_of_its_own() {
+        type Change = fn(&mut Recording);
+        let faults: [(Change, &str); 8] = [
+            (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N·m)"),
+            (|r| *r = r.rows(0, 500), "9.98 s of data are too few"),
+            (|r| std::mem::swap(&mut r.torque, &mut r.rate), "swapped"),
+            (|r| r.rate.iter_mut().for_each(|w| *w = -*w), "wrong sign"),
+            (|r| r.time.iter_mut().for_each(|t| *t *= 1e3), "Is time in milliseconds?"),
+            (
+                |r| {
+                    let mut random = analysis::random::Random::new(3, 0);
+                    r.rate.iter_mut().for_each(|w| *w = 1e-3 + 6e-4 * random.normal());
+                },
+                "the hub does not turn: omega is noise of 6",
+            ),
+            (|r| r.time[7] = r.time[6], "row 8: time must grow"),
+            (|r| r.time.iter_mut().for_each(|t| *t *= 1e-9), "Time must be in seconds"),
+        ];
+        for (change, word) in faults {
+            let error = refusal(change);
+            assert!(error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn running_means_are_those_of_every_stretch() {
+        let x: Vec<f64> = (0..50).map(|k| f64::from(k * k % 17)).collect();
+        for width in [1, 3, 50] {
+            let expected: Vec<f64> = x.windows(width).map(mean).collect();
+            let found = running_mean(&x, width);
+            assert_eq!(found.len(), expected.len());
+            // sums of 50 whole numbers are exact
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{width}");
+        }
+    }
+
+    /// The rows of a recording without those between some.
+    fn without(all: &Recording, lost: &[std::ops::Range<usize>]) -> Recording {
+        let mut parts: Vec<Recording> = Vec::new();
+        let mut from = 0;
+        let end = all.time.len()..all.time.len();
+        for range in lost.iter().cloned().chain(std::iter::once(end)) {
+            parts.push(all.rows(from, range.start));
+            from = range.end;
+        }
+        let column = |of: fn(&Recording) -> &Vec<f64>| parts.iter().flat_map(of).copied().collect();
+        Recording {
+            from_rest: false,
+            ..Recording::of(
+                "a.csv",
+                column(|r| &r.time),
+                column(|r| &r.torque),
+                column(|r| &r.rate),
+            )
+        }
+    }
+
+    #[test]
+    fn lost_rows_of_a_sweep_are_filled_and_those_of_noise_cut_the_recording() {
+        let mut random = analysis::random::Random::new(1, 0);
+        let noise: Vec<f64> = (0..15_000).map(|_| 4e-4 * random.normal()).collect();
+        let noisy = |mut recording: Recording| {
+            recording.rate.iter_mut().zip(&noise).for_each(|(w, n)| *w += n);
+            recording
+        };
+        let lost = [3_000..3_010, 7_000..7_050];
+        let mut said = Vec::new();
+        let sweep = noisy(rigid());
+        let parts = prepare(without(&sweep, &lost), COARSEST, &mut |line| said.push(line)).unwrap();
+        assert_eq!(parts.len(), 1, "{said:?}");
+        let (found, fresh) = (&parts[0], parts[0].fresh.as_ref().unwrap());
+        assert_eq!((found.time.len(), fresh.iter().filter(|f| **f).count()), (15_000, 14_935));
+        let off = found.torque.iter().zip(&sweep.torque).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 2e-4, "{said:?}");
+        assert!(
+            said[0].contains("60 samples of tau_cmd are missing in 2 gaps of up to 1.02 s"),
+            "{said:?}"
+        );
+        // a torque that nothing foretells
+        let mut jumps = sweep.clone();
+        jumps.torque.iter_mut().for_each(|t| *t += 0.05 * random.normal());
+        said.clear();
+        let parts = prepare(without(&jumps, &lost), COARSEST, &mut |line| said.push(line)).unwrap();
+        assert_eq!(parts.iter().map(|p| p.time.len()).collect::<Vec<_>>(), [3_000, 3_990, 7_950]);
+        assert!(
+            said[0].contains("tau_cmd is missing for 0.22 s and cannot be foretold"),
+            "{said:?}"
+        );
+        assert!(!parts[1].from_rest);
+    }
+
+    /// Empty cells of a slow gyro: the rows drive the model all the same, at every torque.
+    #[test]
+    fn rows_without_a_sensor_keep_their_torque() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.csv");
+        let mut text = String::from("time,tau_cmd,omega,theta\n");
+        let all = rigid();
+        for k in 0..15_000 {
+            let rate = if k % 5 == 2 { all.rate[k].to_string() } else { String::new() };
+            let angle = if k % 2 == 0 { "0.1" } else { "" };
+            text += &format!("{},{},{rate},{angle}\n", all.time[k], all.torque[k]);
+        }
+        std::fs::write(&path, text).unwrap();
+        let source = Source { columns: Columns::default(), trim: None };
+        let mut said = Vec::new();
+        let parts = read(&path, &source, COARSEST, &mut |line| said.push(line)).unwrap();
+        assert_eq!((parts.len(), parts[0].torque.len()), (1, 15_000), "{said:?}");
+        assert_eq!(parts[0].torque, all.torque);
+        let (rate, angle) =
+            (parts[0].fresh.as_ref().unwrap(), parts[0].angle_fresh.as_ref().unwrap());
+        let count = |mask: &[bool]| mask.iter().filter(|new| **new).count();
+        // less those of the first 0.1 s, for it begins in motion
+        assert_eq!((count(rate), count(angle)), (2_999, 7_497));
+        assert!(
+            said.iter().any(|line| line
+                .contains("omega has a value in 3000 of 15000 rows, 0.1000 s apart mostly")),
+            "{said:?}"
+        );
+    }
+
+    #[test]
+    fn a_gyro_slower_than_the_rows_is_seen_by_its_repeats() {
+        let mut random = analysis::random::Random::new(1, 0);
+        let mut noisy = rigid();
+        noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
+        assert!(fresh(&noisy.rate).is_none());
+        // every third row new, from row 2 on
+        let held: Vec<f64> =
+            (0..noisy.rate.len()).map(|k| noisy.rate[((k + 1) / 3 * 3).min(14_999)]).collect();
+        let found = fresh(&held).unwrap();
+        assert_eq!(found.iter().filter(|new| **new).count(), held.len() / 3);
+        assert!(found[2] && !found[3] && !found[4]);
+        // a coarse gyro repeats itself by chance
+        let coarse: Vec<f64> = noisy.rate.iter().map(|w| (w / 1e-3).round() * 1e-3).collect();
+        assert!(fresh(&coarse).is_none());
+        // one with a clock of its own
+        let other: Vec<f64> =
+            (0..noisy.rate.len()).map(|k| noisy.rate[(k as f64 / 1.37) as usize]).collect();
+        let new = fresh(&other).unwrap().iter().filter(|new| **new).count();
+        assert!((new as f64 * 1.37 / other.len() as f64 - 1.0).abs() < 0.01, "{new}");
+    }
+}

@@ -1,0 +1,124 @@
+//! Recordings of any FMU's inputs and outputs.
+
+use std::path::Path;
+
+use analysis::statistics::{deviation, noise_level, peak};
+use anyhow::{Context, Result, ensure};
+use host::description::ModelDescription;
+use signals::recording::{self, Between, Columns, Signal, Wanted};
+
+use crate::input::question::Question;
+use crate::input::recording::{check_times, check_values};
+
+/// Values of an output below which nothing is estimated from them.
+const FEWEST: usize = 10;
+
+/// One recording, in the FMU's units.
+#[derive(Clone, Debug, Default)]
+pub struct Record {
+    /// The file's name.
+    pub name: String,
+    /// s, growing.
+    pub time: Vec<f64>,
+    /// Each input at the rows.
+    pub inputs: Vec<Vec<f64>>,
+    /// Each output at the rows; NaN where it was not read.
+    pub outputs: Vec<Vec<f64>>,
+}
+
+impl Record {
+    /// Reads one.
+    ///
+    /// # Errors
+    /// If the file cannot be read so.
+    pub fn read(
+        path: &Path,
+        question: &Question,
+        description: &ModelDescription,
+        columns: &Columns,
+        done: &mut dyn FnMut(String),
+    ) -> Result<Self> {
+        let mut signals = Vec::new();
+        let kinds = [(&question.outputs, true), (&question.inputs, false)];
+        let all = question.outputs.iter().chain(&question.inputs);
+        let units = all.map(|name| question.unit(name, description));
+        let units = units.collect::<Result<Vec<String>>>()?;
+        let mut unit = units.iter();
+        for (names, is_output) in kinds {
+            for name in names {
+                let held = question.held.contains(name);
+                let between = match (is_output, held) {
+                    (true, _) => Between::Missing,
+                    (false, true) => Between::Held,
+                    (false, false) => Between::Line,
+                };
+                let unit = unit.next().map(String::as_str);
+                signals.push(Signal { name, required: true, between, unit });
+            }
+        }
+        let table = recording::read(path, &Wanted { signals: &signals, columns }, done)?;
+        let column = |name: &str| table.column(name).unwrap_or_default().to_vec();
+        let record = Record {
+            name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            time: column("time"),
+            inputs: question.inputs.iter().map(|name| column(name)).collect(),
+            outputs: question.outputs.iter().map(|name| column(name)).collect(),
+        };
+        record.check(question).with_context(|| format!("{} cannot be used", path.display()))?;
+        Ok(record)
+    }
+
+    /// Refuses what cannot be fitted.
+    pub fn check(&self, question: &Question) -> Result<()> {
+        for (name, values) in question.outputs.iter().zip(&self.outputs) {
+            let count = values.iter().filter(|y| !y.is_nan()).count();
+            ensure!(count >= FEWEST, "{name} has {count} values (allowed: at least {FEWEST})");
+        }
+        if self.time.len() > 1 {
+            check_times(&self.time)?;
+        }
+        for (name, values) in question.inputs.iter().zip(&self.inputs) {
+            check_values(name, values.iter().copied())?;
+        }
+        for (name, values) in question.outputs.iter().zip(&self.outputs) {
+            // NaN: not read
+            check_values(name, values.iter().map(|y| if y.is_nan() { 0.0 } else { *y }))?;
+        }
+        Ok(())
+    }
+
+    /// Rows that have a value of an output.
+    pub fn sampled(&self, output: usize) -> Vec<bool> {
+        self.outputs[output].iter().map(|y| !y.is_nan()).collect()
+    }
+
+    fn values(&self, output: usize) -> Vec<f64> {
+        self.outputs[output].iter().copied().filter(|y| !y.is_nan()).collect()
+    }
+
+    /// Standard deviation of an output's values, or what they are where they are all the same.
+    pub fn spread(&self, output: usize) -> f64 {
+        let values = self.values(output);
+        let spread = deviation(&values);
+        if spread > 0.0 { spread } else { peak(&values).max(1.0) }
+    }
+
+    /// The noise that an output shows from row to row.
+    pub fn noise(&self, output: usize) -> f64 {
+        noise_level(&self.values(output))
+    }
+
+    /// Returns the first rows, as many as this part of its time has.
+    pub fn beginning(&self, part: f64) -> Record {
+        let (first, last) = (self.time[0], self.time[self.time.len() - 1]);
+        let end = first + part * (last - first);
+        let rows = self.time.partition_point(|t| *t <= end).max(2);
+        let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[..rows].to_vec()).collect();
+        Record {
+            name: self.name.clone(),
+            time: self.time[..rows].to_vec(),
+            inputs: cut(&self.inputs),
+            outputs: cut(&self.outputs),
+        }
+    }
+}

@@ -1,0 +1,370 @@
+//! A recording of a bench: torque command and hub rate against time, in SI units.
+//!
+//! It is not resampled: the FMU is stepped to the very instants of the rows. Each signal has its own clock: a row without a value of
+//! a sensor is not fitted to it, and drives the FMU all the same ([`crate::input::clocks`]). [`crate::input::reading`] reads files.
+
+use std::borrow::Cow;
+
+use analysis::statistics::{about_mean, noise_level};
+use anyhow::{Context, Result, bail, ensure};
+use files::budget;
+
+use crate::input::clocks::completed;
+
+/// Shortest recording, s: in it, of slosh at 2.4 Hz, some fifty periods.
+pub const SHORTEST: f64 = 20.0;
+
+/// A recording that is long for its slosh, s. A bare tank's slosh decays within some 23 s (1/(ζω) of the
+/// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
+/// damping and mass, and its intervals are as wide as that.
+pub const LONG: f64 = 120.0;
+
+/// Part of the rows up to which a gyro with new values in them is slower than the recording.
+const SLOW: f64 = 0.75;
+
+/// One uninterrupted recording.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Source of the recording.
+    pub name: String,
+    /// Times of the rows, s, growing.
+    pub time: Vec<f64>,
+    /// Torque command, N·m.
+    pub torque: Vec<f64>,
+    /// Hub rate as measured, rad/s.
+    pub rate: Vec<f64>,
+    /// Hub angle of an encoder, rad, if there is one. It is fitted together with the rate.
+    pub angle: Option<Vec<f64>>,
+    /// Specific force along the tank's axis, m/s², if it was recorded: an input like the torque.
+    pub gravity: Option<Vec<f64>>,
+    /// Speed of the reaction wheel, rad/s: what the torque really was.
+    pub wheel_speed: Option<Vec<f64>>,
+    /// Rates about the hub's x and y axes, rad/s: what the model leaves out.
+    pub off_axis: [Option<Vec<f64>>; 2],
+    /// True if the recording begins at rest; otherwise the initial state is unknown.
+    pub from_rest: bool,
+    /// Rows with a new value of the gyro that belongs to its motion; the others are not fitted. `None`: all.
+    pub fresh: Option<Vec<bool>>,
+    /// The same of the encoder.
+    pub angle_fresh: Option<Vec<bool>>,
+    /// Rows with a value of the torque; in the others it lies between those. `None`: all.
+    pub commanded: Option<Vec<bool>>,
+}
+
+/// A row among those that are filled in.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// s.
+    pub time: f64,
+    /// The row of the recording that it is.
+    pub own: Option<usize>,
+    /// A torque that is filled in, N·m.
+    pub filled: Option<f64>,
+}
+
+/// The values of the rows that a mask has.
+pub(crate) fn masked(values: &[f64], mask: Option<&[bool]>) -> Vec<f64> {
+    match mask {
+        None => values.to_vec(),
+        Some(mask) => values.iter().zip(mask).filter(|(_, new)| **new).map(|(v, _)| *v).collect(),
+    }
+}
+
+/// Takes a row out of a mask.
+pub(crate) fn take_out(mask: &mut Option<Vec<bool>>, row: usize, rows: usize) {
+    mask.get_or_insert_with(|| vec![true; rows])[row] = false;
+}
+
+impl Recording {
+    /// Length, s.
+    pub fn duration(&self) -> f64 {
+        self.time[self.time.len() - 1] - self.time[0]
+    }
+
+    /// Mean time between rows, s.
+    pub fn step(&self) -> f64 {
+        self.duration() / (self.time.len() - 1) as f64
+    }
+
+    /// The rows `from..to`.
+    pub(crate) fn rows(&self, from: usize, to: usize) -> Recording {
+        Recording {
+            name: self.name.clone(),
+            time: self.time[from..to].to_vec(),
+            torque: self.torque[from..to].to_vec(),
+            rate: self.rate[from..to].to_vec(),
+            angle: self.angle.as_ref().map(|x| x[from..to].to_vec()),
+            gravity: self.gravity.as_ref().map(|x| x[from..to].to_vec()),
+            wheel_speed: self.wheel_speed.as_ref().map(|x| x[from..to].to_vec()),
+            off_axis: self.off_axis.clone().map(|axis| axis.map(|x| x[from..to].to_vec())),
+            from_rest: false,
+            fresh: self.fresh.as_ref().map(|x| x[from..to].to_vec()),
+            angle_fresh: self.angle_fresh.as_ref().map(|x| x[from..to].to_vec()),
+            commanded: self.commanded.as_ref().map(|x| x[from..to].to_vec()),
+        }
+    }
+
+    /// Rows with a value of the torque.
+    pub fn commands(&self) -> Vec<usize> {
+        let commanded = self.commanded.as_deref();
+        (0..self.time.len()).filter(|k| commanded.is_none_or(|rows| rows[*k])).collect()
+    }
+
+    /// Usual time between values of the torque, s.
+    pub fn torque_step(&self) -> f64 {
+        match &self.commanded {
+            None => self.step(),
+            Some(commanded) => {
+                let time = masked(&self.time, Some(commanded));
+                (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
+            }
+        }
+    }
+
+    /// The recording on other rows.
+    pub fn with_rows(&self, rows: &[Row]) -> Recording {
+        let time: Vec<f64> = rows.iter().map(|row| row.time).collect();
+        let of = |values: &[f64], mask: Option<&[bool]>| {
+            let value = |row: &Row| {
+                let own = row.own.filter(|k| mask.is_none_or(|mask| mask[*k]));
+                own.map_or(f64::NAN, |k| values[k])
+            };
+            completed(&time, rows.iter().map(value).collect())
+        };
+        let torque: Vec<f64> = {
+            let (own, _) = of(&self.torque, self.commanded.as_deref());
+            rows.iter().zip(own).map(|(row, own)| row.filled.unwrap_or(own)).collect()
+        };
+        let commanded = |row: &Row| {
+            let own = row.own.filter(|k| self.commanded.as_ref().is_none_or(|c| c[*k]));
+            row.filled.is_some() || own.is_some()
+        };
+        let commanded: Vec<bool> = rows.iter().map(commanded).collect();
+        let (rate, fresh) = of(&self.rate, self.fresh.as_deref());
+        let angle = self.angle.as_ref().map(|angle| of(angle, self.angle_fresh.as_deref()));
+        let (angle, angle_fresh) = angle.map_or((None, None), |(angle, mask)| (Some(angle), mask));
+        let plain = |values: &Option<Vec<f64>>| values.as_ref().map(|x| of(x, None).0);
+        Recording {
+            name: self.name.clone(),
+            torque,
+            rate,
+            angle,
+            gravity: plain(&self.gravity),
+            wheel_speed: plain(&self.wheel_speed),
+            off_axis: [plain(&self.off_axis[0]), plain(&self.off_axis[1])],
+            from_rest: self.from_rest,
+            fresh,
+            angle_fresh,
+            commanded: (!commanded.iter().all(|c| *c)).then_some(commanded),
+            time,
+        }
+    }
+
+    /// Values of the rows with a new value of the gyro.
+    pub fn of_fresh(&self, values: &[f64]) -> Vec<f64> {
+        masked(values, self.fresh.as_deref())
+    }
+
+    /// Values of the rows with a value of the encoder.
+    pub fn of_fresh_angle(&self, values: &[f64]) -> Vec<f64> {
+        masked(values, self.angle_fresh.as_deref())
+    }
+
+    /// Standard deviation of the gyro's white noise, rad/s.
+    pub fn rate_noise(&self) -> f64 {
+        noise_level(&self.of_fresh(&self.rate))
+    }
+
+    /// A recording of torque and rate alone.
+    pub fn of(name: &str, time: Vec<f64>, torque: Vec<f64>, rate: Vec<f64>) -> Self {
+        Recording {
+            name: name.into(),
+            time,
+            torque,
+            rate,
+            angle: None,
+            gravity: None,
+            wheel_speed: None,
+            off_axis: [None, None],
+            from_rest: true,
+            fresh: None,
+            angle_fresh: None,
+            commanded: None,
+        }
+    }
+
+    /// Finds the rows in which a gyro that is slower than the recording has a new value; `false`: all have one.
+    pub(crate) fn with_repeats(&mut self) -> bool {
+        let places: Vec<usize> = (0..self.time.len())
+            .filter(|k| self.fresh.as_ref().is_none_or(|fresh| fresh[*k]))
+            .collect();
+        let Some(new) = fresh(&self.of_fresh(&self.rate)) else { return false };
+        let rows = self.time.len();
+        for (k, _) in new.iter().enumerate().filter(|(_, new)| !**new) {
+            take_out(&mut self.fresh, places[k], rows);
+        }
+        true
+    }
+
+    /// The rows from one time to another, s.
+    pub fn between(&self, from: f64, to: f64) -> Recording {
+        let first = self.time.partition_point(|t| *t < from);
+        let last = self.time.partition_point(|t| *t <= to);
+        self.rows(first, last.max(first))
+    }
+
+    /// The first part, `fraction` of the rows.
+    pub fn beginning(&self, fraction: f64) -> Recording {
+        let rows = ((self.time.len() as f64 * fraction) as usize).max(2);
+        let part = self.rows(0, rows.min(self.time.len()));
+        Recording { from_rest: self.from_rest, ..part }
+    }
+
+    /// The part of `seconds` in which the hub moves most, after `run_in` more in which the model forgets how it began; those rows are not
+    /// fitted. `None` where that is not a small part, where the beginning counts (it is not at rest), or an encoder's angle does.
+    pub fn loudest(&self, seconds: f64, run_in: f64) -> Option<Recording> {
+        if self.duration() < 2.0 * (seconds + run_in) || !self.from_rest || self.angle.is_some() {
+            return None;
+        }
+        let rows = |time: f64| (time / self.step()) as usize;
+        let (run_in, length) = (rows(run_in), rows(seconds));
+        // about the mean: a gyro's bias is not motion
+        let moving = about_mean(&self.rate);
+        let power =
+            |from: usize| moving[from..from + length].iter().map(|rate| rate * rate).sum::<f64>();
+        let starts = (0..self.time.len() - length).step_by((length / 20).max(1));
+        let from = starts.max_by(|a, b| power(*a).total_cmp(&power(*b)))?;
+        let first = from.saturating_sub(run_in);
+        let part = self.rows(first, from + length);
+        let fresh = (0..part.time.len())
+            .map(|row| first + row >= from && part.fresh.as_ref().is_none_or(|fresh| fresh[row]));
+        Some(Recording { fresh: Some(fresh.collect()), from_rest: true, ..part })
+    }
+
+    /// Returns the usual step from row to row, s.
+    ///
+    /// # Errors
+    /// If times or values are out of range.
+    pub fn check(&self) -> Result<f64> {
+        let of_file = || format!("{} cannot be used", self.name);
+        ensure!(self.time.len() > 2, "{}: {} rows are too few", self.name, self.time.len());
+        let step = check_times(&self.time).with_context(of_file)?;
+        let signals = [
+            ("tau_cmd", Some(&self.torque)),
+            ("omega", Some(&self.rate)),
+            ("theta", self.angle.as_ref()),
+            ("g_axial", self.gravity.as_ref()),
+            ("wheel_speed", self.wheel_speed.as_ref()),
+            ("omega_x", self.off_axis[0].as_ref()),
+            ("omega_y", self.off_axis[1].as_ref()),
+        ];
+        for (name, signal) in signals {
+            check_values(name, signal.into_iter().flatten().copied()).with_context(of_file)?;
+        }
+        Ok(step)
+    }
+
+    /// Torque and rate on an even grid of the mean step, joined by lines: for spectra alone.
+    ///
+    /// # Errors
+    /// If times or values are out of range.
+    pub fn even(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {
+        let own = self.of_gyro();
+        own.even_rows()
+    }
+
+    /// The rows of a gyro that is slower than the recording; else all.
+    pub fn of_gyro(&self) -> Cow<'_, Recording> {
+        let rows: Vec<usize> =
+            (0..self.time.len()).filter(|k| self.fresh.as_ref().is_none_or(|f| f[*k])).collect();
+        if rows.len() as f64 > SLOW * self.time.len() as f64 || rows.len() < 3 {
+            return Cow::Borrowed(self);
+        }
+        let of = |values: &Vec<f64>| rows.iter().map(|k| values[*k]).collect::<Vec<f64>>();
+        Cow::Owned(Recording {
+            angle: self.angle.as_ref().map(of),
+            gravity: self.gravity.as_ref().map(of),
+            wheel_speed: self.wheel_speed.as_ref().map(of),
+            off_axis: [0, 1].map(|axis| self.off_axis[axis].as_ref().map(of)),
+            from_rest: self.from_rest,
+            ..Recording::of(&self.name, of(&self.time), of(&self.torque), of(&self.rate))
+        })
+    }
+
+    pub(crate) fn even_rows(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {
+        self.check()?;
+        let step = self.step();
+        let mut row = 0;
+        let (mut torque, mut rate) = (Vec::new(), Vec::new());
+        for k in 0..self.time.len() {
+            let t = self.time[0] + k as f64 * step;
+            while row + 2 < self.time.len() && self.time[row + 1] < t {
+                row += 1;
+            }
+            let part = (t - self.time[row]) / (self.time[row + 1] - self.time[row]);
+            let at = |x: &[f64]| x[row] + part.clamp(0.0, 1.0) * (x[row + 1] - x[row]);
+            torque.push(at(&self.torque));
+            rate.push(at(&self.rate));
+        }
+        Ok((step, torque, rate))
+    }
+}
+
+/// Largest value of a signal: the squares of all rows have a finite sum.
+const LARGEST: f64 = 1e100;
+
+/// Fails unless times are finite and grow, and their span is a reasonable number of the usual steps. Returns that step, s.
+pub fn check_times(time: &[f64]) -> Result<f64> {
+    ensure!(time.len() > 1, "there are {} rows (allowed: at least 2)", time.len());
+    if let Some(row) = time.iter().position(|t| !t.is_finite()) {
+        bail!("row {}: time is {}", row + 1, time[row]);
+    }
+    if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        bail!("row {}: time must grow, but {} s follows {} s", row + 2, time[row + 1], time[row]);
+    }
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = (steps.len() - 1) / 2;
+    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    budget::steps(time[time.len() - 1] - time[0], step).context("times of the rows")?;
+    Ok(step)
+}
+
+/// Fails if a value is not a number within ±[`LARGEST`].
+pub fn check_values(name: &str, values: impl Iterator<Item = f64>) -> Result<()> {
+    for (row, value) in values.enumerate() {
+        ensure!(
+            value.abs() <= LARGEST,
+            "row {}: {name} is {value:e} (allowed: up to {LARGEST:e})",
+            row + 1
+        );
+    }
+    Ok(())
+}
+
+/// Part of the changes of a held gyro that fall on the rows of its own clock.
+const ON_CLOCK: f64 = 0.98;
+/// Slowest gyro that is looked for, in rows a value.
+const SLOWEST: usize = 100;
+
+/// Returns the rows with a new value if most rows only repeat the one before, as with a gyro that is slower than the recording. A
+/// coarse gyro may repeat values by chance, so the changes must come every n-th row. If the gyro is fine (two values are seldom
+/// equal), every repeat counts.
+pub(crate) fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
+    let changes: Vec<usize> = (1..rate.len()).filter(|&k| rate[k] != rate[k - 1]).collect();
+    if changes.len() < 10 || changes.len() > 9 * rate.len() / 10 {
+        return None;
+    }
+    for n in (2..=SLOWEST.min(rate.len() / 10)).rev() {
+        let mut hits = vec![0; n];
+        changes.iter().for_each(|k| hits[k % n] += 1);
+        let (phase, most) = hits.iter().enumerate().max_by_key(|(_, count)| **count)?;
+        if *most as f64 > ON_CLOCK * changes.len() as f64 {
+            return Some((0..rate.len()).map(|k| k % n == phase).collect());
+        }
+    }
+    let mut values: Vec<f64> = changes.iter().map(|&k| rate[k]).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    let fine = values.len() > 9 * changes.len() / 10;
+    fine.then(|| (0..rate.len()).map(|k| k == 0 || rate[k] != rate[k - 1]).collect())
+}

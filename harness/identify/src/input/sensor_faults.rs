@@ -1,0 +1,328 @@
+//! Values of a sensor that are not its motion: repeated by the logger, clipped at the end of the range, frozen. They are named and
+//! not fitted.
+
+use analysis::statistics::{mean, median, noise_level, peak};
+
+use crate::input::spikes;
+
+/// Fewest values at an end of the range that are clipped, and how many times as many they are as equal values just inside it.
+const CLIPPED: (usize, f64) = (20, 4.0);
+/// Width of that inside, in units of the noise.
+const INSIDE: f64 = 3.0;
+/// Step, in units of the noise, that a value takes when it comes back from being clipped or frozen.
+const LEAVES: f64 = 5.0;
+/// The same in units of the sensor's resolution, where it is at both ends.
+const STEPS: f64 = 2.0;
+/// First step of an angle that leaves its rest over the second, at most: it starts with zero rate, and its acceleration does not fall.
+const FROM_REST: f64 = 1.0 / 3.0;
+/// Probability that a run of equal values is chance.
+const CHANCE: f64 = 1e-6;
+/// Fewest values in a frozen run.
+const SHORTEST_RUN: usize = 5;
+/// Fewest repeats, and how much larger their mean square off the neighbours is than that of other values.
+const REPEATS: (usize, f64) = (10, 3.0);
+/// Part of the largest value that rounding may make.
+const ROUNDING: f64 = 1e-9;
+
+/// Faults of a sensor.
+#[derive(Debug, Default, PartialEq)]
+pub struct Faults {
+    /// Values that are not to be fitted.
+    pub rows: Vec<usize>,
+    /// Sentences that name them.
+    pub words: Vec<String>,
+}
+
+/// Reading of a sensor while the hub rests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rest {
+    /// A rate: this value, if known.
+    Rate(Option<f64>),
+    /// An angle: any value. It leaves that value with zero rate.
+    Angle,
+}
+
+impl Rest {
+    /// Returns how far the value after row k leaves that of row k like one that was clipped or frozen, not like a hub that rested.
+    fn jump(self, values: &[f64], k: usize) -> Option<f64> {
+        let step = (values.get(k + 1)? - values[k]).abs();
+        match self {
+            Rest::Rate(rest) if rest == Some(values[k]) => None,
+            Rest::Rate(_) => Some(step),
+            Rest::Angle => {
+                let second = values.get(k + 2).map_or(0.0, |next| (next - values[k + 1]).abs());
+                Some(step - FROM_REST * second)
+            }
+        }
+    }
+}
+
+/// Looks for faults in values, of `name`, at growing times, s. The values of a hub that rests are no fault.
+pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
+    let mut found = Faults::default();
+    if values.len() < 100 {
+        return found;
+    }
+    let noise = noise_level(values);
+    let mut out = vec![false; values.len()];
+    let at = |k: usize| format!("{:.2} s", time[k]);
+    let ends = [("upper", 1.0), ("lower", -1.0)];
+    let resolution = resolution(values);
+    let held = ends.map(|(_, sign)| held(values, sign, (noise, resolution)));
+    let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
+    // a hub rests at one end of its rates at most
+    let both = rest != Rest::Angle
+        && jumps.iter().all(|jump| jump.is_some_and(|jump| jump > STEPS * resolution));
+    for (((end, _), rows), jump) in ends.into_iter().zip(held).zip(jumps) {
+        if !both && jump.is_none_or(|jump| jump <= LEAVES * noise) {
+            continue;
+        }
+        if let [first, .., last] = rows[..] {
+            found.words.push(format!(
+                "{name} is clipped: {} values are {:.4e}, the {end} end of its range, between {} and {}; they are not fitted",
+                rows.len(),
+                values[first],
+                at(first),
+                at(last)
+            ));
+        }
+        for k in rows {
+            // close to the limit noise is cut on one side
+            (k.saturating_sub(1)..=(k + 1).min(values.len() - 1)).for_each(|k| out[k] = true);
+        }
+    }
+    let runs = frozen(values, &out, noise, rest);
+    if let Some((first, _)) = runs.first() {
+        let longest = runs.iter().map(|(a, b)| time[*b] - time[*a]).fold(0.0, f64::max);
+        found.words.push(format!(
+            "{name} is frozen {} times for up to {longest:.2} s, first at {}; those values are not fitted",
+            runs.len(),
+            at(*first)
+        ));
+    }
+    runs.iter().for_each(|(first, last)| out[first + 1..=*last].fill(true));
+    let repeats = repeated(time, values, &out, noise, rest);
+    if !repeats.is_empty() {
+        found.words.push(format!(
+            "{} of {} values of {name} only repeat the one before, though it moves; they are not fitted",
+            repeats.len(),
+            values.len()
+        ));
+    }
+    repeats.into_iter().for_each(|k| out[k] = true);
+    found.rows = (0..values.len()).filter(|k| out[*k]).collect();
+    found
+}
+
+/// Rows at an end of the range, if they are many and stand together: the sensor clips there, or the hub rests.
+fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize> {
+    let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
+    let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
+    let beside = |v: &&f64| (end - INSIDE * noise..end).contains(&(sign * **v));
+    // as many as one value of the sensor has of those just inside
+    let share = (resolution / (INSIDE * noise)).min(1.0);
+    let usual = share * values.iter().filter(beside).count() as f64;
+    let is_run = |k: &&usize| {
+        let equal = |j: usize| values.get(j) == Some(&values[**k]);
+        **k > 0 && equal(**k - 1) || equal(**k + 1)
+    };
+    let in_runs = rows.iter().filter(is_run).count();
+    let many = rows.len() >= CLIPPED.0 && rows.len() as f64 > CLIPPED.1 * usual;
+    if many && 2 * in_runs > rows.len() { rows } else { Vec::new() }
+}
+
+/// Median step with which values leave the end of the range that they have in these rows.
+fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
+    let last = rows.iter().filter(|k| values.get(**k + 1) != Some(&values[**k]));
+    let jumps: Vec<f64> = last.filter_map(|k| rest.jump(values, *k)).collect();
+    median(&jumps)
+}
+
+/// Least difference of two values that differ.
+fn resolution(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rounding = ROUNDING * peak(values);
+    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > rounding);
+    steps.fold(f64::INFINITY, f64::min)
+}
+
+/// First and last rows of runs of equal values that chance does not make, that are off the mean and that end in a jump. A hub at
+/// rest reads its gyro's bias, which is near the mean. If a sensor freezes once, one of both is enough for its other runs: a rate
+/// may freeze near its mean, or come back near the frozen value.
+fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
+    let runs = runs(values);
+    let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= SHORTEST_RUN;
+    let mean = mean(values);
+    let repeats: usize = runs.iter().filter(|run| !is_long(run)).map(|(a, b)| b - a).sum();
+    let chance = (repeats + 1) as f64 / values.len() as f64;
+    let least = 1.0 + (CHANCE / values.len() as f64).ln() / chance.ln();
+    let sign = |&(_, b): &(usize, usize)| {
+        let jump = rest.jump(values, b).is_some_and(|jump| jump > LEAVES * noise);
+        (jump, (values[b] - mean).abs() > LEAVES * noise)
+    };
+    let is_no_chance = |run: &&(usize, usize)| {
+        let (a, b) = **run;
+        is_long(run) && (b - a + 1) as f64 >= least && !out[a] && !out[b]
+    };
+    let runs: Vec<(usize, usize)> = runs.iter().filter(is_no_chance).copied().collect();
+    if !runs.iter().any(|run| sign(run) == (true, true)) {
+        return Vec::new();
+    }
+    // an angle at rest is off its mean
+    let is_frozen = |run: &(usize, usize)| {
+        let (jump, moves) = sign(run);
+        jump || moves && rest != Rest::Angle
+    };
+    runs.into_iter().filter(is_frozen).collect()
+}
+
+/// First and last rows of the runs of equal values.
+fn runs(values: &[f64]) -> Vec<(usize, usize)> {
+    let mut runs = Vec::new();
+    let mut first = 0;
+    for k in 1..=values.len() {
+        if values.get(k) != Some(&values[first]) {
+            runs.push((first, k - 1));
+            first = k;
+        }
+    }
+    runs
+}
+
+/// Rows that repeat the value before them, if they do so where it moves. A long run of an angle that ends without a jump is a hub at rest.
+fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<usize> {
+    let moves = |(a, b): &(usize, usize)| {
+        let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > LEAVES * noise);
+        rest != Rest::Angle || b - a + 1 < SHORTEST_RUN || jumps()
+    };
+    let moving = runs(values).into_iter().filter(moves);
+    let repeats: Vec<usize> = moving.flat_map(|(a, b)| a + 1..=b).filter(|k| !out[*k]).collect();
+    if repeats.len() < REPEATS.0 {
+        return Vec::new();
+    }
+    let off = spikes::off_neighbours(time, values);
+    let squares: Vec<f64> = off.iter().map(|e| e * e).collect();
+    // the median of a χ² with one degree of freedom is 0.4549
+    let usual = median(&squares).unwrap_or(0.0) / 0.4549;
+    let usual = usual.max((ROUNDING * peak(values)).powi(2));
+    let of_repeats = repeats.iter().map(|k| squares[*k]).sum::<f64>() / repeats.len() as f64;
+    if of_repeats > REPEATS.1 * usual { repeats } else { Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use analysis::random::Random;
+
+    const LEAST: f64 = 1.5e-4;
+
+    /// 200 s at 50 Hz of a motion of 2 Hz whose amplitude grows, read by a gyro that rounds.
+    fn gyro() -> (Vec<f64>, Vec<f64>) {
+        let mut random = Random::new(5, 0);
+        let time: Vec<f64> = (0..10_000).map(|k| 0.02 * f64::from(k)).collect();
+        let rate = time.iter().map(|t| {
+            let motion = 5e-4 * t * (std::f64::consts::TAU * 2.0 * t).sin();
+            ((motion + 4e-4 * random.normal()) / LEAST).round() * LEAST
+        });
+        let rate = rate.collect();
+        (time, rate)
+    }
+
+    fn words(time: &[f64], values: &[f64]) -> (usize, String) {
+        let found = find("omega", time, values, Rest::Rate(None));
+        (found.rows.len(), found.words.join("\n"))
+    }
+
+    #[test]
+    fn a_sound_gyro_has_no_faults() {
+        let (time, mut rate) = gyro();
+        assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
+        // a hub that rests for 20 s under a gyro that is coarser than its noise
+        rate[..1000].fill(3e-4);
+        assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
+        // a coarse gyro
+        rate.iter_mut().for_each(|w| *w = (*w / 5e-3).round() * 5e-3);
+        assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
+    }
+
+    #[test]
+    fn a_hub_at_rest_is_no_fault() {
+        // at rest, half a turn in 10 s, at rest, back under constant acceleration to another rest, and on
+        let course = |t: f64| match t {
+            _ if t < 20.0 => 0.0,
+            _ if t < 30.0 => 0.016 * (t - 20.0).powi(2),
+            _ if t < 40.0 => 3.2 - 0.016 * (40.0 - t).powi(2),
+            _ if t < 60.0 => 3.2,
+            _ if t < 80.0 => 3.2 - 0.005 * (t - 60.0).powi(2),
+            _ => 1.2 - 0.005 * (100.0 - t).powi(2),
+        };
+        // the torque acts between two rows
+        let time: Vec<f64> = (0..5000).map(|k| 0.02 * f64::from(k) + 0.007).collect();
+        for step in [1e-12, 1.7e-6] {
+            let angle: Vec<f64> = time.iter().map(|t| (course(*t) / step).round() * step).collect();
+            assert_eq!(find("theta", &time, &angle, Rest::Angle), Faults::default(), "{step}");
+            let clipped: Vec<f64> = angle.iter().map(|a| a.min(2.0)).collect();
+            let said = find("theta", &time, &clipped, Rest::Angle).words;
+            assert!(said.len() == 1 && said[0].contains("theta is clipped"), "{step}: {said:?}");
+        }
+        // a rate without noise that is least while the hub rests
+        let pushed =
+            |t: f64| 0.05 * (t - 20.0).clamp(0.0, 5.0) - 0.02 * (t - 25.0).clamp(0.0, 12.5);
+        let rate: Vec<f64> = time.iter().map(|t| 0.002 + pushed(*t % 50.0)).collect();
+        let is_clipped = |rest: Option<f64>| {
+            let found = find("omega", &time, &rate, Rest::Rate(rest));
+            found.words.iter().any(|line| line.contains("clipped"))
+        };
+        assert!(!is_clipped(Some(rate[0])));
+    }
+
+    #[test]
+    fn each_fault_is_named() {
+        let (time, rate) = gyro();
+        let clipped: Vec<f64> = rate.iter().map(|w| w.clamp(-0.06, 0.06)).collect();
+        let (rows, said) = words(&time, &clipped);
+        assert!(said.contains("omega is clipped") && said.contains("the upper end"), "{said}");
+        // 42 % of the rows from 120 s on, and a neighbour on each side of 320 runs
+        assert!((2250..2450).contains(&rows), "{rows}");
+        // at 100 Hz a gyro comes back from both ends by less than five standard deviations of its noise
+        let half: Vec<f64> = clipped.iter().map(|w| 0.2 * w.clamp(-0.04, 0.04)).collect();
+        let mut random = Random::new(6, 0);
+        let slow = |k: usize| (half[k / 2] + half[k.div_ceil(2)]) / 2.0 + 4e-4 * random.normal();
+        let slow: Vec<f64> = (0..19_998)
+            .map(slow)
+            .map(|w| (w / LEAST).round() * LEAST)
+            .map(|w| w.clamp(-0.006, 0.006))
+            .collect();
+        let time_100: Vec<f64> = (0..19_998).map(|k| 0.01 * f64::from(k)).collect();
+        let (_, said) = words(&time_100, &slow);
+        assert!(said.contains("the upper end") && said.contains("the lower end"), "{said}");
+        let mut frozen = rate.clone();
+        for from in [5003, 7003] {
+            let value = frozen[from];
+            frozen[from..from + 30].fill(value);
+        }
+        let (rows, said) = words(&time, &frozen);
+        assert!(
+            said.contains("omega is frozen 2 times for up to 0.58 s, first at 100.06 s"),
+            "{said}"
+        );
+        assert_eq!(rows, 58);
+        // another time near the mean, and a last time for a cycle, after which it comes back near the frozen value
+        let is_near_mean = |k: &usize| rate[*k].abs() < 1e-3 && rate[*k + 30].abs() > 0.01;
+        let is_met = |k: &usize| (rate[*k] - rate[*k + 25]).abs() < 1e-3 && rate[*k].abs() > 0.01;
+        let near_mean = (4000..4900).find(is_near_mean).unwrap();
+        let met = (8000..9000).find(is_met).unwrap();
+        for (from, rows) in [(near_mean, 30), (met, 25)] {
+            let value = frozen[from];
+            frozen[from..from + rows].fill(value);
+        }
+        let (rows, said) = words(&time, &frozen);
+        assert!(said.contains("omega is frozen 4 times"), "{said}");
+        assert_eq!(rows, 58 + 29 + 24);
+        let mut repeats = rate.clone();
+        (1..500).for_each(|k| repeats[20 * k] = repeats[20 * k - 1]);
+        let (rows, said) = words(&time, &repeats);
+        assert!(said.contains("only repeat the one before") && rows > 499, "{rows} {said}");
+    }
+}

@@ -1,0 +1,291 @@
+//! Single values of the gyro that belong to no motion: transmission errors, bits that fell over.
+//!
+//! A value is held against the cubic through its two neighbours on either side, at even rows
+//!
+//! ```text
+//! r_k = y_k − (−y_{k−2} + 4 y_{k−1} + 4 y_{k+1} − y_{k+2})/6
+//! ```
+//!
+//! White noise σ makes √(1 + 34/36) σ = 1.39 σ of it, a motion of a few hertz next to nothing, a step of the torque a kink.
+//! At uneven rows r is scaled to the same noise. The limit follows the values around: a resonance that is sampled slowly is in
+//! all of them.
+//! The largest is taken out first, for a spike spoils the cubic of its neighbours. The rows are left out of the fit, which is
+//! Hampel's loss with its three bends in one place: far out a value has no weight at all.
+
+use std::collections::{BTreeMap, BinaryHeap};
+
+use analysis::statistics::{median, noise_level, peak};
+
+use crate::input::clocks::weights;
+
+/// Deviations of r beyond which a value is a spike; of 135,000 rows of noise none is in 10¹⁴ recordings.
+const BEYOND: f64 = 10.0;
+/// Spikes at most, of all values: more are noise of another kind, which no row should be left out for.
+const FEW: f64 = 0.01;
+/// σ of r over that of white noise.
+const GAIN: f64 = 1.394;
+/// Rows on either side of a step of the torque in which r may be the hub's own motion.
+const NEAR_STEP: usize = 3;
+/// Part of the torque's peak that is a step from one row to the next.
+const STEP: f64 = 0.5;
+
+/// Rows on either side whose median is what is usual around a row.
+const AROUND: usize = 50;
+
+/// Returns the differences of values at growing times from the cubics through their neighbours, scaled to the noise of even rows.
+/// The differences are 0 at the ends.
+pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
+    let sound = Sound { rows: y.len(), out: BTreeMap::new() };
+    let inner = 2..y.len().saturating_sub(2);
+    (0..y.len())
+        .map(|k| if inner.contains(&k) { off((time, y), &sound, k).0 } else { 0.0 })
+        .collect()
+}
+
+/// Rows of a rate whose value is a spike, growing, each with the cubic's rate; of `fresh` rows alone where given.
+/// Empty where there are none, or more than can be called so.
+pub fn find(
+    time: &[f64],
+    rate: &[f64],
+    torque: &[f64],
+    fresh: Option<&[bool]>,
+) -> Vec<(usize, f64)> {
+    let rows: Vec<usize> = (0..rate.len()).filter(|&k| fresh.is_none_or(|f| f[k])).collect();
+    let (t, y): (Vec<f64>, Vec<f64>) = rows.iter().map(|&k| (time[k], rate[k])).unzip();
+    if y.len() < 100 {
+        return Vec::new();
+    }
+    let mut sound = Sound { rows: y.len(), out: BTreeMap::new() };
+    let residuals: Vec<f64> =
+        off_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
+    // the median of |r| is 0.6745 σ for noise, and more where friction's kinks are in many rows
+    let typical = |residuals: &[f64]| median(residuals).map_or(0.0, |m| m / 0.6745);
+    let around: Vec<f64> = residuals.chunks(AROUND).map(typical).collect();
+    let usual = typical(&residuals).max(GAIN * noise_level(&y));
+    let limit = |k: usize| {
+        let chunk = (k.max(2) - 2) / AROUND;
+        let near = chunk.saturating_sub(1)..(chunk + 2).min(around.len());
+        BEYOND * around[near].iter().copied().fold(usual, f64::max)
+    };
+    let step = STEP * peak(torque);
+    let suspects: Vec<usize> = (2..y.len() - 2)
+        .filter(|&k| residuals[k - 2] > limit(k) && !near_step(torque, rows[k], step))
+        .collect();
+    let most = (FEW * y.len() as f64) as usize;
+    // a spike is in the cubics of four neighbours
+    if suspects.len() > 5 * most {
+        return Vec::new();
+    }
+    // by |r| and row; the bits of numbers that are not negative sort as the numbers do. An entry is out of date if the
+    // row's |r| has changed since.
+    let mut by_size: BinaryHeap<(u64, usize)> =
+        suspects.iter().map(|&k| (residuals[k - 2].to_bits(), k)).collect();
+    let mut taken: Vec<usize> = Vec::new();
+    while let Some((bits, k)) = by_size.pop() {
+        let off = |sound: &Sound, k: usize| off((&t, &y), sound, k).0.abs();
+        if f64::from_bits(bits) <= limit(k) {
+            continue;
+        }
+        if !sound.has(k) || off(&sound, k).to_bits() != bits {
+            continue;
+        }
+        sound.take(k);
+        taken.push(k);
+        let near = sound.near(k).filter(|near| suspects.binary_search(near).is_ok());
+        by_size.extend(near.map(|near| (off(&sound, near).to_bits(), near)));
+    }
+    // put back neighbours of spikes that were taken by mistake
+    for k in taken.iter().copied() {
+        if off((&t, &y), &sound, k).0.abs() < limit(k) {
+            sound.put_back(k);
+        }
+    }
+    taken.retain(|&k| !sound.has(k));
+    if taken.len() > most {
+        return Vec::new();
+    }
+    taken.sort_unstable();
+    taken.iter().map(|&k| (rows[k], off((&t, &y), &sound, k).1)).collect()
+}
+
+/// Rows without those taken out.
+struct Sound {
+    rows: usize,
+    /// First and last row of each stretch that is out. Stretches do not touch: in a burst of spikes the nearest sound row is
+    /// found without walking over it.
+    out: BTreeMap<usize, usize>,
+}
+
+impl Sound {
+    /// Returns the stretch in which a row is out.
+    fn stretch(&self, k: usize) -> Option<(usize, usize)> {
+        let (first, last) = self.out.range(..=k).next_back()?;
+        (*last >= k).then_some((*first, *last))
+    }
+
+    fn has(&self, k: usize) -> bool {
+        self.stretch(k).is_none()
+    }
+
+    /// Returns the nearest sound row below a row.
+    fn below(&self, k: usize) -> Option<usize> {
+        let next = k.checked_sub(1)?;
+        self.stretch(next).map_or(Some(next), |(first, _)| first.checked_sub(1))
+    }
+
+    /// Returns the nearest sound row above a row.
+    fn above(&self, k: usize) -> Option<usize> {
+        let next = self.stretch(k + 1).map_or(k + 1, |(_, last)| last + 1);
+        (next < self.rows).then_some(next)
+    }
+
+    /// Returns the two nearest sound rows on either side of a row.
+    fn near(&self, k: usize) -> impl Iterator<Item = usize> + use<> {
+        let (below, above) = (self.below(k), self.above(k));
+        let second = [below.and_then(|k| self.below(k)), above.and_then(|k| self.above(k))];
+        [below, second[0], above, second[1]].into_iter().flatten()
+    }
+
+    fn take(&mut self, k: usize) {
+        let first = k.checked_sub(1).and_then(|k| self.stretch(k)).map_or(k, |(first, _)| first);
+        let last = self.out.remove(&(k + 1)).unwrap_or(k);
+        self.out.insert(first, last);
+    }
+
+    fn put_back(&mut self, k: usize) {
+        let Some((first, last)) = self.stretch(k) else { return };
+        self.out.remove(&first);
+        if first < k {
+            self.out.insert(first, k - 1);
+        }
+        if k < last {
+            self.out.insert(k + 1, last);
+        }
+    }
+}
+
+/// Returns the difference of row k from the cubic through the two nearest sound values on either side, scaled to the noise of even
+/// rows, and the cubic there.
+fn off((time, y): (&[f64], &[f64]), sound: &Sound, k: usize) -> (f64, f64) {
+    let nodes: Vec<usize> = sound.near(k).collect();
+    let times: Vec<f64> = nodes.iter().map(|j| time[*j]).collect();
+    let weights = weights(&times, time[k]);
+    let cubic = nodes.iter().zip(&weights).map(|(j, weight)| y[*j] * weight).sum();
+    let gain = (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt();
+    ((y[k] - cubic) * GAIN / gain.max(GAIN), cubic)
+}
+
+/// Returns true if the torque changes by more than `step` from one row to the next near a row.
+fn near_step(torque: &[f64], row: usize, step: f64) -> bool {
+    let near = row.saturating_sub(NEAR_STEP)..(row + NEAR_STEP).min(torque.len() - 1);
+    near.into_iter().any(|k| (torque[k + 1] - torque[k]).abs() > step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use analysis::random::Random;
+
+    /// Time, torque and rate: 300 s of a sine of 2.4 Hz in noise of 0.4 mrad/s, with spikes at rows.
+    fn with(spikes: &[(usize, f64)]) -> [Vec<f64>; 3] {
+        let mut random = Random::new(7, 0);
+        let time: Vec<f64> = (0..15_000).map(|k| 0.02 * f64::from(k)).collect();
+        let phase = |t: f64| std::f64::consts::TAU * 2.4 * t;
+        let torque = time.iter().map(|t| 0.1 * phase(*t).sin()).collect();
+        let mut rate: Vec<f64> =
+            time.iter().map(|t| 0.02 * phase(*t).cos() + 4e-4 * random.normal()).collect();
+        spikes.iter().for_each(|(k, size)| rate[*k] += size);
+        [time, torque, rate]
+    }
+
+    fn found(spikes: &[(usize, f64)]) -> Vec<(usize, f64)> {
+        let [time, torque, rate] = with(spikes);
+        find(&time, &rate, &torque, None)
+    }
+
+    #[test]
+    fn spikes_are_found_alone_and_side_by_side_and_noise_is_none() {
+        assert_eq!(found(&[]), []);
+        let spikes = [(300, 0.02), (4000, -0.5), (4001, -0.4), (9000, 3.0), (9002, 0.01)];
+        let found = found(&spikes);
+        assert_eq!(found.iter().map(|f| f.0).collect::<Vec<_>>(), spikes.map(|s| s.0));
+        // within 4 deviations of the cubic through noise, and the curve's own fourth order of 5 % of 20 mrad/s
+        let [_, _, clean] = with(&[]);
+        found.iter().for_each(|(k, y)| assert!((y - clean[*k]).abs() < 3.3e-3, "{k} {y}"));
+    }
+
+    #[test]
+    fn more_than_one_value_in_a_hundred_is_no_spike() {
+        let many: Vec<(usize, f64)> = (10..14_000).step_by(60).map(|k| (k, 0.1)).collect();
+        assert!(many.len() > 150);
+        assert_eq!(found(&many), []);
+    }
+
+    #[test]
+    fn a_long_burst_is_no_spike_and_costs_no_more_than_its_rows() {
+        // 15,000 rows of noise a thousand times as large: to look at all of them for each took minutes
+        let mut random = Random::new(9, 0);
+        let burst = |k: usize| (100_000..115_000).contains(&k);
+        let mut rate = || -> Vec<f64> {
+            let size = |k: usize| if burst(k) { 0.4 } else { 4e-4 };
+            (0..400_000).map(|k| size(k) * random.normal()).collect()
+        };
+        let time: Vec<f64> = (0..400_000).map(|k| 0.02 * f64::from(k)).collect();
+        assert_eq!(find(&time, &rate(), &vec![0.0; 400_000], None), []);
+    }
+
+    #[test]
+    fn rows_that_are_out_are_stepped_over_however_they_went_and_came_back() {
+        let mut sound = Sound { rows: 100, out: BTreeMap::new() };
+        let mut expected = [true; 100];
+        let mut random = Random::new(3, 0);
+        for _ in 0..2000 {
+            let k = (random.uniform() * 100.0) as usize;
+            if expected[k] {
+                sound.take(k)
+            } else {
+                sound.put_back(k)
+            }
+            expected[k] ^= true;
+            let k = (random.uniform() * 100.0) as usize;
+            let below = (0..k).rev().filter(|j| expected[*j]).take(2);
+            let above = (k + 1..100).filter(|j| expected[*j]).take(2);
+            assert_eq!(sound.near(k).collect::<Vec<_>>(), below.chain(above).collect::<Vec<_>>());
+            assert_eq!(sound.has(k), expected[k]);
+        }
+    }
+
+    #[test]
+    fn a_step_of_the_torque_makes_no_spike() {
+        let [time, mut torque, mut rate] = with(&[]);
+        for (k, t) in time.iter().enumerate() {
+            torque[k] = if (k / 1000) % 2 == 0 { 2.0 } else { -2.0 };
+            // a triangle of 4 N·m/0.3 kg·m²: its kinks are 0.09 rad/s
+            let part = (t / 20.0).fract() - 0.5;
+            rate[k] += 13.0 * 20.0 * (0.5 - part.abs()) / 2.0;
+        }
+        assert_eq!(find(&time, &rate, &torque, None), []);
+    }
+
+    /// A resonance that a slow gyro samples three times a period, and rows that come when they like.
+    #[test]
+    fn a_motion_that_is_sampled_coarsely_or_unevenly_has_no_spikes() {
+        let mut random = Random::new(9, 0);
+        let motion = |t: f64| {
+            let resonance = 1.0 / (1.0 + ((t - 100.0) / 3.0).powi(2));
+            (2e-3 + 0.1 * resonance) * (std::f64::consts::TAU * 3.0 * t).sin()
+        };
+        for jitter in [0.0, 0.04] {
+            let time: Vec<f64> =
+                (0..2000).map(|k| 0.1 * f64::from(k) + jitter * random.uniform()).collect();
+            let rate: Vec<f64> = time.iter().map(|t| motion(*t) + 4e-4 * random.normal()).collect();
+            assert_eq!(find(&time, &rate, &vec![0.0; 2000], None), []);
+        }
+        let time: Vec<f64> =
+            (0..10_000).map(|k| 0.02 * (f64::from(k) + 0.6 * random.uniform())).collect();
+        let mut rate: Vec<f64> = time.iter().map(|t| motion(*t) + 4e-4 * random.normal()).collect();
+        rate[4000] += 0.05;
+        let found = find(&time, &rate, &vec![0.0; 10_000], None);
+        assert_eq!(found.iter().map(|(row, _)| *row).collect::<Vec<_>>(), [4000]);
+    }
+}

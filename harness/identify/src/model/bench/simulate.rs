@@ -1,0 +1,285 @@
+//! The FMU's answer to a recording's torque, at the recording's instants.
+
+use anyhow::Result;
+use experiments::rest;
+use host::drive::Inputs;
+use host::fmu::Fmu;
+use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA, friction};
+
+use crate::input::clocks;
+use crate::input::recording::Recording;
+use crate::model::bench::effect::{self, Effects};
+
+/// Instants closer than this are the same, s.
+const SAME: f64 = 1e-9;
+
+/// The FMU's input for a torque on the hub besides the actuator's.
+pub const TORQUE_BESIDES: &str = TAU_EXT;
+
+/// The FMU's parameters that friction is proportional to.
+const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
+
+/// Motion of the hub at the rows of a recording.
+#[derive(Clone, Debug, Default)]
+pub struct Motion {
+    /// rad.
+    pub angle: Vec<f64>,
+    /// rad/s.
+    pub rate: Vec<f64>,
+    /// rad/s².
+    pub acceleration: Vec<f64>,
+    /// Angle of the first slosh mode, rad.
+    pub slosh_angle: Vec<f64>,
+}
+
+/// Parts of a [`Motion`] read in every row; the rest stays empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Read {
+    /// All of it.
+    All,
+    /// Angle and rate, for the differences: they are states, and the FMU has no outputs to compute.
+    States,
+}
+
+/// Intersample behaviour: what the torque does between the rows of a recording (Ljung; Pintelon & Schoukens).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Intersample {
+    /// A line from row to row.
+    FirstOrderHold,
+    /// The row's value until the next.
+    ZeroOrderHold,
+    /// Band-limited interpolation of the samples: see [`smooth`].
+    BandLimited,
+}
+
+impl Intersample {
+    /// All, the likeliest first.
+    pub const ALL: [Intersample; 3] =
+        [Intersample::FirstOrderHold, Intersample::BandLimited, Intersample::ZeroOrderHold];
+
+    /// Returns the behaviour in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Intersample::FirstOrderHold => "linear between rows (first-order hold)",
+            Intersample::ZeroOrderHold => "held from row to row (zero-order hold)",
+            Intersample::BandLimited => "smooth between rows (band-limited)",
+        }
+    }
+}
+
+/// Values that, joined by lines, act as the smooth signal does whose samples these are. Lines make sinc²(Ωh/2) of a sine at
+/// Ω, h the time between rows: 0.8 % less at 2.4 Hz and 50 Hz sampling. With δ² the second difference, which makes
+/// −(Ωh)² + (Ωh)⁴/12 of it,
+///
+/// ```text
+/// 1/sinc²(Ωh/2) = 1 + (Ωh)²/12 + (Ωh)⁴/240 + … ≈ 1 − δ²/12 + δ⁴/90
+/// ```
+///
+/// Where rows are unevenly spaced, δ² alone.
+pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
+    let n = signal.len();
+    let mean = (time[n - 1] - time[0]) / (n - 1) as f64;
+    let even = time.windows(2).all(|t| (t[1] - t[0] - mean).abs() < 0.01 * mean);
+    let second = |x: &[f64]| -> Vec<f64> {
+        let mut d = vec![0.0; n];
+        for k in 1..n - 1 {
+            let (a, b) = (time[k] - time[k - 1], time[k + 1] - time[k]);
+            d[k] = 2.0 * ((x[k + 1] - x[k]) / b - (x[k] - x[k - 1]) / a) / (a + b) * a * b;
+        }
+        d
+    };
+    let two = second(signal);
+    let mut four = if even { second(&two) } else { vec![0.0; n] };
+    (four[0], four[1], four[n - 2], four[n - 1]) = (0.0, 0.0, 0.0, 0.0);
+    (0..n).map(|k| signal[k] - two[k] / 12.0 + four[k] / 90.0).collect()
+}
+
+/// Instants of a recording's torque, s, and its values there; those of a band-limited torque are joined by lines ([`smooth`]).
+/// The recording's ends are among them.
+pub fn course(recording: &Recording, intersample: Intersample) -> (Vec<f64>, Vec<f64>) {
+    let of = |values: &[f64]| recording.commands().iter().map(|k| values[*k]).collect::<Vec<_>>();
+    let (mut knots, mut torque) = match recording.commanded {
+        None => (recording.time.clone(), recording.torque.clone()),
+        Some(_) => (of(&recording.time), of(&recording.torque)),
+    };
+    if intersample == Intersample::BandLimited && knots.len() > 3 {
+        let (fine, values) = clocks::refined(&knots, &torque);
+        torque = smooth(&fine, &values);
+        knots = fine;
+    }
+    let last = recording.time.len() - 1;
+    if knots.first().is_none_or(|t| *t > recording.time[0]) {
+        knots.insert(0, recording.time[0]);
+        torque.insert(0, recording.torque[0]);
+    }
+    if knots[knots.len() - 1] < recording.time[last] {
+        knots.push(recording.time[last]);
+        torque.push(recording.torque[last]);
+    }
+    (knots, torque)
+}
+
+/// A signal at a time, on the line between two rows; `row` is the row before, and grows from call to call.
+fn at(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
+    while *row + 2 < time.len() && time[*row + 1] <= t {
+        *row += 1;
+    }
+    let k = *row;
+    let part = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
+    signal[k] + part * (signal[k + 1] - signal[k])
+}
+
+/// Setup and drive of the FMU.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// Values by FMU name, as text, set first.
+    pub settings: Vec<(String, String)>,
+    /// Intersample behaviour of the torque.
+    pub intersample: Intersample,
+}
+
+impl Setup {
+    /// Runs the FMU with these real parameters, by name, through a recording. `delay` (s) lies
+    /// between the recorded torque and the recorded rate: row k sees the FMU at t_k − delay.
+    pub fn run(
+        &self,
+        fmu: &Fmu,
+        values: &[(&str, f64)],
+        recording: &Recording,
+        delay: f64,
+    ) -> Result<Motion> {
+        self.run_under(fmu, values, recording, delay, &Effects::default(), Read::All)
+    }
+
+    /// The same with effects that the FMU does not have; of the motion `read` is read. The rate is the one that the gyro's filter
+    /// passes.
+    pub fn run_under(
+        &self,
+        fmu: &Fmu,
+        values: &[(&str, f64)],
+        recording: &Recording,
+        delay: f64,
+        effects: &Effects,
+        read: Read,
+    ) -> Result<Motion> {
+        let reference =
+            |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
+        let mut instance = rest::instantiate(fmu, "identify")?;
+        for (name, value) in &self.settings {
+            instance.set(name, value)?;
+        }
+        for (name, value) in values {
+            instance.set_real(&[reference(name)?], &[*value])?;
+        }
+        let (mut knots, mut torque) = course(recording, self.intersample);
+        let mut held = self.intersample == Intersample::ZeroOrderHold;
+        if effects.actuator_lag > 0.0 {
+            (knots, torque) = effect::of_actuator(effects.actuator_lag, &knots, &torque, held);
+            held = false;
+        }
+        let at_knots = |signal: &[f64]| -> Vec<f64> {
+            if knots.len() == recording.time.len() && knots == recording.time {
+                return signal.to_vec();
+            }
+            let mut row = 0;
+            let value = |t: &f64| at(&recording.time, signal, *t, &mut row);
+            knots.iter().map(value).collect()
+        };
+        let gravity = recording.gravity.as_deref().map(at_knots);
+        let besides = effects.torque.map(at_knots);
+        let mut driven = vec![(TAU_CMD, torque.as_slice())];
+        driven.extend(gravity.as_ref().map(|gravity| (G_AXIAL, gravity.as_slice())));
+        driven.extend(besides.as_ref().map(|torque| (TORQUE_BESIDES, torque.as_slice())));
+        let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
+        let inputs = Inputs::new(fmu.description(), &names, held)?;
+        let time = &recording.time;
+        let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
+        inputs.initialise(&mut instance, None, time[0], None, &first)?;
+        let drifting = match effects.friction_drift == 0.0 {
+            true => Vec::new(),
+            false => FRICTION.map(reference).into_iter().collect::<Result<Vec<u32>>>()?,
+        };
+        let mut friction = vec![0.0; drifting.len()];
+        instance.get_real(&drifting, &mut friction)?;
+        let span = time[time.len() - 1] - time[0];
+
+        let outputs =
+            [reference(THETA)?, reference(OMEGA)?, reference(OMEGA_DOT)?, reference(SLOSH_ANGLE)?];
+        let outputs = match read {
+            Read::All => &outputs[..],
+            Read::States => &outputs[..2],
+        };
+        let mut motion = Motion::default();
+        // the row that is read next; the knot from which on the signals go to the one after it
+        let (mut row, mut knot) = (0, 0);
+        inputs.drive(&mut instance, time[0], |instance, t, course| {
+            let target = loop {
+                let Some(&recorded) = time.get(row) else { return Ok(None) };
+                let target = recorded - delay;
+                if t < target - SAME {
+                    break target;
+                }
+                let mut values = [0.0; 4];
+                instance.get_real(outputs, &mut values[..outputs.len()])?;
+                motion.angle.push(values[0]);
+                motion.rate.push(values[1]);
+                if read == Read::All {
+                    motion.acceleration.push(values[2]);
+                    motion.slosh_angle.push(values[3]);
+                }
+                row += 1;
+                if !drifting.is_empty() {
+                    let part = 1.0 + effects.friction_drift * (recorded - time[0]) / span;
+                    let now: Vec<f64> =
+                        friction.iter().map(|value| value * part.max(0.0)).collect();
+                    instance.set_real(&drifting, &now)?;
+                }
+            };
+            if knots.get(knot + 1).is_some_and(|end| t >= *end) {
+                knot += 1;
+            }
+            let end = knots.get(knot + 1).copied();
+            for (i, signal) in signals.iter().enumerate() {
+                course.slopes[i] = match end {
+                    Some(end) if !held => (signal[knot + 1] - signal[knot]) / (end - knots[knot]),
+                    _ => 0.0,
+                };
+                course.values[i] = signal[knot] + course.slopes[i] * (t - knots[knot]);
+            }
+            Ok(Some(end.filter(|end| *end < target + SAME).unwrap_or(target)))
+        })?;
+        if effects.gyro_lag > 0.0 {
+            for signal in [&mut motion.rate, &mut motion.acceleration] {
+                if signal.len() > 3 {
+                    *signal = effect::of_gyro(effects.gyro_lag, time, &smooth(time, signal));
+                }
+            }
+        }
+        Ok(motion)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_through_smoothed_values_are_the_sine_that_was_sampled() {
+        let h = 0.02;
+        for f in [1.25, 2.4, 3.5] {
+            let w = std::f64::consts::TAU * f;
+            let time: Vec<f64> = (0..5000).map(|k| h * f64::from(k)).collect();
+            let sine: Vec<f64> = time.iter().map(|t| (w * t).sin()).collect();
+            let amplitude = |x: &[f64]| {
+                // of the lines through x at f: that of x times sinc²
+                let half: f64 = 0.5 * w * h;
+                let tone = time.iter().zip(x).map(|(t, x)| x * (w * t).sin()).sum::<f64>();
+                let whole = sine.iter().map(|s| s * s).sum::<f64>();
+                tone / whole * (half.sin() / half).powi(2)
+            };
+            assert!(amplitude(&sine) < 0.998);
+            // the next term of the series, (Ωh)⁶/1600: 5e-6 at 3.5 Hz, and the two ends
+            assert!((amplitude(&smooth(&time, &sine)) - 1.0).abs() < 2e-5, "{f}");
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Second stage: unknowns, and the FMU's answer for their values.
+
+pub mod bench;
+pub mod overridden;
+pub mod simulate;
+pub mod unknown;

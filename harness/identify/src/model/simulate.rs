@@ -1,0 +1,469 @@
+//! An FMU's outputs at the rows of a recording, by its own solver or by the host's.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use experiments::rest;
+use experiments::sensors::Sensor;
+use experiments::sensors::quantity::Quantity;
+use host::causality::Causality;
+use host::description::{ModelDescription, Type};
+use host::exchange;
+use host::fmu::{Fmu, Instance, Interface};
+
+use crate::input::question::{Question, Setting, Solver, real};
+use crate::input::record::Record;
+
+/// An FMU for one solver.
+pub enum Model {
+    /// Co-Simulation, by the FMU's own solver.
+    Own(Fmu),
+    /// The host integrates (Model Exchange).
+    Host(Fmu),
+}
+
+impl Model {
+    /// Opens an FMU for a solver.
+    ///
+    /// # Errors
+    /// If it is not an FMU, or has not what the solver needs.
+    pub fn open(path: &Path, solver: Solver) -> Result<Self> {
+        Ok(match solver {
+            Solver::Own => Model::Own(Fmu::open(path)?),
+            Solver::Host(_) => Model::Host(Fmu::open_for(Interface::ModelExchange, path, &[])?),
+        })
+    }
+
+    fn fmu(&self) -> &Fmu {
+        let (Model::Own(fmu) | Model::Host(fmu)) = self;
+        fmu
+    }
+
+    /// Returns the model description.
+    pub fn description(&self) -> &ModelDescription {
+        self.fmu().description()
+    }
+
+    /// Returns true if the FMU steps itself, but also offers Model Exchange.
+    pub fn offers_exchange(&self) -> bool {
+        matches!(self, Model::Own(fmu) if fmu.description().model_exchange.is_some())
+    }
+
+    /// Returns the process-wide settings that loading the FMU's binary has changed.
+    pub fn changed(&self) -> &[&'static str] {
+        self.fmu().changed()
+    }
+}
+
+fn interpolates(description: &ModelDescription) -> bool {
+    description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs)
+}
+
+/// Settings, inputs and outputs of the FMU's runs.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    settings: Vec<Setting>,
+    /// Value references of the inputs, and whether each is held from row to row.
+    inputs: Vec<u32>,
+    held: Vec<bool>,
+    outputs: Vec<Output>,
+    /// Value references of the variables that all outputs need.
+    reads: Vec<u32>,
+    /// Relative tolerance of the solver, the host's or the FMU's; `None`: the FMU's own.
+    tolerance: Option<f64>,
+    /// Communication steps from one row to the next, of an FMU that steps itself.
+    substeps: usize,
+    /// Steps of the host's solver from one row to the next.
+    most_steps: usize,
+}
+
+/// Runs with smaller errors of the solver.
+pub struct Finer {
+    /// Settings, inputs and outputs of the runs.
+    pub setup: Setup,
+    /// The FMU for another solver than before; `None`: the same.
+    pub model: Option<Model>,
+}
+
+/// Steps of the host's solver from one row to the next where it is only compared with.
+const FEW_STEPS: usize = 1000;
+/// Tolerance of a solver that the FMU's own is compared with, where the FMU suggests none.
+const FINE: f64 = 1e-8;
+/// Factor by which that is finer than the one that the FMU suggests.
+const FINER: f64 = 1e-2;
+/// Parts of the way from row to row over which an input that follows a line is held, where the FMU takes no slopes. Held at
+/// the middle of each part, it differs from its line by a sawtooth of an eighth of its change from row to row, without a delay.
+const HELD_STEPS: usize = 4;
+/// Steps whose effects of an input's slope are compared, s.
+const PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
+/// The finest tolerance of the host's solver.
+const FINEST: f64 = 1e-13;
+
+/// An output, computed from variables of the FMU.
+#[derive(Clone, Debug)]
+struct Output {
+    /// Index of its first variable in [`Setup::reads`].
+    from: usize,
+    /// Quantity of the output.
+    quantity: Quantity,
+    /// Channel of the quantity.
+    channel: usize,
+    /// The sensor that reads it.
+    sensor: Option<Sensor>,
+}
+
+impl Output {
+    fn value(&self, read: &[f64]) -> f64 {
+        let needs = &read[self.from..self.from + self.quantity.needs.len()];
+        let value = self.quantity.values(needs)[self.channel];
+        self.sensor.as_ref().map_or(value, |sensor| sensor.expected(value))
+    }
+}
+
+/// An instance that is ready for its first step.
+enum Initialised<'m> {
+    /// Co-Simulation.
+    Own(Instance<'m>),
+    /// The host integrates.
+    Host(exchange::Run<Box<Instance<'m>>>),
+}
+
+/// An unknown's value: its reference.
+pub type Value = (u32, f64);
+
+impl Setup {
+    /// Returns the setup for a question.
+    ///
+    /// # Errors
+    /// Lists all names that the FMU does not have.
+    pub fn new(question: &Question, description: &ModelDescription) -> Result<Self> {
+        let mut problems = Vec::new();
+        let references = |names: &[String], problems: &mut Vec<String>| -> Vec<u32> {
+            let mut found = Vec::new();
+            for name in names {
+                match real(description, name) {
+                    Ok(variable) => found.push(variable.reference),
+                    Err(error) => problems.push(error.to_string()),
+                }
+            }
+            found
+        };
+        let inputs = references(&question.inputs, &mut problems);
+        let (mut outputs, mut reads) = (Vec::new(), Vec::new());
+        for name in &question.outputs {
+            let found = match question.sensor(name, description) {
+                Ok(Some((sensor, quantity, channel))) => {
+                    Ok((quantity, channel, Some(sensor.clone())))
+                }
+                Ok(None) => Quantity::variable(description, name, None).map(|q| (q, 0, None)),
+                Err(error) => Err(error),
+            };
+            match found {
+                Ok((quantity, channel, sensor)) => {
+                    let from = reads.len();
+                    reads.extend(references(&quantity.needs, &mut problems));
+                    outputs.push(Output { from, quantity, channel, sensor });
+                }
+                Err(error) => problems.push(format!("{error:#}")),
+            }
+        }
+        for name in question.held.iter().filter(|name| !question.inputs.contains(name)) {
+            problems.push(format!("{name} is held, but is not among the inputs"));
+        }
+        if outputs.is_empty() {
+            problems.push("no output is fitted: name them with --outputs".into());
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        Ok(Setup {
+            settings: question.settings.clone(),
+            held: question.inputs.iter().map(|name| question.held.contains(name)).collect(),
+            inputs,
+            outputs,
+            reads,
+            tolerance: match question.solver {
+                Solver::Own => question.tolerance,
+                Solver::Host(tolerance) => Some(tolerance),
+            },
+            substeps: 1,
+            most_steps: exchange::MOST_STEPS,
+        })
+    }
+
+    /// Returns the same runs with smaller errors of the solver: with a finer tolerance, with shorter communication steps, and by the
+    /// host's solver if it can integrate the FMU ([`Setup::can_exchange`]). An FMU may refuse or ignore the first two. The host's
+    /// solver refuses what would take long.
+    pub fn finer(&self, model: &Model) -> Vec<Finer> {
+        let setup = |setup: Setup| Finer { setup, model: None };
+        let Model::Own(fmu) = model else {
+            let tolerance = (FINER * self.tolerance.unwrap_or(FINE)).max(FINEST);
+            return vec![setup(Setup { tolerance: Some(tolerance), ..self.clone() })];
+        };
+        let suggested = fmu.description().default_experiment.tolerance.filter(|t| *t > 0.0);
+        let tolerance = self.tolerance.or(suggested).map_or(FINE, |tolerance| FINER * tolerance);
+        let mut all = vec![
+            setup(Setup { tolerance: Some(tolerance), ..self.clone() }),
+            setup(Setup { substeps: 2 * self.substeps, ..self.clone() }),
+        ];
+        if self.can_exchange(model)
+            && let Ok(model) = Model::open(fmu.path(), Solver::Host(FINE))
+        {
+            let setup = Setup { tolerance: Some(FINE), most_steps: FEW_STEPS, ..self.clone() };
+            all.push(Finer { setup, model: Some(model) });
+        }
+        all
+    }
+
+    /// Returns true if the FMU steps itself, and the host's solver could integrate the same motion.
+    pub fn can_exchange(&self, model: &Model) -> bool {
+        model.offers_exchange() && !self.slopes_act(model.fmu()).is_ok_and(|act| act)
+    }
+
+    /// Returns true if the slope of an input changes an output at once, as the slope of the wheels' angular momentum is a torque
+    /// on a spacecraft. Model Exchange hands over no slopes: the host's solver would integrate another motion.
+    fn slopes_act(&self, fmu: &Fmu) -> Result<bool> {
+        let description = fmu.description();
+        if !interpolates(description) {
+            return Ok(false);
+        }
+        let outputs = description.variables.iter();
+        let outputs =
+            outputs.filter(|v| v.causality == Causality::Output && v.kind() == Type::Real);
+        let outputs: Vec<u32> = outputs.map(|v| v.reference).collect();
+        let reads = |instance: &mut Instance| -> Result<Vec<f64>> {
+            let mut values = vec![0.0; outputs.len()];
+            instance.get_real(&outputs, &mut values)?;
+            Ok(values)
+        };
+        let slopes = |slope: f64| -> Vec<f64> {
+            self.held.iter().map(|held| if *held { 0.0 } else { slope }).collect()
+        };
+        let begun = || -> Result<Instance> {
+            let mut instance = rest::instantiate(fmu, "identify")?;
+            for setting in self.settings.iter().filter(|setting| setting.recording.is_none()) {
+                instance.set(&setting.name, &setting.value)?;
+            }
+            instance.enter_initialization_mode(self.tolerance, 0.0, None)?;
+            instance.exit_initialization_mode()?;
+            Ok(instance)
+        };
+        let mut instance = begun()?;
+        instance.set_slopes(&self.inputs, &slopes(0.0))?;
+        let without = reads(&mut instance)?;
+        instance.set_slopes(&self.inputs, &slopes(1.0))?;
+        if reads(&mut instance)? != without {
+            return Ok(true);
+        }
+        // an FMU 3.0 hears of slopes within steps alone: what acts at once does not shrink with the step
+        let after = |step: f64, slope: f64| -> Result<Vec<f64>> {
+            let mut instance = begun()?;
+            let mut values = vec![0.0; self.inputs.len()];
+            instance.get_real(&self.inputs, &mut values)?;
+            instance.set_real(&self.inputs, &values)?;
+            instance.do_step_along(0.0, step, &self.inputs, &values, &slopes(slope))?;
+            reads(&mut instance)
+        };
+        let change = |step: f64| -> Result<Vec<f64>> {
+            let pairs = after(step, 1.0)?.into_iter().zip(after(step, 0.0)?);
+            Ok(pairs.map(|(with, without)| (with - without).abs()).collect())
+        };
+        let [longest, middle, shortest] = PROBES.map(change);
+        let (longest, middle, shortest) = (longest?, middle?, shortest?);
+        let remains = |k: usize| longest[k] > 0.0 && middle[k].min(shortest[k]) > 0.5 * longest[k];
+        Ok((0..outputs.len()).any(remains))
+    }
+
+    /// The outputs at the rows of the recording of this number.
+    ///
+    /// # Errors
+    /// If the FMU refuses a call; the message has the time.
+    pub fn run(
+        &self,
+        model: &Model,
+        values: &[Value],
+        number: usize,
+        record: &Record,
+    ) -> Result<Vec<Vec<f64>>> {
+        match self.initialised(model, values, number, record)? {
+            Initialised::Own(mut instance) => self.step(&mut instance, model.description(), record),
+            Initialised::Host(run) => self.integrate(run, record),
+        }
+    }
+
+    /// The FMU's warnings of the motion that begins in the recording of this number.
+    ///
+    /// # Errors
+    /// If the FMU refuses a call.
+    pub fn warnings(
+        &self,
+        model: &Model,
+        values: &[Value],
+        number: usize,
+        record: &Record,
+    ) -> Result<Vec<String>> {
+        Ok(match self.initialised(model, values, number, record)? {
+            Initialised::Own(mut instance) => instance.take_warnings(),
+            Initialised::Host(mut run) => run.instance().take_warnings(),
+        })
+    }
+
+    fn initialised<'m>(
+        &self,
+        model: &'m Model,
+        values: &[Value],
+        number: usize,
+        record: &Record,
+    ) -> Result<Initialised<'m>> {
+        let first = self.course(record, 0).0;
+        let start = record.time[0];
+        let fmu = model.fmu();
+        let mut instance = rest::instantiate(fmu, "identify")?;
+        let own = |setting: &&Setting| setting.recording.is_none_or(|of| of == number);
+        for setting in self.settings.iter().filter(own) {
+            instance.set(&setting.name, &setting.value)?;
+        }
+        for (reference, value) in values {
+            instance.set_real(&[*reference], &[*value])?;
+        }
+        let hosts = matches!(model, Model::Host(_));
+        let tolerance = if hosts { None } else { self.tolerance };
+        instance.enter_initialization_mode(tolerance, start, None)?;
+        if !first.is_empty() {
+            instance.set_real(&self.inputs, &first)?;
+        }
+        instance.exit_initialization_mode()?;
+        if !hosts {
+            return Ok(Initialised::Own(instance));
+        }
+        let tolerance = self.tolerance.unwrap_or(FINE);
+        let run = exchange::Run::new(Box::new(instance), tolerance, start, self.most_steps)?;
+        Ok(Initialised::Host(run))
+    }
+
+    /// Simulates with the host's solver, from row to row.
+    fn integrate(
+        &self,
+        mut run: exchange::Run<Box<Instance>>,
+        record: &Record,
+    ) -> Result<Vec<Vec<f64>>> {
+        let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
+        for row in 0..record.time.len() {
+            let (values, slopes) = self.course(record, row);
+            let jumps = row > 0 && self.jumps(record, row);
+            run.drive(&self.inputs, &values, &slopes, jumps)?;
+            let mut at = vec![0.0; self.reads.len()];
+            run.instance().get_real(&self.reads, &mut at)?;
+            self.keep(&at, &mut read)?;
+            if let Some(next) = record.time.get(row + 1) {
+                run.integrate(*next)?;
+            }
+        }
+        self.late(record, read)
+    }
+
+    /// Simulates with the FMU's own solver: at each row it sets the inputs (with slopes if the FMU takes them), reads the outputs
+    /// and steps to the next row. Where the FMU takes no slopes, inputs that follow lines are held over [`HELD_STEPS`] parts of
+    /// the way, each at its value in the middle of the part.
+    fn step(
+        &self,
+        instance: &mut Instance,
+        description: &ModelDescription,
+        record: &Record,
+    ) -> Result<Vec<Vec<f64>>> {
+        let is_sloped = interpolates(description) && self.held.iter().any(|held| !held);
+        let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
+        for row in 0..record.time.len() {
+            let (values, slopes) = self.course(record, row);
+            if !values.is_empty() {
+                instance.set_real(&self.inputs, &values)?;
+            }
+            // an output may follow an input's slope, which changes here: what is read is that of the row onwards
+            if is_sloped {
+                instance.set_slopes(&self.inputs, &slopes)?;
+            }
+            let mut at = vec![0.0; self.reads.len()];
+            instance.get_real(&self.reads, &mut at)?;
+            self.keep(&at, &mut read)?;
+            let Some(next) = record.time.get(row + 1) else { continue };
+            let holds_lines = !is_sloped && slopes.iter().any(|slope| *slope != 0.0);
+            let parts = self.substeps * if holds_lines { HELD_STEPS } else { 1 };
+            let along = |by: f64| -> Vec<f64> {
+                values.iter().zip(&slopes).map(|(value, slope)| value + slope * by).collect()
+            };
+            let part = (next - record.time[row]) / parts as f64;
+            for k in 0..parts {
+                let by = part * k as f64;
+                let t = record.time[row] + by;
+                let h = if k + 1 == parts { next - t } else { part };
+                let done = if is_sloped {
+                    let values = along(by);
+                    if k > 0 {
+                        instance.set_real(&self.inputs, &values)?;
+                    }
+                    instance.do_step_along(t, h, &self.inputs, &values, &slopes)
+                } else {
+                    if holds_lines {
+                        instance.set_real(&self.inputs, &along(by + 0.5 * h))?;
+                    }
+                    instance.do_step(t, h)
+                };
+                done.with_context(|| format!("the run stopped at t = {t} s"))?;
+            }
+        }
+        self.late(record, read)
+    }
+
+    /// Adds a row of the outputs, from what was read.
+    fn keep(&self, at: &[f64], read: &mut [Vec<f64>]) -> Result<()> {
+        for (output, column) in self.outputs.iter().zip(read) {
+            let value = output.value(at);
+            ensure!(value.is_finite(), "an output is not finite");
+            column.push(value);
+        }
+        Ok(())
+    }
+
+    /// The readings of sensors that are late: at a row what was so that much earlier, at a row too; 0 where nothing has arrived yet.
+    fn late(&self, record: &Record, mut read: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
+        for (number, (output, column)) in self.outputs.iter().zip(&mut read).enumerate() {
+            let Some(sensor) = output.sensor.as_ref().filter(|s| s.errors().delay > 0.0) else {
+                continue;
+            };
+            let (delay, truth) = (sensor.errors().delay, column.clone());
+            for (row, value) in column.iter_mut().enumerate() {
+                let then = record.time[row] - delay;
+                // a row within a billionth of the time
+                let slack = 1e-9 * (1.0 + record.time[row].abs());
+                let at = record.time.partition_point(|t| *t < then - slack);
+                let there = record.time[at] <= then + slack;
+                let measured = record.outputs.get(number).is_some_and(|y| !y[row].is_nan());
+                ensure!(
+                    there || !measured,
+                    "sensor {}: it has a reading at {} s, but no row is {delay} s earlier",
+                    sensor.name,
+                    record.time[row]
+                );
+                *value = if there { truth[at] } else { 0.0 };
+            }
+        }
+        Ok(read)
+    }
+
+    /// Values of the inputs at a row and their slopes until the next.
+    fn course(&self, record: &Record, row: usize) -> (Vec<f64>, Vec<f64>) {
+        let one = |(signal, held): (&Vec<f64>, &bool)| {
+            let next = row + 1;
+            let slope = match record.time.get(next) {
+                Some(end) if !held => (signal[next] - signal[row]) / (end - record.time[row]),
+                _ => 0.0,
+            };
+            (signal[row], slope)
+        };
+        record.inputs.iter().zip(&self.held).map(one).unzip()
+    }
+
+    /// Returns true if a held input changes at a row.
+    fn jumps(&self, record: &Record, row: usize) -> bool {
+        let held = record.inputs.iter().zip(&self.held).filter(|(_, held)| **held);
+        held.into_iter().any(|(signal, _)| signal[row] != signal[row - 1])
+    }
+}

@@ -1,0 +1,425 @@
+//! Unknowns of a question, with names, units, bounds and priors.
+
+use anyhow::{Context, Result, bail, ensure};
+use host::causality::{Causality, Variability};
+use host::description::{ModelDescription, Value, Variable};
+
+use crate::input::question::{Bias, EACH, Free, Question, Size, Tolerance, Triad, real, scaled};
+use crate::input::record::Record;
+use crate::model::bench::unknown::range;
+
+/// Kinds of unknowns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    /// A Real of the FMU, of one recording or of all.
+    Parameter {
+        /// Value reference.
+        reference: u32,
+        /// `None`: of all.
+        recording: Option<usize>,
+    },
+    /// Reading of an output's sensor at 0, in one recording.
+    Bias {
+        /// The output.
+        output: usize,
+        /// The recording.
+        recording: usize,
+    },
+    /// Cross-coupling: share of one output in the reading of another.
+    Gain {
+        /// The output that is read.
+        output: usize,
+        /// The output that is in it.
+        of: usize,
+    },
+    /// Error of an input's scale: 1 + x times the recorded values act.
+    Scale {
+        /// The input.
+        input: usize,
+        /// The one recording; `None`: all.
+        recording: Option<usize>,
+    },
+    /// Error of the clock's rate: true intervals are 1 + x times the recorded ones.
+    Clock {
+        /// The one recording; `None`: all.
+        recording: Option<usize>,
+    },
+}
+
+impl What {
+    /// Returns true if the FMU's run depends on it; an error of a sensor only changes the reading.
+    pub fn is_in_runs(self) -> bool {
+        !matches!(self, What::Bias { .. } | What::Gain { .. })
+    }
+
+    /// Returns true if it acts in the recording of this number.
+    pub fn is_of(self, number: usize) -> bool {
+        match self {
+            What::Parameter { recording, .. }
+            | What::Scale { recording, .. }
+            | What::Clock { recording } => recording.is_none_or(|of| of == number),
+            What::Bias { recording, .. } => recording == number,
+            What::Gain { .. } => true,
+        }
+    }
+}
+
+/// One unknown.
+#[derive(Clone, Debug)]
+pub struct Unknown {
+    /// Name in the result.
+    pub name: String,
+    /// Kind.
+    pub what: What,
+    /// Unit.
+    pub unit: String,
+    /// Start of the search.
+    pub start: f64,
+    /// Bounds.
+    pub bounds: (f64, f64),
+    /// Mean and standard deviation beforehand.
+    pub prior: Option<(f64, f64)>,
+    /// Plausible distance from the start.
+    pub reach: f64,
+    /// True for a known value with a tolerance: its uncertainty counts, its estimate was not requested.
+    pub is_known: bool,
+}
+
+/// Plausible distance of a scale's error from 0, where neither bounds nor a prior say it.
+const SCALE_REACH: f64 = 0.1;
+/// Plausible distance of a known value from its mean, standard deviations: differences have to show more than the solver's errors.
+const KNOWN_REACH: f64 = 5.0;
+
+impl Question {
+    /// The unknowns, in the result's order.
+    ///
+    /// # Errors
+    /// All that is wrong with names, types, bounds and priors.
+    pub fn unknowns(
+        &self,
+        description: &ModelDescription,
+        records: &[Record],
+    ) -> Result<Vec<Unknown>> {
+        let (mut unknowns, mut problems) = (Vec::new(), Vec::new());
+        let mut add = |made: Result<Vec<Unknown>>| match made {
+            Ok(made) => unknowns.extend(made),
+            Err(error) => problems.push(format!("{error:#}")),
+        };
+        for free in &self.free {
+            add(self.free(free, description, records.len()));
+        }
+        for triad in &self.triads {
+            add(self.gains(triad));
+        }
+        for bias in &self.biases {
+            add(self.bias(bias, description, records));
+        }
+        for tolerance in &self.tolerances {
+            add(self.known(tolerance, description, records.len()).map(|unknown| vec![unknown]));
+        }
+        for prior in &self.priors {
+            let at = unknowns.iter_mut().find(|unknown: &&mut Unknown| unknown.name == prior.name);
+            match at {
+                Some(unknown) => unknown.prior = Some((prior.mean, prior.std)),
+                None => problems.push(format!("--prior {}: it is not free", prior.name)),
+            }
+        }
+        for (k, unknown) in unknowns.iter().enumerate() {
+            if let Some(other) = unknowns[..k].iter().find(|other| other.name == unknown.name) {
+                problems.push(match (unknown.is_known, other.is_known) {
+                    (true, false) => format!(
+                        "--tolerance {}: it is estimated (allowed: --prior, its mean and standard deviation)",
+                        unknown.name
+                    ),
+                    (true, true) => format!("{} has two tolerances", unknown.name),
+                    _ => format!("{} is free twice", unknown.name),
+                });
+            }
+            let is_alias = |other: &&Unknown| match (unknown.what, other.what) {
+                (
+                    What::Parameter { reference: a, recording: of_a },
+                    What::Parameter { reference: b, recording: of_b },
+                ) => {
+                    let together = of_a.is_none() || of_b.is_none() || of_a == of_b;
+                    a == b && together && unknown.name != other.name
+                }
+                _ => false,
+            };
+            if let Some(other) = unknowns[..k].iter().find(is_alias) {
+                problems.push(format!(
+                    "{} and {} are the same variable of the FMU (allowed: one of them is free)",
+                    other.name, unknown.name
+                ));
+            }
+        }
+        for setting in &self.settings {
+            if let Some(n) = setting.recording.filter(|n| *n >= records.len()) {
+                problems.push(format!(
+                    "--set {}@{}: there are {} recordings",
+                    setting.name,
+                    n + 1,
+                    records.len()
+                ));
+            }
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        ensure!(!unknowns.is_empty(), "nothing is free: name what is estimated with --free");
+        Ok(unknowns)
+    }
+
+    /// Returns the place of an output in the list.
+    fn output(&self, name: &str) -> Result<usize> {
+        let found = self.outputs.iter().position(|output| output == name);
+        found.with_context(|| {
+            format!("{name} is not among the outputs ({})", self.outputs.join(", "))
+        })
+    }
+
+    fn gains(&self, triad: &Triad) -> Result<Vec<Unknown>> {
+        let mut gains = Vec::new();
+        for (i, read) in triad.outputs.iter().enumerate() {
+            for (j, other) in triad.outputs.iter().enumerate() {
+                let (output, of) = (self.output(read)?, self.output(other)?);
+                let (name, std) = match i == j {
+                    true => (format!("scale({read})"), triad.scale),
+                    false => (format!("cross({read},{other})"), triad.angle),
+                };
+                gains.push(Unknown {
+                    name,
+                    what: What::Gain { output, of },
+                    unit: "1".into(),
+                    start: 0.0,
+                    bounds: (f64::NEG_INFINITY, f64::INFINITY),
+                    prior: Some((0.0, std)),
+                    reach: std,
+                    is_known: false,
+                });
+            }
+        }
+        Ok(gains)
+    }
+
+    fn bias(
+        &self,
+        bias: &Bias,
+        description: &ModelDescription,
+        records: &[Record],
+    ) -> Result<Vec<Unknown>> {
+        let output = self.output(&bias.output)?;
+        let unit = self.unit(&bias.output, description)?;
+        let one = |(recording, record): (usize, &Record)| Unknown {
+            name: numbered(&format!("bias({})", bias.output), recording),
+            what: What::Bias { output, recording },
+            unit: unit.clone(),
+            start: 0.0,
+            bounds: (f64::NEG_INFINITY, f64::INFINITY),
+            prior: bias.std.map(|std| (0.0, std)),
+            reach: bias.std.unwrap_or_else(|| record.spread(output)),
+            is_known: false,
+        };
+        Ok(records.iter().enumerate().map(one).collect())
+    }
+
+    /// Unknowns of a flag `--free`.
+    fn free(
+        &self,
+        free: &Free,
+        description: &ModelDescription,
+        recordings: usize,
+    ) -> Result<Vec<Unknown>> {
+        let one = |recording: Option<usize>| match scaled(&free.name) {
+            Some(of) => {
+                let mut unknown = self.scale(of, recording)?;
+                let (low, high) = free.bounds.unwrap_or(unknown.bounds);
+                ensure!(low > -1.0, "{} is free from {low} (allowed: above -1)", free.name);
+                if (high - low).is_finite() {
+                    unknown.reach = 0.25 * (high - low);
+                }
+                (unknown.start, unknown.bounds) = (free.start, (low, high));
+                Ok(unknown)
+            }
+            None => parameter(free, description, recording),
+        };
+        match free.each {
+            true => (0..recordings).map(|k| one(Some(k))).collect(),
+            false => Ok(vec![one(None)?]),
+        }
+    }
+
+    /// The error of the scale of an input, an output or the clock.
+    fn scale(&self, of: &str, recording: Option<usize>) -> Result<Unknown> {
+        let input = self.inputs.iter().position(|name| name == of);
+        let output = self.outputs.iter().position(|name| name == of);
+        let what = match (input, output) {
+            (Some(input), _) => What::Scale { input, recording },
+            (None, Some(output)) => {
+                ensure!(
+                    recording.is_none(),
+                    "scale({of}){EACH}: a sensor has one scale (allowed: scale({of}))"
+                );
+                What::Gain { output, of: output }
+            }
+            (None, None) if of == CLOCK => What::Clock { recording },
+            (None, None) => {
+                let names = self.inputs.iter().chain(&self.outputs).map(String::as_str);
+                let names: Vec<&str> = names.chain([CLOCK]).collect();
+                bail!("scale({of}): {of} has no scale (allowed: {})", names.join(", "))
+            }
+        };
+        let name = format!("scale({of})");
+        Ok(Unknown {
+            name: recording.map_or(name.clone(), |k| numbered(&name, k)),
+            what,
+            unit: "1".into(),
+            start: 0.0,
+            bounds: (f64::NEG_INFINITY, f64::INFINITY),
+            prior: None,
+            reach: SCALE_REACH,
+            is_known: false,
+        })
+    }
+
+    /// The unknown of a flag `--tolerance`.
+    fn known(
+        &self,
+        tolerance: &Tolerance,
+        description: &ModelDescription,
+        recordings: usize,
+    ) -> Result<Unknown> {
+        let flag = format!("--tolerance {}", tolerance.name);
+        if let Some(of) = scaled(&tolerance.name) {
+            let Size::Part(part) = tolerance.size else {
+                bail!("{flag}: a scale has a relative tolerance, such as 1%")
+            };
+            let unknown = self.scale(of, None).with_context(|| flag.clone())?;
+            return unknown.known(0.0, part).with_context(|| flag);
+        }
+        let (name, recording) = match tolerance.name.rsplit_once('@') {
+            None => (tolerance.name.as_str(), None),
+            Some((name, number)) => {
+                let number = number.parse().ok().filter(|n| (1..=recordings).contains(n));
+                let number = number.with_context(|| {
+                    format!("{flag} (allowed: {name}@RECORDING, from 1 to {recordings})")
+                })?;
+                (name, Some(number - 1))
+            }
+        };
+        if self.inputs.iter().any(|input| input == name) {
+            bail!("{flag}: {name} is a recorded input (allowed: scale({name}))");
+        }
+        let variable = real(description, name).with_context(|| flag.clone())?;
+        let own = (0..recordings).filter(|number| recording.is_none_or(|of| of == *number));
+        let values = own.map(|number| self.set_value(variable, description, number));
+        let values = values.collect::<Result<Vec<f64>>>().with_context(|| flag.clone())?;
+        let value = values[0];
+        ensure!(
+            values.iter().all(|other| *other == value),
+            "{flag}: the recordings have different values of {name} (allowed: {name}@1 to {name}@{recordings})"
+        );
+        let std = match &tolerance.size {
+            Size::Part(part) if value == 0.0 && *part > 0.0 => bail!(
+                "{flag}: {name} is 0, so that a part of it is 0 (allowed: a number with a unit, or ±NUMBER)"
+            ),
+            Size::Part(part) => part * value.abs(),
+            Size::Absolute(text) => deviation(variable, description, text)?,
+        };
+        let free = Free { name: name.into(), each: false, start: value, bounds: None };
+        parameter(&free, description, recording)?.known(value, std).with_context(|| flag)
+    }
+
+    /// A variable's value in a recording: that of `--set`, or its start in the model description.
+    fn set_value(
+        &self,
+        variable: &Variable,
+        description: &ModelDescription,
+        number: usize,
+    ) -> Result<f64> {
+        let of = |name: &str, recording: Option<usize>| {
+            name == variable.name && recording.is_none_or(|of| of == number)
+        };
+        let set = self.settings.iter().rev().find(|setting| of(&setting.name, setting.recording));
+        let text = set.map(|setting| &setting.value).or(variable.attributes().start.as_ref());
+        let text = text.with_context(|| {
+            format!("{} has no start value: give it one with --set", variable.name)
+        })?;
+        match description.value(variable, text)? {
+            Value::Real(value) => Ok(value),
+            _ => bail!("{} is not a Real", variable.name),
+        }
+    }
+}
+
+impl Unknown {
+    /// The same as a known value with this standard deviation.
+    fn known(self, mean: f64, std: f64) -> Result<Unknown> {
+        ensure!(std > 0.0 && std.is_finite(), "the tolerance must be above 0");
+        let reach = KNOWN_REACH * std;
+        Ok(Unknown { prior: Some((mean, std)), start: mean, reach, is_known: true, ..self })
+    }
+}
+
+/// Name of the clock among the scales.
+const CLOCK: &str = "time";
+
+/// A standard deviation in a variable's own unit, from a number with or without a unit.
+fn deviation(variable: &Variable, description: &ModelDescription, text: &str) -> Result<f64> {
+    let number = |text: &str| match description.value(variable, text)? {
+        Value::Real(number) => Ok(number),
+        _ => bail!("{} is not a Real", variable.name),
+    };
+    let is_of_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
+    // a unit may have an offset, as °C has
+    let zero = format!("0{}", text.trim_start_matches(is_of_number));
+    Ok(number(text)? - number(&zero)?)
+}
+
+/// The name of what a recording has of its own.
+fn numbered(name: &str, recording: usize) -> String {
+    format!("{name}@{}", recording + 1)
+}
+
+fn parameter(
+    free: &Free,
+    description: &ModelDescription,
+    recording: Option<usize>,
+) -> Result<Unknown> {
+    let variable = real(description, &free.name)?;
+    let allowed = [Causality::Parameter, Causality::Output, Causality::Local, Causality::Input];
+    ensure!(
+        allowed.contains(&variable.causality) && variable.variability != Variability::Constant,
+        "{} cannot be free: it is a {} {}",
+        free.name,
+        variable.variability,
+        variable.causality
+    );
+    let own: (f64, f64) = range(variable).into();
+    let (low, high) = free.bounds.unwrap_or(own);
+    ensure!(
+        own.0 <= low && high <= own.1,
+        "{} is free from {low} to {high} (allowed by the FMU: {} to {})",
+        free.name,
+        own.0,
+        own.1
+    );
+    ensure!(
+        (low..=high).contains(&free.start),
+        "{} starts at {} (allowed: {low} to {high})",
+        free.name,
+        free.start
+    );
+    let reach = match free.bounds {
+        Some((low, high)) if (high - low).is_finite() => 0.25 * (high - low),
+        _ if free.start != 0.0 => 0.5 * free.start.abs(),
+        _ => 1.0,
+    };
+    Ok(Unknown {
+        name: recording.map_or(free.name.clone(), |k| numbered(&free.name, k)),
+        what: What::Parameter { reference: variable.reference, recording },
+        unit: description.unit(variable).into(),
+        start: free.start,
+        bounds: (low, high),
+        prior: None,
+        reach,
+        is_known: false,
+    })
+}

@@ -1,0 +1,353 @@
+//! Design of experiments: torques for identification, and the Cramér–Rao bound of each parameter before anything is recorded.
+
+use std::f64::consts::TAU;
+
+use analysis::linear::Linear;
+use analysis::random::Random;
+use analysis::statistics::peak;
+use anyhow::{Result, ensure};
+use files::budget;
+use host::fmu::Fmu;
+use nalgebra::Matrix5;
+
+use crate::fit::bench::problem::Problem;
+use crate::input::recording::Recording;
+use crate::model::bench::simulate::Setup;
+use crate::model::bench::unknown::Unknown;
+use analysis::gauss_markov::Noise;
+
+/// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification,
+/// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`GROUP`] left out at random.
+///
+/// What the response shows at a left-out odd line is odd nonlinear distortion, at even lines even
+/// distortion; between lines (in records of several periods) it is noise.
+#[derive(Clone, Debug)]
+pub struct Multisine {
+    /// Length of a period, s; lines are 1/period apart.
+    pub period: f64,
+    /// Numbers k of the lines with power.
+    pub lines: Vec<u32>,
+    /// Odd lines of the band without power.
+    pub detection: Vec<u32>,
+    /// a_k, N·m.
+    amplitudes: Vec<f64>,
+    phases: Vec<f64>,
+}
+
+/// Odd lines in a group, of which one is left out.
+pub const GROUP: usize = 4;
+
+impl Multisine {
+    /// Lines between two frequencies (Hz), the largest torque being `peak` (N·m). The phases with the
+    /// smallest crest factor of 20 draws are taken.
+    pub fn new(period: f64, band: (f64, f64), peak: f64, seed: u64) -> Result<Self> {
+        ensure!(0.0 < band.0 && band.0 < band.1, "a multisine's band must be 0 < f0 < f1");
+        ensure!(
+            peak > 0.0 && period > 0.0 && peak.is_finite() && period.is_finite(),
+            "peak torque and period must be positive numbers"
+        );
+        let lines = (band.1 - band.0) * period / 2.0;
+        ensure!(
+            lines <= budget::LINES as f64 && band.1 * period <= f64::from(u32::MAX),
+            "a band from {} to {} Hz has {lines:.1e} odd lines at a period of {period} s (allowed: at \
+             most {})",
+            band.0,
+            band.1,
+            budget::LINES
+        );
+        let mut random = Random::new(seed, 0);
+        let first = (band.0 * period).ceil() as u32 | 1;
+        let odd: Vec<u32> = (first..=(band.1 * period).floor() as u32).step_by(2).collect();
+        ensure!(
+            odd.len() >= 2 * GROUP,
+            "period {period} s is too short for the band: too few lines"
+        );
+        let (mut lines, mut detection) = (Vec::new(), Vec::new());
+        for group in odd.chunks(GROUP) {
+            let left_out = (random.uniform() * GROUP as f64) as usize;
+            for (k, line) in group.iter().enumerate() {
+                if k == left_out { detection.push(*line) } else { lines.push(*line) }
+            }
+        }
+        let amplitudes = vec![1.0; lines.len()];
+        let phases = vec![0.0; lines.len()];
+        let flat = Multisine { period, lines, detection, amplitudes, phases };
+        Ok(flat.drawn(peak, &mut random))
+    }
+
+    /// The same lines with these shares of the power and new phases.
+    pub fn shaped(&self, shares: &[f64], peak: f64, seed: u64) -> Self {
+        let amplitudes = shares.iter().map(|p| p.sqrt()).collect();
+        Multisine { amplitudes, ..self.clone() }.drawn(peak, &mut Random::new(seed, 1))
+    }
+
+    /// The phases with the smallest crest factor of 20 draws, and the largest torque `peak`.
+    fn drawn(self, peak: f64, random: &mut Random) -> Self {
+        let mut best: Option<(f64, Self)> = None;
+        for _ in 0..20 {
+            let phases = self.lines.iter().map(|_| TAU * random.uniform()).collect();
+            let one = Multisine { phases, ..self.clone() };
+            let largest = (0..2000)
+                .map(|k| one.at(self.period * f64::from(k) / 2000.0).abs())
+                .fold(0.0, f64::max);
+            if best.as_ref().is_none_or(|(other, _)| largest < *other) {
+                best = Some((largest, one));
+            }
+        }
+        let (largest, one) = best.expect("twenty draws");
+        one.scaled(peak / largest)
+    }
+
+    /// The same with all torques times a factor.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let amplitudes = self.amplitudes.iter().map(|a| a * factor).collect();
+        Multisine { amplitudes, ..self.clone() }
+    }
+
+    /// Fails if it is too much work to compute that many rows.
+    pub fn check_rows(&self, rows: usize) -> Result<()> {
+        let sines = (rows as u64).saturating_mul(self.lines.len() as u64);
+        ensure!(
+            sines <= budget::SINES,
+            "{rows} rows of {} lines are {:.1e} sines (allowed: at most {:.0e}); a shorter record, a \
+             narrower band or a shorter period has fewer",
+            self.lines.len(),
+            sines as f64,
+            budget::SINES as f64
+        );
+        Ok(())
+    }
+
+    /// Frequencies of the lines with power, Hz.
+    pub fn frequencies(&self) -> Vec<f64> {
+        self.lines.iter().map(|&k| f64::from(k) / self.period).collect()
+    }
+
+    /// Torque at `t` (s), N·m.
+    pub fn at(&self, t: f64) -> f64 {
+        let turn = (t / self.period).fract();
+        let tones = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
+        tones.map(|((&k, a), phase)| a * (TAU * f64::from(k) * turn + phase).sin()).sum()
+    }
+}
+
+/// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
+/// distortion everywhere.
+const SPREAD: f64 = 0.25;
+
+/// Returns the D-optimal power of lines at these frequencies (Hz): it maximises the determinant of the information on a linear
+/// bench's five parameters. The share [`SPREAD`] is the same on all lines.
+///
+/// ```text
+/// maximise ln det Σ p_k A_k,  A_k = Re(J_kᴴ J_k),  J_k = ∂H(f_k)/∂ ln(f, ζ, m, I0, b):
+/// p_k ← p_k tr(M⁻¹ A_k)/5
+/// ```
+///
+/// (Titterington's iteration, which never makes it worse; Goodwin & Payne, Dynamic System Identification, 1977, chapter 6.)
+pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
+    let moved = |which: usize, by: f64| {
+        let mut moved = plant.clone();
+        let mode = &mut moved.modes[0];
+        let value = match which {
+            0 => &mut mode.frequency,
+            1 => &mut mode.damping,
+            2 => &mut mode.mass,
+            3 => &mut moved.inertia,
+            _ => &mut moved.friction,
+        };
+        *value *= 1.0 + by;
+        moved
+    };
+    let step = 1e-5;
+    let pairs: Vec<(Linear, Linear)> = (0..5).map(|i| (moved(i, step), moved(i, -step))).collect();
+    let information: Vec<Matrix5<f64>> = frequencies
+        .iter()
+        .map(|&f| {
+            let slope: Vec<_> =
+                pairs.iter().map(|(a, b)| (a.response(f) - b.response(f)) / (2.0 * step)).collect();
+            Matrix5::from_fn(|i, j| (slope[i].conj() * slope[j]).re)
+        })
+        .collect();
+    let count = frequencies.len() as f64;
+    let mut shares = vec![1.0 / count; frequencies.len()];
+    for _ in 0..300 {
+        let total: Matrix5<f64> = information.iter().zip(&shares).map(|(a, p)| a * *p).sum();
+        let Some(inverse) = total.try_inverse() else { break };
+        for (share, a) in shares.iter_mut().zip(&information) {
+            *share *= (inverse * a).trace() / 5.0;
+        }
+    }
+    shares.iter().map(|p| (1.0 - SPREAD) * p + SPREAD / count).collect()
+}
+
+/// A reaction wheel's limits.
+#[derive(Clone, Copy, Debug)]
+pub struct Wheel {
+    /// Largest torque, N·m.
+    pub torque: f64,
+    /// Moment of inertia, kg·m².
+    pub inertia: f64,
+    /// Speed at the start, and the least and the largest that are allowed, rad/s.
+    pub speeds: [f64; 3],
+}
+
+impl Wheel {
+    /// The wheel's least and largest speed under a torque on the hub, rad/s: I_w W' = −τ.
+    pub fn range(&self, time: &[f64], torque: &[f64]) -> (f64, f64) {
+        let mut speed = self.speeds[0];
+        let (mut least, mut largest) = (speed, speed);
+        for (t, tau) in time.windows(2).zip(torque.windows(2)) {
+            speed -= (tau[0] + tau[1]) / 2.0 * (t[1] - t[0]) / self.inertia;
+            (least, largest) = (least.min(speed), largest.max(speed));
+        }
+        (least, largest)
+    }
+
+    /// The largest factor (at most 1) by which a torque can be multiplied within the limits.
+    pub fn factor(&self, time: &[f64], torque: &[f64]) -> f64 {
+        let (least, largest) = self.range(time, torque);
+        let [start, low, high] = self.speeds;
+        [
+            self.torque / peak(torque),
+            (start - low) / (start - least),
+            (high - start) / (largest - start),
+        ]
+        .into_iter()
+        .filter(|f| f.is_finite())
+        .fold(1.0, f64::min)
+    }
+}
+
+/// Largest angle of the liquid's first mode under a torque from rest, rad.
+pub fn slosh_angle(fmu: &Fmu, setup: &Setup, time: &[f64], torque: &[f64]) -> Result<f64> {
+    let rate = vec![0.0; time.len()];
+    let recording = Recording::of("plan", time.to_vec(), torque.to_vec(), rate);
+    Ok(peak(&setup.run(fmu, &[], &recording, 0.0)?.slosh_angle))
+}
+
+/// The largest factor (at most 1) by which a torque can be multiplied so that the liquid stays within an angle, rad.
+pub fn within_angle(
+    fmu: &Fmu,
+    setup: &Setup,
+    time: &[f64],
+    torque: &[f64],
+    limit: f64,
+) -> Result<f64> {
+    let angle = |factor: f64| {
+        let scaled: Vec<f64> = torque.iter().map(|t| factor * t).collect();
+        slosh_angle(fmu, setup, time, &scaled)
+    };
+    if angle(1.0)? <= limit {
+        return Ok(1.0);
+    }
+    // Dry friction takes its share first, so the angle grows faster than the torque: between a factor within the limit and
+    // one beyond it the middle one.
+    let (mut within, mut beyond) = (0.0, 1.0);
+    for _ in 0..ROUNDS {
+        let factor = 0.5 * (within + beyond);
+        let found = angle(factor)?;
+        *(if found <= limit { &mut within } else { &mut beyond }) = factor;
+        if (ENOUGH * limit..=limit).contains(&found) {
+            break;
+        }
+    }
+    ensure!(within > 0.0, "no torque of this shape keeps the liquid within {limit} rad");
+    Ok(within)
+}
+
+/// Rounds of [`within_angle`].
+const ROUNDS: usize = 20;
+/// Part of the limit that [`within_angle`] is content with.
+const ENOUGH: f64 = 0.97;
+
+/// Geometric mean of the relative standard deviations: what one plan tells against another. An unknown that is expected to be 0,
+/// a delay or a bias, has no relative deviation and does not count.
+pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
+    let relative = bounds.iter().filter(|(_, value, _)| *value != 0.0);
+    let logarithms: Vec<f64> = relative.map(|(_, value, std)| (std / value.abs()).ln()).collect();
+    analysis::statistics::mean(&logarithms).exp()
+}
+
+/// Standard deviation that no unbiased estimate can beat, for each unknown at its start, from a torque
+/// and a gyro's noise.
+pub fn cramer_rao(
+    fmu: &Fmu,
+    setup: Setup,
+    (time, torque): (Vec<f64>, Vec<f64>),
+    unknowns: Vec<Unknown>,
+    noise: Noise,
+) -> Result<Vec<(String, f64, f64)>> {
+    let rate = vec![0.0; time.len()];
+    let recording = [Recording::of("plan", time, torque, rate)];
+    let mut problem = Problem::new(fmu, setup, &recording, unknowns);
+    problem.channels[0].noise = noise;
+    let x = problem.start();
+    let (covariance, _) = problem.information(&x)?;
+    let deviation = |i: usize| covariance.x[(i, i)].sqrt();
+    Ok(problem
+        .unknowns
+        .iter()
+        .enumerate()
+        .map(|(i, u)| (u.quantity.name(), u.start, deviation(i) * u.scale.slope(x[i]).abs()))
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_multisine_has_odd_lines_alone_and_its_peak() {
+        let torque = Multisine::new(100.0, (1.25, 3.5), 0.25, 1).unwrap();
+        assert!(torque.lines.iter().chain(&torque.detection).all(|k| k % 2 == 1));
+        assert!(torque.detection.len() >= torque.lines.len() / GROUP);
+        let largest =
+            (0..20_000).map(|k| torque.at(f64::from(k) * 0.005).abs()).fold(0.0, f64::max);
+        // the search looks every 0.05 s, at 3.5 Hz within cos(π 0.05 3.5) of a crest
+        assert!((0.2499..0.29).contains(&largest), "{largest}");
+        // odd lines alone: the second half of a period is the first with the other sign
+        assert!((torque.at(13.7) + torque.at(63.7)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn d_optimal_power_stands_around_the_slosh_and_tells_more() {
+        let plant = Linear { friction: 0.1, ..Linear::bench_10_cm(0.003) };
+        let frequencies: Vec<f64> = (125..350).step_by(2).map(|k| f64::from(k) / 100.0).collect();
+        let shares = d_optimal(&plant, &frequencies);
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        let near: f64 = frequencies
+            .iter()
+            .zip(&shares)
+            .filter(|(f, _)| (2.25..2.55).contains(*f))
+            .map(|(_, p)| p)
+            .sum();
+        // 13 % of the lines; the antiresonance and the resonance are there
+        assert!(near > 0.3, "{near}");
+    }
+
+    #[test]
+    fn an_unknown_that_is_expected_to_be_zero_does_not_count_in_the_mean_deviation() {
+        let bound = |value: f64, std: f64| ("name".to_string(), value, std);
+        let known = [bound(2.0, 0.02), bound(-1.0, 0.04)];
+        let with_zero = [&known[..], &[bound(0.0, 1e-4)]].concat();
+        // the geometric mean of 1 % and 4 %
+        assert!((merit(&known) - 0.02).abs() < 1e-15 && merit(&with_zero) == merit(&known));
+    }
+
+    #[test]
+    fn a_wheels_limits_bound_the_torque() {
+        let rpm = std::f64::consts::TAU / 60.0;
+        let wheel = Wheel {
+            torque: 0.26,
+            inertia: 2.25e-3,
+            speeds: [1600.0 * rpm, 200.0 * rpm, 3000.0 * rpm],
+        };
+        let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        // 0.1 N·m for 10 s is 444 rad/s; 146.6 rad/s are there
+        let factor = wheel.factor(&time, &vec![0.1; 1000]);
+        assert!((factor - 146.6 / 444.0).abs() < 1e-3, "{factor}");
+        let fast: Vec<f64> = time.iter().map(|t| 0.52 * (TAU * 3.0 * t).sin()).collect();
+        // the sine's crests lie between rows: (π 3 0.01)²/2 = 0.4 %
+        assert!((wheel.factor(&time, &fast) - 0.5).abs() < 3e-3);
+    }
+}

@@ -1,0 +1,114 @@
+//! Information from a planned recording: the Cramér–Rao bound of each unknown from its sensitivities along the planned inputs.
+
+use anyhow::{Result, ensure};
+use serde::Serialize;
+
+use crate::fit::problem::Problem;
+use crate::input::question::Question;
+use crate::input::record::Record;
+use crate::model::simulate::{Model, Setup};
+use crate::model::unknown::What;
+use crate::uncertainty::knowledge::{finite, knowledge};
+use crate::uncertainty::solver_error::measure;
+use analysis::gauss_markov::Noise;
+
+/// The bound of one unknown.
+#[derive(Clone, Debug, Serialize)]
+pub struct Bound {
+    /// Name.
+    pub name: String,
+    /// Value in the plan.
+    pub value: f64,
+    /// The least standard deviation of an unbiased estimate; NaN: none can be made.
+    pub std: f64,
+    /// True if the recordings tell less than the value itself or than was known beforehand.
+    pub not_determined: bool,
+    /// True if the errors of the solver decide the bound. Neither bound is known then.
+    pub decided_by_solver: bool,
+    /// Names of the unknowns that the recordings cannot distinguish from this one.
+    pub inseparable_from: Vec<String>,
+    /// The same if all others were known.
+    pub std_alone: f64,
+    /// Standard deviation beforehand.
+    pub prior: Option<f64>,
+    /// Unit.
+    pub unit: String,
+    /// The unknown with which it is most correlated, and how.
+    pub with: Option<(String, f64)>,
+    /// A parameter of the FMU, or one of the sensors.
+    pub is_parameter: bool,
+}
+
+/// Foresees what recordings with these inputs tell at the starts; `noise`: of a row of each output. Their outputs are not looked at.
+/// `warn` hears the FMU's warnings.
+///
+/// # Errors
+/// All that is wrong with what is asked; what the FMU refuses.
+pub fn foresee(
+    model: &Model,
+    question: &Question,
+    records: &[Record],
+    noise: &[f64],
+    warn: &mut dyn FnMut(String),
+) -> Result<Vec<Bound>> {
+    ensure!(!records.is_empty(), "there is no table of planned inputs");
+    for record in records {
+        ensure!(!record.time.is_empty(), "{}: it has no row (allowed: at least one)", record.name);
+    }
+    ensure!(
+        noise.iter().all(|sigma| *sigma > 0.0 && sigma.is_finite()),
+        "the noise of an output must be above 0"
+    );
+    let setup = Setup::new(question, model.description())?;
+    let unknowns = question.unknowns(model.description(), records)?;
+    let mut problem = Problem::new(model, &setup, records, unknowns, 1.0);
+    for channel in &mut problem.channels {
+        channel.noise = Noise::white(noise[channel.output]);
+        channel.sampled.fill(true);
+    }
+    problem.warnings()?.into_iter().for_each(warn);
+    let x = problem.start();
+    let motion = problem.answer(&x)?.motion;
+    let mut steps = problem.first_steps();
+    // the second time with steps that suit the noise
+    problem.jacobian(&x, &motion, &mut steps)?;
+    let jacobian = problem.jacobian(&x, &motion, &mut steps)?;
+    let all: Vec<usize> = (0..x.len()).collect();
+    let solver = measure(&problem, &x, &motion, &jacobian, &steps, &all)?;
+    let known = knowledge(&problem, &jacobian, &all, &solver)?;
+    let covariance = &known.covariance;
+    let bound = |j: usize| {
+        let unknown = &problem.unknowns[j];
+        let std = covariance[(j, j)].sqrt();
+        let correlation =
+            |k: usize| covariance[(j, k)] / (covariance[(j, j)] * covariance[(k, k)]).sqrt();
+        let with = all.iter().filter(|k| **k != j).map(|&k| (k, correlation(k)));
+        let with = with
+            .filter(|(_, r)| r.is_finite())
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+            .map(|(k, r)| (problem.unknowns[k].name.clone(), r));
+        let is_lost = known.decided_by_solver[j];
+        let sets = known.inseparable.iter().filter(|set| set.direction.contains_key(&unknown.name));
+        let others =
+            sets.flat_map(|set| set.direction.keys()).filter(|name| **name != unknown.name);
+        let prior = unknown.prior.map(|(_, std)| std);
+        let is_vague = match prior {
+            Some(prior) => std > 0.9 * prior,
+            None => !std.is_finite() || std > x[j].abs(),
+        };
+        Bound {
+            not_determined: is_vague && !is_lost,
+            decided_by_solver: is_lost,
+            inseparable_from: others.cloned().collect(),
+            name: unknown.name.clone(),
+            value: x[j],
+            std: if std.is_finite() && !is_lost { std } else { f64::NAN },
+            std_alone: if is_lost { f64::NAN } else { finite(1.0 / jacobian.column(j).norm()) },
+            prior,
+            unit: unknown.unit.clone(),
+            with,
+            is_parameter: !unknown.is_known && matches!(unknown.what, What::Parameter { .. }),
+        }
+    };
+    Ok(all.iter().map(|&j| bound(j)).collect())
+}

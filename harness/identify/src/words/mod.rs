@@ -1,0 +1,6 @@
+//! Fifth stage: the results in words, as a page and as JSON.
+
+pub mod identified;
+pub mod page;
+pub mod start_study;
+pub mod verdict;

@@ -1,0 +1,213 @@
+//! The answer in words.
+
+use std::collections::BTreeMap;
+
+use crate::estimate::{Estimated, prose};
+use crate::fit::bench::candidate::ModelFit;
+use crate::fit::evidence::{DECIDES, probabilities};
+use crate::uncertainty::bench::budget::Effect;
+use crate::uncertainty::bench::cause::Cause;
+use crate::uncertainty::bench::missing::Missing;
+use crate::uncertainty::bench::sources::Combination;
+use analysis::innovations::{self, Tests};
+use names::hubslosh::{SloshModel, hub};
+
+/// Newton decrement above which the verdict reports it.
+const TOLD: f64 = 0.1;
+
+/// Beginning of the sentence about an invalidated model.
+pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
+/// Beginning of the sentence about a search that has not converged.
+pub const NO_MINIMUM: &str = "The search did not end at a minimum";
+
+/// Beginning of the sentence about errors of the solver that leave no judgement.
+pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
+/// Beginnings of sentences that forbid to trust the numbers.
+pub const DOUBTS: [&str; 3] = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED];
+
+/// Candidates of the choice.
+pub struct Question<'a> {
+    /// Slosh models; those that fit about as well as the best come first.
+    pub slosh: &'a [ModelFit],
+    /// Number of those.
+    pub near: usize,
+    /// Friction laws, with one slosh model.
+    pub laws: &'a [ModelFit],
+    /// Doubts about the recordings before any fit.
+    pub doubts: &'a [String],
+}
+
+/// Findings at the chosen model's minimum other than values.
+pub struct Findings {
+    /// Reasons for the choice of the torque's intersample behaviour, in words.
+    pub torque: Vec<String>,
+    /// Torques that the model lacks.
+    pub missing: Vec<Missing>,
+    /// The likeliest cause of a misfit, if one was found.
+    pub cause: Option<Cause>,
+    /// Doubts about recordings or model, in words.
+    pub doubts: Vec<String>,
+}
+
+impl Findings {
+    /// Returns true if the model with this fit explains the recordings.
+    pub fn fits(&self, fit: &ModelFit) -> bool {
+        fit.tests.iter().all(Tests::passed) && self.missing.is_empty() && self.doubts.is_empty()
+    }
+}
+
+/// Each sentence answers one question: which model, which friction, whether it fits, what is known and what not.
+pub fn words(
+    question: &Question,
+    findings: &Findings,
+    fit: &ModelFit,
+    combinations: &[Combination],
+    parameters: &BTreeMap<String, Estimated>,
+    budget: &[Effect],
+) -> Vec<String> {
+    let (mut lines, fits) = (Vec::new(), findings.fits(fit));
+    lines.extend(slosh(question, fits));
+    lines.extend(friction(question.laws));
+    lines.extend(findings.torque.iter().cloned());
+    if !fits {
+        let mut reasons: Vec<String> =
+            fit.tests.iter().flat_map(|tests| failed(tests, "the torque")).collect();
+        // a torque that explains less than the cause does is its shadow
+        let gain = findings.cause.as_ref().map_or(0.0, |cause| cause.gain);
+        let missing = findings.missing.iter();
+        reasons.extend(missing.filter(|m| m.deviations.powi(2) > gain).map(Missing::words));
+        reasons.extend(findings.doubts.iter().cloned());
+        if reasons.is_empty() {
+            reasons.extend(findings.missing.iter().map(Missing::words));
+        }
+        lines.push(format!(
+            "{DOES_NOT_FIT}: no model leaves only the gyro's noise as residual ({}). Values and intervals are those of the \
+             nearest model and cannot be trusted: something acts on the bench that the models lack.",
+            reasons.join("; ")
+        ));
+        lines.extend(findings.cause.as_ref().map(Cause::words));
+    }
+    if !fit.converged {
+        lines.push(format!(
+            "{NO_MINIMUM} (it is {:.2} standard deviations away): values and standard deviations cannot be trusted. More torque, \
+             a longer recording or --start may help.",
+            fit.newton_decrement
+        ));
+    }
+    if fit.converged && fit.newton_decrement > TOLD {
+        lines.push(format!(
+            "The search ended {:.2} standard deviations from the minimum; the stated standard deviations include this.",
+            fit.newton_decrement
+        ));
+    }
+    if fit.model == SloshModel::Frozen.name() && parameters.contains_key(hub::I) {
+        lines.push(
+            "hub.I is the total inertia minus that of the liquid in the tank as set (tank.d, tank.h, tank.r, fluid.rho). A \
+             recording without slosh does not show the liquid: the interval holds for this one."
+                .into(),
+        );
+    }
+    lines.extend(combinations.iter().map(Combination::words));
+    for (name, p) in parameters {
+        if !p.determined {
+            let [low, high] = p.interval;
+            let within = if high.is_finite() {
+                format!("from {low:.2e} to {high:.2e}")
+            } else {
+                format!("above {low:.2e}")
+            };
+            lines.push(format!(
+                "{name} is not determined by these data: 95 % interval {within} {}, the nearest fit has {:.3e}.",
+                prose(&p.unit),
+                p.value
+            ));
+        }
+    }
+    lines.extend(modes(parameters, budget));
+    lines
+}
+
+fn slosh(question: &Question, fits: bool) -> Option<String> {
+    let best = question.slosh.first()?;
+    if question.slosh.len() == 1 {
+        return None;
+    }
+    if question.near > 1 {
+        let near = &question.slosh[..question.near];
+        let each: Vec<String> = near
+            .iter()
+            .zip(probabilities(near.iter().map(|m| m.bic)))
+            .map(|(model, p)| format!("{} (probability {p:.2})", model.model))
+            .collect();
+        return Some(format!(
+            "Cannot tell which slosh model it is: {}. The parameters below are those of the first; their standard deviations \
+             include the others.",
+            each.join(", ")
+        ));
+    }
+    let second = &question.slosh[1];
+    let is = if fits { "The slosh model is" } else { "The nearest slosh model is" };
+    Some(format!(
+        "{is} {}: its BIC is {:.0} below that of the next, {}.",
+        best.model,
+        second.bic - best.bic,
+        second.model
+    ))
+}
+
+fn friction(laws: &[ModelFit]) -> Vec<String> {
+    let Some(first) = laws.first() else { return Vec::new() };
+    let one = |other: &ModelFit| {
+        let gain = first.bic - other.bic;
+        match gain {
+            g if g > DECIDES => {
+                format!(
+                    "The friction is {}: its BIC is {g:.0} below that of {}.",
+                    other.friction, first.friction
+                )
+            }
+            // what the other has more counts ln N a parameter; without that they are alike
+            _ if first.deviance - other.deviance > -DECIDES => format!(
+                "Cannot tell the friction's law: {} explains the data as well as {}, which has fewer unknowns and is used.",
+                other.friction, first.friction
+            ),
+            g => format!(
+                "The friction is {}: its BIC is {:.0} below that of {}.",
+                first.friction, -g, other.friction
+            ),
+        }
+    };
+    laws[1..].iter().map(one).collect()
+}
+
+fn modes(parameters: &BTreeMap<String, Estimated>, budget: &[Effect]) -> Option<String> {
+    let modes = budget.iter().find(|e| e.source.starts_with("slosh modes"))?;
+    let large: Vec<String> = parameters
+        .iter()
+        .filter_map(|(name, p)| {
+            let change = modes.change.get(name)?;
+            (change.abs() > p.std).then(|| format!("{name} {}", p.change(*change)))
+        })
+        .collect();
+    (!large.is_empty()).then(|| {
+        format!(
+            "Slosh modes 2 to 4 are left out; with them the estimates would change by more than their \
+             standard deviation: {}. Set slosh.modes to include them.",
+            large.join(", ")
+        )
+    })
+}
+
+/// Names the failed tests of a residual, each with its standard deviations of chance; `input` names what may be correlated with it.
+pub fn failed(tests: &Tests, input: &str) -> Vec<String> {
+    let (time, frequency) = (tests.in_time, tests.in_frequency);
+    let all = [
+        (tests.whiteness, "it is not white".to_string()),
+        (time.0, format!("it is too large around {:.1} s", time.1)),
+        (frequency.0, format!("it is too large around {:.2} Hz", frequency.1)),
+        (tests.torque, format!("it is correlated with {input}")),
+        (tests.torque_squared, format!("it is correlated with the square of {input}")),
+    ];
+    let failed = all.into_iter().filter(|(deviations, _)| *deviations >= innovations::LIMIT);
+    failed.map(|(deviations, what)| format!("{what} ({deviations:.0} σ)")).collect()
+}
