@@ -28,6 +28,7 @@ mod six {
     mod bits;
     mod component;
     mod cosimulation;
+    mod finite_amplitude;
     mod hubslosh;
     mod steps;
     // Random craft and reference records of the crate `craft`
@@ -36,6 +37,8 @@ mod six {
     #[path = "../../fmu/craft/tests/craft/records.rs"]
     #[allow(dead_code, reason = "the crate's tests use the rest of it")]
     mod records;
+    #[path = "../../fmu/craft/tests/craft/waves.rs"]
+    mod waves;
 }
 mod xml {
     mod checklist;

@@ -26,3 +26,4 @@ mod small_motions;
 mod special_cases;
 mod surface;
 mod tilting;
+mod waves;

@@ -1,84 +1,24 @@
 //! Coefficients of the third order: bobs on other surfaces than spheres.
 //!
+//! `tests/six` compares their waves with potential flow.
 //! `independent.rs`, `equations.rs`, `exchange.rs`, `balances.rs`, `draining.rs` and `impulses.rs` have such bobs among
 //! their random tanks.
 
 use craft::{
-    Coupling, Craft, DampingLaw, Inertia, Inputs, MODES, Mount, Parameters, Ramp, STATES,
-    TANK_STATES, Tank, TankInputs, TankParameters, index,
+    Coupling, Inertia, Inputs, MODES, Mount, Parameters, Ramp, STATES, TANK_STATES, Tank,
+    TankInputs, TankParameters,
 };
-use formulas::{cylinder, third_order};
 
 use super::component::{SloshTank, Spacecraft};
 use super::exchange::runge_kutta;
 use super::random::Random;
-
-const G: f64 = 9.80665;
-
-/// The bench's tank of 81.5 mm radius, filled to `fill` radii, with its first mode alone and the coefficients of potential
-/// flow.
-fn bench(fill: f64) -> Tank {
-    let (d, h) = (0.163, 0.0815 * fill);
-    let pendulum = cylinder::pendulum(0, d, h, 2.083);
-    let (s, kappa) = third_order::coefficients(fill);
-    let mut tank = Tank {
-        position: [0.0; 3],
-        modes: 1,
-        m_0: 2.083 - pendulum.mass,
-        i_0: 0.0,
-        g_ref: G,
-        zeta: [0.0; MODES],
-        damping_law: DampingLaw::Constant,
-        ..Tank::default()
-    };
-    (tank.mass[0], tank.length[0], tank.hinge[0]) = (pendulum.mass, pendulum.length, 0.0);
-    (tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]) = (s, kappa);
-    tank
-}
+use super::waves::{G, bench, circular, planar};
 
 /// A tank that rests upright under gravity.
 fn resting(tank: Tank) -> (SloshTank, TankInputs) {
     let u = TankInputs { a: Ramp::held([0.0, 0.0, G]), ..TankInputs::default() };
     let p = TankParameters { tank, ..TankParameters::default() };
     (SloshTank::new(&p, &u, 0.0, 1e-12).unwrap(), u)
-}
-
-fn linear_frequency(tank: &Tank) -> f64 {
-    f64::sqrt(G / tank.length[0])
-}
-
-/// Frequency of the mode, over the linear one, when it is released at A = |q|/l in the plane of x and z.
-fn planar(mut tank: Tank, a: f64) -> f64 {
-    tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
-    let (start, u) = resting(tank);
-    let w = linear_frequency(&tank);
-    // Newton's iteration for the first zero of p_x.
-    let mut quarter = 1.5 / w;
-    for _ in 0..8 {
-        let mut tank = start.clone();
-        tank.step(&u, quarter).unwrap();
-        let x = tank.continuous_states();
-        quarter -= x[0] / x[3];
-    }
-    std::f64::consts::FRAC_PI_2 / quarter / w
-}
-
-/// Frequency of the mode over the linear one on a circle with A = |q|/l.
-fn circular(mut tank: Tank, a: f64) -> f64 {
-    let z = -f64::sqrt(1.0 - a * a);
-    let w = linear_frequency(&tank);
-    tank.p_0[0] = [a, 0.0, z];
-    // The acceleration along the meridian is linear in the square of the rate.
-    let slide = |rate: f64| {
-        let mut tank = tank;
-        tank.p_dot_0[0] = [0.0, a * rate, 0.0];
-        let (mut tank, u) = resting(tank);
-        let d = tank.derivatives(&u);
-        // On a circle p_x'' = -a rate^2.
-        d[3] + a * rate * rate
-    };
-    let [at_rest, moving] = [slide(0.0), slide(w)];
-    f64::sqrt(at_rest / (at_rest - moving))
 }
 
 /// Expected: (3 kappa/8 - s/2) A^2 and (kappa/2) A^2. Halving A divides what is left by 16.
@@ -88,9 +28,10 @@ fn frequencies_shift_as_the_coefficients_say_and_the_rest_is_of_fourth_order() {
     {
         let mut tank = bench(1.227);
         (tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]) = (s, kappa);
-        for (shift, frequency) in
-            [(3.0 * kappa / 8.0 - s / 2.0, planar as fn(Tank, f64) -> f64), (kappa / 2.0, circular)]
-        {
+        for (shift, frequency) in [
+            (3.0 * kappa / 8.0 - s / 2.0, planar::<SloshTank> as fn(Tank, f64) -> f64),
+            (kappa / 2.0, circular::<SloshTank>),
+        ] {
             let left = |a: f64| frequency(tank, a).powi(2) - 1.0 - shift * a * a;
             let [large, small] = [left(0.1), left(0.05)];
             // Up to the sixth order.
@@ -99,66 +40,6 @@ fn frequencies_shift_as_the_coefficients_say_and_the_rest_is_of_fourth_order() {
             let ratio = large / small;
             assert!(large.abs() < 1e-9 || (12.0..20.0).contains(&ratio), "{s} {kappa}: {ratio}");
         }
-    }
-}
-
-/// Periodic waves by fully nonlinear potential flow without an expansion in steepness, with the first mode's angle in
-/// degrees: frequency over that of small waves.
-#[test]
-fn frequencies_of_waves_in_the_bench_s_tank_are_those_of_potential_flow() {
-    for (fill, circles, waves) in [
-        (1.227, false, [(4.0, 0.998962), (8.0, 0.995954), (12.0, 0.990939), (16.0, 0.983653)]),
-        (0.613, false, [(4.0, 0.999368), (8.0, 0.997373), (12.0, 0.993682), (16.0, 0.98767)]),
-        (1.227, true, [(2.0, 1.00022), (4.0, 1.00091), (6.0, 1.00208), (8.0, 1.00389)]),
-        (0.613, true, [(2.0, 1.00026), (4.0, 1.00104), (6.0, 1.00238), (8.0, 1.0043)]),
-    ] {
-        for (degrees, exact) in waves {
-            let a = f64::to_radians(degrees);
-            let got = if circles { circular(bench(fill), a) } else { planar(bench(fill), a) };
-            println!("{fill} {circles} {degrees}: {got:.5} {exact} {:.2e}", got / exact - 1.0);
-            assert!((got / exact - 1.0).abs() < 3e-3, "{fill} {degrees}: {got} {exact}");
-        }
-    }
-}
-
-/// Largest angles along and across in degrees over the last tenth of 150 periods of a tank that moves sideways by
-/// -stroke cos(w t), from rest, with 0.01 rad across.
-fn driven(tank: Tank, ratio: f64, stroke: f64) -> [f64; 2] {
-    let mut tank = Tank { p_0: [[0.0, 0.01, -1.0]; MODES], ..tank };
-    tank.zeta[0] = 0.005;
-    let (mut at, _) = resting(tank);
-    let w = ratio * linear_frequency(&tank);
-    let pieces = 100;
-    let h = std::f64::consts::TAU / w / pieces as f64;
-    let a = |t: f64| stroke * w * w * (w * t).cos();
-    let mut largest = [0.0_f64; 2];
-    for k in 0..150 * pieces {
-        let t = k as f64 * h;
-        let slope = (a(t + h) - a(t)) / h;
-        let ramp = Ramp { value: [a(t), 0.0, G], slope: [slope, 0.0, 0.0] };
-        at.step(&TankInputs { a: ramp, ..TankInputs::default() }, h).unwrap();
-        if k > 135 * pieces {
-            let x = at.continuous_states();
-            largest = [0, 1].map(|i| largest[i].max(x[i].abs().to_degrees()));
-        }
-    }
-    largest
-}
-
-/// Series of fully nonlinear potential flow that a pendulum misses by up to a factor of two. In the last one what was across
-/// at the start decays.
-#[test]
-fn forced_waves_near_resonance_are_those_of_potential_flow() {
-    for (ratio, stroke, along, across) in [
-        (0.985, 0.18097e-3, 17.18, Some(0.798)),
-        (1.0019, 0.10677e-3, 8.21, Some(1.02)),
-        (1.02, 0.36193e-3, 9.00, None),
-    ] {
-        let [got, aside] = driven(bench(1.227), ratio, stroke);
-        println!("{ratio}: {got:.2} {along}, {aside:.3} {across:?}");
-        assert!((got / along - 1.0).abs() < 0.03, "{ratio}: {got} {along}");
-        let off = across.map_or(0.0, |across: f64| (aside / across - 1.0).abs());
-        assert!(off < 0.15, "{ratio}: {aside} {across:?}");
     }
 }
 
@@ -212,29 +93,6 @@ fn a_tank_s_motion_does_not_depend_on_its_steps() {
             // 1e-12 a step, grown over 2 s.
             assert!((cut[i] - whole[i]).abs() < 1e-10 * size, "{seed} [{i}]");
             assert!((x[i] - whole[i]).abs() < 1e-9 * size, "{seed} [{i}]");
-        }
-    }
-}
-
-/// A tank on a craft so heavy that the liquid does not move it, against the tank alone under the same motion.
-#[test]
-fn a_tank_on_a_heavy_craft_moves_as_a_tank_alone() {
-    let heavy = 1e12;
-    let mut p = Parameters { tanks: 1, ..Parameters::default() };
-    let j = Inertia { xx: heavy, yy: heavy, zz: heavy, xy: 0.0, xz: 0.0, yz: 0.0 };
-    p.craft = Craft { mass: heavy, r: [0.0; 3], j };
-    p.tank[0] = bench(1.227);
-    (p.tank[0].zeta[0], p.tank[0].p_0[0]) = (0.005, [0.2, 0.1, -1.0]);
-    let (mut alone, u) = resting(p.tank[0]);
-    let mass = heavy + 2.083;
-    let thrust = Inputs { force: Ramp::held([0.0, 0.0, mass * G]), ..Inputs::default() };
-    let mut craft = Spacecraft::new(&p, &thrust, 0.0, 1e-12).unwrap();
-    for _ in 0..100 {
-        alone.step(&u, 0.05).unwrap();
-        craft.step(&thrust, 0.05).unwrap();
-        let x = craft.continuous_states();
-        for (got, want) in x[index::bob(0, 0)..][..6].iter().zip(alone.continuous_states()) {
-            assert!((got - want).abs() < 1e-9, "{got} {want}");
         }
     }
 }

@@ -1,0 +1,111 @@
+//! Free waves of the first mode in the tank of the bench, at rest or driven sideways.
+//!
+//! `tests/six` has this file too, with the packed FMUs as components.
+
+use std::f64::consts::FRAC_PI_2;
+
+use craft::{DampingLaw, MODES, Ramp, Tank, TankInputs, TankParameters};
+use formulas::{cylinder, third_order};
+
+use super::component::SloshTank;
+
+pub const G: f64 = 9.80665;
+
+pub const TOLERANCE: f64 = 1e-12;
+
+/// The bench's tank of 81.5 mm radius, filled to `fill` radii, with its first mode alone and the coefficients of potential
+/// flow.
+pub fn bench(fill: f64) -> Tank {
+    let (d, h) = (0.163, 0.0815 * fill);
+    let pendulum = cylinder::pendulum(0, d, h, 2.083);
+    let (s, kappa) = third_order::coefficients(fill);
+    let mut tank = Tank {
+        position: [0.0; 3],
+        modes: 1,
+        m_0: 2.083 - pendulum.mass,
+        i_0: 0.0,
+        g_ref: G,
+        zeta: [0.0; MODES],
+        damping_law: DampingLaw::Constant,
+        ..Tank::default()
+    };
+    (tank.mass[0], tank.length[0], tank.hinge[0]) = (pendulum.mass, pendulum.length, 0.0);
+    (tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]) = (s, kappa);
+    tank
+}
+
+/// Frequency of small waves, rad/s.
+pub fn linear_frequency(tank: &Tank) -> f64 {
+    f64::sqrt(G / tank.length[0])
+}
+
+/// Specific force of an upright tank that is accelerated along x, m/s2.
+pub fn sideways([value, slope]: [f64; 2]) -> Ramp {
+    Ramp { value: [value, 0.0, G], slope: [slope, 0.0, 0.0] }
+}
+
+/// One tank whose motion is prescribed.
+pub trait Moved: Sized {
+    /// Starts upright, at rest, under gravity.
+    fn start(tank: &Tank) -> Self;
+
+    /// Accelerates the tank along x for `h` s: value at the start (m/s2) and slope.
+    fn step(&mut self, a: [f64; 2], h: f64);
+
+    /// p of the first mode and its rate.
+    fn bob(&mut self) -> [f64; 6];
+
+    /// Derivative of [`bob`](Self::bob) in a tank at rest.
+    fn rates(&mut self) -> [f64; 6];
+}
+
+impl Moved for SloshTank {
+    fn start(tank: &Tank) -> Self {
+        let p = TankParameters { tank: *tank, ..TankParameters::default() };
+        let u = TankInputs { a: sideways([0.0; 2]), ..TankInputs::default() };
+        SloshTank::new(&p, &u, 0.0, TOLERANCE).unwrap()
+    }
+
+    fn step(&mut self, a: [f64; 2], h: f64) {
+        let u = TankInputs { a: sideways(a), ..TankInputs::default() };
+        SloshTank::step(self, &u, h).unwrap();
+    }
+
+    fn bob(&mut self) -> [f64; 6] {
+        self.continuous_states()[..6].try_into().unwrap()
+    }
+
+    fn rates(&mut self) -> [f64; 6] {
+        let u = TankInputs { a: sideways([0.0; 2]), ..TankInputs::default() };
+        self.derivatives(&u)[..6].try_into().unwrap()
+    }
+}
+
+/// Frequency of the mode, over the linear one, when it is released at A = |q|/l in the plane of x and z.
+pub fn planar<T: Moved>(mut tank: Tank, a: f64) -> f64 {
+    tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
+    let w = linear_frequency(&tank);
+    // Newton's iteration for the first zero of p_x.
+    let mut quarter = 1.5 / w;
+    for _ in 0..6 {
+        let mut moved = T::start(&tank);
+        moved.step([0.0; 2], quarter);
+        let x = moved.bob();
+        quarter -= x[0] / x[3];
+    }
+    FRAC_PI_2 / quarter / w
+}
+
+/// Frequency of the mode over the linear one on a circle with A = |q|/l.
+pub fn circular<T: Moved>(mut tank: Tank, a: f64) -> f64 {
+    let w = linear_frequency(&tank);
+    tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
+    // The acceleration along the meridian is linear in the square of the rate.
+    let mut slide = |rate: f64| {
+        tank.p_dot_0[0] = [0.0, a * rate, 0.0];
+        // On a circle p_x'' = -a rate^2.
+        T::start(&tank).rates()[3] + a * rate * rate
+    };
+    let [at_rest, moving] = [slide(0.0), slide(w)];
+    f64::sqrt(at_rest / (at_rest - moving))
+}

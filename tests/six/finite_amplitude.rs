@@ -1,0 +1,174 @@
+//! Waves of finite amplitude through the packed SloshTank and, on a heavy craft, the packed Spacecraft, compared with fully
+//! nonlinear potential flow, which has no expansion in steepness.
+//!
+//! The force on the craft accelerates craft and tank as the tank alone is accelerated, except for the recoil: a bob of mass m
+//! that swings pushes a craft of mass M. It raises the frequency by m/(2 M), 4e-12 here, and each test compares the
+//! FMUs to 1e-9.
+
+use std::f64::consts::TAU;
+
+use craft::{Craft, Inertia, Inputs, MODES, Parameters, Ramp, Tank, index};
+
+use super::component::{SloshTank, Spacecraft};
+use super::waves::{Moved, TOLERANCE, bench, circular, linear_frequency, planar, sideways};
+
+/// Mass (kg) and moments of inertia (kg.m2) of the craft. Its weight is near the largest force that the FMU takes.
+const HEAVY: f64 = 1e11;
+
+/// A tank at the centre of mass of a craft in free flight that a force at the same place accelerates.
+struct Carried {
+    craft: Spacecraft,
+    mass: f64,
+}
+
+impl Carried {
+    fn by(heavy: f64, tank: &Tank) -> Carried {
+        let j = Inertia { xx: heavy, yy: heavy, zz: heavy, xy: 0.0, xz: 0.0, yz: 0.0 };
+        let craft = Craft { mass: heavy, r: [0.0; 3], j };
+        let mut p = Parameters { craft, tanks: 1, ..Parameters::default() };
+        p.tank[0] = *tank;
+        p.init.omega = [0.0; 3];
+        let mass = heavy + tank.m_0 + tank.mass[0];
+        let craft = Spacecraft::new(&p, &push(mass, [0.0; 2]), 0.0, TOLERANCE).unwrap();
+        Carried { craft, mass }
+    }
+}
+
+/// Force for the acceleration of a mass along x.
+fn push(mass: f64, a: [f64; 2]) -> Inputs {
+    let a = sideways(a);
+    let force = Ramp { value: a.value.map(|a| mass * a), slope: a.slope.map(|a| mass * a) };
+    Inputs { force, ..Inputs::default() }
+}
+
+fn bob(x: &[f64]) -> [f64; 6] {
+    x[index::bob(0, 0)..][..6].try_into().unwrap()
+}
+
+impl Moved for Carried {
+    fn start(tank: &Tank) -> Self {
+        Carried::by(HEAVY, tank)
+    }
+
+    fn step(&mut self, a: [f64; 2], h: f64) {
+        self.craft.step(&push(self.mass, a), h).unwrap();
+    }
+
+    fn bob(&mut self) -> [f64; 6] {
+        bob(&self.craft.continuous_states())
+    }
+
+    fn rates(&mut self) -> [f64; 6] {
+        bob(&self.craft.derivatives(&push(self.mass, [0.0; 2])))
+    }
+}
+
+/// Largest difference of two bobs in the direction and, over `w`, in its rate.
+fn apart(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
+    (0..6).map(|i| (a[i] - b[i]).abs() / if i < 3 { 1.0 } else { w }).fold(0.0, f64::max)
+}
+
+/// First mode's angle in degrees, and frequency over that of small waves.
+#[test]
+fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
+    type Frequency = fn(Tank, f64) -> f64;
+    let in_plane: [Frequency; 2] = [planar::<SloshTank>, planar::<Carried>];
+    let on_circle: [Frequency; 2] = [circular::<SloshTank>, circular::<Carried>];
+    for (fill, of_fmus, waves) in [
+        (1.227, in_plane, [(4.0, 0.998962), (8.0, 0.995954), (12.0, 0.990939), (16.0, 0.983653)]),
+        (0.613, in_plane, [(4.0, 0.999368), (8.0, 0.997373), (12.0, 0.993682), (16.0, 0.98767)]),
+        (1.227, on_circle, [(2.0, 1.00022), (4.0, 1.00091), (6.0, 1.00208), (8.0, 1.00389)]),
+        (0.613, on_circle, [(2.0, 1.00026), (4.0, 1.00104), (6.0, 1.00238), (8.0, 1.0043)]),
+    ] {
+        for (degrees, exact) in waves {
+            let a = f64::to_radians(degrees);
+            let [alone, carried] = of_fmus.map(|frequency| frequency(bench(fill), a));
+            let (error, off) = (alone / exact - 1.0, carried / alone - 1.0);
+            println!("{fill} {degrees}: {alone:.5} {exact} {error:.1e}, {off:.1e}");
+            assert!(error.abs() < 3e-3, "{fill} {degrees}: {alone} {exact}");
+            assert!(off.abs() < 1e-9, "{fill} {degrees}: {carried} {alone}");
+        }
+    }
+}
+
+#[test]
+fn waves_on_circles_close_after_the_period_of_their_frequency_in_both_fmus() {
+    fn end<T: Moved>(tank: &Tank, a: f64, w: f64) -> f64 {
+        let mut moved = T::start(tank);
+        let start = moved.bob();
+        (0..16).for_each(|_| moved.step([0.0; 2], TAU / w / 16.0));
+        apart(start, moved.bob(), w) / a
+    }
+    let (mut tank, a) = (bench(1.227), f64::to_radians(8.0));
+    let w = linear_frequency(&tank) * circular::<SloshTank>(tank, a);
+    tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
+    tank.p_dot_0[0] = [0.0, a * w, 0.0];
+    let off = [end::<SloshTank>(&tank, a, w), end::<Carried>(&tank, a, w)];
+    assert!(off.iter().all(|off| *off < 1e-9), "{off:?}");
+}
+
+/// Largest angles along and across in degrees and force along x in N over the last tenth of 150 periods of a tank that moves
+/// sideways by -stroke cos(w t), from rest, with 0.01 rad across. The last value is the largest difference of both FMUs
+/// over all periods, with a craft of mass `heavy`.
+fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
+    let mut tank = Tank { p_0: [[0.0, 0.01, -1.0]; MODES], ..bench(1.227) };
+    tank.zeta[0] = 0.005;
+    let w = ratio * linear_frequency(&tank);
+    let pieces = 100;
+    let h = TAU / w / f64::from(pieces);
+    let a = |k: i32| stroke * w * w * (f64::from(k) * h * w).cos();
+    let (mut alone, mut carried) = (SloshTank::start(&tank), Carried::by(heavy, &tank));
+    let (mut largest, mut off) = ([0.0_f64; 3], 0.0_f64);
+    for k in 0..150 * pieces {
+        let a = [a(k), (a(k + 1) - a(k)) / h];
+        Moved::step(&mut alone, a, h);
+        carried.step(a, h);
+        let x = alone.bob();
+        off = off.max(apart(x, carried.bob(), w));
+        if k > 135 * pieces {
+            let force = alone.outputs_after_step().tank.force[0];
+            let now = [x[0].to_degrees(), x[1].to_degrees(), force];
+            largest = [0, 1, 2].map(|i| largest[i].max(now[i].abs()));
+        }
+    }
+    (largest, off)
+}
+
+/// Series of potential flow that a pendulum misses by up to a factor of two. In the last one what was across at the start
+/// decays. The force has the error of the angle and, of 2 %, that of one mode alone.
+#[test]
+fn forced_waves_near_resonance_are_those_of_potential_flow_in_both_fmus() {
+    for (ratio, stroke, along, across, force) in [
+        (0.985, 0.18097e-3, 17.18, Some(0.798), 1.977),
+        (1.0019, 0.10677e-3, 8.21, Some(1.02), 0.996),
+        (1.02, 0.36193e-3, 9.00, None, 1.011),
+    ] {
+        let ([got, aside, pull], off) = forced(ratio, stroke, HEAVY);
+        println!("{ratio}: {got:.2} {along}, {aside:.3} {across:?}, {pull:.3} {force}, {off:.1e}");
+        assert!((got / along - 1.0).abs() < 0.03, "{ratio}: {got} {along}");
+        let error = across.map_or(0.0, |across: f64| (aside / across - 1.0).abs());
+        assert!(error < 0.15, "{ratio}: {aside} {across:?}");
+        assert!((pull / force - 1.0).abs() < 0.05, "{ratio}: {pull} {force}");
+        assert!(off < 1e-9, "{ratio}: {off:e}");
+    }
+}
+
+/// The difference of both FMUs is the recoil: it falls as 1/M.
+#[test]
+fn a_lighter_craft_recoils_more_by_the_ratio_of_the_masses() {
+    let (tank, heavy) = (bench(1.227), 1e6);
+    let period = TAU / linear_frequency(&tank);
+    let released = Tank { p_0: [[0.02, 0.0, -1.0]; MODES], ..tank };
+    // A quarter of a period later the bob is early by the gain in phase, pi/2 times that in frequency.
+    let (mut alone, mut carried) = (SloshTank::start(&released), Carried::by(heavy, &released));
+    Moved::step(&mut alone, [0.0; 2], period / 4.0);
+    carried.step([0.0; 2], period / 4.0);
+    let gain = (alone.bob()[0] - carried.bob()[0]) / (0.02 * TAU / 4.0);
+    let expected = tank.mass[0] / (2.0 * heavy);
+    // of second order in the angle
+    assert!((gain / expected - 1.0).abs() < 1e-2, "{gain:e} {expected:e}");
+
+    let [lighter, heavier] = [1e9, HEAVY].map(|heavy| forced(0.985, 0.18097e-3, heavy).1);
+    println!("{lighter:.1e} {heavier:.1e}");
+    assert!((lighter / heavier / 100.0 - 1.0).abs() < 0.1, "{lighter:e} {heavier:e}");
+}
