@@ -321,6 +321,36 @@ impl Division {
         (known.len() > unknown.len()).then_some((fields, labelled))
     }
 
+    /// Returns the sample without the separators that end its rows, if they end all rows and the header names no column there.
+    /// Where rows are numbered from 1 and the header has a name less, a last column without values is as likely: `None`.
+    fn opened(&self, sample: &[(usize, String)]) -> Option<Vec<(usize, String)>> {
+        let Separator::Char(sign) = self.separator else { return None };
+        let at =
+            sample.iter().position(|(_, line)| self.is_row(line)).filter(|_| self.width > 2)?;
+        let (above, rows) = sample.split_at(at);
+        let fields = |line: &str| self.texts(line).len();
+        let is_closed = |line: &str| fields(line) == self.width && line.ends_with(sign);
+        let is_numbered = |(k, (_, row)): (usize, &(usize, String))| {
+            self.texts(row).first().is_some_and(|first| *first == (k + 1).to_string())
+        };
+        let mut heads = above.iter().map(|(_, line)| self.texts(line));
+        let mut less = heads.clone().filter(|head| head.len() + 1 == self.width).peekable();
+        // an empty first name is that of the rows
+        let is_one_less = less.peek().is_some()
+            && less.all(|head| !head[0].is_empty())
+            && rows.iter().enumerate().all(is_numbered);
+        let is_named =
+            heads.any(|head| head.len() == self.width && !head[self.width - 1].is_empty());
+        let are_closed = rows.iter().all(|(_, row)| fields(row) != self.width || is_closed(row));
+        (are_closed && !is_named && !is_one_less).then(|| {
+            let open = |line: &String| match is_closed(line) {
+                true => line[..line.len() - sign.len_utf8()].to_string(),
+                false => line.clone(),
+            };
+            sample.iter().map(|(number, line)| (*number, open(line))).collect()
+        })
+    }
+
     /// Fails for a file whose lines are records of several kinds, each with a name and columns of its own.
     fn refuse_kinds(&self, sample: &[(usize, String)], has_header: bool) -> Result<()> {
         if !self.texts.contains(&0) {
@@ -467,7 +497,7 @@ impl Layout {
         };
         let division = best(tried.iter().map(|separator| of(separator, 2)).collect())
             .or_else(|| best(vec![of(&SEPARATORS[2], 1)]));
-        let Some(division) = division else {
+        let Some(mut division) = division else {
             let (line, text) = sample.get(1).unwrap_or(&sample[0]);
             bail!(
                 "line {line}, \"{}\", is not a row of numbers (allowed: numbers with decimal point or comma, separated by \
@@ -477,6 +507,10 @@ impl Layout {
                 COMMENTS.join(" or ")
             );
         };
+        if let Some(opened) = division.opened(&sample) {
+            sample = opened;
+            division = Division::of(&sample, division.separator, 2);
+        }
         let (separator, width) = (division.separator, division.width);
         let at = sample.iter().position(|(_, line)| division.is_row(line)).unwrap_or(0);
         let first = sample[at].0;

@@ -520,6 +520,8 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
             "line 2, column omega: \"true\" is not a number; line 3",
         ),
         ("a,b\nidle,x\nbusy,y\n", "line 2, \"idle,x\", is not a row of numbers"),
+        // numbers of rows and no omega, or a separator at the end of each row
+        ("time;tau_cmd;omega\n1;0;5;\n2;0;6;\n3;0;7;\n", "omega has values in 0 rows"),
     ];
     for (text, words) in cases {
         let error = read_text("csv", text.as_bytes(), "").unwrap_err();
