@@ -185,8 +185,7 @@ class Identification:
         """Covariance of the unknowns of ``free=``, their names as index and columns, SI units.
 
         It is that of the noise; `Estimated.std` includes tolerances too.
-        `uncertain` takes it as ``covariance=`` if all unknowns are uncertain parameters there;
-        ``found.covariance.loc[names, names]`` chooses some.
+        `uncertain` converts it to its own parameters: ``covariance=found``.
         """
         if "covariance" not in self.all:
             raise FmuError("a result of identify has a covariance if it was found with free=")

@@ -46,6 +46,8 @@ from .stability import _closed, minimal
 if TYPE_CHECKING:
     import pandas as pd
 
+    from .program import Identification
+
 Matrix = NDArray[np.float64]
 
 TURN = 2 * np.pi
@@ -109,6 +111,16 @@ class _Craft:
             J[i, j] = J[j, i] = values[f"craft.J{name}"]
         return values["craft.mass"], np.array([values[f"craft.r[{i}]"] for i in (1, 2, 3)]), J
 
+    def rigid(self) -> Matrix:
+        """Return the mass matrix of craft and liquid as one rigid body."""
+        return _rigid(*self.dry(self.values)) + self.liquid
+
+    def accelerations(self) -> tuple[Matrix, Matrix]:
+        """Return X as one rigid body, and with moving bobs."""
+        matrices = self.rigid(), self.mass_matrix(self.values)
+        whole, moving = (np.linalg.solve(M, self.wrench) for M in matrices)
+        return whole, moving
+
     def mass_matrix(self, values: Mapping[str, float]) -> Matrix:
         """Return M: all but the bobs' motion across their axes."""
         M = _rigid(*self.dry(values)) + self.liquid
@@ -132,8 +144,13 @@ def _rigid(mass: float, center: Matrix, own: Matrix) -> Matrix:
     return np.block([[mass * np.eye(3), -C], [C, own - C @ _cross(center)]])
 
 
-def _read(model: str | Path, parameters: Mapping[str, Quantity]) -> _Craft:
-    """Return the craft as its FMU has it."""
+def _read(
+    model: str | Path, parameters: Mapping[str, Quantity], held: tuple[Matrix, Matrix] | None = None
+) -> _Craft:
+    """Return the craft as its FMU has it; under the accelerations of another one if they are held.
+
+    They are those of craft and liquid as one rigid body, and with moving bobs.
+    """
     with Plant(model, parameters) as plant:
 
         def get(*names: str) -> Matrix:
@@ -202,8 +219,7 @@ def _read(model: str | Path, parameters: Mapping[str, Quantity]) -> _Craft:
         wrench = np.concatenate([vector("force"), vector("torque")])
         found = _Craft(values, tanks, tuple(bobs), liquid, wrench, vector("h_wheels"))
     # the drag follows the acceleration of craft and liquid as one rigid body (damping.rs)
-    whole = np.linalg.solve(_rigid(*found.dry(values)) + liquid, wrench)
-    moving = np.linalg.solve(found.mass_matrix(values), wrench)
+    whole, moving = held or found.accelerations()
     for bob, zeta, floor, law in drags:
         tank = tanks[bob.tank]
         rest, g = (float(tank.axes[:, 2] @ (X[:3] + np.cross(X[3:], tank.origin)))
@@ -221,6 +237,92 @@ def _read(model: str | Path, parameters: Mapping[str, Quantity]) -> _Craft:
         values[bob.name("frequency")] = float(np.sqrt(w2)) / TURN
         values[bob.name("zeta")] = float(c_m / (2 * np.sqrt(w2)))
     return found
+
+
+def _slope(ends: tuple[Matrix, Matrix], size: Matrix, step: float) -> Matrix:
+    """Return a difference quotient; a difference by rounding is 0."""
+    rise = ends[1] - ends[0]
+    rise[np.abs(rise) <= ALONE * size] = 0.0
+    found: Matrix = rise / step
+    return found
+
+
+def _derivative(craft: _Craft, step: float, ends: tuple[_Craft, _Craft]) -> dict[str, float]:
+    """Return the derivatives of uncertain parameters by one of a tank, from both ends of a step.
+
+    A rigid change of the liquid is one of the dry craft: mass, centre and inertia of both together
+    are those of the FMU.
+    """
+    of_bobs = [bob.name(kind) for bob in craft.bobs for kind in KINDS]
+    values, *at = (np.array([c.values[of] for of in of_bobs]) for c in (craft, *ends))
+    found = dict(zip(of_bobs, _slope((at[0], at[1]), np.abs(values), step).tolist(), strict=True))
+    M = craft.rigid()
+    size = np.sqrt(np.outer(np.diag(M), np.diag(M)))
+    slope = _slope((ends[0].rigid(), ends[1].rigid()), size, step)
+    # M = [m, -C; C, J - C r×] with C = m r×
+    mass, r, _ = craft.dry(craft.values)
+    by_m, moment = slope[0, 0], np.array([slope[5, 1], slope[3, 2], slope[4, 0]])
+    by_r = (moment - by_m * r) / mass
+    crossed = _cross(moment) @ _cross(r) + mass * _cross(r) @ _cross(by_r)
+    by_J = slope[3:, 3:] + crossed
+    by_J[np.abs(by_J) <= 1e-9 * (np.abs(slope[3:, 3:]) + np.abs(crossed))] = 0.0
+    found |= {"craft.mass": float(by_m)}
+    found |= {f"craft.r[{i + 1}]": float(by_r[i]) for i in range(3)}
+    return found | {f"craft.J{axes}": float(by_J[at]) for axes, at in AXES.items()}
+
+
+def _root(matrix: Matrix) -> Matrix:
+    """Return L of L L^T, a column for each principal axis of the correlations.
+
+    Raises ValueError if the matrix is not a covariance.
+    """
+    variances = np.diag(matrix)
+    if not (np.isfinite(matrix).all() and (variances >= 0).all()):
+        raise ValueError
+    scale = np.where(variances > 0, np.sqrt(variances), 1.0)
+    lengths, axes = np.linalg.eigh((matrix + matrix.T) / 2 / np.outer(scale, scale))
+    if lengths.min() < -1e-12 * np.abs(lengths).max():
+        raise ValueError
+    kept = lengths > 1e-15 * lengths.max()
+    found: Matrix = scale[:, None] * axes[:, kept] * np.sqrt(lengths[kept])
+    return found
+
+
+OF_TANK = re.compile(r"tank\[\d\]\.(m_0|H_0|I_0|I_z|(mass|length|frequency|hinge|zeta)\[\d\])")
+"""The FMU's parameters of tanks that uncertain parameters replace, to first order."""
+
+
+def _converted(
+    model: str | Path, given: Mapping[str, Quantity], craft: _Craft, table: "pd.DataFrame"
+) -> tuple["pd.DataFrame", list[str]]:
+    """Return the derivatives of uncertain parameters by those of the FMU, and what forbids them."""
+    import pandas as pd
+
+    slopes: dict[str, dict[str, float]] = {}
+    problems, held = [], craft.accelerations()
+    for name in (str(name) for name in table.index):
+        if name.startswith("craft.") and name in craft.values:
+            slopes[name] = {name: 1.0}
+            continue
+        if not OF_TANK.fullmatch(name):
+            problems.append(
+                f"no uncertain parameter replaces {name} (allowed: those of craft, and "
+                "of a tank m_0, H_0, I_0, I_z, mass, length, frequency, hinge, zeta)"
+            )
+            continue
+        with Plant(model, given) as plant:
+            value = float(plant.get([name])[0])
+        step = max(1e-4 * abs(value), 1e-7)
+        # most must not be below 0
+        points = value - step if value > step or value < 0 else value, value + step
+        # a frequency of 0 leaves it to the length
+        if not (value == 0 and ".frequency[" in name):
+            low, high = (_read(model, {**given, name: x}, held) for x in points)
+            slopes[name] = _derivative(craft, points[1] - points[0], (low, high))
+        if not any(slopes.get(name, {}).values()):
+            problems.append(f"{name} = {value:g} has no effect at this point")
+    found = pd.DataFrame(slopes).fillna(0.0)
+    return found.loc[found.any(axis="columns")], problems
 
 
 class _Equations:
@@ -731,7 +833,7 @@ def uncertain(
     inputs: Sequence[str] | str = "torque",
     outputs: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
     *,
-    covariance: "pd.DataFrame | None" = None,
+    covariance: "pd.DataFrame | Identification | None" = None,
     sigmas: float = 2.0,
     model: str | Path = "Spacecraft",
 ) -> UncertainModel:
@@ -745,11 +847,16 @@ def uncertain(
       and inertia stay), ``craft.mass``, ``craft.Jxx``, … and ``craft.r[1]``, … of the dry craft,
       and ``acceleration``, a factor of the acceleration at which force and torque hold the craft,
       1 as it is. Dry mass and inertia change at that acceleration.
-    * ``covariance``: A table with parameters as index and columns, as `identify` estimates it.
-      Δ then has its principal axes, ±``sigmas`` standard deviations long.
+    * ``covariance``: A table with the names of ``ranges`` as index and columns, or what `identify`
+      found with ``free=``. Δ then has the principal axes of its correlations, ±``sigmas`` standard
+      deviations long. Parameters of the FMU (``tank[1].length[1]``, ``hinge``, ``m_0``, …) are
+      converted to first order at the acceleration of the point. Unknowns of a record alone (biases,
+      states at its start) are left out.
     * ``inputs``, ``outputs``: Of force and torque; of q and omega.
     """
     import pandas as pd
+
+    from .program import Identification
 
     given = dict(parameters_of(parameters))
     # the point is at rest unless the caller says otherwise, which is refused below
@@ -757,15 +864,35 @@ def uncertain(
     craft = _read(model, given)
     values = dict(craft.values)
     ranges = dict(ranges or {})
-    problems: list[str] = []
-    of_axes = [str(name) for name in covariance.index] if covariance is not None else []
-    for name in [*ranges, *of_axes]:
-        if name not in values:
-            problems.append(f"there is no uncertain {name}{did_you_mean(name, values)}")
-        elif [*ranges, *of_axes].count(name) > 1:
-            problems.append(f"{name} has a range and a covariance")
+    problems = [f"there is no uncertain {name}{did_you_mean(name, values)}"
+                for name in ranges if name not in values]  # fmt: skip
+    of_axes, root = [], np.zeros((0, 0))
+    if covariance is not None:
+        is_fit = isinstance(covariance, Identification)
+        table = covariance.covariance if is_fit else covariance
+        try:
+            if is_fit:
+                # a record's own biases and states at its start are not the craft's
+                kept = [name for name in table.index if not re.search(r"[@(]|^init\.", name)]
+                table = table.loc[kept, kept]
+            root = _root(table[list(table.index)].to_numpy(float))
+        except (KeyError, ValueError, TypeError, np.linalg.LinAlgError):
+            problems.append("covariance must be a positive semidefinite table of the same names")
+        of_axes = [str(name) for name in table.index]
+        twice = set(of_axes)
+        if is_fit:
+            slopes, more = _converted(model, given, craft, table)
+            problems += more
+            if not problems:
+                root, of_axes = slopes.to_numpy() @ root, [str(name) for name in slopes.index]
+            # the liquid's rigid part moves the dry craft's properties, which may have ranges
+            twice |= {name for name in of_axes if not name.startswith("craft.")}
+        else:
+            problems += [f"there is no uncertain {name}{did_you_mean(name, values)}"
+                         for name in of_axes if name not in values]  # fmt: skip
+        problems += [f"{name} has a range and a covariance" for name in ranges if name in twice]
     columns: dict[str, Matrix] = {}
-    every = [*ranges, *of_axes]
+    every = list(dict.fromkeys([*ranges, *of_axes]))
     if not every:
         problems.append("nothing is uncertain: give ranges or covariance")
     for k, (name, of) in enumerate(ranges.items()):
@@ -790,19 +917,9 @@ def uncertain(
         values[name] = (low + high) / 2
         columns[name] = np.zeros(len(every))
         columns[name][k] = (high - low) / 2
-    if covariance is not None and not problems:
-        try:
-            matrix = covariance[of_axes].to_numpy(float)
-            lengths, axes = np.linalg.eigh((matrix + matrix.T) / 2)
-        except (KeyError, ValueError, TypeError, np.linalg.LinAlgError):
-            lengths, axes = np.array([-1.0]), np.zeros((0, 1))
-        if lengths.min() < -1e-12 * np.abs(lengths).max() or not np.isfinite(lengths).all():
-            problems.append("covariance must be a positive semidefinite table of the same names")
-        else:
-            for k in np.flatnonzero(lengths > 1e-15 * lengths.max()):
-                column = np.zeros(len(every))
-                column[len(ranges) :] = sigmas * np.sqrt(lengths[k]) * axes[:, k]
-                columns[f"axis[{len(columns) - len(ranges) + 1}]"] = column
+    for column in () if problems else root.T:
+        named = pd.Series(sigmas * column, of_axes).reindex(every, fill_value=0.0)
+        columns[f"axis[{len(columns) - len(ranges) + 1}]"] = named.to_numpy()
     chosen = []
     for given_names, allowed, what in ((inputs, INPUTS, "inputs"), (outputs, OUTPUTS, "outputs")):
         listed = names_of(given_names, what, problems)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import option
 from scipy.io import loadmat
 from scipy.optimize import brentq
 
@@ -115,6 +116,105 @@ def test_a_covariance_gives_its_principal_axes(spacecraft: Path) -> None:
         off = [model.values(delta)[name] - model.center[name] for name in names]
         assert off @ np.linalg.solve(matrix.to_numpy(), off) == pytest.approx(4, rel=1e-6)
         assert difference(model, delta, spacecraft) < 1e-11
+
+
+STILL = {
+    "craft.mass": 900.0, "craft.r[3]": 0.9, "craft.Jxx": 600.0, "craft.Jyy": 500.0,
+    "force[3]": 470.0, "tank[1].position[3]": -0.3, "tank[1].g_ref": 1.7, "tank[1].k[1]": 2.0,
+    "tank[1].zeta[1]": 0.004, "tank[1].H_0": 0.1,
+}  # fmt: skip
+"""One tank on the axis. Its damping follows the acceleration, which is not that of g_ref."""
+
+
+def fit(names: list[str], matrix: np.ndarray) -> Identification:
+    """Return what `identify` finds, with a covariance."""
+    of_fit = {"correlations": [dict.fromkeys(names)], "covariance": matrix.tolist()}
+    return Identification({}, {}, None, {}, True, True, (), of_fit)
+
+
+def test_a_fit_s_parameters_become_uncertain_ones(spacecraft: Path) -> None:
+    """The response along each axis of Δ has the derivatives of the FMU's own linear model.
+
+    Its thrust gives each craft the same acceleration. Central differences: 1e-5 of the largest.
+    """
+    names = ["tank[1].length[1]", "tank[1].hinge[1]", "tank[1].zeta[1]", "tank[1].mass[1]",
+             "tank[1].m_0", "tank[1].H_0", "tank[1].I_0", "craft.mass", "craft.Jxx"]  # fmt: skip
+    weights = ["craft.mass", "tank[1].m_0", "tank[1].mass[1]"]
+    with hubslosh.Plant(spacecraft, STILL) as plant:
+        value = np.array(plant.get(names))
+        g = STILL["force[3]"] / sum(plant.get(weights))
+
+    def response(off: np.ndarray) -> np.ndarray:
+        there = STILL | dict(zip(names, (value + off).tolist(), strict=True))
+        with hubslosh.Plant(spacecraft, there) as plant:
+            there |= {"force[3]": g * sum(plant.get(weights))}
+        return linearize(spacecraft, there, TORQUE, MEASURED).response([0.05, 0.17, 0.3])
+
+    random = np.random.default_rng(5).standard_normal((12, len(names) + 1))
+    deviation = 0.01 * np.append(value, 1.0)
+    covariance = np.corrcoef(random, rowvar=False) * np.outer(deviation, deviation)
+    # that of a gyro's bias is no parameter of the craft
+    found = fit([*names, "bias(omega[1])@1"], covariance)
+    model = uncertain(STILL, covariance=found, outputs=MEASURED, model=spacecraft)
+    assert len(model.deltas) == len(names)
+    step = 1e-3
+    slopes = np.array([
+        response(off) - response(-off) for off in step * np.diag(deviation[:-1])
+    ])  # fmt: skip
+    mine = np.array([
+        model.at(w * step).response([0.05, 0.17, 0.3])
+        - model.at(-w * step).response([0.05, 0.17, 0.3])
+        for w in np.eye(len(names))
+    ])  # fmt: skip
+    # the axes are those of the correlations, two standard deviations long
+    correlations = np.corrcoef(random, rowvar=False)[:-1, :-1]
+    expected = 4 * np.einsum("i...,ij,j...->...", slopes, correlations, slopes)
+    squares = np.einsum("i...,i...->...", mine, mine)
+    assert np.abs(squares - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_a_fit_of_a_length_gives_the_frequency_with_its_deviation(
+    spacecraft: Path, request: pytest.FixtureRequest
+) -> None:
+    """The frequency within 4 σ of the truth; its deviation and the bob's by the formulas."""
+    time = np.arange(0.0, 60.0, 0.2)
+    torque = pd.DataFrame({"time": time, "torque[2]": np.where(time < 2, 5.0, 0.0)})
+    flight = hubslosh.simulate(spacecraft, STILL, torque, outputs=["omega[2]"])
+    flight["omega[2]"] += 1e-6 * np.random.default_rng(1).standard_normal(len(flight))
+    free = {"tank[1].length[1]": 0.27, "tank[1].zeta[1]": 0.003}
+    found = hubslosh.identify(
+        pd.DataFrame(flight), fmu=spacecraft, free=free, inputs=["torque[2]"],
+        outputs=["omega[2]"], settings=STILL, program=option(request, "--hubslosh"),
+    )  # fmt: skip
+    assert found.fits, found.verdict
+    point = STILL | {name: e.value for name, e in found.parameters.items()}
+    model = uncertain(point, covariance=found, model=spacecraft)
+    with hubslosh.Plant(spacecraft, point) as plant:
+        length, g = plant.get(["tank[1].length[1]", "specific_force[3]"])
+    f = model.center["tank[1].frequency[1]"]
+    deviation = np.sqrt(found.covariance.loc["tank[1].length[1]", "tank[1].length[1]"])
+    slopes = {"frequency[1]": g / (8 * np.pi**2 * f * length**2), "bob[1]": 1.0}
+    for kind, slope in slopes.items():
+        size = np.linalg.norm(model.spread.loc[f"tank[1].{kind}"])
+        assert size == pytest.approx(2 * slope * deviation, rel=1e-6)
+    truth = uncertain(STILL, {"craft.Jxx": "1%"}, model=spacecraft)
+    off = f - truth._values["tank[1].frequency[1]"]
+    assert abs(off) < 4 * slopes["frequency[1]"] * deviation
+
+
+def test_a_fit_that_the_model_cannot_take_is_refused_by_name(spacecraft: Path) -> None:
+    """A tank's place, a frequency that does not act, and what is not resolved."""
+    for name, words in [
+        ("tank[1].position[3]", r"replaces tank\[1\].position\[3\] \(allowed"),
+        ("tank[1].frequency[1]", r"frequency\[1\] = 0 has no effect"),
+    ]:
+        with pytest.raises(FmuError, match=words):
+            uncertain(STILL, covariance=fit([name], np.eye(1)), model=spacecraft)
+    with pytest.raises(FmuError, match="positive semidefinite"):
+        uncertain(STILL, covariance=fit(["craft.Jxx"], np.full((1, 1), np.inf)), model=spacecraft)
+    with pytest.raises(FmuError, match="range and a covariance"):
+        found = fit(["tank[1].length[1]"], 1e-6 * np.eye(1))
+        uncertain(STILL, {"tank[1].frequency[1]": "5%"}, covariance=found, model=spacecraft)
 
 
 def test_files_give_the_model_back(spacecraft: Path, tmp_path: Path) -> None:
