@@ -775,11 +775,37 @@ fn interpret(
     if trusted {
         found.verdict.push("The intervals include noise alone: settings, motion, clock and the scales of the loads count as exact.".into());
     }
+    let is_fitted = question.free.iter().any(|free| free.name == tank::ZETA_BREAKING.at([n]));
+    if !trusted && !is_fitted {
+        let largest = largest_angle.iter().copied().fold(0.0, f64::max);
+        found.verdict.extend(left_out(n, largest, has_scale));
+    }
     found.parameters.retain(|name, _| told[name]);
     let reasons = quantities.iter().filter_map(|q| Some((q, q.reason.as_ref()?)));
     found.verdict.extend(reasons.map(|(q, reason)| format!("{} is not stated: {reason}", q.label)));
     let largest_angle = has_scale.then_some(largest_angle);
     Ok(ForceRecord { found, tank: quantities, trusted, largest_angle })
+}
+
+/// The words about a misfit whose waves break in a fit without this damping, with the way to estimate it; nothing if they do not.
+fn left_out(mode: usize, largest: f64, has_scale: bool) -> Option<String> {
+    let steepness = breaking::steepness(largest);
+    let [growth, mass] = [tank::ZETA_BREAKING.at([mode]), tank::MASS.at([mode])];
+    let way = match has_scale {
+        true => format!("{growth} is set: without --set {growth} it is estimated"),
+        false => format!(
+            "the fit leaves this damping out, because the slosh angle is not known: with --release DEG or --set {mass}=KG it \
+             estimates {growth}"
+        ),
+    };
+    (steepness >= breaking::least()).then(|| {
+        format!(
+            "The likeliest cause is waves that break: in the fit k a reaches {steepness:.2} ({:.1}°), and they break from {:.2} on. Here \
+             {way}.",
+            largest.to_degrees(),
+            breaking::least()
+        )
+    })
 }
 
 /// Takes the offsets of the loads out of the fit, by the names and in the signs of the records.

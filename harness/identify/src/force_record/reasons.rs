@@ -68,15 +68,22 @@ impl Context<'_> {
         } else {
             "no load of this record depends on it".into()
         };
-        let width = match self.trusted {
+        let width = match self.trusted || !e.std.is_finite() {
             true => width,
             false => format!("the residual is not noise, so that {width} or ten times that"),
         };
         if breaks {
             let steepness = breaking::steepness(largest);
             let (begins, _) = breaking::BEGINS;
-            return if steepness < breaking::least() {
+            return if steepness < breaking::least() && self.trusted {
                 breaking::never(largest)
+            } else if steepness < breaking::least() {
+                format!(
+                    "waves break from a steepness k a of {:.2} on, and the fit, which is not trusted, reaches {steepness:.2} ({degrees:.1}°)",
+                    breaking::least()
+                )
+            } else if !e.std.is_finite() {
+                width
             } else {
                 format!(
                     "too little of the record lies above the steepness of breaking (k a reaches {steepness:.2}, breaking begins at \

@@ -346,7 +346,8 @@ fn dominant(raw: &Raw, lateral: &[Option<Vec<f64>>; 2]) -> Result<f64> {
     let motion = motion
         .filter_map(|(k, values)| Some((spectrum(values.as_ref()?), if k < 3 { 4 } else { 0 })));
     if let Some(motion) = sum(motion.collect()) {
-        let floor = 1e-3 * peak(&motion);
+        // an overtone of a large wave, up to 5 % of its force, is no resonance: the tank does not move at its frequency
+        let floor = 1e-2 * peak(&motion);
         for (ratio, motion) in ratio.iter_mut().zip(motion) {
             *ratio = if *ratio > 1e-4 * strongest { *ratio / (motion + floor) } else { 0.0 };
         }

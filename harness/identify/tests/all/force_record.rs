@@ -344,11 +344,6 @@ const MOVING: Moving = Moving {
 
 /// The task of a record of [`MOVING`] with the tank's x axis along z and its z axis along y; the damping and the third order are known.
 fn moving(is_fixed: bool) -> Task {
-    let known = |name: &str, value: &str| Setting {
-        name: format!("tank.{name}"),
-        recording: None,
-        value: value.into(),
-    };
     let axes = Frame::axes("z,x,y").unwrap();
     let point = [0.0, 0.0, MOVING.point];
     Task {
@@ -452,6 +447,64 @@ fn offsets_of_a_balance_are_found_in_the_signs_of_its_record() {
     task.biases = vec![bias(2)];
     task.frame.is_fixed = true;
     assert!(refused(&task).to_string().contains("--bias with --fixed"));
+}
+
+/// A tank whose waves break.
+const BREAKS: Tank = Tank { breaking: 0.04, ..TANK };
+
+fn known(name: &str, value: &str) -> Setting {
+    Setting { name: format!("tank.{name}"), recording: None, value: value.into() }
+}
+
+/// Whether the damping by breaking is stated, with the truth in 4 standard deviations.
+fn holds_the_breaking(result: &ForceRecord) {
+    let stated = compared(&BREAKS, result);
+    let of = |name: &str| stated.iter().find(|(other, ..)| other == name).unwrap();
+    for name in ["tank.zeta[1]", "tank.zeta_breaking[1]"] {
+        let (_, [low, high], truth) = of(name);
+        let room = 0.5 * (high - low);
+        assert!(low - room < *truth && *truth < high + room, "{name}: {low} to {high}");
+    }
+}
+
+#[test]
+fn a_misfit_of_waves_that_break_names_the_option_that_estimates_their_damping() {
+    let raw = BREAKS.record(4.0, 0.02, 0.6, 0.01, 11);
+    let settings = vec![
+        known("nonlinear_inertia[1]", "1.41"),
+        known("nonlinear_stiffness[1]", "0.73"),
+        known("zeta_amplitude[1]", "0"),
+    ];
+    let release = Some([0.6, 0.0]);
+    let breaks = |task: &Task| {
+        let result = found(task, std::slice::from_ref(&raw));
+        let words = result.found.verdict.iter().find(|line| line.contains("waves that break"));
+        (words.cloned().unwrap_or_default(), result)
+    };
+    let (words, result) = breaks(&Task { settings: settings.clone(), ..task() });
+    assert_eq!(result.found.fits, Some(false), "{:#?}", lines(&result));
+    assert!(words.contains("--release DEG or --set tank.mass[1]=KG"), "{words}");
+
+    let unbroken = [settings.clone(), vec![known("zeta_breaking[1]", "0")]].concat();
+    let (words, result) = breaks(&Task { release, settings: unbroken, ..task() });
+    assert_eq!(result.found.fits, Some(false), "{:#?}", lines(&result));
+    assert!(words.contains("without --set tank.zeta_breaking[1]"), "{words}");
+
+    let (words, result) = breaks(&Task { release, settings, ..task() });
+    assert_eq!(result.found.fits, Some(true), "{:#?}", lines(&result));
+    assert_eq!(words, "");
+    holds_the_breaking(&result);
+}
+
+/// The force has overtones at which the tank does not move: no resonances.
+#[test]
+#[ignore = "10 s of CPU time: .ci/run --nightly"]
+fn a_forced_record_of_waves_that_break_gives_their_damping() {
+    let tank = Tank { drive: [0.35, 2.2, 0.03], ..BREAKS };
+    let raw = tank.record(10.0, 0.02, 0.0, 0.01, 12);
+    let result = found(&task(), &[raw]);
+    assert_eq!(result.found.fits, Some(true), "{:#?}", lines(&result));
+    holds_the_breaking(&result);
 }
 
 /// Coverage of the 95 % intervals over 20 draws of noise. Statements of one draw are correlated, so that 90 % is two standard deviations
