@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import measured
@@ -41,25 +40,11 @@ def test_a_comparison_comes_out_as_it_was_kept(name: str) -> None:
         same_picture(drawing, measured.BOOK / f"measured_{name}.svg")
 
 
-@pytest.mark.usefixtures("built")
-def test_harmonic_balance_has_the_branches_of_the_fmu() -> None:
-    """Amplitudes of SloshTank on both branches, within 3 % of those that judge the points."""
-    parameters, found = measured.tank(measured.BOX, 0.4, model="SloshTank")
-    free, of_bob = measured.ring_down(), measured.bob_share(parameters, found)
-    for relative in ([0.97, 0.975], [1.0, 0.994, 0.989, 0.985]):
-        omega = 7.8 * np.array(relative)
-        fmu = measured.sweep(parameters, 0.17 / 200, omega)[:, 0]
-        at = measured.branches(free, of_bob, omega, 0.17)
-        for x, column in zip(fmu, at.T, strict=True):
-            nearest = np.abs(measured.GRID[column, 0] / x - 1).min()
-            assert nearest < 0.03
-
-
 def test_every_measurement_has_its_source() -> None:
     """A file of numbers has its source, its licence and its error."""
     ours = (measured.RESULTS, measured.BEFORE)
     files = [file for file in measured.DATA.glob("*.csv") if file not in ours]
-    assert len(files) >= 8
+    assert len(files) >= 6
     for file in files:
         head = "".join(line for line in file.open(encoding="utf-8") if line.startswith("#"))
         assert "Source:" in head
