@@ -220,6 +220,24 @@ fn source_files_that_architecture_names_are_there() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
+#[test]
+fn tests_that_the_tuning_of_fits_names_are_there() {
+    let mut files = Vec::new();
+    collect(&pack::root(), &pack::root().join("harness/identify"), &mut files);
+    let read = |name: &str| fs::read_to_string(pack::root().join(name)).expect("a source file");
+    let code: String = files.iter().filter(|f| f.ends_with(".rs")).map(|f| read(f)).collect();
+    let tuning = read("harness/identify/src/tuning.rs");
+    let named = tuning.lines().filter(|line| line.starts_with("// Tests: "));
+    let named: Vec<&str> = named.flat_map(|line| line.split('`').skip(1).step_by(2)).collect();
+    assert!(named.len() > 60, "{named:?}");
+    let is_there = |name: &&&str| match name.contains('/') {
+        true => pack::root().join(name).is_file(),
+        false => code.contains(&format!("fn {name}()")),
+    };
+    let missing: Vec<&&str> = named.iter().filter(|name| !is_there(name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
 /// Files below a folder, as paths from the root.
 fn collect(root: &Path, folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("a folder of the project").flatten() {

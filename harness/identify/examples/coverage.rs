@@ -39,8 +39,9 @@ use identify::input::reading;
 use identify::input::tolerance::Tolerances;
 use identify::methods::identification::Identification;
 use identify::methods::output_error::identify;
-use identify::model::bench::nominal::COARSEST;
+
 use identify::model::bench::simulate::Intersample;
+use identify::tuning::COARSEST;
 
 /// Command-line arguments.
 struct Arguments {

@@ -3,8 +3,8 @@
 //! [`crate::any_fmu`] fits SloshTank. This module reads the record in any frame ([`Frame`]), turns the [`motion`] into the FMU's inputs,
 //! and chooses unknowns, starts and priors. The starts are those of the tank's drawing ([`Prediction`]) or of the record's spectrum.
 //!
-//! Every unknown that a record may lack has a wide prior. A value is stated only if the record narrows this prior to [`TOLD`] of its
-//! width, or to [`TOLD_WITHOUT_FIT`] if the model does not fit. For all others the result names the reason. A result of a model that
+//! Every unknown that a record may lack has a wide prior. A value is stated only if the record narrows this prior to [`STATED`] of its
+//! width, or to [`STATED_WITHOUT_FIT`] if the model does not fit. For all others the result names the reason. A result of a model that
 //! does not fit has no intervals.
 
 pub mod motion;
@@ -27,16 +27,8 @@ use crate::input::record::Record;
 use crate::model::bench::breaking;
 use crate::model::simulate::{Model, Setup};
 use crate::news::News;
+use crate::tuning::{INPUT_PHASE, MOST_INPUTS, STATED, STATED_WITHOUT_FIT, WIDE_SHIFT};
 use start::Start;
-
-/// Largest standard deviation of a stated value, over that of its wide prior.
-const TOLD: f64 = 0.3;
-/// The same where the residual is not noise: the errors of the model may then be ten times those that the fit states.
-const TOLD_WITHOUT_FIT: f64 = 0.03;
-/// Phase of the first mode from one input to the next: the error of the line between them is a 12th of its square.
-const PHASE: f64 = 0.05;
-/// Largest number of inputs from one row to the next.
-const MOST_PARTS: f64 = 20.0;
 
 /// Signals of forces and moments of a record, with their units.
 pub const LOADS: [(&str, &str); 6] =
@@ -474,7 +466,7 @@ fn records(
             let t = raw.time[row];
             let step = raw.time.get(row + 1).map_or(0.0, |next| next - t);
             let parts = match is_moved {
-                true => (step * omega / PHASE).ceil().clamp(1.0, MOST_PARTS),
+                true => (step * omega / INPUT_PHASE).ceil().clamp(1.0, MOST_INPUTS),
                 false => 1.0,
             };
             for part in 0..if step > 0.0 { parts as usize } else { 1 } {
@@ -659,7 +651,7 @@ fn interpret(
         angles.iter().map(|angles| angles.iter().copied().fold(0.0, f64::max)).collect();
     let prior = |name: &str| question.priors.iter().find(|prior| prior.name == name).map(|p| p.std);
     let trusted = found.fits == Some(true) && found.converged;
-    let most = if trusted { TOLD } else { TOLD_WITHOUT_FIT };
+    let most = if trusted { STATED } else { STATED_WITHOUT_FIT };
     let is_own = |name: &str| task.priors.iter().any(|prior| prior.name == name);
     let has_scale = has_scale(task, start, &found);
     let scaled = [tank::LENGTH.at([n]), tank::HINGE.at([n]), tank::ZETA.at([n]), tank::M_0.into()];
@@ -914,7 +906,7 @@ fn derived(
 
 /// Standard deviation of the planar shift by the priors of s and κ.
 fn shift_prior() -> f64 {
-    (0.5 * start::WIDE_SHIFT).hypot(0.375 * start::WIDE_SHIFT)
+    (0.5 * WIDE_SHIFT).hypot(0.375 * WIDE_SHIFT)
 }
 
 /// Head of the column of values.

@@ -14,27 +14,21 @@ use serde::Serialize;
 use crate::estimate::{Estimated, prose};
 use crate::fit::decomposition::Curvature;
 use crate::fit::problem::{Channel, Motion, Problem};
-use crate::fit::search::{self, DECREMENT, Minimum};
+use crate::fit::search::{self, Minimum};
 use crate::input::question::Question;
 use crate::input::record::Record;
 use crate::input::tolerance::{self, Share};
 use crate::model::simulate::{Model, Setup};
 use crate::model::unknown::{Unknown, What};
 use crate::news::News;
+use crate::tuning::{DECREMENT, PAIR_CORRELATION, PRIOR_ALONE, SOLVER_ADDED, TURNS};
 use crate::uncertainty::knowledge::{Inseparable, Knowledge, finite, knowledge};
 use crate::uncertainty::profile::{self, Interval};
-use crate::uncertainty::solver_error::{self, ADDED, SolverError};
+use crate::uncertainty::solver_error::{self, SolverError};
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use analysis::innovations::{LIMIT, Tests, crossed};
 use analysis::statistics::{mean, variance};
-
-/// Correlation from which on two estimates are named as a pair.
-const CORRELATED: f64 = 0.98;
-/// Part of the prior's standard deviation that is left where the recordings say nothing.
-const PRIOR_ALONE: f64 = 0.9;
-/// Turns of noise and fit.
-const TURNS: usize = 4;
 
 /// Results other than the estimates.
 #[derive(Clone, Debug, Serialize)]
@@ -204,7 +198,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
                 true => widened * covariance[(j, j)].sqrt(),
                 false => curvature_alone(j),
             };
-            if solver.shift[j] > ADDED * std { std.hypot(solver.shift[j]) } else { std }
+            if solver.shift[j] > SOLVER_ADDED * std { std.hypot(solver.shift[j]) } else { std }
         })
         .collect();
     let intervals = profile::intervals(problem, minimum, &std)?;
@@ -306,7 +300,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
     for i in 0..n {
         for j in 0..i {
             let is_asked = !(problem.unknowns[i].is_known || problem.unknowns[j].is_known);
-            if is_asked && correlations[i][j].abs() > CORRELATED {
+            if is_asked && correlations[i][j].abs() > PAIR_CORRELATION {
                 words.push(format!(
                     "{} and {} are strongly correlated ({:+.3}): the recordings determine a combination of them better than each \
                      alone",

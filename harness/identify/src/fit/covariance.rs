@@ -3,16 +3,13 @@
 //! With whitened residuals of unit variance and sensitivities J, the covariance is (JᵀJ)⁻¹: the
 //! Cramér–Rao bound of that noise. If the residual is more than noise, no such formula holds: what a
 //! model leaves out is not random. The sandwich (JᵀJ)⁻¹ (Σ s_w s_wᵀ) (JᵀJ)⁻¹, s_w the sum of the scores
-//! J_kᵀ e_k over windows of [`WINDOW`], then shows at least how much the estimate would move from
+//! J_kᵀ e_k over windows of [`SANDWICH_WINDOW`], then shows at least how much the estimate would move from
 //! one part of the recording to the next.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::decomposition;
-
-/// Length of the windows of the sandwich, s; two times the slosh's decay.
-pub const WINDOW: f64 = 50.0;
 
 /// Covariance of the variables x.
 #[derive(Clone, Debug)]

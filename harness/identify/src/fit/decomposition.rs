@@ -3,13 +3,7 @@
 use anyhow::{Context, Result, bail, ensure};
 use nalgebra::{DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 
-/// Limit of nalgebra's iterations; n columns take about 2 n.
-const ITERATIONS: usize = 10_000;
-
-/// Eigenvalue over the largest one up to which a direction counts as flat: the recordings do not show it.
-const FLAT: f64 = 1e-12;
-/// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
-const RESOLVED: f64 = 4.0;
+use crate::tuning::{EIGEN_ITERATIONS, FLAT_EIGENVALUE, RESOLVED_EIGENVALUE};
 
 /// Lengths of the columns.
 ///
@@ -40,7 +34,7 @@ pub fn lengths(derivatives: &DMatrix<f64>, names: &[String]) -> Result<Vec<f64>>
 /// If an entry is not finite, or the iterations do not end.
 pub fn singular(matrix: DMatrix<f64>) -> Result<SVD<f64, Dyn, Dyn>> {
     ensure!(matrix.iter().all(|entry| entry.is_finite()), "{NOT_FINITE}");
-    let found = matrix.try_svd(false, true, f64::EPSILON * 5.0, ITERATIONS);
+    let found = matrix.try_svd(false, true, f64::EPSILON * 5.0, EIGEN_ITERATIONS);
     found.context("the singular values of the derivatives are not found")
 }
 
@@ -50,7 +44,7 @@ pub fn singular(matrix: DMatrix<f64>) -> Result<SVD<f64, Dyn, Dyn>> {
 /// If an entry is not finite, or the iterations do not end.
 pub fn symmetric(matrix: DMatrix<f64>) -> Result<SymmetricEigen<f64, Dyn>> {
     ensure!(matrix.iter().all(|entry| entry.is_finite()), "{NOT_FINITE}");
-    let found = matrix.try_symmetric_eigen(f64::EPSILON, ITERATIONS);
+    let found = matrix.try_symmetric_eigen(f64::EPSILON, EIGEN_ITERATIONS);
     found.context("the eigenvectors of the derivatives are not found")
 }
 
@@ -83,7 +77,7 @@ impl Curvature {
 
     /// The eigenvalue below which a direction is flat.
     fn flat(&self) -> f64 {
-        FLAT * self.values.iter().copied().fold(0.0, f64::max)
+        FLAT_EIGENVALUE * self.values.iter().copied().fold(0.0, f64::max)
     }
 
     /// A⁻¹ b, damped by λ in the matrix's own scales; nothing along directions that are flat.
@@ -103,7 +97,7 @@ impl Curvature {
         let flat = self.flat();
         let is_flat = |value: f64, v: &DVector<f64>| {
             let made: f64 = v.iter().zip(errors).map(|(v, error)| (v * error).powi(2)).sum();
-            value <= flat.max(RESOLVED * made)
+            value <= flat.max(RESOLVED_EIGENVALUE * made)
         };
         let all = self.values.iter().zip(self.vectors.column_iter());
         let all = all.map(|(value, v)| (*value, v.into_owned()));

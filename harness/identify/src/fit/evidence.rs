@@ -1,10 +1,5 @@
 //! Comparison of models of the same recordings by the information criterion.
 
-/// Least difference of the information criterion that decides (Kass and Raftery: very strong).
-pub const DECIDES: f64 = 10.0;
-/// Difference below which it tells nothing (not worth more than a bare mention, ibid.).
-pub const ALIKE: f64 = 2.0;
-
 /// Probabilities of models by their information criterion, all equally probable beforehand (Kass and Raftery 1995):
 /// exp(−BIC/2) over the sum.
 pub fn probabilities(bic: impl Iterator<Item = f64> + Clone) -> Vec<f64> {

@@ -11,9 +11,6 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fit::decomposition::Curvature;
 
-/// Distance to the minimum up to which a search has converged, standard deviations: the stated deviations contain it.
-pub const CONVERGED: f64 = 0.5;
-
 /// A sum of squares of residuals, each over its standard deviation.
 pub trait SumOfSquares {
     /// The model's answer at a point, with the residuals.

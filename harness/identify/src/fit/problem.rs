@@ -24,21 +24,9 @@ use crate::input::record::Record;
 use crate::model::overridden::{near, refuse};
 use crate::model::simulate::{Model, Setup, Value};
 use crate::model::unknown::{Unknown, What};
+use crate::tuning::{BEND, FIRST_STEP, MOVE, OUTPUT_JUMP, STEPS, WIDER};
 use analysis::gauss_markov::{Noise, Whitening};
 use analysis::statistics::median;
-
-/// Change of the outputs by a difference to either side, in units of the noise's norm of one degree of freedom.
-const MOVE: f64 = 0.5;
-/// Bounds of the differences' steps, in units of an unknown's reach.
-const STEPS: (f64, f64) = (1e-7, 2e-2);
-/// The first step, in the same units.
-const FIRST_STEP: f64 = 1e-3;
-/// Second over first difference from which on the solver's noise may decide a derivative: noise alone makes √3 of it.
-const BEND: f64 = 0.3;
-/// Factor between the steps that are tried where noise may decide, and the largest one in units of an unknown's reach.
-const WIDER: (f64, f64) = (8.0, 0.2);
-/// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
-const JUMP: (f64, f64) = (8.0, 20.0);
 
 /// An output of a recording with its noise.
 #[derive(Clone, Debug)]
@@ -424,7 +412,7 @@ impl<'a> Problem<'a> {
             channel.sampled = self.records[channel.recording].sampled(channel.output);
             let bends: Vec<f64> = y.windows(3).map(|y| (y[2] - 2.0 * y[1] + y[0]).abs()).collect();
             let usual = median(&bends).unwrap_or(0.0);
-            let limit = (JUMP.0 * channel.noise.white).max(JUMP.1 * usual);
+            let limit = (OUTPUT_JUMP.0 * channel.noise.white).max(OUTPUT_JUMP.1 * usual);
             for (k, _) in bends.iter().enumerate().filter(|(_, bend)| **bend > limit) {
                 count += usize::from(channel.sampled[k + 1]);
                 channel.sampled[k + 1] = false;

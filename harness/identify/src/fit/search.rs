@@ -6,21 +6,13 @@
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::minimum::{self, CONVERGED, End, SumOfSquares};
+use crate::fit::minimum::{self, End, SumOfSquares};
 use crate::fit::problem::{Answer, Problem, Step};
 use crate::input::record::Record;
 use crate::model::unknown::Unknown;
 use crate::news::News;
+use crate::tuning::{BAD_START, CONVERGED, WINDOW_NOISE, WINDOWS};
 use analysis::random::Random;
-
-/// A search has ended where the distance to the minimum, in standard deviations, is below this.
-pub const DECREMENT: f64 = 0.02;
-/// Windows of a search from afar, as parts of the recordings.
-const WINDOWS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
-/// Least noise of a window, in parts of an output's spread: what the model can't follow yet.
-const COARSE: f64 = 0.03;
-/// Residual over the noise from row to row beyond which a fit counts as bad, and another start is tried.
-const BAD: f64 = 1.5;
 
 /// End of a search.
 pub type Minimum = minimum::Minimum<Answer, Step>;
@@ -105,11 +97,11 @@ fn from_afar(problem: &Problem, x: &[f64], news: &mut dyn FnMut(&News)) -> Resul
             let (mean, std) = unknown.prior.unwrap_or((*x, f64::INFINITY));
             unknown.prior = Some((mean, std.min(2.0 * unknown.reach)));
         }
-        let mut window = Problem::new(problem.model, problem.setup, &cut, unknowns, COARSE);
+        let mut window = Problem::new(problem.model, problem.setup, &cut, unknowns, WINDOW_NOISE);
         // sizes of the noise are those of the whole
         for (channel, whole) in window.channels.iter_mut().zip(&problem.channels) {
             let spread = problem.records[whole.recording].spread(whole.output);
-            channel.noise.white = whole.noise.white.max(COARSE * spread);
+            channel.noise.white = whole.noise.white.max(WINDOW_NOISE * spread);
         }
         let steps = window.first_steps();
         let found = search(&window, &x, steps, (0.1, 25), &mut |_| {})?;
@@ -161,7 +153,7 @@ pub fn best(
                 if best.as_ref().is_none_or(|best| found.cost() < best.cost()) {
                     best = Some(found);
                 }
-                if bad < BAD {
+                if bad < BAD_START {
                     break;
                 }
             }

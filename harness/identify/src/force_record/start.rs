@@ -8,17 +8,7 @@ use signals::fourier::Forward;
 
 use super::{LOADS, Raw, Task, lateral};
 use crate::model::bench::breaking;
-
-/// Standard deviation of the wide priors of s and κ. Liquids have 0.9 to 1.5 and 0.3 to 8.
-pub const WIDE_SHIFT: f64 = 2.0;
-/// Largest number of points of a spectrum.
-const POINTS: usize = 1 << 14;
-/// Padding of a record with zeros, over its length.
-const PADDING: usize = 4;
-/// Slosh angle that is assumed for a first mass, rad.
-const ASSUMED_ANGLE: f64 = 0.0873;
-/// Part of a liquid's mass that is assumed to slosh.
-const SLOSHING: f64 = 0.4;
+use crate::tuning::{ASSUMED_ANGLE, PADDING, SLOSHING_PART, SPECTRUM_POINTS, WIDE_SHIFT};
 
 /// A possible unknown.
 pub struct Possible {
@@ -130,7 +120,7 @@ impl Start {
         let total = weight.unwrap_or_else(|| if is_moved { by_motion() } else { f64::NAN });
         let estimated = match (is_moved, of_release) {
             (false, Some(mass)) => mass,
-            _ if total.is_finite() => SLOSHING * total,
+            _ if total.is_finite() => SLOSHING_PART * total,
             _ => by_angle(ASSUMED_ANGLE),
         };
         let mass = known(&tank::MASS.at([mode])).unwrap_or(estimated).max(1e-9);
@@ -296,7 +286,7 @@ fn lever(task: &Task, raw: &Raw, axis: usize) -> f64 {
 fn dominant(raw: &Raw, lateral: &[Option<Vec<f64>>; 2]) -> Result<f64> {
     let rows = raw.time.len();
     ensure!(rows >= 8, "{}: {rows} rows are too few (allowed: at least 8)", raw.name);
-    let points = rows.min(POINTS);
+    let points = rows.min(SPECTRUM_POINTS);
     let (first, last) = (raw.time[0], raw.time[rows - 1]);
     let step = (last - first) / (points - 1) as f64;
     let spectrum = |values: &[f64]| -> Vec<f64> {

@@ -5,16 +5,7 @@
 
 use std::f64::consts::PI;
 
-/// Spacing of values, in usual ones, up to which a cubic joins them.
-const NEAR: f64 = 2.5;
-/// Rows of a torque that are wider apart than this, s, do not describe a band-limited torque by lines between them: lines leave images of it.
-const COARSE: f64 = 0.035;
-/// Time between the instants that a coarse torque gets, s, at most.
-const FINE: f64 = 0.02;
-/// Half the length of the kernel that interpolates a coarse torque, in its samples.
-const KERNEL: isize = 24;
-/// Shape of its Kaiser window: side lobes of 80 dB.
-const SHAPE: f64 = 7.9;
+use crate::tuning::{COARSE_TORQUE, CUBIC_SPACING, FINE_TORQUE, KERNEL_HALF, KERNEL_SHAPE};
 
 /// Values at all rows, and the rows that had one; `None`: all.
 pub type Clocked = (Vec<f64>, Option<Vec<bool>>);
@@ -38,7 +29,8 @@ pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
             (_, Some(b)) if b == k => values[k],
             (Some(a), Some(b)) => {
                 let far = [next.checked_sub(2).map(|n| rows[n]), rows.get(next + 1).copied()];
-                let is_near = |pair: &[usize]| time[pair[1]] - time[pair[0]] < NEAR * usual;
+                let is_near =
+                    |pair: &[usize]| time[pair[1]] - time[pair[0]] < CUBIC_SPACING * usual;
                 let nodes: Vec<usize> =
                     [far[0], Some(a), Some(b), far[1]].into_iter().flatten().collect();
                 match nodes.windows(2).all(is_near) {
@@ -83,10 +75,10 @@ fn through(nodes: &[usize], time: &[f64], values: &[f64], at: f64) -> f64 {
 pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
-    if step <= COARSE {
+    if step <= COARSE_TORQUE {
         return (time.to_vec(), values.to_vec());
     }
-    let parts = (step / FINE).ceil() as usize;
+    let parts = (step / FINE_TORQUE).ceil() as usize;
     let even = time.windows(2).all(|t| (t[1] - t[0] - step).abs() < 0.01 * step);
     let sample = |k: isize| match k {
         k if k < 0 => 2.0 * values[0] - values[(-k as usize).min(n - 1)],
@@ -98,7 +90,9 @@ pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let between = |k: usize, part: f64| -> f64 {
         if even {
             let k = k as isize;
-            return (1 - KERNEL..=KERNEL).map(|j| sample(k + j) * kernel(part - j as f64)).sum();
+            return (1 - KERNEL_HALF..=KERNEL_HALF)
+                .map(|j| sample(k + j) * kernel(part - j as f64))
+                .sum();
         }
         let from = k.saturating_sub(1).min(n.saturating_sub(4));
         let nodes: Vec<usize> = (from..(from + 4).min(n)).collect();
@@ -126,12 +120,12 @@ fn kernel(x: f64) -> f64 {
             sum + term
         })
     };
-    let inside = 1.0 - (x / KERNEL as f64).powi(2);
+    let inside = 1.0 - (x / KERNEL_HALF as f64).powi(2);
     if inside <= 0.0 {
         return 0.0;
     }
     let sinc = if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) };
-    sinc * bessel(SHAPE * inside.sqrt()) / bessel(SHAPE)
+    sinc * bessel(KERNEL_SHAPE * inside.sqrt()) / bessel(KERNEL_SHAPE)
 }
 
 #[cfg(test)]

@@ -9,25 +9,11 @@ use analysis::statistics::{deviation, mean};
 use nalgebra::{DMatrix, DVector};
 
 use crate::input::clocks;
-use crate::input::recording::{Recording, Row, SHORTEST};
-
-/// Spacing of the torque's samples, in usual ones, from which on some were lost.
-const LOST: f64 = 1.75;
-/// Longest gap that is filled, s.
-const LONGEST_FILLED: f64 = 3.0;
-/// Longest gap that a line may join where the recording cannot be cut, s.
-const LONGEST_LINE: f64 = 0.25;
-/// Samples on either side of a gap that the model is fitted to, and its order.
-const SIDE: usize = 250;
-const ORDER: usize = 32;
-/// Places at which a filling is tried.
-const TRIALS: usize = 12;
-/// Kick of the hub by the errors of all fillings, over the gyro's noise.
-const KICK: f64 = 0.1;
-/// Gaps that are too few to make small parts of a recording.
-const FEW: usize = 5;
-/// Part of the usual step by which samples may be off an even grid.
-const EVEN: f64 = 0.02;
+use crate::input::recording::{Recording, Row};
+use crate::tuning::{
+    EVEN_GRID, FEW_GAPS, GAP_KICK, GAP_ORDER, GAP_SIDE, GAP_TRIALS, LONGEST_FILLED, LONGEST_LINE,
+    LOST_SPACING, SHORTEST_RECORDING,
+};
 
 /// Fills the gaps that can be filled, and returns the rows before the others.
 pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<usize>) {
@@ -35,15 +21,17 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     let time: Vec<f64> = knots.iter().map(|k| all.time[*k]).collect();
     let usual = clocks::usual(&time);
     let span = |n: usize| time[n + 1] - time[n];
-    let gaps: Vec<usize> = (0..time.len() - 1).filter(|n| span(*n) > LOST * usual).collect();
+    let gaps: Vec<usize> =
+        (0..time.len() - 1).filter(|n| span(*n) > LOST_SPACING * usual).collect();
     if gaps.is_empty() {
         return (all, Vec::new());
     }
-    let near: Vec<f64> = (0..time.len() - 1).map(span).filter(|s| *s <= LOST * usual).collect();
+    let near: Vec<f64> =
+        (0..time.len() - 1).map(span).filter(|s| *s <= LOST_SPACING * usual).collect();
     let step = mean(&near);
-    let is_even = near.iter().all(|s| (s - step).abs() < EVEN * step);
+    let is_even = near.iter().all(|s| (s - step).abs() < EVEN_GRID * step);
     let values: Vec<f64> = knots.iter().map(|k| all.torque[*k]).collect();
-    let kick = KICK * momentum(&all) / (gaps.len() as f64).sqrt();
+    let kick = GAP_KICK * momentum(&all) / (gaps.len() as f64).sqrt();
     let (mut filled, mut left) = (Vec::new(), Vec::new());
     let mut tried: Vec<(usize, f64)> = Vec::new();
     for &n in &gaps {
@@ -78,14 +66,17 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     }
     // where the recording is cut: parts must be long enough, or the gap too long for a line
     let mut cuts = Vec::new();
-    let few = left.len() <= FEW;
+    let few = left.len() <= FEW_GAPS;
     let end = time[time.len() - 1];
     let mut from = time[0];
     for (i, &n) in left.iter().enumerate() {
         let is_long = span(n) > LONGEST_LINE.max(10.0 * usual);
         let next = left[i + 1..].iter().find(|m| span(**m) > LONGEST_LINE.max(10.0 * usual));
         let to = next.map_or(end, |m| time[*m]);
-        let fits = is_even && few && time[n] - from >= SHORTEST && to - time[n + 1] >= SHORTEST;
+        let fits = is_even
+            && few
+            && time[n] - from >= SHORTEST_RECORDING
+            && to - time[n + 1] >= SHORTEST_RECORDING;
         if is_long || fits {
             cuts.push(n);
             from = time[n + 1];
@@ -103,27 +94,28 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     with_rows(all, &knots, filled, cuts)
 }
 
-/// Samples of the torque before and after gap `n` up to the next gaps, at most [`SIDE`].
+/// Samples of the torque before and after gap `n` up to the next gaps, at most [`GAP_SIDE`].
 fn before<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     let from = gaps.iter().filter(|gap| **gap < n).max().map_or(0, |gap| gap + 1);
-    &values[from.max((n + 1).saturating_sub(SIDE))..=n]
+    &values[from.max((n + 1).saturating_sub(GAP_SIDE))..=n]
 }
 
 fn after<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     let to = gaps.iter().filter(|gap| **gap > n).min().map_or(values.len(), |gap| gap + 1);
-    &values[n + 1..to.min(n + 1 + SIDE)]
+    &values[n + 1..to.min(n + 1 + GAP_SIDE)]
 }
 
 /// Root mean square of the sums of errors where `lost` samples that are known are filled; infinite where that cannot be tried.
 fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
-    let side = 4 * ORDER;
+    let side = 4 * GAP_ORDER;
     let room = values.len().saturating_sub(2 * side + lost);
     let mut squares = Vec::new();
-    for trial in 0..4 * TRIALS {
-        let from = side + (trial * 2 + 1) * room / (8 * TRIALS);
-        let (first, to) = (from.saturating_sub(SIDE), (from + lost + SIDE).min(values.len()));
+    for trial in 0..4 * GAP_TRIALS {
+        let from = side + (trial * 2 + 1) * room / (8 * GAP_TRIALS);
+        let (first, to) =
+            (from.saturating_sub(GAP_SIDE), (from + lost + GAP_SIDE).min(values.len()));
         // gap g is between g and g + 1
-        if squares.len() >= TRIALS && trial % 4 != 0 {
+        if squares.len() >= GAP_TRIALS && trial % 4 != 0 {
             continue;
         }
         let lower = gaps.iter().filter(|g| **g < from).max().map_or(first, |g| first.max(g + 1));
@@ -144,12 +136,12 @@ fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
             None => return f64::INFINITY,
         }
     }
-    if squares.len() < TRIALS / 2 { f64::INFINITY } else { mean(&squares).sqrt() }
+    if squares.len() < GAP_TRIALS / 2 { f64::INFINITY } else { mean(&squares).sqrt() }
 }
 
 /// The `lost` samples between two stretches; `None` where these are too short.
 fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
-    let order = ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
+    let order = GAP_ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
     if order < 4 {
         return None;
     }

@@ -4,6 +4,7 @@
 use anyhow::{Result, bail};
 
 use crate::input::recording::Recording;
+use crate::tuning::WHEEL_WINDOW;
 use analysis::innovations;
 use analysis::statistics::{deviation, mean, median, noise_level};
 
@@ -40,9 +41,6 @@ pub fn check_size(inertia: f64, nominal: f64) -> Result<()> {
         0.4 * inertia
     )
 }
-
-/// Time over which wheel speed and torque are compared, s.
-const WINDOW: f64 = 0.1;
 
 /// Evidence of further columns: notes for the reader, and doubts that no fit can remove.
 pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
@@ -92,7 +90,7 @@ struct Actuator {
 /// I_w ΔΩ = −∫τ dt over windows: least squares of I_w, and windows that are off by more than a tenth of the
 /// largest and more than the speed's noise.
 fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
-    let width = ((WINDOW / recording.step()) as usize).max(2);
+    let width = ((WHEEL_WINDOW / recording.step()) as usize).max(2);
     let noise = noise_level(speed);
     let mut pairs = Vec::new();
     for k in (0..speed.len().saturating_sub(width)).step_by(width) {
@@ -114,7 +112,7 @@ fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
         .filter(|(_, impulse, change)| (impulse / inertia - change).abs() > allowed)
         .map(|p| p.0)
         .collect();
-    Actuator { inertia, missing: off.first().map(|from| (*from, off.len() as f64 * WINDOW)) }
+    Actuator { inertia, missing: off.first().map(|from| (*from, off.len() as f64 * WHEEL_WINDOW)) }
 }
 
 #[cfg(test)]

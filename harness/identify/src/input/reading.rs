@@ -11,22 +11,12 @@ use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::Table;
 
 use crate::input::clocks::{self, Clocked, completed};
-use crate::input::recording::{LONG, Recording, SHORTEST, masked, take_out};
+use crate::input::recording::{Recording, masked, take_out};
 use crate::input::sensor_faults::{self, Rest};
 use crate::input::{gaps, spikes};
-
-/// Time after the beginning of a part that is already moving in which no sensor is fitted, s: a sensor that is late shows
-/// what happened before the part's first torque.
-const LATE: f64 = 0.1;
-
-/// Rows of a free decay: the spectrum of its residual takes 400 sines a row.
-const DECAY_ROWS: usize = 1_000_000;
-
-/// Number of spikes whose times are listed.
-const LISTED: usize = 8;
-
-/// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.
-const MOVES: f64 = 2.0;
+use crate::tuning::{
+    DECAY_ROWS, LATE_SENSOR, LISTED_SPIKES, LONG_RECORDING, MOVING_SPREAD, SHORTEST_RECORDING,
+};
 
 /// Columns that a recording must have.
 pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
@@ -159,8 +149,8 @@ pub fn read_decay(
     let seconds = all.duration();
     // the last row stands for a step too
     ensure!(
-        seconds + all.step() >= SHORTEST * (1.0 - 1e-9),
-        "{name}: {seconds:.2} s are too few (allowed: at least {SHORTEST} s)"
+        seconds + all.step() >= SHORTEST_RECORDING * (1.0 - 1e-9),
+        "{name}: {seconds:.2} s are too few (allowed: at least {SHORTEST_RECORDING} s)"
     );
     ensure!(deviation(&all.rate) > 0.0, "{name}: {found} is constant ({})", all.rate[0]);
     Ok((found, all))
@@ -207,10 +197,10 @@ pub fn prepare(
         let mut part = all.rows(*from, *to);
         let seconds = if part.time.len() > 1 { part.duration() } else { 0.0 };
         let step = if part.time.len() > 1 { part.step() } else { 0.0 };
-        if seconds + step < SHORTEST * (1.0 - 1e-9) {
+        if seconds + step < SHORTEST_RECORDING * (1.0 - 1e-9) {
             ensure!(
                 cuts.len() > 1,
-                "{name}: {seconds:.2} s of data are too few (allowed: at least {SHORTEST} s, and {LONG} s where the \
+                "{name}: {seconds:.2} s of data are too few (allowed: at least {SHORTEST_RECORDING} s, and {LONG_RECORDING} s where the \
                  damping of a bare tank is to be seen: its slosh decays in some 23 s, its resonance is 14 mHz wide)"
             );
             done(format!(
@@ -225,9 +215,9 @@ pub fn prepare(
             part.name = format!("{name}, part {}", index + 1);
         }
         done(describe(&part));
-        if seconds < LONG {
+        if seconds < LONG_RECORDING {
             done(format!(
-                "{}: {seconds:.0} s are short for a bare tank, whose resonance takes {LONG} s to be resolved; expect wide \
+                "{}: {seconds:.0} s are short for a bare tank, whose resonance takes {LONG_RECORDING} s to be resolved; expect wide \
                  intervals of damping and mass",
                 part.name
             ));
@@ -244,7 +234,7 @@ pub fn prepare(
         without_spikes(&mut part, done);
         if !part.from_rest {
             let rows = part.time.len();
-            for row in (0..rows).take_while(|k| part.time[*k] < part.time[0] + LATE) {
+            for row in (0..rows).take_while(|k| part.time[*k] < part.time[0] + LATE_SENSOR) {
                 take_out(&mut part.fresh, row, rows);
                 take_out(&mut part.angle_fresh, row, rows);
             }
@@ -252,7 +242,7 @@ pub fn prepare(
         check_signals(&part)?;
         parts.push(part);
     }
-    ensure!(!parts.is_empty(), "{name}: no part between gaps is as long as {SHORTEST} s");
+    ensure!(!parts.is_empty(), "{name}: no part between gaps is as long as {SHORTEST_RECORDING} s");
     let torque = parts.iter().map(|part| peak(&part.torque)).fold(0.0, f64::max);
     ensure!(
         !parts.iter().all(is_stuck),
@@ -300,8 +290,8 @@ fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
         return;
     };
     let at: Vec<String> =
-        found.iter().take(LISTED).map(|(k, _)| format!("{:.2}", part.time[*k])).collect();
-    let more = if found.len() > LISTED { ", …" } else { "" };
+        found.iter().take(LISTED_SPIKES).map(|(k, _)| format!("{:.2}", part.time[*k])).collect();
+    let more = if found.len() > LISTED_SPIKES { ", …" } else { "" };
     done(format!(
         "{}: {} single values of omega differ from their neighbours by more than noise, by up to {largest:.2e} rad/s; they are \
          not fitted (at {}{more} s)",
@@ -408,7 +398,7 @@ fn check_signals(part: &Recording) -> Result<()> {
 fn is_stuck(part: &Recording) -> bool {
     let (mean, noise) = (mean(&part.rate), noise_level(&part.rate));
     let unit: Vec<f64> = part.rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();
-    deviation(&unit) < MOVES
+    deviation(&unit) < MOVING_SPREAD
         && innovations::crossed(&unit, &part.torque, part.step()) < innovations::LIMIT
 }
 
@@ -434,7 +424,8 @@ fn running_mean(x: &[f64], width: usize) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::input::recording::fresh;
-    use crate::model::bench::nominal::COARSEST;
+    use crate::tuning::COARSEST;
+
     use std::f64::consts::TAU;
 
     /// 300 s of a rigid body of 0.4 kg·m² under a sweep.

@@ -9,9 +9,7 @@ use signals::recording::{self, Between, Columns, Signal, Wanted};
 
 use crate::input::question::Question;
 use crate::input::recording::{check_times, check_values};
-
-/// Values of an output below which nothing is estimated from them.
-const FEWEST: usize = 10;
+use crate::tuning::FEWEST_VALUES;
 
 /// One recording, in the FMU's units.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +70,10 @@ impl Record {
     pub fn check(&self, question: &Question) -> Result<()> {
         for (name, values) in question.outputs.iter().zip(&self.outputs) {
             let count = values.iter().filter(|y| !y.is_nan()).count();
-            ensure!(count >= FEWEST, "{name} has {count} values (allowed: at least {FEWEST})");
+            ensure!(
+                count >= FEWEST_VALUES,
+                "{name} has {count} values (allowed: at least {FEWEST_VALUES})"
+            );
         }
         if self.time.len() > 1 {
             check_times(&self.time)?;

@@ -10,17 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use files::budget;
 
 use crate::input::clocks::completed;
-
-/// Shortest recording, s: in it, of slosh at 2.4 Hz, some fifty periods.
-pub const SHORTEST: f64 = 20.0;
-
-/// A recording that is long for its slosh, s. A bare tank's slosh decays within some 23 s (1/(ζω) of the
-/// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
-/// damping and mass, and its intervals are as wide as that.
-pub const LONG: f64 = 120.0;
-
-/// Part of the rows up to which a gyro with new values in them is slower than the recording.
-const SLOW: f64 = 0.75;
+use crate::tuning::{LARGEST_VALUE, ON_CLOCK, SLOW_GYRO, SLOWEST_GYRO};
 
 /// One uninterrupted recording.
 #[derive(Clone, Debug)]
@@ -277,7 +267,7 @@ impl Recording {
     pub fn of_gyro(&self) -> Cow<'_, Recording> {
         let rows: Vec<usize> =
             (0..self.time.len()).filter(|k| self.fresh.as_ref().is_none_or(|f| f[*k])).collect();
-        if rows.len() as f64 > SLOW * self.time.len() as f64 || rows.len() < 3 {
+        if rows.len() as f64 > SLOW_GYRO * self.time.len() as f64 || rows.len() < 3 {
             return Cow::Borrowed(self);
         }
         let of = |values: &Vec<f64>| rows.iter().map(|k| values[*k]).collect::<Vec<f64>>();
@@ -310,9 +300,6 @@ impl Recording {
     }
 }
 
-/// Largest value of a signal: the squares of all rows have a finite sum.
-const LARGEST: f64 = 1e100;
-
 /// Fails unless times are finite and grow, and their span is a reasonable number of the usual steps. Returns that step, s.
 pub fn check_times(time: &[f64]) -> Result<f64> {
     ensure!(time.len() > 1, "there are {} rows (allowed: at least 2)", time.len());
@@ -329,22 +316,17 @@ pub fn check_times(time: &[f64]) -> Result<f64> {
     Ok(step)
 }
 
-/// Fails if a value is not a number within ±[`LARGEST`].
+/// Fails if a value is not a number within ±[`LARGEST_VALUE`].
 pub fn check_values(name: &str, values: impl Iterator<Item = f64>) -> Result<()> {
     for (row, value) in values.enumerate() {
         ensure!(
-            value.abs() <= LARGEST,
-            "row {}: {name} is {value:e} (allowed: up to {LARGEST:e})",
+            value.abs() <= LARGEST_VALUE,
+            "row {}: {name} is {value:e} (allowed: up to {LARGEST_VALUE:e})",
             row + 1
         );
     }
     Ok(())
 }
-
-/// Part of the changes of a held gyro that fall on the rows of its own clock.
-const ON_CLOCK: f64 = 0.98;
-/// Slowest gyro that is looked for, in rows a value.
-const SLOWEST: usize = 100;
 
 /// Returns the rows with a new value if most rows only repeat the one before, as with a gyro that is slower than the recording. A
 /// coarse gyro may repeat values by chance, so the changes must come every n-th row. If the gyro is fine (two values are seldom
@@ -354,7 +336,7 @@ pub(crate) fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
     if changes.len() < 10 || changes.len() > 9 * rate.len() / 10 {
         return None;
     }
-    for n in (2..=SLOWEST.min(rate.len() / 10)).rev() {
+    for n in (2..=SLOWEST_GYRO.min(rate.len() / 10)).rev() {
         let mut hits = vec![0; n];
         changes.iter().for_each(|k| hits[k % n] += 1);
         let (phase, most) = hits.iter().enumerate().max_by_key(|(_, count)| **count)?;

@@ -4,25 +4,10 @@
 use analysis::statistics::{mean, median, noise_level, peak};
 
 use crate::input::spikes;
-
-/// Fewest values at an end of the range that are clipped, and how many times as many they are as equal values just inside it.
-const CLIPPED: (usize, f64) = (20, 4.0);
-/// Width of that inside, in units of the noise.
-const INSIDE: f64 = 3.0;
-/// Step, in units of the noise, that a value takes when it comes back from being clipped or frozen.
-const LEAVES: f64 = 5.0;
-/// The same in units of the sensor's resolution, where it is at both ends.
-const STEPS: f64 = 2.0;
-/// First step of an angle that leaves its rest over the second, at most: it starts with zero rate, and its acceleration does not fall.
-const FROM_REST: f64 = 1.0 / 3.0;
-/// Probability that a run of equal values is chance.
-const CHANCE: f64 = 1e-6;
-/// Fewest values in a frozen run.
-const SHORTEST_RUN: usize = 5;
-/// Fewest repeats, and how much larger their mean square off the neighbours is than that of other values.
-const REPEATS: (usize, f64) = (10, 3.0);
-/// Part of the largest value that rounding may make.
-const ROUNDING: f64 = 1e-9;
+use crate::tuning::{
+    CLIPPED, CLIPPED_INSIDE, FAULT_LEAVES, FAULT_STEPS, FROM_REST, FROZEN_CHANCE, FROZEN_RUN,
+    REPEATS, SENSOR_ROUNDING,
+};
 
 /// Faults of a sensor.
 #[derive(Debug, Default, PartialEq)]
@@ -72,9 +57,9 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
     // a hub rests at one end of its rates at most
     let both = rest != Rest::Angle
-        && jumps.iter().all(|jump| jump.is_some_and(|jump| jump > STEPS * resolution));
+        && jumps.iter().all(|jump| jump.is_some_and(|jump| jump > FAULT_STEPS * resolution));
     for (((end, _), rows), jump) in ends.into_iter().zip(held).zip(jumps) {
-        if !both && jump.is_none_or(|jump| jump <= LEAVES * noise) {
+        if !both && jump.is_none_or(|jump| jump <= FAULT_LEAVES * noise) {
             continue;
         }
         if let [first, .., last] = rows[..] {
@@ -118,9 +103,9 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
 fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize> {
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
-    let beside = |v: &&f64| (end - INSIDE * noise..end).contains(&(sign * **v));
+    let beside = |v: &&f64| (end - CLIPPED_INSIDE * noise..end).contains(&(sign * **v));
     // as many as one value of the sensor has of those just inside
-    let share = (resolution / (INSIDE * noise)).min(1.0);
+    let share = (resolution / (CLIPPED_INSIDE * noise)).min(1.0);
     let usual = share * values.iter().filter(beside).count() as f64;
     let is_run = |k: &&usize| {
         let equal = |j: usize| values.get(j) == Some(&values[**k]);
@@ -142,7 +127,7 @@ fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
 fn resolution(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let rounding = ROUNDING * peak(values);
+    let rounding = SENSOR_ROUNDING * peak(values);
     let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > rounding);
     steps.fold(f64::INFINITY, f64::min)
 }
@@ -152,14 +137,14 @@ fn resolution(values: &[f64]) -> f64 {
 /// may freeze near its mean, or come back near the frozen value.
 fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
     let runs = runs(values);
-    let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= SHORTEST_RUN;
+    let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= FROZEN_RUN;
     let mean = mean(values);
     let repeats: usize = runs.iter().filter(|run| !is_long(run)).map(|(a, b)| b - a).sum();
     let chance = (repeats + 1) as f64 / values.len() as f64;
-    let least = 1.0 + (CHANCE / values.len() as f64).ln() / chance.ln();
+    let least = 1.0 + (FROZEN_CHANCE / values.len() as f64).ln() / chance.ln();
     let sign = |&(_, b): &(usize, usize)| {
-        let jump = rest.jump(values, b).is_some_and(|jump| jump > LEAVES * noise);
-        (jump, (values[b] - mean).abs() > LEAVES * noise)
+        let jump = rest.jump(values, b).is_some_and(|jump| jump > FAULT_LEAVES * noise);
+        (jump, (values[b] - mean).abs() > FAULT_LEAVES * noise)
     };
     let is_no_chance = |run: &&(usize, usize)| {
         let (a, b) = **run;
@@ -193,8 +178,8 @@ fn runs(values: &[f64]) -> Vec<(usize, usize)> {
 /// Rows that repeat the value before them, if they do so where it moves. A long run of an angle that ends without a jump is a hub at rest.
 fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<usize> {
     let moves = |(a, b): &(usize, usize)| {
-        let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > LEAVES * noise);
-        rest != Rest::Angle || b - a + 1 < SHORTEST_RUN || jumps()
+        let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > FAULT_LEAVES * noise);
+        rest != Rest::Angle || b - a + 1 < FROZEN_RUN || jumps()
     };
     let moving = runs(values).into_iter().filter(moves);
     let repeats: Vec<usize> = moving.flat_map(|(a, b)| a + 1..=b).filter(|k| !out[*k]).collect();
@@ -205,7 +190,7 @@ fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) 
     let squares: Vec<f64> = off.iter().map(|e| e * e).collect();
     // the median of a χ² with one degree of freedom is 0.4549
     let usual = median(&squares).unwrap_or(0.0) / 0.4549;
-    let usual = usual.max((ROUNDING * peak(values)).powi(2));
+    let usual = usual.max((SENSOR_ROUNDING * peak(values)).powi(2));
     let of_repeats = repeats.iter().map(|k| squares[*k]).sum::<f64>() / repeats.len() as f64;
     if of_repeats > REPEATS.1 * usual { repeats } else { Vec::new() }
 }

@@ -17,20 +17,10 @@ use std::collections::{BTreeMap, BinaryHeap};
 use analysis::statistics::{median, noise_level, peak};
 
 use crate::input::clocks::weights;
+use crate::tuning::{SPIKE_AROUND, SPIKE_BEYOND, SPIKE_NEAR_STEP, SPIKE_SHARE, TORQUE_STEP};
 
-/// Deviations of r beyond which a value is a spike; of 135,000 rows of noise none is in 10¹⁴ recordings.
-const BEYOND: f64 = 10.0;
-/// Spikes at most, of all values: more are noise of another kind, which no row should be left out for.
-const FEW: f64 = 0.01;
 /// σ of r over that of white noise.
 const GAIN: f64 = 1.394;
-/// Rows on either side of a step of the torque in which r may be the hub's own motion.
-const NEAR_STEP: usize = 3;
-/// Part of the torque's peak that is a step from one row to the next.
-const STEP: f64 = 0.5;
-
-/// Rows on either side whose median is what is usual around a row.
-const AROUND: usize = 50;
 
 /// Returns the differences of values at growing times from the cubics through their neighbours, scaled to the noise of even rows.
 /// The differences are 0 at the ends.
@@ -60,18 +50,18 @@ pub fn find(
         off_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
     // the median of |r| is 0.6745 σ for noise, and more where friction's kinks are in many rows
     let typical = |residuals: &[f64]| median(residuals).map_or(0.0, |m| m / 0.6745);
-    let around: Vec<f64> = residuals.chunks(AROUND).map(typical).collect();
+    let around: Vec<f64> = residuals.chunks(SPIKE_AROUND).map(typical).collect();
     let usual = typical(&residuals).max(GAIN * noise_level(&y));
     let limit = |k: usize| {
-        let chunk = (k.max(2) - 2) / AROUND;
+        let chunk = (k.max(2) - 2) / SPIKE_AROUND;
         let near = chunk.saturating_sub(1)..(chunk + 2).min(around.len());
-        BEYOND * around[near].iter().copied().fold(usual, f64::max)
+        SPIKE_BEYOND * around[near].iter().copied().fold(usual, f64::max)
     };
-    let step = STEP * peak(torque);
+    let step = TORQUE_STEP * peak(torque);
     let suspects: Vec<usize> = (2..y.len() - 2)
         .filter(|&k| residuals[k - 2] > limit(k) && !near_step(torque, rows[k], step))
         .collect();
-    let most = (FEW * y.len() as f64) as usize;
+    let most = (SPIKE_SHARE * y.len() as f64) as usize;
     // a spike is in the cubics of four neighbours
     if suspects.len() > 5 * most {
         return Vec::new();
@@ -177,7 +167,7 @@ fn off((time, y): (&[f64], &[f64]), sound: &Sound, k: usize) -> (f64, f64) {
 
 /// Returns true if the torque changes by more than `step` from one row to the next near a row.
 fn near_step(torque: &[f64], row: usize, step: f64) -> bool {
-    let near = row.saturating_sub(NEAR_STEP)..(row + NEAR_STEP).min(torque.len() - 1);
+    let near = row.saturating_sub(SPIKE_NEAR_STEP)..(row + SPIKE_NEAR_STEP).min(torque.len() - 1);
     near.into_iter().any(|k| (torque[k + 1] - torque[k]).abs() > step)
 }
 

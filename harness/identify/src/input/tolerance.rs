@@ -3,6 +3,8 @@
 use anyhow::{Context, Result, bail, ensure};
 use names::hubslosh::{G_AXIAL, fluid, tank};
 
+use crate::tuning::TOLD_SHARE;
+
 /// Relative standard deviations of numbers that the recording cannot show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
@@ -43,9 +45,6 @@ pub fn part(name: &str, text: &str) -> Result<Option<f64>> {
     ensure!((0.0..0.5).contains(&number), "{name}: must be from 0 to 50 %, not {text}");
     Ok(Some(number))
 }
-
-/// Share of the variance above which the verdict names it.
-const TOLD_SHARE: f64 = 0.2;
 
 /// Share of tolerances in the variance of an estimate.
 pub struct Share {

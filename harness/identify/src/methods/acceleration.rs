@@ -43,7 +43,13 @@ use crate::input::recording::Recording;
 use crate::model::bench::nominal::{self, Nominal};
 use crate::model::bench::unknown::{self, Scale};
 use crate::news::News;
-use crate::uncertainty::bench::sources::{Combination, ONE_WAY, Sources, one_way};
+use crate::tuning::{
+    ACCELERATION_MISFIT, ACCELERATION_REACH, BLOCK, CERTAIN_SIGN, DRIVING_FRICTION, FEWEST_BLOCKS,
+    FREE_TORQUE, FRICTION_BINS, FRICTION_PARTS, GRID_STRIDE, LIKELIHOOD_END, MOVING_POWER,
+    MOVING_SPEED, ONE_WAY, ROUGH_ROWS, SCORE_WINDOW, SHORT_CHANGE, STICKING_ROUNDS, TOLD_SHARE,
+    VAGUE_STRIBECK,
+};
+use crate::uncertainty::bench::sources::{Combination, Sources, one_way};
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::Sections;
 use crate::words::start_study::{self, Trial};
@@ -151,7 +157,7 @@ impl Method for Acceleration {
         let fmu = task.fmu()?;
         let found = identify(fmu, task.recordings, &self.options)?;
         let inertia = &found.measurement["inertia"];
-        if inertia.std < VAGUE * inertia.value {
+        if inertia.std < VAGUE_STRIBECK * inertia.value {
             let nominal = Nominal::of(fmu, &self.options.settings, &[])?;
             plausible::check_size(inertia.value, nominal.inertia)?;
         }
@@ -227,45 +233,10 @@ impl Braking {
     }
 }
 
-/// Length of the windows over which the residual's scores are summed, s: the difference makes neighbouring rows
-/// correlated.
-const WINDOW: f64 = 2.0;
-/// Residual over that of the gyro's noise, beyond which something else acts.
-const MISFIT: f64 = 1.1;
-/// Parts of an interval over which the friction is averaged.
-const PARTS: usize = 8;
-/// Rate over the width of the noise beyond which its sign is certain: 1 − tanh is 1e-17.
-const CERTAIN: f64 = 20.0;
-/// Change of the rate over the width of the noise, up to which its mean sign is that in the middle, to 1e-6.
-const SHORT: f64 = 1e-3;
-/// Rounds in which the rows of a hub that sticks are found with the bias.
-const ROUNDS: usize = 4;
-/// Relative standard deviation of friction.d or omega_s beyond which the sum of squares is not quadratic in them.
-const VAGUE: f64 = 0.3;
-/// Standard deviations by which a friction below zero would explain more, beyond which it is not zero but something else acts.
-const DRIVING: f64 = 3.0;
-/// Fall of the likelihood's logarithm that ends a 95 % interval, times two.
-const LIMIT: f64 = 3.84;
 /// Names of the first unknowns.
 const FIRST: [&str; 6] =
     [hub::I, friction::B, friction::C, friction::D, friction::OMEGA_S, friction::ASYMMETRY];
 
-/// Rows that are closer are taken together, s. The mean of a sine of 3.5 Hz over it is 0.2 % less than its peak.
-const BLOCK: f64 = 0.01;
-/// Blocks of the shortest recording.
-const FEWEST: usize = 100;
-/// Power of the rate's changes over that of the gyro's noise, below which the hub does not move.
-const MOVES: f64 = 2.0;
-/// Intervals of the rate over which the measured friction is averaged, and the fewest rows of one.
-const BINS: (usize, usize) = (160, 3);
-/// Farthest start of the study of starts over the estimate, or the estimate over it.
-const REACH: f64 = 10.0;
-/// Share of the variance by which a tolerance is reported.
-const SHARE: f64 = 0.2;
-/// Number of rows on which the starts are compared; the best start is then refined on all rows.
-const ROUGH: usize = 20_000;
-/// Stride over the grid of Stribeck speeds for intervals.
-const EVERY: usize = 2;
 /// Place of the Stribeck speed among them.
 const STRIBECK: usize = 4;
 /// Place of the asymmetry among them.
@@ -371,8 +342,8 @@ impl Rows {
     /// Rates at the ends of equal parts of the interval, on the parabola through the three rows (Lagrange). The form at a row has one
     /// part without length. Where the rate passes through zero, its slope jumps by that of the dry friction over the inertia: without
     /// this kink the parabola passes late, and the inertia comes out too large by (hΩ/π)(dry friction over torque)², 3e-4 on the bench.
-    fn rates(&self, form: Form, k: usize) -> ([f64; PARTS + 1], usize) {
-        let mut rates = [self.rate[k]; PARTS + 1];
+    fn rates(&self, form: Form, k: usize) -> ([f64; FRICTION_PARTS + 1], usize) {
+        let mut rates = [self.rate[k]; FRICTION_PARTS + 1];
         if form == Form::AtRow {
             return (rates, 1);
         }
@@ -396,13 +367,13 @@ impl Rows {
         let bend = |at: f64| kink.map_or(0.0, |(zero, way)| -way * jump * (at - zero).max(0.0));
         let bends = t.map(bend);
         for (part, w) in rates.iter_mut().enumerate() {
-            let at = t[0] + part as f64 / PARTS as f64 * (t[2] - t[0]);
+            let at = t[0] + part as f64 / FRICTION_PARTS as f64 * (t[2] - t[0]);
             *w = parabola(at, of);
             if kink.is_some() {
                 *w += bend(at) - parabola(at, bends);
             }
         }
-        (rates, PARTS)
+        (rates, FRICTION_PARTS)
     }
 }
 
@@ -410,10 +381,10 @@ impl Rows {
 /// with respect to that rate. `width` is 1.25 standard deviations of the noise.
 fn mean_sign(from: f64, to: f64, width: f64) -> (f64, f64) {
     let (a, b) = (from / width, to / width);
-    if a.abs().min(b.abs()) > CERTAIN && a * b > 0.0 {
+    if a.abs().min(b.abs()) > CERTAIN_SIGN && a * b > 0.0 {
         return (a.signum(), 0.0);
     }
-    if (b - a).abs() < SHORT {
+    if (b - a).abs() < SHORT_CHANGE {
         let sign = (0.5 * (a + b)).tanh();
         return (sign, (1.0 - sign * sign) / width);
     }
@@ -762,7 +733,7 @@ impl Problem {
         let biases = self.biases(&p);
         let [low, high] = [f64::NEG_INFINITY, f64::INFINITY].map(|end| self.bounded(STRIBECK, end));
         let mut points = vec![minimum.clone()];
-        for (speed, (linear, _)) in self.grid(biases).into_iter().step_by(EVERY) {
+        for (speed, (linear, _)) in self.grid(biases).into_iter().step_by(GRID_STRIDE) {
             let start = self.start(speed.clamp(low, high), &linear, biases);
             let mut x = off_the_bounds(&minimum.x);
             (1..=STRIBECK).for_each(|place| x[place] = start[place]);
@@ -773,7 +744,7 @@ impl Problem {
         let least = points.iter().map(|point| point.cost).fold(f64::INFINITY, f64::min);
         let variance = least / self.used().max(1) as f64;
         let is_in: Vec<bool> =
-            points.iter().map(|point| point.cost - least < LIMIT * variance).collect();
+            points.iter().map(|point| point.cost - least < LIKELIHOOD_END * variance).collect();
         let mut intervals = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
         for (point, _) in points.iter().zip(&is_in).filter(|(_, is_in)| **is_in) {
             let (p, known) = (self.values(&point.x), self.known(point, &held)?);
@@ -809,7 +780,7 @@ impl Problem {
                 more: Some((found.cost - minimum.cost) / square),
             }
         };
-        let starts = start_study::starts(count, REACH);
+        let starts = start_study::starts(count, ACCELERATION_REACH);
         let all: Vec<(usize, f64)> =
             (0..=STRIBECK).flat_map(|place| starts.iter().map(move |s| (place, *s))).collect();
         all.into_par_iter().map(of).collect()
@@ -817,7 +788,7 @@ impl Problem {
 
     /// Measured friction, mean torque less I y, over rows of similar rate in which the hub slips.
     fn friction_points(&self, p: &[f64]) -> Vec<FrictionPoint> {
-        let (count, fewest) = BINS;
+        let (count, fewest) = FRICTION_BINS;
         let mut all: Vec<(f64, f64)> = Vec::new();
         for (rows, bias) in self.rows.iter().zip(self.biases(p)) {
             let slips = rows.inner().filter(|k| rows.weight[k - 1] > 0.0);
@@ -926,11 +897,11 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     for recording in recordings {
         recording.check()?;
         ensure!(
-            recording.duration() > FEWEST as f64 * BLOCK,
+            recording.duration() > FEWEST_BLOCKS as f64 * BLOCK,
             "{}: it lasts {:e} s (allowed: more than {} s). Record a ramp, a step and a sweep of a minute or more each",
             recording.name,
             recording.duration(),
-            FEWEST as f64 * BLOCK
+            FEWEST_BLOCKS as f64 * BLOCK
         );
     }
     let names = || recordings.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -940,7 +911,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         "{}: the torque is 0 in every row. Friction and inertia need a torque; record a ramp, a step or a sweep",
         names()
     );
-    let moves = |r: &Recording| variance(&r.rate) > MOVES * r.rate_noise().powi(2);
+    let moves = |r: &Recording| variance(&r.rate) > MOVING_POWER * r.rate_noise().powi(2);
     ensure!(
         recordings.iter().any(moves),
         "{}: the hub does not move: the rate is constant but for the gyro's noise. Static friction holds it up to the largest torque, \
@@ -966,7 +937,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let biases = plain.rough_biases(&rests);
     plain.leave_out_stuck(&biases);
     plain.one_way = !plain.turns_both_ways(&biases);
-    let rough = plain.thinned(ROUGH);
+    let rough = plain.thinned(ROUGH_ROWS);
     let starts = rough.starts(&biases, &given);
     ensure!(!starts.is_empty(), "inertia and friction have no influence on the recording");
     let start = rough.solve_to(&starts, &[], 1e-4);
@@ -986,7 +957,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     problem.leave_out_stuck(problem.biases(&first).to_vec().as_slice());
     problem.place_kinks(&first);
     let mut minimum = problem.solve_to(&[x, starts[0].clone()], &[], 1e-6);
-    for _ in 0..ROUNDS {
+    for _ in 0..STICKING_ROUNDS {
         let p = problem.values(&minimum.x);
         if !problem.leave_out_stuck(problem.biases(&p).to_vec().as_slice()) {
             break;
@@ -1017,7 +988,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         known = problem.known(&minimum, &held)?;
     }
     let values = problem.values(&minimum.x);
-    let vague = |place: usize| is_vague(&known, place, VAGUE * values[place]);
+    let vague = |place: usize| is_vague(&known, place, VAGUE_STRIBECK * values[place]);
     let is_profiled = vague(3) || vague(STRIBECK);
     let profile = is_profiled.then(|| problem.profile(&minimum, &held)).transpose()?;
     if let Some(profile) = &profile {
@@ -1049,7 +1020,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let newton = covariance::spread_out(&covariance.x, &shown, n)
         * problem.jacobian(&p).tr_mul(&DVector::from_column_slice(&e));
     let is_none = |j: usize| {
-        problem.is_zero(j, p[j]) && p[j] - newton[j] > -DRIVING * of_values[(j, j)].sqrt()
+        problem.is_zero(j, p[j]) && p[j] - newton[j] > -DRIVING_FRICTION * of_values[(j, j)].sqrt()
     };
     let at_bound: Vec<bool> =
         (0..n).map(|j| problem.is_at_bound(j, p[j]) && !held.contains(&j) && !is_none(j)).collect();
@@ -1057,7 +1028,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let root_mean = |sum: f64| (sum / e.len() as f64).sqrt();
     let rms = root_mean(e.iter().map(|e| e * e).sum());
     let expected = root_mean(problem.noise_power());
-    let fits = rms < MISFIT * expected && !at_bound.contains(&true);
+    let fits = rms < ACCELERATION_MISFIT * expected && !at_bound.contains(&true);
     let sum_of_dry = (of_values[(2, 2)] + of_values[(3, 3)] + 2.0 * of_values[(2, 3)]).max(0.0);
     if let Some(profile) = &profile {
         for (place, [low, high]) in (1..=3).zip(profile.intervals) {
@@ -1137,7 +1108,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let rests = problem.rows.iter().any(|rows| rows.resting.iter().any(|weight| *weight > 0.0));
     let share = |j: usize| (of_values[(j, j)] - of_noise[j]) / of_values[(j, j)];
     let shares: Vec<String> = (0..n)
-        .filter(|j| of_noise[*j] > 0.0 && share(*j) > SHARE)
+        .filter(|j| of_noise[*j] > 0.0 && share(*j) > TOLD_SHARE)
         .map(|j| format!("{} {:.0} %", problem.names[j], 100.0 * share(j)))
         .collect();
     let mut remarks = Vec::new();
@@ -1210,13 +1181,8 @@ fn unit(name: &str) -> &'static str {
 /// Rows of the windows, over all recordings.
 fn windows(problem: &Problem) -> Vec<(usize, usize)> {
     let rows = problem.rows.iter().map(|rows| (rows.inner().len(), rows.step));
-    covariance::windows(rows, WINDOW)
+    covariance::windows(rows, SCORE_WINDOW)
 }
-
-/// Torque below which nothing drives the hub, over the largest torque.
-const FREE: f64 = 1e-3;
-/// Speeds of free decay: above this part of the fastest, or the sign is not sure.
-const MOVING: f64 = 0.05;
 
 /// The braking of free decay in one direction against the angle, ordinary least squares (thesis 5.4);
 /// `None` without angle or free decay.
@@ -1227,7 +1193,7 @@ fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking
         let Some(angle) = &recording.angle else { continue };
         let rate: Vec<f64> = recording.rate.iter().map(|w| w - bias).collect();
         let (torque, t) = (&recording.torque, &recording.time);
-        let (still, slow) = (FREE * peak(torque), MOVING * peak(&rate));
+        let (still, slow) = (FREE_TORQUE * peak(torque), MOVING_SPEED * peak(&rate));
         for k in 1..t.len() - 1 {
             let free = (k - 1..=k + 1).all(|i| torque[i].abs() <= still && way * rate[i] > slow);
             if free {
@@ -1270,7 +1236,7 @@ fn words(found: &Found, problem: &Problem, p: &[f64]) -> Vec<String> {
     let mut words = Vec::new();
     let Details { fit, at_bound, braking, .. } = &found.details;
     let (ratio, fits) = (fit.rmse / fit.expected, found.fits == Some(true));
-    if ratio < MISFIT {
+    if ratio < ACCELERATION_MISFIT {
         words.extend((!at_bound.is_empty()).then(|| {
             format!(
                 "{DOES_NOT_FIT}: {} ended at a bound; no number here can be trusted.",

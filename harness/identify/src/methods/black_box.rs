@@ -16,17 +16,9 @@ use serde::Serialize;
 use super::{Method, Needs, Task};
 use crate::input::recording::Recording;
 use crate::news::News;
+use crate::tuning::{ARMAX_ORDERS, ARX_ORDERS, FITTED_PART, WORTH};
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::{RATE, Sections};
-
-/// Orders of ARX that are tried.
-const ARX: [usize; 9] = [2, 3, 4, 6, 8, 12, 16, 24, 32];
-/// Orders of ARMAX that are tried.
-const ARMAX: [usize; 4] = [2, 3, 4, 5];
-/// Part of the record that is fitted; the rest is held back.
-const FITTED: f64 = 2.0 / 3.0;
-/// A larger model must simulate better by this much, %.
-const WORTH: f64 = 0.1;
 
 /// A fitted model and how it simulates.
 #[derive(Clone, Debug, Serialize)]
@@ -135,7 +127,7 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
     let (u, y) = (centred(u), centred(y));
     let cut = match held_out {
         Some(_) => u.len(),
-        None => (u.len() as f64 * FITTED) as usize,
+        None => (u.len() as f64 * FITTED_PART) as usize,
     };
     let other = held_out.map(Recording::even).transpose()?;
     let other = other.map(|(other_step, u, y)| (other_step, centred(u), centred(y)));
@@ -146,7 +138,7 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
              samples needs the same"
         );
     }
-    let kinds = [(true, &ARX[..]), (false, &ARMAX[..])].into_iter();
+    let kinds = [(true, &ARX_ORDERS[..]), (false, &ARMAX_ORDERS[..])].into_iter();
     let orders: Vec<(bool, usize)> =
         kinds.flat_map(|(plain, orders)| orders.iter().map(move |n| (plain, *n))).collect();
     let judged = |(plain, n): (bool, usize)| {

@@ -10,13 +10,9 @@ use super::{Method, Needs, Task};
 use crate::estimate::Estimated;
 use crate::input::recording::Recording;
 use crate::news::News;
+use crate::tuning::{DECAY_MISFIT, NAMED_OSCILLATION};
 use crate::words::identified::{Identified, Residual};
 use analysis::statistics::noise_level;
-
-/// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.
-const MOST_RESIDUAL: f64 = 2.0;
-/// Part of the oscillation that another one in the residual has, from which on it is named.
-const NAMED: f64 = 0.02;
 
 /// The result; `measurement` has f, ζ, ζ_A and κ.
 pub type Found = Identified<Details>;
@@ -107,7 +103,7 @@ impl Method for FreeDecay {
             torque: None,
         };
         answer.residuals = task.recordings.iter().zip(&found.residuals).map(residual).collect();
-        let fits = found.residual < MOST_RESIDUAL * noise.max(1e-9 * found.amplitudes[0][0]);
+        let fits = found.residual < DECAY_MISFIT * noise.max(1e-9 * found.amplitudes[0][0]);
         answer.fits = Some(fits);
         let all = found.amplitudes.iter().flatten();
         let (least, most) = all.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
@@ -147,7 +143,7 @@ impl Method for FreeDecay {
             },
         ];
         let (at, size) = found.other;
-        if size > NAMED * most && !fits {
+        if size > NAMED_OSCILLATION * most && !fits {
             answer.verdict.push(format!(
                 "The residual has an oscillation of {:.0} % at {at:.3} Hz: another mode, or a beat with it.",
                 100.0 * size / most

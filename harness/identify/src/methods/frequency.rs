@@ -32,6 +32,7 @@ use crate::input::recording::Recording;
 use crate::model::bench::nominal::{Bench, Nominal};
 use crate::model::bench::simulate::Intersample;
 use crate::news::News;
+use crate::tuning::{FREQUENCY_MISFIT, VARIANCE_LINES, WEIGHT_ROUNDS};
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::{RATE, Sections};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM};
@@ -42,12 +43,6 @@ use names::hubslosh::{FrictionModel, SloshModel, friction, hub, slosh, tank};
 const TRANSIENT: usize = 4;
 /// Coefficients of B and A, and the delay.
 const PLANT: usize = 7;
-/// Lines on each side over which the residual's variance is averaged.
-const AROUND: usize = 40;
-/// Rounds of weights.
-const ROUNDS: usize = 5;
-/// Residual over the gyro's noise beyond which the plant is not linear, or something else acts.
-const MISFIT: f64 = 1.3;
 
 /// The result: parameters of an upright cylinder; `measurement` is poles, zeros and what they say without a tank's
 /// shape.
@@ -151,7 +146,8 @@ fn variances(residual: &[Complex64], unknowns: usize) -> Vec<f64> {
     }
     (0..count)
         .map(|k| {
-            let (from, to) = (k.saturating_sub(AROUND), (k + AROUND + 1).min(count));
+            let (from, to) =
+                (k.saturating_sub(VARIANCE_LINES), (k + VARIANCE_LINES + 1).min(count));
             (sums[to] - sums[from]) / (to - from) as f64 / freedom
         })
         .collect()
@@ -181,13 +177,13 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     let band = (measured.frequency[0], measured.frequency[measured.frequency.len() - 1]);
     let bins = (band.0 / bin).ceil() as usize..=((band.1 / bin) as usize).min(count / 2 - 1);
     ensure!(
-        bins.clone().count() > 4 * AROUND,
+        bins.clone().count() > 4 * VARIANCE_LINES,
         "{}: {} lines of its spectrum lie within {:.2} to {:.2} Hz; {} are needed",
         recording.name,
         bins.clone().count(),
         band.0,
         band.1,
-        4 * AROUND
+        4 * VARIANCE_LINES
     );
     let unit = TAU * (band.0 * band.1).sqrt();
     let s: Vec<f64> = bins.clone().map(|k| TAU * k as f64 * bin / unit).collect();
@@ -218,7 +214,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         let scaled = problem.residual(x).into_iter().zip(sigma).map(|(v, s)| v * (2f64.sqrt() / s));
         scaled.flat_map(|v| [v.re, v.im]).collect()
     };
-    for _ in 0..ROUNDS {
+    for _ in 0..WEIGHT_ROUNDS {
         let residuals = |x: &[f64]| weighted(x, &sigma);
         let derivatives = |x: &[f64]| differences(&residuals, x, &steps);
         let minimum = minimise(&residuals, &|x| Some(derivatives(x)), &x);
@@ -265,7 +261,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         structure,
         condition: covariance.condition,
     };
-    let fits = over_noise < MISFIT && structure.abs() < 3.3;
+    let fits = over_noise < FREQUENCY_MISFIT && structure.abs() < 3.3;
     let time = (0..count).map(|k| recording.time[0] + k as f64 * step).collect();
     let residual = Residual {
         name: format!("{}, {:.3} to {:.3} Hz", recording.name, band.0, band.1),

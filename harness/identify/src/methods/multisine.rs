@@ -21,15 +21,9 @@ use signals::fourier::Forward;
 use super::{Method, Needs, Task};
 use crate::input::recording::Recording;
 use crate::news::News;
+use crate::tuning::{DETECTION_LINES, EXCITED, SETTLING};
 use crate::words::identified::Identified;
 use crate::words::page::Sections;
-
-/// Beginning that is left out, s: slosh of a bare tank decays with 23 s, to a thousandth in this time.
-pub const SETTLING: f64 = 150.0;
-/// Power of a line over the largest one above which it is excited.
-const EXCITED: f64 = 1e-4;
-/// Detection lines on each side that stand for the distortion at a line.
-const AROUND: usize = 3;
 
 /// Response at an excited line.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -203,7 +197,8 @@ pub fn analyse(recording: &Recording, period: f64) -> Result<Found> {
         .map(|&k| {
             let g = mean(&y, k) / mean(&u, k);
             let place = odd.partition_point(|o| *o < k);
-            let near = &odd[place.saturating_sub(AROUND)..(place + AROUND).min(odd.len())];
+            let near = &odd
+                [place.saturating_sub(DETECTION_LINES)..(place + DETECTION_LINES).min(odd.len())];
             let distortion = average(near, &beyond).max(0.0);
             Line {
                 frequency: k as f64 / period,

@@ -23,22 +23,26 @@ use crate::fit::bench::candidate::{self, Fitted, ModelFit};
 use crate::fit::bench::friction;
 use crate::fit::bench::goodness::{fit_pct, is_poor, tests};
 use crate::fit::bench::options::Options;
-use crate::fit::bench::problem::{self, Answer, Differences, Polished, Problem, ROUNDS};
+use crate::fit::bench::problem::{self, Answer, Differences, Polished, Problem};
 use crate::fit::bench::start::{self, Response};
 use crate::fit::covariance::{self, Covariance};
-use crate::fit::evidence::{self, ALIKE, DECIDES};
-use crate::fit::minimum::CONVERGED;
+use crate::fit::evidence;
+
 use crate::input::plausible;
-use crate::input::recording::{self, Recording};
+use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
 use crate::model::bench::breaking;
 use crate::model::bench::unknown::{Quantity, Unknown};
 use crate::news::{News, Since};
+use crate::tuning::{
+    BEGINNINGS, BIC_ALIKE, BIC_DECIDES, CONVERGED, GOES_ON, LONG_RECORDING, ONE_WAY, ROUNDS,
+    SANDWICH_WINDOW, STUDY_REACH,
+};
 use crate::uncertainty::bench::budget::{self, Effect};
 use crate::uncertainty::bench::cause;
 use crate::uncertainty::bench::deep_tank;
 use crate::uncertainty::bench::missing;
-use crate::uncertainty::bench::sources::{self, ONE_WAY, Sources};
+use crate::uncertainty::bench::sources::{self, Sources};
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::{RATE, Sections};
 use crate::words::start_study::{self, Trial};
@@ -80,9 +84,6 @@ const ORDER: [&str; 5] =
 /// Slosh models, the simplest first.
 const SIMPLEST: [&str; 5] =
     [Frozen.name(), Linear.name(), Planar.name(), Spherical.name(), Paraboloid.name()];
-
-/// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
-const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 
 /// Identifies the FMU from recordings. `progress` receives each message.
 pub fn identify(
@@ -127,7 +128,7 @@ fn fitting_beginning(
     let mut longest = None;
     for part in BEGINNINGS.map(|fraction| recording.beginning(fraction)) {
         let end = part.time[part.time.len() - 1];
-        if part.duration() < recording::LONG {
+        if part.duration() < LONG_RECORDING {
             continue;
         }
         progress(&News::Step(format!(
@@ -216,13 +217,14 @@ fn identify_whole(
         std::iter::once(first).chain(&others).map(|f| f.fit.clone()).collect();
     let mut models: Vec<ModelFit> = fitted.iter().chain(&others).map(|f| f.fit.clone()).collect();
     // a law must be better than the first by what decides
-    let (best, of_models) = match others.iter().position(|f| f.fit.bic < first.fit.bic - DECIDES) {
-        Some(index) => (others.swap_remove(index), None),
-        None => {
-            let gained = of_models(&fitted[..near]);
-            (fitted.swap_remove(0), Some(gained))
-        }
-    };
+    let (best, of_models) =
+        match others.iter().position(|f| f.fit.bic < first.fit.bic - BIC_DECIDES) {
+            Some(index) => (others.swap_remove(index), None),
+            None => {
+                let gained = of_models(&fitted[..near]);
+                (fitted.swap_remove(0), Some(gained))
+            }
+        };
     let question =
         verdict::Question { slosh: &models[..slosh], near, laws: &laws, doubts: &doubts };
     let mut found = finish(best, of_models, &question, options, &mut tell)?;
@@ -243,7 +245,7 @@ fn identify_whole(
 fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
     fitted.sort_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
     let within = |of: f64| fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + of).count();
-    let (near, alike) = (within(DECIDES), within(ALIKE));
+    let (near, alike) = (within(BIC_DECIDES), within(BIC_ALIKE));
     fitted[..alike].sort_by_key(|f| SIMPLEST.iter().position(|model| *model == f.fit.model));
     (near, fitted.len())
 }
@@ -492,9 +494,6 @@ fn finish(
     })
 }
 
-/// Most times that a search goes on.
-const GOES_ON: usize = 3;
-
 /// Goes on with a search whose sets of sensitivities ran out before the minimum, as long as that lessens the sum of squares: two bent
 /// valleys at once, of the friction's curve and of a deep tank's fill, take more sets than one.
 fn on_to_the_end(problem: &Problem, mut found: Polished) -> Result<Polished> {
@@ -510,9 +509,6 @@ fn on_to_the_end(problem: &Problem, mut found: Polished) -> Result<Polished> {
     }
     Ok(found)
 }
-
-/// Farthest start of the study of starts over the estimate, or the estimate over it.
-const REACH: f64 = 3.0;
 
 /// Ends of searches over the whole recordings that start with the tank's diameter or fill height off its estimate, or with inertia or
 /// friction if there is no tank to fit. `cost`: sum of squares at the estimate x.
@@ -530,7 +526,7 @@ fn start_study(problem: &Problem, x: &[f64], cost: f64, count: usize) -> Vec<Tri
         ];
         places = there(&[hubslosh::hub::I, b, c, d, speed]);
     }
-    let starts = start_study::starts(count, REACH);
+    let starts = start_study::starts(count, STUDY_REACH);
     let one = |(place, factor): (usize, f64)| {
         let unknown = &problem.unknowns[place];
         let estimate = unknown.value(x[place]);
@@ -748,7 +744,7 @@ fn residuals(problem: &Problem, answer: &Answer) -> Vec<Residual> {
 /// Rows of the windows of the sandwich.
 fn windows(problem: &Problem) -> Vec<(usize, usize)> {
     let recordings = problem.channels.iter().map(|channel| &problem.recordings[channel.recording]);
-    covariance::windows(recordings.map(|r| (r.time.len(), r.step())), covariance::WINDOW)
+    covariance::windows(recordings.map(|r| (r.time.len(), r.step())), SANDWICH_WINDOW)
 }
 
 /// The covariance if the unknown at `place` were known exactly; its row and column are 0.

@@ -13,6 +13,9 @@ use host::fmu::{Fmu, Instance, Interface};
 
 use crate::input::question::{Question, Setting, Solver, real};
 use crate::input::record::Record;
+use crate::tuning::{
+    COMPARED_FACTOR, COMPARED_STEPS, COMPARED_TOLERANCE, FINEST_TOLERANCE, HELD_STEPS, SLOPE_PROBES,
+};
 
 /// An FMU for one solver.
 pub enum Model {
@@ -84,20 +87,6 @@ pub struct Finer {
     /// The FMU for another solver than before; `None`: the same.
     pub model: Option<Model>,
 }
-
-/// Steps of the host's solver from one row to the next where it is only compared with.
-const FEW_STEPS: usize = 1000;
-/// Tolerance of a solver that the FMU's own is compared with, where the FMU suggests none.
-const FINE: f64 = 1e-8;
-/// Factor by which that is finer than the one that the FMU suggests.
-const FINER: f64 = 1e-2;
-/// Parts of the way from row to row over which an input that follows a line is held, where the FMU takes no slopes. Held at
-/// the middle of each part, it differs from its line by a sawtooth of an eighth of its change from row to row, without a delay.
-const HELD_STEPS: usize = 4;
-/// Steps whose effects of an input's slope are compared, s.
-const PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
-/// The finest tolerance of the host's solver.
-const FINEST: f64 = 1e-13;
 
 /// An output, computed from variables of the FMU.
 #[derive(Clone, Debug)]
@@ -195,19 +184,27 @@ impl Setup {
     pub fn finer(&self, model: &Model) -> Vec<Finer> {
         let setup = |setup: Setup| Finer { setup, model: None };
         let Model::Own(fmu) = model else {
-            let tolerance = (FINER * self.tolerance.unwrap_or(FINE)).max(FINEST);
+            let tolerance = (COMPARED_FACTOR * self.tolerance.unwrap_or(COMPARED_TOLERANCE))
+                .max(FINEST_TOLERANCE);
             return vec![setup(Setup { tolerance: Some(tolerance), ..self.clone() })];
         };
         let suggested = fmu.description().default_experiment.tolerance.filter(|t| *t > 0.0);
-        let tolerance = self.tolerance.or(suggested).map_or(FINE, |tolerance| FINER * tolerance);
+        let tolerance = self
+            .tolerance
+            .or(suggested)
+            .map_or(COMPARED_TOLERANCE, |tolerance| COMPARED_FACTOR * tolerance);
         let mut all = vec![
             setup(Setup { tolerance: Some(tolerance), ..self.clone() }),
             setup(Setup { substeps: 2 * self.substeps, ..self.clone() }),
         ];
         if self.can_exchange(model)
-            && let Ok(model) = Model::open(fmu.path(), Solver::Host(FINE))
+            && let Ok(model) = Model::open(fmu.path(), Solver::Host(COMPARED_TOLERANCE))
         {
-            let setup = Setup { tolerance: Some(FINE), most_steps: FEW_STEPS, ..self.clone() };
+            let setup = Setup {
+                tolerance: Some(COMPARED_TOLERANCE),
+                most_steps: COMPARED_STEPS,
+                ..self.clone()
+            };
             all.push(Finer { setup, model: Some(model) });
         }
         all
@@ -266,7 +263,7 @@ impl Setup {
             let pairs = after(step, 1.0)?.into_iter().zip(after(step, 0.0)?);
             Ok(pairs.map(|(with, without)| (with - without).abs()).collect())
         };
-        let [longest, middle, shortest] = PROBES.map(change);
+        let [longest, middle, shortest] = SLOPE_PROBES.map(change);
         let (longest, middle, shortest) = (longest?, middle?, shortest?);
         let remains = |k: usize| longest[k] > 0.0 && middle[k].min(shortest[k]) > 0.5 * longest[k];
         Ok((0..outputs.len()).any(remains))
@@ -334,7 +331,7 @@ impl Setup {
         if !hosts {
             return Ok(Initialised::Own(instance));
         }
-        let tolerance = self.tolerance.unwrap_or(FINE);
+        let tolerance = self.tolerance.unwrap_or(COMPARED_TOLERANCE);
         let run = exchange::Run::new(Box::new(instance), tolerance, start, self.most_steps)?;
         Ok(Initialised::Host(run))
     }

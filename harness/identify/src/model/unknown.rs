@@ -7,6 +7,7 @@ use host::description::{ModelDescription, Value, Variable};
 use crate::input::question::{Bias, EACH, Free, Question, Size, Tolerance, Triad, real, scaled};
 use crate::input::record::Record;
 use crate::model::bench::unknown::range;
+use crate::tuning::{KNOWN_REACH, SCALE_REACH};
 
 /// Kinds of unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,11 +85,6 @@ pub struct Unknown {
     /// True for a known value with a tolerance: its uncertainty counts, its estimate was not requested.
     pub is_known: bool,
 }
-
-/// Plausible distance of a scale's error from 0, where neither bounds nor a prior say it.
-const SCALE_REACH: f64 = 0.1;
-/// Plausible distance of a known value from its mean, standard deviations: differences have to show more than the solver's errors.
-const KNOWN_REACH: f64 = 5.0;
 
 impl Question {
     /// The unknowns, in the result's order.

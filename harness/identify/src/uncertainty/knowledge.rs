@@ -8,10 +8,8 @@ use serde::Serialize;
 
 use crate::fit::decomposition::Curvature;
 use crate::fit::problem::Problem;
-use crate::uncertainty::solver_error::{DECIDES, SolverError};
-
-/// Part of a unit direction from which on an unknown belongs to it.
-const PART: f64 = 1e-2;
+use crate::tuning::{DIRECTION_PART, SOLVER_DECIDES};
+use crate::uncertainty::solver_error::SolverError;
 
 /// Unknowns that change together without a change of any output.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -42,7 +40,7 @@ pub(crate) struct Knowledge {
     pub covariance: DMatrix<f64>,
     /// Directions that no output shows.
     pub inseparable: Vec<Inseparable>,
-    /// Unknowns whose derivatives are lost in the solver's errors, or which these move by more than [`DECIDES`] of the standard
+    /// Unknowns whose derivatives are lost in the solver's errors, or which these move by more than [`SOLVER_DECIDES`] of the standard
     /// deviation.
     pub decided_by_solver: Vec<bool>,
 }
@@ -71,7 +69,8 @@ pub(crate) fn knowledge(
     let mut decided_by_solver = vec![false; n];
     if of_both.len() > of_model.len() {
         for direction in &of_both {
-            let of = which.iter().zip(direction.iter()).filter(|(_, part)| part.abs() > PART);
+            let of =
+                which.iter().zip(direction.iter()).filter(|(_, part)| part.abs() > DIRECTION_PART);
             of.for_each(|(&j, _)| decided_by_solver[j] = true);
         }
     }
@@ -79,7 +78,7 @@ pub(crate) fn knowledge(
         let own = curvature.unscaled(direction);
         let sign = direction[direction.iamax()].signum();
         let of = which.iter().zip(direction.iter().zip(own.iter()));
-        let of = of.filter(|(_, (part, _))| part.abs() > PART);
+        let of = of.filter(|(_, (part, _))| part.abs() > DIRECTION_PART);
         for (&j, _) in of.clone() {
             covariance[(j, j)] = f64::INFINITY;
         }
@@ -89,7 +88,7 @@ pub(crate) fn knowledge(
     let inseparable = inseparable.collect();
     for &j in which {
         let std = covariance[(j, j)].sqrt();
-        decided_by_solver[j] |= std.is_finite() && solver.shift[j] > DECIDES * std;
+        decided_by_solver[j] |= std.is_finite() && solver.shift[j] > SOLVER_DECIDES * std;
     }
     Ok(Knowledge { covariance, inseparable, decided_by_solver })
 }

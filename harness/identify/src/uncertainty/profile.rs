@@ -12,17 +12,10 @@ use rayon::prelude::*;
 use crate::fit::decomposition::Curvature;
 use crate::fit::problem::{Answer, Problem};
 use crate::fit::search::Minimum;
+use crate::tuning::{END_POINTS, FARTHEST, INNER_STEPS, PARABOLIC};
 
 /// Two-sided 95 % of the normal distribution.
 pub const Z: f64 = 1.96;
-/// Part by which √Δ may differ from that of a parabola.
-const PARABOLIC: f64 = 0.1;
-/// Largest distance to search for an end, in standard deviations.
-const FARTHEST: f64 = 20.0;
-/// Steps of the others to their minimum at one point.
-const INNER_STEPS: usize = 3;
-/// Points at which an end is searched for.
-const POINTS: usize = 10;
 
 /// An interval and how it was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -158,7 +151,7 @@ impl<'a> Profile<'a> {
         let (mut inside, mut outside) = ((0.0, 0.0), None);
         let mut by = first;
         let mut value = root;
-        for _ in 0..POINTS {
+        for _ in 0..END_POINTS {
             if value < Z {
                 inside = (by, value);
                 if by >= room || by >= FARTHEST * std {

@@ -18,11 +18,7 @@ use rayon::prelude::*;
 
 use crate::fit::decomposition::Curvature;
 use crate::fit::problem::{Motion, Problem, Step};
-
-/// Part of its standard deviation from which on the solver's errors decide an estimate.
-pub const DECIDES: f64 = 0.3;
-/// Part of it below which they are not added: they would make it 0.1 % larger.
-pub const ADDED: f64 = 0.05;
+use crate::tuning::OUTPUT_ROUNDING;
 
 /// Effect of the solver's errors.
 #[derive(Clone, Debug)]
@@ -37,8 +33,6 @@ pub struct SolverError {
     pub is_seen: bool,
 }
 
-/// Change of an output, in parts of its peak, that rounding may make.
-const ROUNDING: f64 = 1e-12;
 /// Weights of the fourth difference, whose squares add up to 70, and of the third of the same points.
 const FOURTH: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const THIRD: [f64; 5] = [-1.0, 2.0, 0.0, -2.0, 1.0];
@@ -123,7 +117,7 @@ pub fn measure(
         outputs.into_iter().any(|(new, old)| {
             let change =
                 new.iter().zip(old).map(|(new, old)| (new - old).abs()).fold(0.0, f64::max);
-            change > ROUNDING * peak(old)
+            change > OUTPUT_ROUNDING * peak(old)
         })
     };
     let changes = motions.iter().flatten();

@@ -11,18 +11,13 @@ use report::svg::{Chart, Style};
 use crate::estimate::{Estimated, prose};
 use crate::fit::bench::start;
 use crate::input::recording::Recording;
+use crate::tuning::{PAGE_LAGS, PAGE_POINTS, PAGE_STRETCH};
 use crate::uncertainty::bench::sources::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::DOUBTS;
 
-/// Points of a curve: more than a screen has pixels are not seen.
-const POINTS: usize = 700;
-/// Length of the stretch that is drawn row by row, s.
-const STRETCH: f64 = 8.0;
 /// Label of a rate.
 pub const RATE: &str = "rad/s";
-/// Longest lag of the autocorrelation, rows.
-const LAGS: usize = 200;
 
 /// Sections that a method adds to the page.
 #[derive(Default)]
@@ -122,9 +117,9 @@ fn parameters<D>(found: &Identified<D>, combinations: &[Combination]) -> Markup 
     html! { h2 { "Parameters" } (table(head, rows)) }
 }
 
-/// Largest value in each of [`POINTS`] windows, measured and modelled, and the residual's root mean square.
+/// Largest value in each of [`PAGE_POINTS`] windows, measured and modelled, and the residual's root mean square.
 fn envelope(signals: &Residual) -> Chart {
-    let width = (signals.time.len() / POINTS).max(1);
+    let width = (signals.time.len() / PAGE_POINTS).max(1);
     let windows = |of: &dyn Fn(usize) -> f64, mean: bool| -> Vec<(f64, f64)> {
         (0..signals.time.len() / width)
             .map(|k| {
@@ -153,7 +148,7 @@ fn stretch(signals: &Residual) -> Chart {
         .unwrap_or(0);
     let middle = signals.time[fastest];
     let rows: Vec<usize> = (0..signals.time.len())
-        .filter(|&i| (signals.time[i] - middle).abs() < STRETCH / 2.0)
+        .filter(|&i| (signals.time[i] - middle).abs() < PAGE_STRETCH / 2.0)
         .collect();
     let of =
         |value: &dyn Fn(usize) -> f64| rows.iter().map(|&i| (signals.time[i], value(i))).collect();
@@ -172,7 +167,7 @@ fn spectrum(signals: &Residual) -> Chart {
     // the spectra's unit is arbitrary: Parseval's theorem fixes it
     let density = |bins: &[f64], total: f64| -> Vec<(f64, f64)> {
         let sum = bins.iter().sum::<f64>() * spectra.resolution;
-        let each = bins.iter().enumerate().skip(1).step_by((bins.len() / POINTS).max(1));
+        let each = bins.iter().enumerate().skip(1).step_by((bins.len() / PAGE_POINTS).max(1));
         each.map(|(k, p)| (k as f64 * spectra.resolution, (p * total / sum).sqrt().max(1e-12)))
             .collect()
     };
@@ -195,7 +190,7 @@ fn spectrum(signals: &Residual) -> Chart {
 
 /// The residual over time, every so many rows.
 fn residual(signals: &Residual) -> Chart {
-    let every = signals.time.len().div_ceil(2 * POINTS);
+    let every = signals.time.len().div_ceil(2 * PAGE_POINTS);
     let rows = (0..signals.time.len()).step_by(every);
     let points = rows.map(|k| (signals.time[k], signals.residual[k])).collect();
     let title = match every {
@@ -210,7 +205,7 @@ fn residual(signals: &Residual) -> Chart {
 fn autocorrelation(signals: &Residual) -> Chart {
     let count = signals.residual.len();
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
-    let values = rest::autocorrelation(&about_mean(&signals.residual), LAGS);
+    let values = rest::autocorrelation(&about_mean(&signals.residual), PAGE_LAGS);
     let last = (values.len() - 1) as f64 * step;
     let bound = 1.96 / (count as f64).sqrt();
     let values = values.iter().enumerate().skip(1).map(|(k, r)| (k as f64 * step, *r)).collect();

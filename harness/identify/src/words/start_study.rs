@@ -6,14 +6,8 @@ use report::page::{COLORS, drawn, series, table};
 use report::svg::{Axis, Chart, Style};
 use serde::Serialize;
 
+use crate::tuning::{CHART_BELOW, SAME_MINIMUM};
 use crate::words::verdict::NO_MINIMUM;
-
-/// Difference of two sums of squares, in variances of the noise, up to which two ends are one minimum. The 95 % interval of an unknown
-/// ends at 3.84.
-const SAME: f64 = 0.5;
-
-/// Ratio of the heights at which a chart draws the searches of one unknown and of the next that ended at the minimum.
-const BELOW: f64 = 0.6;
 
 /// End of a search from another start.
 #[derive(Clone, Debug, Serialize)]
@@ -31,7 +25,7 @@ pub struct Trial {
 impl Trial {
     /// Returns true if the search ended at the minimum of the estimate.
     pub fn is_same(&self) -> bool {
-        self.more.is_some_and(|more| more.abs() < SAME)
+        self.more.is_some_and(|more| more.abs() < SAME_MINIMUM)
     }
 }
 
@@ -88,14 +82,15 @@ fn names(trials: &[Trial]) -> Vec<&str> {
 
 /// Sum of squares at the end of each search, against its start.
 pub fn chart(trials: &[Trial]) -> Chart {
-    let mut level = SAME;
+    let mut level = SAME_MINIMUM;
     let lines: Vec<_> = names(trials)
         .iter()
         .zip(COLORS.iter().cycle())
         .map(|(name, color)| {
-            level *= BELOW;
-            let height =
-                |trial: &Trial, more: f64| if trial.is_same() { level } else { more.max(SAME) };
+            level *= CHART_BELOW;
+            let height = |trial: &Trial, more: f64| {
+                if trial.is_same() { level } else { more.max(SAME_MINIMUM) }
+            };
             let point = |trial: &Trial| Some((trial.start, height(trial, trial.more?)));
             series(of(trials, name).filter_map(point).collect(), color, Style::Dots, name)
         })
@@ -103,7 +98,7 @@ pub fn chart(trials: &[Trial]) -> Chart {
     let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
     Chart {
         title: format!(
-            "Sum of squares at the end above the minimum, by the unknown that starts elsewhere (below {SAME}: the minimum itself)"
+            "Sum of squares at the end above the minimum, by the unknown that starts elsewhere (below {SAME_MINIMUM}: the minimum itself)"
         ),
         size: (900.0, 260.0),
         x: Axis::decades("start over the estimate", trials.iter().map(|trial| trial.start)),

@@ -4,16 +4,14 @@ use std::collections::BTreeMap;
 
 use crate::estimate::{Estimated, prose};
 use crate::fit::bench::candidate::ModelFit;
-use crate::fit::evidence::{DECIDES, probabilities};
+use crate::fit::evidence::probabilities;
+use crate::tuning::{BIC_DECIDES, TOLD_DECREMENT};
 use crate::uncertainty::bench::budget::Effect;
 use crate::uncertainty::bench::cause::Cause;
 use crate::uncertainty::bench::missing::Missing;
 use crate::uncertainty::bench::sources::Combination;
 use analysis::innovations::{self, Tests};
 use names::hubslosh::{SloshModel, hub};
-
-/// Newton decrement above which the verdict reports it.
-const TOLD: f64 = 0.1;
 
 /// Beginning of the sentence about an invalidated model.
 pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
@@ -94,7 +92,7 @@ pub fn words(
             fit.newton_decrement
         ));
     }
-    if fit.converged && fit.newton_decrement > TOLD {
+    if fit.converged && fit.newton_decrement > TOLD_DECREMENT {
         lines.push(format!(
             "The search ended {:.2} standard deviations from the minimum; the stated standard deviations include this.",
             fit.newton_decrement
@@ -160,14 +158,14 @@ fn friction(laws: &[ModelFit]) -> Vec<String> {
     let one = |other: &ModelFit| {
         let gain = first.bic - other.bic;
         match gain {
-            g if g > DECIDES => {
+            g if g > BIC_DECIDES => {
                 format!(
                     "The friction is {}: its BIC is {g:.0} below that of {}.",
                     other.friction, first.friction
                 )
             }
             // what the other has more counts ln N a parameter; without that they are alike
-            _ if first.deviance - other.deviance > -DECIDES => format!(
+            _ if first.deviance - other.deviance > -BIC_DECIDES => format!(
                 "Cannot tell the friction's law: {} explains the data as well as {}, which has fewer unknowns and is used.",
                 other.friction, first.friction
             ),

@@ -7,21 +7,16 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::fit::bench::problem::{Channel, MINIMUM, Polished, Problem, ROUNDS, Until, is_other};
+use crate::fit::bench::problem::{Channel, Polished, Problem, Until, is_other};
 use crate::fit::covariance::Covariance;
-use crate::fit::evidence::{ALIKE, DECIDES, probabilities};
+use crate::fit::evidence::probabilities;
 use crate::input::recording::Recording;
 use crate::model::bench::simulate::Intersample;
 use crate::model::bench::unknown::Quantity;
-
-/// Standard deviations below zero at which a delay counts as acausal.
-const ACAUSAL: f64 = 3.0;
-
-/// Difference of two channels' time stamps that is negligible, in rows.
-const SYNCHRONOUS: f64 = 0.02;
-
-/// Difference from half a row up to which a delay counts as half a row, in rows.
-const NEAR_HALF: f64 = 0.1;
+use crate::tuning::{
+    ACAUSAL, BIC_ALIKE, BIC_DECIDES, FORESEEN, HALF_ROW, LOST_RIVAL, MINIMUM, NO_RIVAL, ROUNDS,
+    SYNCHRONOUS,
+};
 
 /// Another behaviour than the one that was fitted.
 #[derive(Clone)]
@@ -106,15 +101,6 @@ pub fn matters(recordings: &[Recording]) -> bool {
     recordings.iter().any(varies)
 }
 
-/// Difference from the first behaviour's sum of squares above which another behaviour is out, wherever its minimum is.
-const NO_RIVAL: f64 = 1.5;
-
-/// The same beyond which another one is given up, if a step has been taken.
-const LOST: f64 = 10.0;
-
-/// Newton decrement below which the sum of squares of the minimum is foreseen well enough to say that it does not count.
-const FORESEEN: f64 = 1.0;
-
 /// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row.
 /// The sensitivities are nearly the same, so each behaviour costs a few simulations. If they lead near its minimum but not to it,
 /// the behaviour gets sensitivities of its own: a wrong behaviour may have moved a poorly determined unknown far along its
@@ -130,8 +116,8 @@ pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Other
         decrement: MINIMUM,
         rounds: 2,
         trust: FORESEEN,
-        far: LOST * minimum.cost,
-        ..Until::at_most(minimum.cost + DECIDES)
+        far: LOST_RIVAL * minimum.cost,
+        ..Until::at_most(minimum.cost + BIC_DECIDES)
     };
     let one = |behaviour: Intersample| {
         let mut problem = problem.clone();
@@ -175,7 +161,7 @@ pub fn better(cost: f64, step: f64, acausal: bool, others: &[Alternative]) -> Op
         .iter()
         .filter(|other| acausal || !other.is_acausal(step))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
-        .filter(|best| best.cost < cost - ALIKE)
+        .filter(|best| best.cost < cost - BIC_ALIKE)
 }
 
 /// Returns the covariance that the unknown intersample behaviour adds to the unknowns x: Σ p_k δ_k δ_kᵀ. p_k is the probability
@@ -206,9 +192,9 @@ fn near(
     acausal: bool,
     others: &[Alternative],
 ) -> impl Iterator<Item = &Alternative> {
-    others
-        .iter()
-        .filter(move |other| (acausal || !other.is_acausal(step)) && other.cost < cost + DECIDES)
+    others.iter().filter(move |other| {
+        (acausal || !other.is_acausal(step)) && other.cost < cost + BIC_DECIDES
+    })
 }
 
 /// Returns the evidence in words: the sums of squares of the fitted behaviour and of the others. Rows come every `step` seconds.
@@ -226,7 +212,7 @@ pub fn evidence(
         delay.map_or(String::new(), |(delay, _)| format!(" with a delay of {:.2} ms", 1e3 * delay))
     };
     let alike: Vec<&Alternative> = near(cost, step, acausal, others).collect();
-    let is_near = found.cost < cost + DECIDES;
+    let is_near = found.cost < cost + BIC_DECIDES;
     let cost = found.cost;
     if is_near && !alike.is_empty() {
         let costs = std::iter::once(cost).chain(alike.iter().map(|other| other.cost));
@@ -288,8 +274,8 @@ pub fn is_found(
 /// words. It is a finding only where the behaviour was not found ([`is_found`]).
 pub fn half_a_row(delay: (f64, f64), step: f64) -> Option<String> {
     let rows = delay.0.abs() / step;
-    let known = delay.1 < NEAR_HALF * step;
-    (known && (rows - 0.5).abs() < NEAR_HALF).then(|| {
+    let known = delay.1 < HALF_ROW * step;
+    (known && (rows - 0.5).abs() < HALF_ROW).then(|| {
         format!(
             "The delay, {:.2} ms, is half a row ({:.2} ms): the torque may be held from row to row where it is taken as linear, or \
              the other way round. Say which it is (--torque), or how late the rate is.",

@@ -15,7 +15,7 @@
 //! 95 % interval of another:  the union of v ± sqrt((1.96² + C_min − C) V)
 //! ```
 //!
-//! (Pawitan, In All Likelihood, 3.4). Another valley counts too unless its sum of squares is clearly larger ([`DECIDES`], as
+//! (Pawitan, In All Likelihood, 3.4). Another valley counts too unless its sum of squares is clearly larger ([`BIC_DECIDES`], as
 //! between models). Noise decides which of several valleys is the lowest, and the difference of two minima does not follow the χ²
 //! distribution of a single one (Davies, Biometrika 74, 1987). Its interval is that about its own least, and all are joined. What
 //! holds an unknown only vaguely beforehand does not count in C. An end that the speeds of the recording do not reach is open:
@@ -29,36 +29,14 @@ use rayon::prelude::*;
 use crate::fit::bench::goodness::tests;
 use crate::fit::bench::problem::{self, Differences, Known, Polished, Problem, Until};
 use crate::fit::covariance::spread_out;
-use crate::fit::evidence::DECIDES;
+
 use crate::input::recording::Recording;
 use crate::model::bench::stribeck::Indices;
-
-/// ω_s over the fastest speed of the recording.
-const GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
-
-/// Relative standard deviation of d or ω_s beyond which a minimum may be one of several.
-const VAGUE: f64 = 0.05;
-/// The same beyond which intervals are no longer those of a quadratic.
-const BENT: f64 = 0.05;
-/// Sum of squares above the least at the ends of the 95 % interval of one unknown: 1.96².
-const LIMIT: f64 = 3.8415;
-/// The same that still counts for the covariance: three standard deviations.
-const COUNTED: f64 = 9.0;
-/// The same beyond which no other noise makes a minimum of it.
-const EXCLUDED: f64 = 30.0;
-/// Largest growth of the sum of squares from one grid speed to the next that does not count as a wall.
-const FLAT: f64 = 1.0;
-/// Longest extrapolation beyond the last point, over the way to that from the one before.
-const FURTHER: f64 = 0.5;
-/// Longest step along ln ω_s.
-const LONGEST: f64 = 0.7;
-/// Target of the next point: square root of its increase of the sum of squares, relative to that at the end of the interval.
-const AIM: f64 = 1.03;
-/// Points on either side of the minimum.
-const POINTS: usize = 7;
-/// Part by which what the last point adds to the sum of squares may differ from [`LIMIT`]. Its root is then an eighth off, and the end is
-/// where the line through it and the point before leads.
-const ENOUGH: f64 = 0.25;
+use crate::tuning::{
+    BENT_SHAPE, BIC_DECIDES, EXTRAPOLATED, LONGEST_SHAPE_STEP, NO_WALL, PROFILE_AIM,
+    PROFILE_BETWEEN, PROFILE_COUNTED, PROFILE_DECREMENT, PROFILE_END, PROFILE_EXCLUDED,
+    PROFILE_NEAR, PROFILE_POINTS, PROFILE_ROUNDS, RARE_CHI_SQUARE, STRIBECK_GRID, VAGUE_SHAPE,
+};
 
 /// Standard deviation of the unknown at an index over its value.
 fn relative(problem: &Problem, found: &Polished, index: usize) -> f64 {
@@ -70,7 +48,7 @@ fn relative(problem: &Problem, found: &Polished, index: usize) -> f64 {
 /// Returns true if there may be other minima: the search did not converge, or the recording hardly shows the Stribeck excess.
 pub fn is_vague(problem: &Problem, found: &Polished, indices: Indices) -> bool {
     let relative = |index| relative(problem, found, index);
-    !found.converged() || relative(indices.d) > VAGUE || relative(indices.speed) > VAGUE
+    !found.converged() || relative(indices.d) > VAGUE_SHAPE || relative(indices.speed) > VAGUE_SHAPE
 }
 
 /// The best fit at one Stribeck speed.
@@ -100,7 +78,7 @@ impl Point {
 
     /// Returns the distance to the end of the interval, relative to that of another point, by a straight line through both roots.
     fn to_end(&self, other: &Point, least: f64) -> f64 {
-        (LIMIT.sqrt() - self.root(least)) / (other.root(least) - self.root(least))
+        (PROFILE_END.sqrt() - self.root(least)) / (other.root(least) - self.root(least))
     }
 }
 
@@ -130,7 +108,7 @@ pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Vec<Tried> 
         let found = point(problem, &x, &from.jacobian, indices, from.cost)?;
         Some(Tried { speed: found.speed, more: found.cost - from.cost, x: Some(found.x) })
     };
-    GRID.par_iter().filter_map(one).collect()
+    STRIBECK_GRID.par_iter().filter_map(one).collect()
 }
 
 /// The loudest part of long recordings. With C_p the sum of squares over it, C_r over the rest, and x the minimum over all,
@@ -149,9 +127,6 @@ struct Loudest<'a> {
     jacobian: DMatrix<f64>,
 }
 
-/// Largest plausible χ², relative to its degrees of freedom: with 8 degrees, 32 has a probability of 1e-4.
-const RARE: f64 = 4.0;
-
 impl<'a> Loudest<'a> {
     /// Prepares the loudest part at the minimum `from`; `None` if the FMU refuses to run.
     fn of(problem: &Problem<'a>, part: &'a [Recording], from: &Polished) -> Option<Self> {
@@ -165,17 +140,15 @@ impl<'a> Loudest<'a> {
         Some(Loudest { problem, cost, jacobian })
     }
 
-    /// Returns the ω_s of x if the part alone rejects it by more than [`EXCLUDED`].
+    /// Returns the ω_s of x if the part alone rejects it by more than [`PROFILE_EXCLUDED`].
     fn refutes(&self, x: &[f64], indices: Indices) -> Option<Tried> {
-        let rest = RARE * x.len() as f64;
-        let found = point(&self.problem, x, &self.jacobian, indices, self.cost + rest + EXCLUDED)?;
+        let rest = RARE_CHI_SQUARE * x.len() as f64;
+        let found =
+            point(&self.problem, x, &self.jacobian, indices, self.cost + rest + PROFILE_EXCLUDED)?;
         let more = found.least - self.cost - rest;
-        (more > EXCLUDED).then_some(Tried { speed: found.speed, more, x: None })
+        (more > PROFILE_EXCLUDED).then_some(Tried { speed: found.speed, more, x: None })
     }
 }
-
-/// Sets of sensitivities at one speed, the first of them mostly that of another one.
-const STEPS: usize = 3;
 
 /// x near `near` at ω_s = `speed`: b, c and d whose curve is nearest to that of `near` over the recording's speeds.
 fn on_its_curve(
@@ -230,7 +203,8 @@ fn point(
     let problem = &Problem { differences: Differences::Forward, ..problem.clone() };
     let answer = problem.answer(x).ok()?;
     let jacobian = problem.refreshed(x, &bearing, &answer.motion, known).ok()?;
-    let until = Until { decrement: CLOSE, rounds: STEPS, ..Until::at_most(most) };
+    let until =
+        Until { decrement: PROFILE_DECREMENT, rounds: PROFILE_ROUNDS, ..Until::at_most(most) };
     let known = Known::Sensitivities(&jacobian);
     let found = problem.polish_some((x, answer), &others, known, until).ok()?;
     let least = Until::foreseen(found.cost, found.decrement);
@@ -247,9 +221,6 @@ fn point(
         x: found.x,
     })
 }
-
-/// Newton decrement below which a point is near enough to the minimum at its speed: 1 % of [`LIMIT`].
-const CLOSE: f64 = 0.2;
 
 /// b, c, d ≥ 0 for which b w + c + d exp(−(w/speed)²) is nearest to a curve at `speeds`, least squares.
 fn nearest(curve: &dyn Fn(f64) -> f64, speed: f64, speeds: &[f64]) -> [f64; 3] {
@@ -301,7 +272,7 @@ pub fn profile(
 ) -> Result<Option<Profile>> {
     let Some(indices) = Indices::of(&problem.unknowns) else { return Ok(None) };
     let deviation = relative(problem, minimum, indices.speed);
-    if deviation < BENT && relative(problem, minimum, indices.d) < BENT {
+    if deviation < BENT_SHAPE && relative(problem, minimum, indices.d) < BENT_SHAPE {
         return Ok(None);
     }
     let others: Vec<usize> = (0..minimum.x.len()).filter(|j| *j != indices.speed).collect();
@@ -316,20 +287,21 @@ pub fn profile(
         jacobian: minimum.jacobian.clone(),
     };
     let fastest = problem::fastest(&minimum.answer.motion);
-    let most = minimum.cost + DECIDES;
-    let ends = [GRID[0] * fastest, GRID[GRID.len() - 1] * fastest];
+    let most = minimum.cost + BIC_DECIDES;
+    let ends = [STRIBECK_GRID[0] * fastest, STRIBECK_GRID[STRIBECK_GRID.len() - 1] * fastest];
     let sides: Vec<(Vec<Point>, bool)> = [(-1.0, ends[0]), (1.0, ends[1])]
         .into_par_iter()
         .map(|(side, end)| {
             let (mut found, mut open) =
                 outwards(problem, minimum, indices, (&middle, middle.data), (side, end, deviation));
             // there may be another minimum beyond
-            let mut beyond: Vec<f64> = GRID.iter().map(|part| part * fastest).collect();
+            let mut beyond: Vec<f64> = STRIBECK_GRID.iter().map(|part| part * fastest).collect();
             beyond.sort_by(|a, b| (side * a).total_cmp(&(side * b)));
             for speed in beyond {
                 let furthest = found.iter().map(|p| side * p.speed.ln()).fold(f64::MIN, f64::max);
-                let is_known =
-                    |(s, more): &(f64, f64)| (s / speed).ln().abs() < 0.2 && *more > EXCLUDED;
+                let is_known = |(s, more): &(f64, f64)| {
+                    (s / speed).ln().abs() < 0.2 && *more > PROFILE_EXCLUDED
+                };
                 if open || side * speed.ln() <= furthest || known.iter().any(is_known) {
                     continue;
                 }
@@ -340,8 +312,8 @@ pub fn profile(
                 };
                 let above = (other.data - middle.data).max(0.0);
                 // what goes on rising is the wall of the same valley
-                let is_rival = above <= DECIDES && other.data < from.data + FLAT;
-                if above <= LIMIT || is_rival {
+                let is_rival = above <= BIC_DECIDES && other.data < from.data + NO_WALL;
+                if above <= PROFILE_END || is_rival {
                     let reference = (&other, other.data);
                     let (mut more, is_open) =
                         outwards(problem, minimum, indices, reference, (side, end, deviation));
@@ -373,7 +345,7 @@ pub fn profile(
     }))
 }
 
-/// Fits from the middle outwards until the sum of squares is about [`LIMIT`] above `least`, then between the points on both sides
+/// Fits from the middle outwards until the sum of squares is about [`PROFILE_END`] above `least`, then between the points on both sides
 /// of that value. Returns true if no such speed was found up to the last one, `end`.
 fn outwards(
     problem: &Problem,
@@ -383,10 +355,10 @@ fn outwards(
     (side, end, deviation): (f64, f64, f64),
 ) -> (Vec<Point>, bool) {
     let mut points: Vec<Point> = Vec::new();
-    let mut step = (AIM * LIMIT.sqrt() * deviation).clamp(0.02, LONGEST);
+    let mut step = (PROFILE_AIM * PROFILE_END.sqrt() * deviation).clamp(0.02, LONGEST_SHAPE_STEP);
     // the last within and the first beyond
     let (mut inside, mut outside) = (middle.clone(), None::<Point>);
-    while points.len() < POINTS {
+    while points.len() < PROFILE_POINTS {
         let (from, to) = (inside.speed.ln(), outside.as_ref().map(|p| p.speed.ln()));
         let at = match (&outside, to) {
             (Some(beyond), Some(to)) => {
@@ -405,7 +377,7 @@ fn outwards(
         from.sort_by(|a, b| way(a).total_cmp(&way(b)));
         let fit = |near: &&Point| {
             let x = foreseen(problem, &near.x, minimum, indices, speed);
-            point(problem, &x, &near.jacobian, indices, minimum.cost + COUNTED)
+            point(problem, &x, &near.jacobian, indices, minimum.cost + PROFILE_COUNTED)
         };
         // a sum of squares larger than beyond is that of a search gone astray, and the other neighbour may lead
         let is_astray = |p: &Point| outside.as_ref().is_some_and(|beyond| p.data > beyond.data);
@@ -422,8 +394,8 @@ fn outwards(
         };
         let above = found.data - least;
         points.push(found.clone());
-        if above > LIMIT {
-            let near_enough = above < LIMIT * (1.0 + ENOUGH);
+        if above > PROFILE_END {
+            let near_enough = above < PROFILE_END * (1.0 + PROFILE_NEAR);
             outside = Some(found);
             if near_enough {
                 break;
@@ -433,7 +405,7 @@ fn outwards(
             if last {
                 return (points, true);
             }
-            if above > LIMIT * (1.0 - ENOUGH) {
+            if above > PROFILE_END * (1.0 - PROFILE_NEAR) {
                 if outside.is_some() {
                     break;
                 }
@@ -447,8 +419,9 @@ fn outwards(
             // as if the root went on growing as it has from the point before
             let way = (inside.speed / before.speed).ln().abs();
             let growth = inside.root(least) - before.root(least);
-            let to_aim = way * (AIM * LIMIT.sqrt() - inside.root(least)) / growth;
-            step = if growth > 0.0 { to_aim.min(2.0 * step) } else { 2.0 * step }.min(LONGEST);
+            let to_aim = way * (PROFILE_AIM * PROFILE_END.sqrt() - inside.root(least)) / growth;
+            step = if growth > 0.0 { to_aim.min(2.0 * step) } else { 2.0 * step }
+                .min(LONGEST_SHAPE_STEP);
         }
     }
     (points, outside.is_none())
@@ -458,18 +431,18 @@ fn outwards(
 fn end_beyond(before: &Point, last: &Point, least: f64) -> Option<Point> {
     let part = before.to_end(last, least) - 1.0;
     let further = |before: f64, last: f64| last + part * (last - before);
-    (0.0..FURTHER).contains(&part).then(|| Point {
+    (0.0..EXTRAPOLATED).contains(&part).then(|| Point {
         speed: further(before.speed.ln(), last.speed.ln()).exp(),
         x: before.x.iter().zip(&last.x).map(|(a, b)| further(*a, *b)).collect(),
         // within, whatever the last digit
-        data: least + LIMIT * (1.0 - 1e-9),
+        data: least + PROFILE_END * (1.0 - 1e-9),
         ..last.clone()
     })
 }
 
 /// The 95 % interval of ω_s.
 fn speeds(points: &[Point], least: f64, open: [bool; 2]) -> [f64; 2] {
-    let is_in = |p: &Point| p.data - least <= LIMIT;
+    let is_in = |p: &Point| p.data - least <= PROFILE_END;
     // between one within and its neighbour beyond
     let between = |inside: &Point, beyond: &Point| {
         let part = inside.to_end(beyond, least).clamp(0.0, 1.0);
@@ -504,9 +477,6 @@ struct Place {
     covariance: DMatrix<f64>,
 }
 
-/// Places between two points.
-const BETWEEN: usize = 8;
-
 /// Interpolates the profile linearly: x, its covariance, and the signed root of the sum of squares above the least, which is a
 /// straight line for a quadratic. Without them, an unknown that goes with ω_s would have an interval too narrow by up to 1/√2,
 /// for the widest is between the middle and the end.
@@ -527,16 +497,17 @@ fn places(points: &[Point], least: f64) -> Vec<Place> {
             covariance: a.covariance.zip_map(&b.covariance, mix),
         }
     };
-    let gaps = (0..points.len() - 1)
-        .flat_map(|k| (0..BETWEEN).map(move |part| (k, part as f64 / BETWEEN as f64)));
+    let gaps = (0..points.len() - 1).flat_map(|k| {
+        (0..PROFILE_BETWEEN).map(move |part| (k, part as f64 / PROFILE_BETWEEN as f64))
+    });
     gaps.chain([(points.len() - 1, 0.0)]).map(|(k, part)| place(k, part)).collect()
 }
 
 /// The union of the intervals at fixed speeds, of every unknown.
 fn intervals(problem: &Problem, places: &[Place], fastest: f64) -> Vec<[f64; 2]> {
     let mut all = vec![[f64::INFINITY, f64::NEG_INFINITY]; problem.unknowns.len()];
-    for place in places.iter().filter(|p| p.above <= LIMIT) {
-        let reach = (LIMIT - place.above).sqrt();
+    for place in places.iter().filter(|p| p.above <= PROFILE_END) {
+        let reach = (PROFILE_END - place.above).sqrt();
         for j in 0..problem.unknowns.len() {
             let end = |side: f64| {
                 problem.end(place.x.as_slice(), &place.covariance, (j, side * reach), fastest)
@@ -553,7 +524,7 @@ fn covariance(problem: &Problem, minimum: &Polished, places: &[Place]) -> DMatri
     let n = minimum.x.len();
     let middle = problem.values(&minimum.x);
     let (mut total, mut sum) = (0.0, DMatrix::zeros(n, n));
-    for (k, place) in places.iter().enumerate().filter(|(_, p)| p.above < COUNTED) {
+    for (k, place) in places.iter().enumerate().filter(|(_, p)| p.above < PROFILE_COUNTED) {
         // the part of ln ω_s that it stands for
         let (before, after) =
             (&places[k.saturating_sub(1)], &places[(k + 1).min(places.len() - 1)]);
@@ -589,7 +560,7 @@ mod tests {
         let middle = on_a_parabola(0.0);
         for side in [-1.0, 1.0] {
             let end = end_beyond(&middle, &on_a_parabola(1.75 * side), 100.0).unwrap();
-            // 1.96 standard deviations, of which LIMIT has five digits
+            // 1.96 standard deviations, of which PROFILE_END has five digits
             assert!((end.speed.ln() / (0.02 * 1.96 * side) - 1.0).abs() < 1e-4, "{end:?}");
             assert!((end.x[0] / (0.06 * 1.96 * side) - 1.0).abs() < 1e-4, "{end:?}");
             let ends = speeds(&[middle.clone(), end.clone()], 100.0, [false; 2]);

@@ -1,11 +1,9 @@
 //! Tests of how well the FMU's answer explains the recordings.
 
 use crate::fit::bench::problem::{Answer, Channel, Problem, Signal};
+use crate::tuning::POOR_FIT;
 use analysis::innovations::Tests;
 use analysis::statistics::mean;
-
-/// Fit of a rate below which a minimum is taken for a wrong one at first, %.
-const POOR: f64 = 90.0;
 
 /// Tests for each channel whether the residual of an answer is noise.
 pub fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
@@ -44,5 +42,5 @@ pub fn is_poor(problem: &Problem, answer: &Answer) -> bool {
     let noise = problem.recordings[0].rate_noise();
     let residual = problem.recordings[0].of_fresh(&answer.residual[0]);
     let rms = (residual.iter().map(|e| e * e).sum::<f64>() / residual.len() as f64).sqrt();
-    fit_pct(problem, answer) < POOR && rms > 2.0 * noise
+    fit_pct(problem, answer) < POOR_FIT && rms > 2.0 * noise
 }

@@ -19,7 +19,7 @@
 //! Convex Optimization, 9.5).
 //!
 //! Sensitivities to s, b and δ are exact: −ω, −1 and s ω'. Those to the FMU's parameters are
-//! differences. The step moves the whole answer by [`MOVE`] standard deviations of its noise:
+//! differences. The step moves the whole answer by [`BENCH_MOVE`] standard deviations of its noise:
 //! small against curvature and large against the integrator's tolerance
 //! (`sensitivities_are_those_of_smaller_and_larger_steps` in tests/twin.rs).
 //!
@@ -48,29 +48,12 @@ use crate::model::bench::stribeck;
 use crate::model::bench::tank;
 use crate::model::bench::unknown::{Quantity, Scale, Unknown};
 use crate::model::overridden::{near, refuse};
+use crate::tuning::{
+    BENCH_DECREMENT, BENCH_FIRST_STEP, BENCH_MOVE, BENCH_STEPS, LONGEST_STEP, LOUDEST, MINIMUM,
+    MOST_SETS, NOISE_FACTOR, ROUNDS, RUN_IN, SHARPEST_BEND, SHORTEST_GROWTH, TYPICAL_DRIFT,
+    WINDOW_JUMP, WINDOW_PRIOR,
+};
 use analysis::gauss_markov::{FLOOR, Noise, Whitening};
-
-/// Change of the answer by a difference, in units of the noise's norm of one degree of freedom.
-pub const MOVE: f64 = 0.3;
-/// Drift of a MEMS gyro (the thesis's LSM6DS3), until the recording's own is known. Without it the slow
-/// decay at a recording's start, where the drift is all the noise, would draw the friction after it.
-const TYPICAL: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
-/// Bounds of the differences' steps, in units of the variable x.
-const STEPS: (f64, f64) = (1e-6, 2e-2);
-/// Step of the first differences, in the same units.
-const FIRST_STEP: f64 = 1e-5;
-/// Most sets of derivatives of a search from afar.
-const MOST: usize = 20;
-/// Longest step of a difference along a direction, in units of x.
-const LONGEST_STEP: f64 = 0.05;
-/// Steps end where the Newton decrement is below this: a hundredth of a standard deviation.
-const DECREMENT: f64 = 0.01;
-/// Newton decrement of a minimum: the sum of squares is known to a hundredth, and no sensitivities are found anew for less.
-pub const MINIMUM: f64 = 0.1;
-/// Sets of sensitivities that Gauss and Newton's steps have at most.
-pub const ROUNDS: usize = 6;
-/// A change of one variable there by more than this of one here is not a valley's bend.
-const SHARPEST: f64 = 1e3;
 
 /// A measured signal of the hub.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,12 +178,12 @@ pub struct Until {
 impl Until {
     /// Returns the condition to end at the minimum, whatever its sum of squares.
     fn minimum(rounds: usize) -> Self {
-        Until { decrement: DECREMENT, rounds, ..Until::at_most(f64::INFINITY) }
+        Until { decrement: BENCH_DECREMENT, rounds, ..Until::at_most(f64::INFINITY) }
     }
 
     /// Returns the condition to end at the minimum, or if the minimum's sum of squares is above `cost`.
     pub fn at_most(cost: f64) -> Self {
-        let (decrement, rounds) = (DECREMENT, ROUNDS);
+        let (decrement, rounds) = (BENCH_DECREMENT, ROUNDS);
         Until { decrement, rounds, cost, trust: f64::INFINITY, far: f64::INFINITY }
     }
 
@@ -225,7 +208,7 @@ pub enum Differences {
 }
 
 impl<'a> Problem<'a> {
-    /// Fits unknowns with noise of the level that the recordings show and [`TYPICAL`] drift.
+    /// Fits unknowns with noise of the level that the recordings show and [`TYPICAL_DRIFT`] drift.
     pub fn new(
         fmu: &'a Fmu,
         setup: Setup,
@@ -234,7 +217,7 @@ impl<'a> Problem<'a> {
     ) -> Self {
         let mut channels = Vec::new();
         for (index, recording) in recordings.iter().enumerate() {
-            let noise = Noise { white: recording.rate_noise().max(FLOOR), ..TYPICAL };
+            let noise = Noise { white: recording.rate_noise().max(FLOOR), ..TYPICAL_DRIFT };
             channels.push(Channel { recording: index, signal: Signal::Rate, noise });
             if let Some(angle) = &recording.angle {
                 // the angle integrates the residual of the rate: much drift
@@ -603,10 +586,15 @@ impl<'a> Problem<'a> {
         self.unknowns.iter().any(|unknown| unknown.quantity == Quantity::AngleDelay)
     }
 
-    /// Steps of the differences that move the answer by [`MOVE`] at these sensitivities.
+    /// Steps of the differences that move the answer by [`BENCH_MOVE`] at these sensitivities.
     pub fn steps(jacobian: &DMatrix<f64>) -> Vec<f64> {
-        let step =
-            |norm: f64| if norm > 0.0 { (MOVE / norm).clamp(STEPS.0, STEPS.1) } else { STEPS.1 };
+        let step = |norm: f64| {
+            if norm > 0.0 {
+                (BENCH_MOVE / norm).clamp(BENCH_STEPS.0, BENCH_STEPS.1)
+            } else {
+                BENCH_STEPS.1
+            }
+        };
         jacobian.column_iter().map(|column| step(column.norm())).collect()
     }
 
@@ -620,7 +608,7 @@ impl<'a> Problem<'a> {
         known: Option<&DMatrix<f64>>,
     ) -> Result<DMatrix<f64>> {
         let Some(known) = known else {
-            let axes = vec![FIRST_STEP; x.len()];
+            let axes = vec![BENCH_FIRST_STEP; x.len()];
             let rough = self.jacobian(x, free, base, &axes)?;
             let known = at_places(&rough, free, x.len());
             return self.sensitivities(x, free, base, Some(&known));
@@ -648,7 +636,7 @@ impl<'a> Problem<'a> {
         let fastest = fastest(base);
         let column = |k: usize| {
             let direction = directions.column(k);
-            let step = MOVE.min(LONGEST_STEP / direction.amax());
+            let step = BENCH_MOVE.min(LONGEST_STEP / direction.amax());
             let moved = |by: f64| {
                 let mut part = vec![0.0; x.len()];
                 mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
@@ -692,7 +680,8 @@ impl<'a> Problem<'a> {
     /// `turn` cannot be inverted: a bound has cut the step short (there is no such tank).
     pub fn carry(&self, jacobian: &mut DMatrix<f64>, turn: &DMatrix<f64>) -> bool {
         let known = self.unknowns.iter().filter(|unknown| unknown.prior.is_some()).count();
-        let Some(back) = turn.clone().try_inverse().filter(|back| back.amax() < SHARPEST) else {
+        let Some(back) = turn.clone().try_inverse().filter(|back| back.amax() < SHARPEST_BEND)
+        else {
             return false;
         };
         let mut rows = jacobian.rows_mut(0, jacobian.nrows() - known);
@@ -750,7 +739,7 @@ impl<'a> Problem<'a> {
         unknown.scale.slope(unknown.scale.variable(mean)) / deviation
     }
 
-    /// Gauss and Newton's steps from near a minimum, until the Newton decrement is below [`DECREMENT`], with
+    /// Gauss and Newton's steps from near a minimum, until the Newton decrement is below [`BENCH_DECREMENT`], with
     /// at most `rounds` sets of sensitivities. A step v that increases the cost has left a curved valley. The curvature's part is
     /// e(x + v) − e(x) − J v, and −(JᵀJ)⁻¹Jᵀ times it leads back: a correction of second order that costs one simulation
     /// (geodesic acceleration; Transtrum & Sethna, arXiv:1207.4999). A step that is worse even so is shortened.
@@ -952,15 +941,21 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// If the FMU refuses the start, or a difference.
     pub fn search(&self, x: &[f64], part: f64) -> Result<Rough> {
-        let end = End { decrement: DECREMENT, part, most: MOST };
-        minimum::search(self, &self.inside(x), vec![FIRST_STEP; x.len()], end, &mut |_, _, _| {})
+        let end = End { decrement: BENCH_DECREMENT, part, most: MOST_SETS };
+        minimum::search(
+            self,
+            &self.inside(x),
+            vec![BENCH_FIRST_STEP; x.len()],
+            end,
+            &mut |_, _, _| {},
+        )
     }
 
     /// The same over windows of the recordings that grow, each from the estimate of the one before.
     ///
     /// A start whose slosh frequency is 20 % off is out of phase after a few cycles; over a whole
     /// recording its error has as many minima as there are cycles. Over the beginning it has one,
-    /// and as the window grows the estimate stays within its reach. If the residual's mean square rises by the factor [`JUMP`]
+    /// and as the window grows the estimate stays within its reach. If the residual's mean square rises by the factor [`WINDOW_JUMP`]
     /// from one window to the next (a resonance or rotary slosh begins), the window grows in smaller steps.
     pub fn search_growing(
         &self,
@@ -979,8 +974,10 @@ impl<'a> Problem<'a> {
             let found = self.search_part(x, &from, &part)?;
             let residual = found.mean_square();
             progress(format!("window of {:.0} %: mean square {residual:.3e}", 100.0 * window));
-            if let Some((reached, less, estimate)) = before.take_if(|b| residual > JUMP * b.1) {
-                if window - reached > SHORTEST {
+            if let Some((reached, less, estimate)) =
+                before.take_if(|b| residual > WINDOW_JUMP * b.1)
+            {
+                if window - reached > SHORTEST_GROWTH {
                     to_come.extend([window, 0.5 * (reached + window)]);
                     from.clone_from(&estimate);
                     before = Some((reached, less, estimate));
@@ -1013,7 +1010,7 @@ impl<'a> Problem<'a> {
         self.recordings.iter().map(|r| r.loudest(LOUDEST, RUN_IN)).collect()
     }
 
-    /// Searches over parts of the recordings from x. A wide prior ([`PRIOR_WIDTH`]) holds each parameter near its first start,
+    /// Searches over parts of the recordings from x. A wide prior ([`WINDOW_PRIOR`]) holds each parameter near its first start,
     /// because a short window does not determine all. Noise of [`NOISE_FACTOR`] times the gyro's covers what the model cannot
     /// follow yet.
     fn search_part(&self, first: &[f64], x: &[f64], part: &[Recording]) -> Result<Rough> {
@@ -1022,7 +1019,7 @@ impl<'a> Problem<'a> {
             if let Some(name) = unknown.quantity.parameter() {
                 // the friction's shape is left to the search that knows of its valleys
                 let shape = matches!(name, friction::D | friction::OMEGA_S);
-                let width = if shape { 0.4 * PRIOR_WIDTH } else { PRIOR_WIDTH };
+                let width = if shape { 0.4 * WINDOW_PRIOR } else { WINDOW_PRIOR };
                 let value = unknown.scale.value(x);
                 let size = match unknown.scale {
                     Scale::Log | Scale::Softplus(_) => value,
@@ -1139,22 +1136,8 @@ pub fn fastest(motion: &[Motion]) -> f64 {
     speeds[speeds.len() * 99 / 100]
 }
 
-/// Windows for starts that are far off, as fractions of the recordings.
-pub const WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
-/// Length of the loudest part, s: a slow sweep's resonance, some times over.
-const LOUDEST: f64 = 300.0;
-/// Time in which a model forgets its initial state, s: some five times the slosh's time constant 1/(2π · 2.4 Hz · 0.003) = 22 s.
-const RUN_IN: f64 = 100.0;
 /// All of the recordings at once.
 const WHOLE: [f64; 1] = [1.0];
-/// Assumed noise of a window over the gyro's.
-const NOISE_FACTOR: f64 = 10.0;
-/// Mean square of a window's residual over that of the one before beyond which it is reached in smaller steps.
-const JUMP: f64 = 3.0;
-/// Shortest step from one window to the next, as a fraction of the recordings.
-const SHORTEST: f64 = 0.05;
-/// Standard deviation of a parameter about its start in a window, relative.
-const PRIOR_WIDTH: f64 = 0.5;
 
 #[cfg(test)]
 mod tests {

@@ -9,18 +9,13 @@ use nalgebra::DMatrix;
 use crate::fit::bench::between;
 use crate::fit::bench::friction;
 use crate::fit::bench::goodness::{fit_pct, is_poor, tests};
-use crate::fit::bench::problem::{Answer, Polished, Problem, ROUNDS, Rough, WINDOWS};
+use crate::fit::bench::problem::{Answer, Polished, Problem, Rough};
 use crate::model::bench::simulate::Intersample;
 use crate::model::bench::stribeck::Indices;
 use crate::news::Since;
+use crate::tuning::{BENCH_WINDOWS, LEADS, NEARLY_NOISE, ROUNDS};
 use analysis::innovations::Tests;
 use names::hubslosh::{SloshModel, hub};
-
-/// Mean square of the innovations below which a model may be near its minimum; noise has 1.
-const NEARLY_NOISE: f64 = 1.5;
-
-/// Share of the sum of squares that remains after the steps of one set of sensitivities that lead far.
-const LEADS: f64 = 0.7;
 
 /// The search for one model's minimum.
 pub struct Search<'a, 'h> {
@@ -367,18 +362,18 @@ impl<'a> Search<'a, '_> {
         let frozen = self.model == SloshModel::Frozen.name();
         // The response that starts come from is linear: a model that is not may be far from it.
         let nonlinear = !frozen && self.model != SloshModel::Linear.name();
-        let how = if self.far || nonlinear { How::Windows(&WINDOWS) } else { How::Loudest };
+        let how = if self.far || nonlinear { How::Windows(&BENCH_WINDOWS) } else { How::Loudest };
         let others = (1..if frozen { 1 } else { self.starts.len() }).flat_map(|i| {
             [
                 Attempt::over(From::Start(i), How::Loudest, When::Unexplained),
-                Attempt::over(From::Best, How::Windows(&WINDOWS), When::Moved),
+                Attempt::over(From::Best, How::Windows(&BENCH_WINDOWS), When::Moved),
             ]
         });
         let Some(sibling) = sibling else {
             let mut all = vec![Attempt::over(From::Start(0), how, When::Always)];
             all.extend(others);
             if self.model == SloshModel::Linear.name() && self.alone && !self.far {
-                all.push(Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Poor));
+                all.push(Attempt::over(From::Start(0), How::Windows(&BENCH_WINDOWS), When::Poor));
             }
             return all;
         };
@@ -393,7 +388,7 @@ impl<'a> Search<'a, '_> {
         if is_poor(sibling.problem, &sibling.minimum.answer) {
             // so nonlinear that the other model's estimate leads nowhere
             return vec![
-                Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Always),
+                Attempt::over(From::Start(0), How::Windows(&BENCH_WINDOWS), When::Always),
                 Attempt::over(From::Start(0), How::Loudest, When::Poor),
             ];
         }
@@ -401,12 +396,12 @@ impl<'a> Search<'a, '_> {
         if is_explained {
             all.push(Attempt::near(From::Best, How::Search, When::Near));
             if sibling.is_poorer {
-                all.push(Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Poor));
+                all.push(Attempt::over(From::Start(0), How::Windows(&BENCH_WINDOWS), When::Poor));
             }
         } else {
             // its minimum may be anywhere
             all.push(Attempt::near(From::Best, How::Search, When::Unfinished));
-            all.push(Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Poor));
+            all.push(Attempt::over(From::Start(0), How::Windows(&BENCH_WINDOWS), When::Poor));
             all.push(Attempt::over(From::Start(0), How::Loudest, When::Poor));
         }
         all.extend(others.filter(|_| sibling.is_poorer));

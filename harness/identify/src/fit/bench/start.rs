@@ -18,6 +18,7 @@ use signals::fourier::Forward;
 use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::model::bench::nominal::{Bench, Nominal, Start};
+use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS, LATEST_DELAY};
 
 /// Bench parameters from a frequency response.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -282,11 +283,6 @@ impl Balance {
     }
 }
 
-/// Damping ratios that are tried.
-const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
-/// Steps of the slosh frequency over the band, relatively: half the half-power width of the least damping.
-const FINENESS: f64 = 1e-3;
-
 /// The slosh mode from the balance of torques in the frequency domain, with the *measured* rate W in it:
 ///
 /// ```text
@@ -353,7 +349,7 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
             residual,
         })
     };
-    let steps = ((band.1 / band.0).ln() / FINENESS) as u32;
+    let steps = ((band.1 / band.0).ln() / FREQUENCY_FINENESS) as u32;
     let grid = |damping: f64, low: f64, fineness: f64, count: u32| {
         (0..count).map(move |k| (low * (fineness * f64::from(k)).exp(), damping))
     };
@@ -363,7 +359,14 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
         let candidates: Vec<(f64, f64)> = match best {
             None => DAMPINGS
                 .iter()
-                .flat_map(|&z| grid(z, band.0, (10.0 * z * FINENESS).sqrt().max(FINENESS), steps))
+                .flat_map(|&z| {
+                    grid(
+                        z,
+                        band.0,
+                        (10.0 * z * FREQUENCY_FINENESS).sqrt().max(FREQUENCY_FINENESS),
+                        steps,
+                    )
+                })
                 .filter(|(f, _)| *f < band.1)
                 .collect(),
             Some(near) => [0.5, 0.7, 1.0, 1.4, 2.0]
@@ -428,7 +431,7 @@ fn friction(recordings: &[Recording]) -> Start {
             }
         }
     }
-    let delay = slope_of(&windows).filter(|delay| delay.abs() < LATEST).unwrap_or(0.0);
+    let delay = slope_of(&windows).filter(|delay| delay.abs() < LATEST_DELAY).unwrap_or(0.0);
     let torque = |[power, late, _]: &[f64; 3]| power - delay * late;
     let (torques, speeds): (Vec<f64>, Vec<f64>) =
         windows.iter().map(|w| (torque(w), w[2])).filter(|(torque, _)| *torque > 0.0).unzip();
@@ -440,9 +443,6 @@ fn friction(recordings: &[Recording]) -> Start {
     let (c, stribeck) = (0.55 * torque, 0.35 * torque);
     Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck, omega_s }
 }
-
-/// Longest delay that the balance of power may show, s.
-const LATEST: f64 = 0.05;
 
 /// Slope of the line through points (y, x, …), least squares; `None` where they do not tell.
 fn slope_of(points: &[[f64; 3]]) -> Option<f64> {

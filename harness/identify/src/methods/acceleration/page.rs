@@ -8,13 +8,9 @@ use report::page::{axis_chart, drawn, series};
 use report::svg::{Axis, Style};
 
 use super::{Braking, Found, FrictionPoint};
+use crate::tuning::{FRICTION_POINTS, SLOW_CHART};
 use crate::words::page::Sections;
 use crate::words::start_study;
-
-/// Points of a curve.
-const POINTS: usize = 400;
-/// Speeds of the second chart over the Stribeck speed.
-const SLOW: f64 = 4.0;
 
 /// The sections.
 pub fn sections(found: &Found) -> Sections {
@@ -49,8 +45,8 @@ fn friction_curve(found: &Found) -> Markup {
         let within: Vec<&FrictionPoint> = points.iter().filter(|p| p.rate.abs() <= most).collect();
         let rates = || within.iter().map(|p| p.rate);
         let (low, high) = (rates().fold(0.0, f64::min), rates().fold(0.0, f64::max));
-        let at = |k: usize| low + (high - low) * (k as f64 + 0.5) / POINTS as f64;
-        let fitted = (0..POINTS).map(|k| (at(k), curve(at(k)))).collect();
+        let at = |k: usize| low + (high - low) * (k as f64 + 0.5) / FRICTION_POINTS as f64;
+        let fitted = (0..FRICTION_POINTS).map(|k| (at(k), curve(at(k)))).collect();
         let measured = within.iter().map(|p| (p.rate, p.torque)).collect();
         let lines = vec![
             series(fitted, "a", Style::Line, "fitted"),
@@ -72,15 +68,16 @@ fn friction_curve(found: &Found) -> Markup {
     html! {
         h2 { "Friction" }
         (chart("Friction torque against the rate, means over rows of similar rate", f64::INFINITY))
-        (chart("The same at low speed", SLOW * speed))
+        (chart("The same at low speed", SLOW_CHART * speed))
     }
 }
 
 /// Deceleration over the angle in either direction (thesis 5.10 and 5.11).
 fn braking(all: &[Braking]) -> Markup {
     let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
-        let angle = |k: usize| PI * (2.0 * k as f64 / POINTS as f64 - 1.0);
-        let points = (0..=POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();
+        let angle = |k: usize| PI * (2.0 * k as f64 / FRICTION_POINTS as f64 - 1.0);
+        let points =
+            (0..=FRICTION_POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();
         series(points, color, Style::Line, braking.direction)
     });
     let title = "Deceleration in free decay over the angle";

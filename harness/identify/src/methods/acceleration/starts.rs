@@ -7,25 +7,11 @@
 use analysis::statistics::{deviation, mean, median};
 use nalgebra::{DMatrix, DVector};
 
-use super::{FREE, Problem, Rows, rough_inertia};
+use super::{Problem, Rows, rough_inertia};
 
-/// Stribeck speeds of the grid over the fastest speed: the first and the last, and how many.
-const GRID: (f64, f64, usize) = (2e-3, 3.0, 14);
-/// Basins of the grid that are followed.
-const FOLLOWED: usize = 3;
-/// A rate nearer to zero than this many standard deviations of its noise is that of a hub that sticks…
-const STILL: f64 = 4.0;
-/// …if so many rows in succession are.
-const RUN: usize = 5;
-/// Difference of the means of the halves of a rest in standard deviations beyond which the hub creeps; chance makes one in two million.
-const CREEPS: f64 = 5.0;
-/// Length of a part in which the hub rests without torque, s. A dry bearing that slips changes the rate within
-/// it by more than the noise.
-const REST: f64 = 0.5;
-/// Length of a part in which the hub rests under a torque, s.
-const LOADED: f64 = 2.0;
-/// Largest standard deviation of the share of the torque's changes that moves the hub: 0 at rest, 1 if it slips.
-const SHARE: f64 = 0.1;
+use crate::tuning::{
+    CREEPS, FOLLOWED, FREE_TORQUE, LOADED, MOVING_SHARE, REST, SPEED_GRID, STILL, STILL_RUN,
+};
 
 /// Inertia, b, c, d and a constant torque, and the sum of squares.
 type Linear = ([f64; 5], f64);
@@ -51,7 +37,7 @@ impl Rows {
         let mut from = 0;
         for part in self.rate.chunk_by(|a, b| still(a) == still(b)) {
             let to = from + part.len();
-            if still(&part[0]) && part.len() >= RUN {
+            if still(&part[0]) && part.len() >= STILL_RUN {
                 states[from.saturating_sub(1)..(to + 1).min(count)].fill(State::Sticks);
                 let end = part.len() / 4;
                 let middle = &part[end..part.len() - end];
@@ -66,7 +52,7 @@ impl Rows {
 
     /// Rows of the shortest part in which the hub rests.
     fn shortest_rest(&self) -> usize {
-        (REST / self.step).ceil().max(RUN as f64) as usize
+        (REST / self.step).ceil().max(STILL_RUN as f64) as usize
     }
 
     /// Returns true if these rates are one value and the gyro's noise. A drift shows in the difference of the halves.
@@ -87,7 +73,7 @@ impl Rows {
             flat.map(|(a, b)| mean(&self.rate[a..b])).collect()
         };
         let is_free =
-            |a: usize, b: usize| self.torque[a..b].iter().all(|t| t.abs() <= FREE * largest);
+            |a: usize, b: usize| self.torque[a..b].iter().all(|t| t.abs() <= FREE_TORQUE * largest);
         let free = readings(self.shortest_rest(), &is_free);
         let loaded = (LOADED / self.step).ceil() as usize;
         median(&free).or_else(|| median(&readings(loaded, &|a, b| self.resists(a, b, inertia))))
@@ -107,7 +93,7 @@ impl Rows {
         let (torque, rate) = (curve(&torque), curve(&self.rate[from..to]));
         let square: f64 = torque.iter().map(|t| t * t).sum();
         let share = torque.iter().zip(&rate).map(|(t, w)| t * w).sum::<f64>() / square;
-        self.noise < SHARE * square.sqrt() && share.abs() < 0.5
+        self.noise < MOVING_SHARE * square.sqrt() && share.abs() < 0.5
     }
 }
 
@@ -185,7 +171,7 @@ impl Problem {
 
     /// A Stribeck speed with the least squares there, for each speed of the grid that has one.
     pub(super) fn grid(&self, biases: &[f64]) -> Vec<(f64, Linear)> {
-        let (first, last, count) = GRID;
+        let (first, last, count) = SPEED_GRID;
         let fastest = self
             .rows
             .iter()

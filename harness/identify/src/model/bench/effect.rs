@@ -7,6 +7,8 @@
 //!
 //! The lags are computed from the signals outside the FMU, exactly for lines between instants.
 
+use crate::tuning::LAG_PARTS;
+
 /// The effects; 0: there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effects<'a> {
@@ -19,10 +21,6 @@ pub struct Effects<'a> {
     /// Relative change a of the friction over a recording.
     pub friction_drift: f64,
 }
-
-/// Fewest and most parts of the way from knot to knot: lines between points of a lagged torque act as the curve does to 1e-3 at 2.4 Hz
-/// and 50 knots a second.
-const PARTS: (f64, f64) = (3.0, 8.0);
 
 /// Output of a first-order lag at the end of a step h, from y at its beginning, under the line from a with slope b.
 fn lagged(y: f64, (a, b): (f64, f64), h: f64, lag: f64) -> f64 {
@@ -38,7 +36,7 @@ pub fn of_actuator(lag: f64, knots: &[f64], torque: &[f64], held: bool) -> (Vec<
     for k in 1..knots.len() {
         let h = knots[k] - knots[k - 1];
         let slope = if held { 0.0 } else { (torque[k] - torque[k - 1]) / h };
-        let parts = (2.0 * h / lag).ceil().clamp(PARTS.0, PARTS.1);
+        let parts = (2.0 * h / lag).ceil().clamp(LAG_PARTS.0, LAG_PARTS.1);
         for part in 0..parts as usize {
             let by = h * part as f64 / parts;
             y = lagged(y, (torque[k - 1] + slope * by, slope), h / parts, lag);

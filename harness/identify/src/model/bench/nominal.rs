@@ -7,6 +7,8 @@ use host::causality::Causality;
 use host::fmu::{Fmu, Instance};
 use names::hubslosh::{G_AXIAL, TAU_CMD, fluid, friction, hub, slosh, tank};
 
+use crate::tuning::COARSEST;
+
 /// Known values of the bench without the recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
@@ -138,6 +140,3 @@ impl Nominal {
         (self.period / 5.0).max(COARSEST)
     }
 }
-
-/// [`Nominal::coarsest`] for any bench on the ground, s: slosh at 2.4 Hz needs more than two rows a period.
-pub const COARSEST: f64 = 0.2;

@@ -9,9 +9,7 @@ use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, 
 use crate::input::clocks;
 use crate::input::recording::Recording;
 use crate::model::bench::effect::{self, Effects};
-
-/// Instants closer than this are the same, s.
-const SAME: f64 = 1e-9;
+use crate::tuning::SAME_INSTANT;
 
 /// The FMU's input for a torque on the hub besides the actuator's.
 pub const TORQUE_BESIDES: &str = TAU_EXT;
@@ -216,7 +214,7 @@ impl Setup {
             let target = loop {
                 let Some(&recorded) = time.get(row) else { return Ok(None) };
                 let target = recorded - delay;
-                if t < target - SAME {
+                if t < target - SAME_INSTANT {
                     break target;
                 }
                 let mut values = [0.0; 4];
@@ -246,7 +244,7 @@ impl Setup {
                 };
                 course.values[i] = signal[knot] + course.slopes[i] * (t - knots[knot]);
             }
-            Ok(Some(end.filter(|end| *end < target + SAME).unwrap_or(target)))
+            Ok(Some(end.filter(|end| *end < target + SAME_INSTANT).unwrap_or(target)))
         })?;
         if effects.gyro_lag > 0.0 {
             for signal in [&mut motion.rate, &mut motion.acceleration] {

@@ -13,6 +13,7 @@ use names::hubslosh::{hub, tank};
 
 use crate::model::bench::nominal::Bench;
 use crate::model::bench::unknown::Unknown;
+use crate::tuning::{SHALLOWEST, VALLEY_LEFT};
 
 /// Indices of d, h and I among the unknowns.
 #[derive(Clone, Copy, Debug)]
@@ -33,11 +34,6 @@ impl Indices {
     }
 }
 
-/// 1 − T is not brought below this part of itself by a step, and I not below this part: beyond it no tank has the mode, no hub the inertia.
-const LEFT: f64 = 0.02;
-/// Least T.
-const SHALLOWEST: f64 = 0.02;
-
 /// `there`, which is x with a step added, so that l, m and I₀ change as the step's first order says, even where h moves far. Where no
 /// tank has that mode, l and I₀ do, and h goes as far as it can.
 pub fn bent(unknowns: &[Unknown], bench: Bench, x: &[f64], step: &[f64], there: &mut [f64]) {
@@ -53,7 +49,7 @@ pub fn bent(unknowns: &[Unknown], bench: Bench, x: &[f64], step: &[f64], there: 
     let by_t = double * h / d * (1.0 - t * t) / t * (by_h - by_d);
     let length = d / (double * t) * (by_d - by_t).exp();
     // d⁴ goes with l m, T with d/l
-    let deepest = 1.0 - LEFT * (1.0 - t);
+    let deepest = 1.0 - VALLEY_LEFT * (1.0 - t);
     let tanh = (t * by_t.exp()).clamp(SHALLOWEST.min(t), deepest);
     let new_d = double * length * tanh;
     let mut new_h = tanh.atanh() * new_d / double;
@@ -67,7 +63,7 @@ pub fn bent(unknowns: &[Unknown], bench: Bench, x: &[f64], step: &[f64], there: 
         // the fixed liquid's first order, by a central difference
         let slope = (at(1e-4) - at(-1e-4)) / 2e-4;
         let whole = now * ((value(hub) * change(hub) + slope) / now).exp();
-        let least = LEFT * value(hub);
+        let least = VALLEY_LEFT * value(hub);
         let mut inertia = whole - fixed(new_d, new_h);
         if inertia < least {
             // of so deep a tank the mode's mass no longer changes

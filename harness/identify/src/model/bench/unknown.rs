@@ -5,6 +5,7 @@ use names::hubslosh::{friction, init, slosh};
 use serde::Serialize;
 
 use crate::model::bench::breaking;
+use crate::tuning::RANGE_MARGIN;
 
 /// One unknown number.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,9 +34,6 @@ pub fn range(variable: &Variable) -> [f64; 2] {
     };
     [number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY)]
 }
-
-/// Distance (in x) that a search keeps from the ends of the range, so that differences of x stay within the range.
-const MARGIN: f64 = 0.06;
 
 /// Kinds of unknowns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -175,7 +173,7 @@ impl Unknown {
     pub fn ends(&self) -> [f64; 2] {
         let [low, high] = self.range.map(|end| self.scale.variable(end));
         let or = |end: f64, open: f64| if end.is_nan() { open } else { end };
-        [or(low, f64::NEG_INFINITY) + MARGIN, or(high, f64::INFINITY) - MARGIN]
+        [or(low, f64::NEG_INFINITY) + RANGE_MARGIN, or(high, f64::INFINITY) - RANGE_MARGIN]
     }
 
     /// x within [`Unknown::ends`].

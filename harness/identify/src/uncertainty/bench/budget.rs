@@ -21,6 +21,7 @@ use crate::input::tolerance::{NAMES, Tolerances};
 use crate::model::bench::nominal::{self, Bench};
 use crate::model::bench::tank;
 use crate::model::bench::unknown::Quantity;
+use crate::tuning::{BUDGET_LEAVES, BUDGET_ROUNDS, BUDGET_SETTLED, BUDGET_SIZE, BUDGET_STEP};
 use names::hubslosh::{self, G_AXIAL, fluid, friction, hub, slosh};
 
 /// Effect of an error of something that is not estimated.
@@ -36,17 +37,6 @@ pub struct Effect {
     #[serde(skip)]
     pub x: DVector<f64>,
 }
-
-/// Relative change by which the answer is differenced: of a long recording, less than a tenth of a standard deviation.
-const STEP: f64 = 5e-6;
-/// Relative error for which [`relative_slope`] seeks the minimum anew.
-const SIZE: f64 = 1e-3;
-/// Most steps of [`settled`].
-const ROUNDS: usize = 5;
-/// Least part of an error that a step is assumed to leave.
-const LEAVES: f64 = 0.3;
-/// Step, in standard deviations, that is not taken any more.
-const SETTLED: f64 = 0.1;
 
 /// Effect of an error of something that is known within a tolerance.
 pub struct Slope {
@@ -91,7 +81,7 @@ pub fn relative_slope(
     at: (&[f64], &Answer, &DMatrix<f64>),
     name: &str,
 ) -> Result<DVector<f64>> {
-    Ok(refit(problem, at, name, SIZE)?.0 / SIZE)
+    Ok(refit(problem, at, name, BUDGET_SIZE)?.0 / BUDGET_SIZE)
 }
 
 /// The same problem with an error of this relative size in what is not estimated.
@@ -137,8 +127,8 @@ fn refit(
     if refitted.is_ok() {
         return refitted;
     }
-    with_error(problem, name, STEP, |other| {
-        let change = (other.stacked(&other.answer(x)?, x) - &base) * (size / STEP);
+    with_error(problem, name, BUDGET_STEP, |other| {
+        let change = (other.stacked(&other.answer(x)?, x) - &base) * (size / BUDGET_STEP);
         let moved = -(&covariance.x * jacobian.tr_mul(&change));
         Ok((change, moved))
     })
@@ -159,16 +149,17 @@ fn settled(
         DVector::from_iterator(x.len(), there.iter().zip(x).map(|(there, x)| there - x))
     };
     let mut last = f64::INFINITY;
-    for _ in 0..ROUNDS {
+    for _ in 0..BUDGET_ROUNDS {
         let change = other.stacked(&other.answer(&there)?, &there) - base;
         let step = -(&covariance.x * jacobian.tr_mul(&change));
         let explained = change - jacobian * off(&there);
         there.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
         let length = (jacobian * &step).norm();
         ensure!(length.is_finite() && length <= 2.0 * last, "the steps do not settle");
-        let next = if last.is_finite() { length * (length / last).max(LEAVES) } else { length };
+        let next =
+            if last.is_finite() { length * (length / last).max(BUDGET_LEAVES) } else { length };
         last = length;
-        if next < SETTLED {
+        if next < BUDGET_SETTLED {
             return Ok((explained, off(&there)));
         }
     }

@@ -14,19 +14,11 @@ use serde::Serialize;
 use crate::estimate::prose;
 use crate::fit::bench::goodness::tests;
 use crate::fit::bench::problem::{Problem, Rough};
-use crate::fit::evidence::DECIDES;
+
 use crate::model::bench::unknown::{Quantity, Unknown};
+use crate::tuning::{ACTUATOR_LIMIT, BIC_DECIDES, CAUSE_LEAST, CAUSE_PART, REFITTED};
 use analysis::innovations::Tests;
 use analysis::statistics::peak;
-
-/// Part of the sum of squares that is left to gain when a search ends: of the candidates, which differ by much more, and of the best.
-const PART: (f64, f64) = (1e-2, 1e-3);
-/// Candidates that are fitted.
-const REFITTED: usize = 3;
-/// Part of the best candidate's share below which another one is not fitted.
-const LEAST: f64 = 0.05;
-/// Largest commanded torque over which the actuator's limit starts.
-const LIMIT: f64 = 0.9;
 
 /// Cause of a misfit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -85,7 +77,7 @@ fn candidates(problem: &Problem, model: &str, law: &str) -> Vec<Candidate> {
     let parameter = |name: &str, start: f64| Unknown::positive(name, &unit(name), start);
     let start = |name: &str, value: f64| format!("--start {name}={value:.3}");
     let most = problem.recordings.iter().map(|r| peak(&r.torque)).fold(0.0, f64::max);
-    let limit = LIMIT * most;
+    let limit = ACTUATOR_LIMIT * most;
     let mut all = vec![
         with("an actuator that lags its command", "--actuator-lag", Unknown::actuator_lag()),
         with("a gyro with a low-pass filter", "--gyro-lag", Unknown::gyro_lag()),
@@ -187,7 +179,7 @@ pub fn find(
     tell: &mut dyn FnMut(&str),
 ) -> Result<Option<Cause>> {
     let problem = fresh(problem);
-    let base = problem.search(x, PART.0)?;
+    let base = problem.search(x, CAUSE_PART.0)?;
     let (jacobian, e) = (&base.jacobian, &base.answer.1);
     let covariance = problem.covariance(jacobian)?;
     // what the unknowns cannot take
@@ -213,13 +205,13 @@ pub fn find(
         ));
     }
     let before = deviance(&problem, &base);
-    let chance = (e.len() as f64).ln() + DECIDES;
+    let chance = (e.len() as f64).ln() + BIC_DECIDES;
     let mut best: Option<(f64, Candidate, Problem, Rough)> = None;
-    let least = scored.first().map_or(0.0, |best| LEAST * best.0).max(chance);
+    let least = scored.first().map_or(0.0, |best| CAUSE_LEAST * best.0).max(chance);
     let worth = scored.into_iter().take(REFITTED).filter(|(score, _)| *score > least);
     for (_, candidate) in worth {
         let (other, there) = with_candidate(&problem, &candidate, &base.x);
-        let Ok(found) = other.search(&there, PART.0) else { continue };
+        let Ok(found) = other.search(&there, CAUSE_PART.0) else { continue };
         let gain = before - deviance(&other, &found);
         tell(&format!("with {}, −2 ln L falls by {gain:.1}", candidate.effect));
         if gain > chance && best.as_ref().is_none_or(|best| gain > best.0) {
@@ -229,7 +221,7 @@ pub fn find(
     let Some((gain, candidate, mut other, found)) = best else { return Ok(None) };
     // the noise of the last search is the recording's; the tests need the noise that is left
     other.estimate_noise(&found.answer.0);
-    let found = other.search(&found.x, PART.1)?;
+    let found = other.search(&found.x, CAUSE_PART.1)?;
     other.estimate_noise(&found.answer.0);
     let size = candidate.unknown.as_ref().and(other.unknowns.last()).map(|unknown| {
         let value = unknown.value(found.x[found.x.len() - 1]);

@@ -24,13 +24,7 @@ use crate::fit::bench::problem::{Answer, Problem};
 use crate::fit::covariance::Covariance;
 use crate::model::bench::nominal::Bench;
 use crate::model::bench::tank::Indices;
-
-/// Standard deviation of ln h beyond which first order will not do.
-const DEEP: f64 = 0.05;
-/// Draws: the quantiles' own error is a fiftieth of a standard deviation.
-const DRAWS: usize = 20_000;
-/// Fewer than this say nothing.
-const FEWEST: usize = 400;
+use crate::tuning::{DEEP, DEEP_DRAWS, FEWEST_DRAWS};
 
 /// 95 % intervals of d, h and I with the places of these among the unknowns.
 pub struct Intervals(pub [(usize, [f64; 2]); 3]);
@@ -151,7 +145,7 @@ fn quantiles(bench: Bench, mean: [f64; 3], spread: &DMatrix<f64>) -> Option<[[f6
     let beyond = mean[1] / deviation;
     let mut random = Random::new(1, 0);
     let mut draws: [Vec<f64>; 3] = Default::default();
-    for _ in 0..DRAWS {
+    for _ in 0..DEEP_DRAWS {
         // far beyond 0 the tail is exponential
         let first = match beyond > 2.0 {
             true => (1.0 - random.uniform()).ln() / beyond - beyond,
@@ -164,7 +158,7 @@ fn quantiles(bench: Bench, mean: [f64; 3], spread: &DMatrix<f64>) -> Option<[[f6
             draws.iter_mut().zip(values).for_each(|(draws, value)| draws.push(value));
         }
     }
-    if draws[0].len() < FEWEST {
+    if draws[0].len() < FEWEST_DRAWS {
         return None;
     }
     Some(draws.map(|mut draws| {

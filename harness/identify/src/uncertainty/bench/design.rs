@@ -14,10 +14,11 @@ use crate::fit::bench::problem::Problem;
 use crate::input::recording::Recording;
 use crate::model::bench::simulate::Setup;
 use crate::model::bench::unknown::Unknown;
+use crate::tuning::{ANGLE_ENOUGH, ANGLE_ROUNDS, LINE_GROUP, SPREAD_POWER};
 use analysis::gauss_markov::Noise;
 
 /// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification,
-/// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`GROUP`] left out at random.
+/// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`LINE_GROUP`] left out at random.
 ///
 /// What the response shows at a left-out odd line is odd nonlinear distortion, at even lines even
 /// distortion; between lines (in records of several periods) it is noise.
@@ -33,9 +34,6 @@ pub struct Multisine {
     amplitudes: Vec<f64>,
     phases: Vec<f64>,
 }
-
-/// Odd lines in a group, of which one is left out.
-pub const GROUP: usize = 4;
 
 impl Multisine {
     /// Lines between two frequencies (Hz), the largest torque being `peak` (N·m). The phases with the
@@ -59,12 +57,12 @@ impl Multisine {
         let first = (band.0 * period).ceil() as u32 | 1;
         let odd: Vec<u32> = (first..=(band.1 * period).floor() as u32).step_by(2).collect();
         ensure!(
-            odd.len() >= 2 * GROUP,
+            odd.len() >= 2 * LINE_GROUP,
             "period {period} s is too short for the band: too few lines"
         );
         let (mut lines, mut detection) = (Vec::new(), Vec::new());
-        for group in odd.chunks(GROUP) {
-            let left_out = (random.uniform() * GROUP as f64) as usize;
+        for group in odd.chunks(LINE_GROUP) {
+            let left_out = (random.uniform() * LINE_GROUP as f64) as usize;
             for (k, line) in group.iter().enumerate() {
                 if k == left_out { detection.push(*line) } else { lines.push(*line) }
             }
@@ -131,12 +129,8 @@ impl Multisine {
     }
 }
 
-/// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
-/// distortion everywhere.
-const SPREAD: f64 = 0.25;
-
 /// Returns the D-optimal power of lines at these frequencies (Hz): it maximises the determinant of the information on a linear
-/// bench's five parameters. The share [`SPREAD`] is the same on all lines.
+/// bench's five parameters. The share [`SPREAD_POWER`] is the same on all lines.
 ///
 /// ```text
 /// maximise ln det Σ p_k A_k,  A_k = Re(J_kᴴ J_k),  J_k = ∂H(f_k)/∂ ln(f, ζ, m, I0, b):
@@ -177,7 +171,7 @@ pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
             *share *= (inverse * a).trace() / 5.0;
         }
     }
-    shares.iter().map(|p| (1.0 - SPREAD) * p + SPREAD / count).collect()
+    shares.iter().map(|p| (1.0 - SPREAD_POWER) * p + SPREAD_POWER / count).collect()
 }
 
 /// A reaction wheel's limits.
@@ -243,22 +237,17 @@ pub fn within_angle(
     // Dry friction takes its share first, so the angle grows faster than the torque: between a factor within the limit and
     // one beyond it the middle one.
     let (mut within, mut beyond) = (0.0, 1.0);
-    for _ in 0..ROUNDS {
+    for _ in 0..ANGLE_ROUNDS {
         let factor = 0.5 * (within + beyond);
         let found = angle(factor)?;
         *(if found <= limit { &mut within } else { &mut beyond }) = factor;
-        if (ENOUGH * limit..=limit).contains(&found) {
+        if (ANGLE_ENOUGH * limit..=limit).contains(&found) {
             break;
         }
     }
     ensure!(within > 0.0, "no torque of this shape keeps the liquid within {limit} rad");
     Ok(within)
 }
-
-/// Rounds of [`within_angle`].
-const ROUNDS: usize = 20;
-/// Part of the limit that [`within_angle`] is content with.
-const ENOUGH: f64 = 0.97;
 
 /// Geometric mean of the relative standard deviations: what one plan tells against another. An unknown that is expected to be 0,
 /// a delay or a bias, has no relative deviation and does not count.
@@ -300,7 +289,7 @@ mod tests {
     fn a_multisine_has_odd_lines_alone_and_its_peak() {
         let torque = Multisine::new(100.0, (1.25, 3.5), 0.25, 1).unwrap();
         assert!(torque.lines.iter().chain(&torque.detection).all(|k| k % 2 == 1));
-        assert!(torque.detection.len() >= torque.lines.len() / GROUP);
+        assert!(torque.detection.len() >= torque.lines.len() / LINE_GROUP);
         let largest =
             (0..20_000).map(|k| torque.at(f64::from(k) * 0.005).abs()).fold(0.0, f64::max);
         // the search looks every 0.05 s, at 3.5 Hz within cos(π 0.05 3.5) of a crest

@@ -23,18 +23,8 @@ use crate::estimate::prose;
 use crate::fit::bench::problem::{Differences, Polished, Problem};
 use crate::input::recording::Recording;
 use crate::model::bench::simulate::{Motion, TORQUE_BESIDES};
+use crate::tuning::{MISSING_LIMIT, MISSING_STEP, QUIET_TORQUE, SEEN_SENSITIVITY};
 use crate::uncertainty::bench::budget::Slope;
-
-/// Root mean square of the torque by which the answer is differenced, over that of the command: small against the nonlinearity,
-/// large against the integrator's tolerance.
-const STEP: f64 = 1e-4;
-/// Smallest commanded torque that serves as a scale, N·m; a free decay has none.
-const QUIET: f64 = 1e-3;
-/// Part of a sensitivity that the unknowns must leave for it to be seen: theirs are differences, good to a thousandth.
-const SEEN: f64 = 1e-2;
-
-/// A torque is missing beyond this many standard deviations: a chance of 6e-5 for each of seven.
-const LIMIT: f64 = 4.0;
 
 /// A row of the model's motion.
 struct Row {
@@ -137,10 +127,10 @@ pub fn torques(
             return Ok(None);
         }
         let command = rms(problem.recordings.iter().flat_map(|r| &r.torque));
-        let step = STEP * command.max(QUIET) / size;
+        let step = MISSING_STEP * command.max(QUIET_TORQUE) / size;
         let s = problem.to_torque(x, base, &torque, step)?;
         let seen = rest(extended(&s));
-        Ok((seen.norm() > SEEN * s.norm()).then_some((kind, seen)))
+        Ok((seen.norm() > SEEN_SENSITIVITY * s.norm()).then_some((kind, seen)))
     };
     let seen: Vec<_> = KINDS.par_iter().map(of_kind).collect::<Result<_>>()?;
     let mut seen: Vec<_> = seen.into_iter().flatten().collect();
@@ -152,7 +142,7 @@ pub fn torques(
             .enumerate()
             .map(|(i, (_, s))| (i, score(s)))
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let Some((i, deviations)) = most.filter(|(_, d)| d.abs() > LIMIT) else {
+        let Some((i, deviations)) = most.filter(|(_, d)| d.abs() > MISSING_LIMIT) else {
             return Ok(missing);
         };
         let (kind, s) = seen.swap_remove(i);
@@ -170,7 +160,7 @@ pub fn torques(
         seen = seen
             .into_iter()
             .map(|(kind, s)| (kind, without(&s), s.norm()))
-            .filter(|(_, s, before)| s.norm() > SEEN * before)
+            .filter(|(_, s, before)| s.norm() > SEEN_SENSITIVITY * before)
             .map(|(kind, s, _)| (kind, s))
             .collect();
     }

@@ -7,14 +7,8 @@ use serde::Serialize;
 
 use crate::estimate::{Estimated, prose};
 use crate::model::bench::unknown::Unknown;
+use crate::tuning::{COMBINED_CORRELATION, VAGUE_ALONE};
 use names::hubslosh::friction;
-
-/// Standard deviation of the friction's asymmetry above which the recordings do not show it.
-pub const ONE_WAY: f64 = 0.3;
-/// Correlation above which two unknowns count as determined only if each is precise by itself.
-const CORRELATED: f64 = 0.99;
-/// Relative standard deviation beyond which a correlated unknown is not known by itself.
-const VAGUE: f64 = 0.05;
 
 /// Sources of uncertainty, as covariances of the variables x.
 #[derive(Clone, Copy, Debug)]
@@ -148,9 +142,9 @@ pub fn combinations(
         for j in 0..i {
             let (vi, vj, vij) = (covariance[(i, i)], covariance[(j, j)], covariance[(i, j)]);
             let correlation = vij / (vi * vj).sqrt();
-            let vague = |k: usize| covariance[(k, k)].sqrt() > VAGUE * values[k].abs();
+            let vague = |k: usize| covariance[(k, k)].sqrt() > VAGUE_ALONE * values[k].abs();
             let alike = unknowns[i].unit == unknowns[j].unit;
-            if alike && correlation < -CORRELATED && (vague(i) || vague(j)) {
+            if alike && correlation < -COMBINED_CORRELATION && (vague(i) || vague(j)) {
                 let of = [unknowns[j].quantity.name(), unknowns[i].quantity.name()];
                 found.push(Combination {
                     name: of.join(" + "),

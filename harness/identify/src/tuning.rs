@@ -1,0 +1,589 @@
+//! Tuning constants of all fits, by the file that uses them, with tests that depend on them.
+//!
+//! A length without a unit is a ratio. "Deviations" are standard deviations of noise, and sums of squares are in its variances.
+//! Coefficients of formulas, orders of tables and names stay with their code.
+
+use analysis::gauss_markov::Noise;
+
+// Signals on clocks of their own: `input/clocks.rs`.
+// Tests: `a_slow_gyro_is_completed_and_its_own_rows_are_known`, `a_band_limited_torque_of_10_hz_is_known_between_its_samples`.
+/// Spacing of values, in usual ones, up to which a cubic joins them.
+pub const CUBIC_SPACING: f64 = 2.5;
+/// Rows of a torque that are wider apart than this, s, do not describe a band-limited torque by lines between them: lines leave images of it.
+pub const COARSE_TORQUE: f64 = 0.035;
+/// Time between the instants that a coarse torque gets, s, at most.
+pub const FINE_TORQUE: f64 = 0.02;
+/// Half the length of the kernel that interpolates a coarse torque, in its samples.
+pub const KERNEL_HALF: isize = 24;
+/// Shape of its Kaiser window: side lobes of 80 dB.
+pub const KERNEL_SHAPE: f64 = 7.9;
+
+// Gaps of the torque: `input/gaps.rs`.
+// Tests: `lost_samples_of_a_sweep_are_foretold`, `lost_rows_of_a_sweep_are_filled_and_those_of_noise_cut_the_recording`.
+/// Spacing of the torque's samples, in usual ones, from which on some were lost.
+pub const LOST_SPACING: f64 = 1.75;
+/// Longest gap that is filled, s.
+pub const LONGEST_FILLED: f64 = 3.0;
+/// Longest gap that a line may join where the recording cannot be cut, s.
+pub const LONGEST_LINE: f64 = 0.25;
+/// Samples on either side of a gap that the model is fitted to.
+pub const GAP_SIDE: usize = 250;
+/// Order of that model.
+pub const GAP_ORDER: usize = 32;
+/// Places at which a filling is tried.
+pub const GAP_TRIALS: usize = 12;
+/// Kick of the hub by the errors of all fillings, over the gyro's noise.
+pub const GAP_KICK: f64 = 0.1;
+/// Gaps that are too few to make small parts of a recording.
+pub const FEW_GAPS: usize = 5;
+/// Part of the usual step by which samples may be off an even grid.
+pub const EVEN_GRID: f64 = 0.02;
+
+// Plausibility of a recording: `input/plausible.rs`.
+// Tests: `a_wheel_that_gives_its_torque_shows_its_inertia_and_one_that_does_not_is_doubted`.
+/// Time over which wheel speed and torque are compared, s.
+pub const WHEEL_WINDOW: f64 = 0.1;
+
+// Reading: `input/reading.rs`.
+// Tests: `each_fault_has_a_sentence_of_its_own`, `twenty_spikes_are_told_and_left_out`.
+/// Time after the beginning of a part that is already moving in which no sensor is fitted, s: a sensor that is late shows
+/// what happened before the part's first torque.
+pub const LATE_SENSOR: f64 = 0.1;
+/// Rows of a free decay: the spectrum of its residual takes 400 sines a row.
+pub const DECAY_ROWS: usize = 1_000_000;
+/// Number of spikes whose times are listed.
+pub const LISTED_SPIKES: usize = 8;
+/// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.
+pub const MOVING_SPREAD: f64 = 2.0;
+
+// Recordings of any FMU: `input/record.rs`.
+// Tests: `any_fmu_refuses_records_out_of_range`.
+/// Values of an output below which nothing is estimated from them.
+pub const FEWEST_VALUES: usize = 10;
+
+// Recordings of the bench: `input/recording.rs`.
+// Tests: `each_fault_has_a_sentence_of_its_own`, `a_gyro_slower_than_the_rows_is_seen_by_its_repeats`, `no_method_hangs_or_panics_on_values_out_of_range`.
+/// Shortest recording, s: in it, of slosh at 2.4 Hz, some fifty periods.
+pub const SHORTEST_RECORDING: f64 = 20.0;
+/// A recording that is long for its slosh, s. A bare tank's slosh decays within some 23 s (1/(ζω) of the
+/// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
+/// damping and mass, and its intervals are as wide as that.
+pub const LONG_RECORDING: f64 = 120.0;
+/// Part of the rows up to which a gyro with new values in them is slower than the recording.
+pub const SLOW_GYRO: f64 = 0.75;
+/// Largest value of a signal: the squares of all rows have a finite sum.
+pub const LARGEST_VALUE: f64 = 1e100;
+/// Part of the changes of a held gyro that fall on the rows of its own clock.
+pub const ON_CLOCK: f64 = 0.98;
+/// Slowest gyro that is looked for, in rows a value.
+pub const SLOWEST_GYRO: usize = 100;
+
+// Sensor faults: `input/sensor_faults.rs`.
+// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`.
+/// Fewest values at an end of the range that are clipped, and how many times as many they are as equal values just inside it.
+pub const CLIPPED: (usize, f64) = (20, 4.0);
+/// Width of that inside, in units of the noise.
+pub const CLIPPED_INSIDE: f64 = 3.0;
+/// Step, in units of the noise, that a value takes when it comes back from being clipped or frozen.
+pub const FAULT_LEAVES: f64 = 5.0;
+/// The same in units of the sensor's resolution, where it is at both ends.
+pub const FAULT_STEPS: f64 = 2.0;
+/// First step of an angle that leaves its rest over the second, at most: it starts with zero rate, and its acceleration does not fall.
+pub const FROM_REST: f64 = 1.0 / 3.0;
+/// Probability that a run of equal values is chance.
+pub const FROZEN_CHANCE: f64 = 1e-6;
+/// Fewest values in a frozen run.
+pub const FROZEN_RUN: usize = 5;
+/// Fewest repeats, and how much larger their mean square off the neighbours is than that of other values.
+pub const REPEATS: (usize, f64) = (10, 3.0);
+/// Part of the largest value that rounding may make.
+pub const SENSOR_ROUNDING: f64 = 1e-9;
+
+// Spikes: `input/spikes.rs`.
+// Tests: `spikes_are_found_alone_and_side_by_side_and_noise_is_none`, `more_than_one_value_in_a_hundred_is_no_spike`, `a_step_of_the_torque_makes_no_spike`.
+/// Deviations of r beyond which a value is a spike; of 135,000 rows of noise none is in 10¹⁴ recordings.
+pub const SPIKE_BEYOND: f64 = 10.0;
+/// Spikes at most, of all values: more are noise of another kind, which no row should be left out for.
+pub const SPIKE_SHARE: f64 = 0.01;
+/// Rows on either side of a step of the torque in which r may be the hub's own motion.
+pub const SPIKE_NEAR_STEP: usize = 3;
+/// Part of the torque's peak that is a step from one row to the next.
+pub const TORQUE_STEP: f64 = 0.5;
+/// Rows on either side whose median is what is usual around a row.
+pub const SPIKE_AROUND: usize = 50;
+
+// Tolerances: `input/tolerance.rs`.
+// Tests: `a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals`.
+/// Share of the variance above which the verdict names it.
+pub const TOLD_SHARE: f64 = 0.2;
+
+// Unknowns of any FMU: `model/unknown.rs`.
+// Tests: `known_values_count_with_their_tolerances`.
+/// Plausible distance of a scale's error from 0, where neither bounds nor a prior say it.
+pub const SCALE_REACH: f64 = 0.1;
+/// Plausible distance of a known value from its mean, standard deviations: differences have to show more than the solver's errors.
+pub const KNOWN_REACH: f64 = 5.0;
+
+// Runs of any FMU: `model/simulate.rs`.
+// Tests: `the_hosts_solver_and_the_fmus_give_the_same_estimates`, `a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate`.
+/// Steps of the host's solver from one row to the next where it is only compared with.
+pub const COMPARED_STEPS: usize = 1000;
+/// Tolerance of a solver that the FMU's own is compared with, where the FMU suggests none.
+pub const COMPARED_TOLERANCE: f64 = 1e-8;
+/// Factor by which that is finer than the one that the FMU suggests.
+pub const COMPARED_FACTOR: f64 = 1e-2;
+/// Parts of the way from row to row over which an input that follows a line is held, where the FMU takes no slopes. Held at
+/// the middle of each part, it differs from its line by a sawtooth of an eighth of its change from row to row, without a delay.
+pub const HELD_STEPS: usize = 4;
+/// Steps whose effects of an input's slope are compared, s.
+pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
+/// The finest tolerance of the host's solver.
+pub const FINEST_TOLERANCE: f64 = 1e-13;
+
+// Effects outside the FMU: `model/bench/effect.rs`.
+// Tests: `lags_of_a_sine_are_those_of_its_frequency_response`.
+/// Fewest and most parts of the way from knot to knot: lines between points of a lagged torque act as the curve does to 1e-3 at 2.4 Hz
+/// and 50 knots a second.
+pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
+
+// The bench as it is set up: `model/bench/nominal.rs`.
+// Tests: `each_fault_has_a_sentence_of_its_own`.
+/// Coarsest mean time between rows of any bench on the ground, s: slosh at 2.4 Hz needs more than two rows a period.
+pub const COARSEST: f64 = 0.2;
+
+// Runs of the bench: `model/bench/simulate.rs`.
+// Tests: `a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates`.
+/// Instants closer than this are the same, s.
+pub const SAME_INSTANT: f64 = 1e-9;
+
+// The valley of tank and hub: `model/bench/tank.rs`.
+// Tests: `a_long_step_along_the_valley_stays_in_it`, `a_step_to_where_there_is_no_tank_ends_before`.
+/// 1 − T is not brought below this part of itself by a step, and I not below this part: beyond it no tank has the mode, no hub the inertia.
+pub const VALLEY_LEFT: f64 = 0.02;
+/// Least T.
+pub const SHALLOWEST: f64 = 0.02;
+
+// Unknowns of the bench: `model/bench/unknown.rs`.
+// Tests: `a_search_stays_within_the_range_that_the_fmu_declares`.
+/// Distance (in x) that a search keeps from the ends of the range, so that differences of x stay within the range.
+pub const RANGE_MARGIN: f64 = 0.06;
+
+// Directions of derivatives: `fit/decomposition.rs`.
+// Tests: `what_is_not_finite_is_named_and_no_iteration_hangs`, `parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json`.
+/// Limit of nalgebra's iterations; n columns take about 2 n.
+pub const EIGEN_ITERATIONS: usize = 10_000;
+/// Eigenvalue over the largest one up to which a direction counts as flat: the recordings do not show it.
+pub const FLAT_EIGENVALUE: f64 = 1e-12;
+/// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
+pub const RESOLVED_EIGENVALUE: f64 = 4.0;
+
+// Covariance: `fit/covariance.rs`.
+// Tests: `coverage_of_a_hundred_twins_of_each_kind`, `recordings_with_the_habits_of_loggers_are_described`.
+/// Length of the windows of the sandwich, s; two times the slosh's decay.
+pub const SANDWICH_WINDOW: f64 = 50.0;
+
+// Comparison of models: `fit/evidence.rs`.
+// Tests: `a_difference_of_ten_in_the_criterion_is_a_probability_of_99_percent`, `a_downward_sweep_shows_that_slosh_rotates`.
+/// Least difference of the information criterion that decides (Kass and Raftery: very strong).
+pub const BIC_DECIDES: f64 = 10.0;
+/// Difference below which it tells nothing (not worth more than a bare mention, ibid.).
+pub const BIC_ALIKE: f64 = 2.0;
+
+// Minimum: `fit/minimum.rs`.
+// Tests: `a_bent_valley_ends_at_its_minimum_or_at_the_bound_before_it`.
+/// Distance to the minimum up to which a search has converged, standard deviations: the stated deviations contain it.
+pub const CONVERGED: f64 = 0.5;
+
+// Derivatives of any FMU: `fit/problem.rs`.
+// Tests: `no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide`, `a_hub_in_closed_form_comes_back_within_its_intervals`.
+/// Change of the outputs by a difference to either side, in units of the noise's norm of one degree of freedom.
+pub const MOVE: f64 = 0.5;
+/// Bounds of the differences' steps, in units of an unknown's reach.
+pub const STEPS: (f64, f64) = (1e-7, 2e-2);
+/// The first step, in the same units.
+pub const FIRST_STEP: f64 = 1e-3;
+/// Second over first difference from which on the solver's noise may decide a derivative: noise alone makes √3 of it.
+pub const BEND: f64 = 0.3;
+/// Factor between the steps that are tried where noise may decide, and the largest one in units of an unknown's reach.
+pub const WIDER: (f64, f64) = (8.0, 0.2);
+/// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
+pub const OUTPUT_JUMP: (f64, f64) = (8.0, 20.0);
+
+// Search of any FMU: `fit/search.rs`.
+// Tests: `a_hub_in_closed_form_comes_back_within_its_intervals`, `what_no_recording_says_is_not_determined_and_a_bound_in_the_way_is_named`.
+/// A search has ended where the distance to the minimum, in standard deviations, is below this.
+pub const DECREMENT: f64 = 0.02;
+/// Windows of a search from afar, as parts of the recordings.
+pub const WINDOWS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
+/// Least noise of a window, in parts of an output's spread: what the model can't follow yet.
+pub const WINDOW_NOISE: f64 = 0.03;
+/// Residual over the noise from row to row beyond which a fit counts as bad, and another start is tried.
+pub const BAD_START: f64 = 1.5;
+
+// Derivatives and search of the bench: `fit/bench/problem.rs`.
+// Tests: `sensitivities_are_those_of_smaller_and_larger_steps`, `after_its_noise_is_renewed_a_minimum_is_of_that_noise`, `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale`.
+/// Change of the answer by a difference, in units of the noise's norm of one degree of freedom.
+pub const BENCH_MOVE: f64 = 0.3;
+/// Drift of a MEMS gyro (the thesis's LSM6DS3), until the recording's own is known. Without it the slow
+/// decay at a recording's start, where the drift is all the noise, would draw the friction after it.
+pub const TYPICAL_DRIFT: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
+/// Bounds of the differences' steps, in units of the variable x.
+pub const BENCH_STEPS: (f64, f64) = (1e-6, 2e-2);
+/// Step of the first differences, in the same units.
+pub const BENCH_FIRST_STEP: f64 = 1e-5;
+/// Most sets of derivatives of a search from afar.
+pub const MOST_SETS: usize = 20;
+/// Longest step of a difference along a direction, in units of x.
+pub const LONGEST_STEP: f64 = 0.05;
+/// Steps end where the Newton decrement is below this: a hundredth of a standard deviation.
+pub const BENCH_DECREMENT: f64 = 0.01;
+/// Newton decrement of a minimum: the sum of squares is known to a hundredth, and no sensitivities are found anew for less.
+pub const MINIMUM: f64 = 0.1;
+/// Sets of sensitivities that Gauss and Newton's steps have at most.
+pub const ROUNDS: usize = 6;
+/// A change of one variable there by more than this of one here is not a valley's bend.
+pub const SHARPEST_BEND: f64 = 1e3;
+/// Windows for starts that are far off, as fractions of the recordings.
+pub const BENCH_WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
+/// Length of the loudest part, s: a slow sweep's resonance, some times over.
+pub const LOUDEST: f64 = 300.0;
+/// Time in which a model forgets its initial state, s: some five times the slosh's time constant 1/(2π · 2.4 Hz · 0.003) = 22 s.
+pub const RUN_IN: f64 = 100.0;
+/// Assumed noise of a window over the gyro's.
+pub const NOISE_FACTOR: f64 = 10.0;
+/// Mean square of a window's residual over that of the one before beyond which it is reached in smaller steps.
+pub const WINDOW_JUMP: f64 = 3.0;
+/// Shortest step from one window to the next, as a fraction of the recordings.
+pub const SHORTEST_GROWTH: f64 = 0.05;
+/// Standard deviation of a parameter about its start in a window, relative.
+pub const WINDOW_PRIOR: f64 = 0.5;
+
+// Attempts: `fit/bench/search.rs`.
+// Tests: `what_the_loudest_part_has_against_a_stribeck_speed_the_whole_has_too`, `what_the_torque_between_rows_cannot_be_costs_few_simulations`.
+/// Mean square of the innovations below which a model may be near its minimum; noise has 1.
+pub const NEARLY_NOISE: f64 = 1.5;
+/// Share of the sum of squares that remains after the steps of one set of sensitivities that lead far.
+pub const LEADS: f64 = 0.7;
+
+// Starts from data: `fit/bench/start.rs`.
+// Tests: `poles_and_zeros_of_the_exact_response_give_the_bench_back`.
+/// Damping ratios that are tried.
+pub const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
+/// Steps of the slosh frequency over the band, relatively: half the half-power width of the least damping.
+pub const FREQUENCY_FINENESS: f64 = 1e-3;
+/// Longest delay that the balance of power may show, s.
+pub const LATEST_DELAY: f64 = 0.05;
+
+// Intersample behaviour: `fit/bench/between.rs`.
+// Tests: `what_the_torque_between_rows_cannot_be_costs_few_simulations`, `a_delay_of_half_a_row_is_a_finding_where_it_is_known`, `no_model_error_makes_the_rate_come_before_the_torque`.
+/// Standard deviations below zero at which a delay counts as acausal.
+pub const ACAUSAL: f64 = 3.0;
+/// Difference of two channels' time stamps that is negligible, in rows.
+pub const SYNCHRONOUS: f64 = 0.02;
+/// Difference from half a row up to which a delay counts as half a row, in rows.
+pub const HALF_ROW: f64 = 0.1;
+/// Difference from the first behaviour's sum of squares above which another behaviour is out, wherever its minimum is.
+pub const NO_RIVAL: f64 = 1.5;
+/// The same beyond which another one is given up, if a step has been taken.
+pub const LOST_RIVAL: f64 = 10.0;
+/// Newton decrement below which the sum of squares of the minimum is foreseen well enough to say that it does not count.
+pub const FORESEEN: f64 = 1.0;
+
+// The friction's shape: `fit/bench/friction.rs`.
+// Tests: `along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood`, `ends_that_the_likelihood_does_not_have_are_open`, `the_end_of_an_interval_beyond_its_last_point_is_that_of_the_parabola`, `a_point_of_the_profile_that_went_astray_ends_no_interval`.
+/// ω_s over the fastest speed of the recording.
+pub const STRIBECK_GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
+/// Relative standard deviation of d or ω_s beyond which a minimum may be one of several.
+pub const VAGUE_SHAPE: f64 = 0.05;
+/// The same beyond which intervals are no longer those of a quadratic.
+pub const BENT_SHAPE: f64 = 0.05;
+/// Sum of squares above the least at the ends of the 95 % interval of one unknown: 1.96².
+pub const PROFILE_END: f64 = 3.8415;
+/// The same that still counts for the covariance: three standard deviations.
+pub const PROFILE_COUNTED: f64 = 9.0;
+/// The same beyond which no other noise makes a minimum of it.
+pub const PROFILE_EXCLUDED: f64 = 30.0;
+/// Largest growth of the sum of squares from one grid speed to the next that does not count as a wall.
+pub const NO_WALL: f64 = 1.0;
+/// Longest extrapolation beyond the last point, over the way to that from the one before.
+pub const EXTRAPOLATED: f64 = 0.5;
+/// Longest step along ln ω_s.
+pub const LONGEST_SHAPE_STEP: f64 = 0.7;
+/// Target of the next point: square root of its increase of the sum of squares, relative to that at the end of the interval.
+pub const PROFILE_AIM: f64 = 1.03;
+/// Points on either side of the minimum.
+pub const PROFILE_POINTS: usize = 7;
+/// Part by which what the last point adds to the sum of squares may differ from [`PROFILE_END`]. Its root is then an eighth off, and the end is
+/// where the line through it and the point before leads.
+pub const PROFILE_NEAR: f64 = 0.25;
+/// Largest plausible χ², relative to its degrees of freedom: with 8 degrees, 32 has a probability of 1e-4.
+pub const RARE_CHI_SQUARE: f64 = 4.0;
+/// Sets of sensitivities at one speed, the first of them mostly that of another one.
+pub const PROFILE_ROUNDS: usize = 3;
+/// Newton decrement below which a point is near enough to the minimum at its speed: 1 % of [`PROFILE_END`].
+pub const PROFILE_DECREMENT: f64 = 0.2;
+/// Places between two points.
+pub const PROFILE_BETWEEN: usize = 8;
+
+// Goodness: `fit/bench/goodness.rs`.
+// Tests: `no_model_fits_a_torque_that_is_clipped`.
+/// Fit of a rate below which a minimum is taken for a wrong one at first, %.
+pub const POOR_FIT: f64 = 90.0;
+
+// Profile of any FMU: `uncertainty/profile.rs`.
+// Tests: `what_no_recording_says_is_not_determined_and_a_bound_in_the_way_is_named`, `coverage_of_a_hundred_twins_of_each_kind`.
+/// Part by which √Δ may differ from that of a parabola.
+pub const PARABOLIC: f64 = 0.1;
+/// Largest distance to search for an end, in standard deviations.
+pub const FARTHEST: f64 = 20.0;
+/// Steps of the others to their minimum at one point.
+pub const INNER_STEPS: usize = 3;
+/// Points at which an end is searched for.
+pub const END_POINTS: usize = 10;
+
+// Errors of the solver: `uncertainty/solver_error.rs`.
+// Tests: `no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide`, `the_slope_of_the_wheels_momentum_is_no_error_of_the_solver`.
+/// Part of its standard deviation from which on the solver's errors decide an estimate.
+pub const SOLVER_DECIDES: f64 = 0.3;
+/// Part of it below which they are not added: they would make it 0.1 % larger.
+pub const SOLVER_ADDED: f64 = 0.05;
+/// Change of an output, in parts of its peak, that rounding may make.
+pub const OUTPUT_ROUNDING: f64 = 1e-12;
+
+// Inseparable unknowns: `uncertainty/knowledge.rs`.
+// Tests: `parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json`.
+/// Part of a unit direction from which on an unknown belongs to it.
+pub const DIRECTION_PART: f64 = 1e-2;
+
+// Sources of uncertainty: `uncertainty/bench/sources.rs`.
+// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum`.
+/// Standard deviation of the friction's asymmetry above which the recordings do not show it.
+pub const ONE_WAY: f64 = 0.3;
+/// Correlation above which two unknowns count as determined only if each is precise by itself.
+pub const COMBINED_CORRELATION: f64 = 0.99;
+/// Relative standard deviation beyond which a correlated unknown is not known by itself.
+pub const VAGUE_ALONE: f64 = 0.05;
+
+// Error budget: `uncertainty/bench/budget.rs`.
+// Tests: `the_error_budget_is_what_a_new_fit_gives`.
+/// Relative change by which the answer is differenced: of a long recording, less than a tenth of a standard deviation.
+pub const BUDGET_STEP: f64 = 5e-6;
+/// Relative error for which `relative_slope` seeks the minimum anew.
+pub const BUDGET_SIZE: f64 = 1e-3;
+/// Most steps of `settled`.
+pub const BUDGET_ROUNDS: usize = 5;
+/// Least part of an error that a step is assumed to leave.
+pub const BUDGET_LEAVES: f64 = 0.3;
+/// Step, in standard deviations, that is not taken any more.
+pub const BUDGET_SETTLED: f64 = 0.1;
+
+// Causes: `uncertainty/bench/cause.rs`.
+// Tests: `the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it`.
+/// Part of the sum of squares that is left to gain when a search ends: of the candidates, which differ by much more, and of the best.
+pub const CAUSE_PART: (f64, f64) = (1e-2, 1e-3);
+/// Candidates that are fitted.
+pub const REFITTED: usize = 3;
+/// Part of the best candidate's share below which another one is not fitted.
+pub const CAUSE_LEAST: f64 = 0.05;
+/// Largest commanded torque over which the actuator's limit starts.
+pub const ACTUATOR_LIMIT: f64 = 0.9;
+
+// Deep tanks: `uncertainty/bench/deep_tank.rs`.
+// Tests: `in_a_shallow_tank_the_intervals_are_those_of_first_order`, `the_fill_of_a_tank_without_a_bottom_is_known_from_below`.
+/// Standard deviation of ln h beyond which first order will not do.
+pub const DEEP: f64 = 0.05;
+/// Draws: the quantiles' own error is a fiftieth of a standard deviation.
+pub const DEEP_DRAWS: usize = 20_000;
+/// Fewer than this say nothing.
+pub const FEWEST_DRAWS: usize = 400;
+
+// Design of experiments: `uncertainty/bench/design.rs`.
+// Tests: `d_optimal_power_stands_around_the_slosh_and_tells_more`, `a_multisine_has_odd_lines_alone_and_its_peak`.
+/// Odd lines in a group, of which one is left out.
+pub const LINE_GROUP: usize = 4;
+/// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
+/// distortion everywhere.
+pub const SPREAD_POWER: f64 = 0.25;
+/// Rounds of `within_angle`.
+pub const ANGLE_ROUNDS: usize = 20;
+/// Part of the limit with which `within_angle` ends.
+pub const ANGLE_ENOUGH: f64 = 0.97;
+
+// Missing torques: `uncertainty/bench/missing.rs`.
+// Tests: `a_drag_that_the_model_lacks_is_named_with_its_size`.
+/// Root mean square of the torque by which the answer is differenced, over that of the command: small against the nonlinearity,
+/// large against the integrator's tolerance.
+pub const MISSING_STEP: f64 = 1e-4;
+/// Smallest commanded torque that serves as a scale, N·m; a free decay has none.
+pub const QUIET_TORQUE: f64 = 1e-3;
+/// Part of a sensitivity that the unknowns must leave for it to be seen: theirs are differences, good to a thousandth.
+pub const SEEN_SENSITIVITY: f64 = 1e-2;
+/// A torque is missing beyond this many standard deviations: a chance of 6e-5 for each of seven.
+pub const MISSING_LIMIT: f64 = 4.0;
+
+// Study of starts: `words/start_study.rs`.
+// Tests: `an_end_that_is_lower_is_a_doubt`.
+/// Difference of two sums of squares, in variances of the noise, up to which two ends are one minimum. The 95 % interval of an unknown
+/// ends at 3.84.
+pub const SAME_MINIMUM: f64 = 0.5;
+/// Ratio of the heights at which a chart draws the searches of one unknown and of the next that ended at the minimum.
+pub const CHART_BELOW: f64 = 0.6;
+
+// Verdict: `words/verdict.rs`.
+// Tests: `a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result`.
+/// Newton decrement above which the verdict reports it.
+pub const TOLD_DECREMENT: f64 = 0.1;
+
+// Page: `words/page.rs`.
+// Tests: `the_page_is_whole`.
+/// Points of a curve: more than a screen has pixels are not seen.
+pub const PAGE_POINTS: usize = 700;
+/// Length of the stretch that is drawn row by row, s.
+pub const PAGE_STRETCH: f64 = 8.0;
+/// Longest lag of the autocorrelation, rows.
+pub const PAGE_LAGS: usize = 200;
+
+// Words on any FMU: `any_fmu/mod.rs`.
+// Tests: `what_no_recording_says_is_not_determined_and_a_bound_in_the_way_is_named`, `a_prior_holds_what_it_knows_better_than_the_recordings`.
+/// Correlation from which on two estimates are named as a pair.
+pub const PAIR_CORRELATION: f64 = 0.98;
+/// Part of the prior's standard deviation that is left where the recordings say nothing.
+pub const PRIOR_ALONE: f64 = 0.9;
+/// Turns of noise and fit.
+pub const TURNS: usize = 4;
+
+// Output error: `methods/output_error.rs`.
+// Tests: `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `no_model_fits_a_torque_that_is_clipped`.
+/// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
+pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
+/// Most times that a search goes on.
+pub const GOES_ON: usize = 3;
+/// Farthest start of the study of starts over the estimate, or the estimate over it.
+pub const STUDY_REACH: f64 = 3.0;
+
+// Acceleration: `methods/acceleration.rs`.
+// Tests: `the_accelerations_least_squares_find_friction_and_inertia_without_its_biases`, `liquid_that_moves_does_not_fit_the_accelerations_least_squares`, `the_mean_sign_is_the_integral_and_its_slope_the_derivative`, `a_hub_that_turns_one_way_determines_the_friction_of_that_way_alone`.
+/// Length of the windows over which the residual's scores are summed, s: the difference makes neighbouring rows
+/// correlated.
+pub const SCORE_WINDOW: f64 = 2.0;
+/// Residual over that of the gyro's noise, beyond which something else acts.
+pub const ACCELERATION_MISFIT: f64 = 1.1;
+/// Parts of an interval over which the friction is averaged.
+pub const FRICTION_PARTS: usize = 8;
+/// Rate over the width of the noise beyond which its sign is certain: 1 − tanh is 1e-17.
+pub const CERTAIN_SIGN: f64 = 20.0;
+/// Change of the rate over the width of the noise, up to which its mean sign is that in the middle, to 1e-6.
+pub const SHORT_CHANGE: f64 = 1e-3;
+/// Rounds in which the rows of a hub that sticks are found with the bias.
+pub const STICKING_ROUNDS: usize = 4;
+/// Relative standard deviation of friction.d or omega_s beyond which the sum of squares is not quadratic in them.
+pub const VAGUE_STRIBECK: f64 = 0.3;
+/// Standard deviations by which a friction below zero would explain more, beyond which it is not zero but something else acts.
+pub const DRIVING_FRICTION: f64 = 3.0;
+/// Fall of the likelihood's logarithm that ends a 95 % interval, times two.
+pub const LIKELIHOOD_END: f64 = 3.84;
+/// Rows that are closer are taken together, s. The mean of a sine of 3.5 Hz over it is 0.2 % less than its peak.
+pub const BLOCK: f64 = 0.01;
+/// Blocks of the shortest recording.
+pub const FEWEST_BLOCKS: usize = 100;
+/// Power of the rate's changes over that of the gyro's noise, below which the hub does not move.
+pub const MOVING_POWER: f64 = 2.0;
+/// Intervals of the rate over which the measured friction is averaged, and the fewest rows of one.
+pub const FRICTION_BINS: (usize, usize) = (160, 3);
+/// Farthest start of the study of starts over the estimate, or the estimate over it.
+pub const ACCELERATION_REACH: f64 = 10.0;
+/// Number of rows on which the starts are compared; the best start is then refined on all rows.
+pub const ROUGH_ROWS: usize = 20_000;
+/// Stride over the grid of Stribeck speeds for intervals.
+pub const GRID_STRIDE: usize = 2;
+/// Torque below which nothing drives the hub, over the largest torque.
+pub const FREE_TORQUE: f64 = 1e-3;
+/// Speeds of free decay: above this part of the fastest, or the sign is not sure.
+pub const MOVING_SPEED: f64 = 0.05;
+
+// Starts of the acceleration: `methods/acceleration/starts.rs`.
+// Tests: `a_bias_of_five_degrees_a_second_leads_to_no_false_minimum`, `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `a_hub_that_resists_a_growing_torque_shows_the_bias`.
+/// Stribeck speeds of the grid over the fastest speed: the first and the last, and how many.
+pub const SPEED_GRID: (f64, f64, usize) = (2e-3, 3.0, 14);
+/// Basins of the grid that are followed.
+pub const FOLLOWED: usize = 3;
+/// A rate nearer to zero than this many standard deviations of its noise is that of a hub that sticks…
+pub const STILL: f64 = 4.0;
+/// …if so many rows in succession are.
+pub const STILL_RUN: usize = 5;
+/// Difference of the means of the halves of a rest in standard deviations beyond which the hub creeps; chance makes one in two million.
+pub const CREEPS: f64 = 5.0;
+/// Length of a part in which the hub rests without torque, s. A dry bearing that slips changes the rate within
+/// it by more than the noise.
+pub const REST: f64 = 0.5;
+/// Length of a part in which the hub rests under a torque, s.
+pub const LOADED: f64 = 2.0;
+/// Largest standard deviation of the share of the torque's changes that moves the hub: 0 at rest, 1 if it slips.
+pub const MOVING_SHARE: f64 = 0.1;
+
+// Page of the acceleration: `methods/acceleration/page.rs`.
+// Tests: `the_accelerations_least_squares_find_friction_and_inertia_without_its_biases`.
+/// Points of a curve.
+pub const FRICTION_POINTS: usize = 400;
+/// Speeds of the second chart over the Stribeck speed.
+pub const SLOW_CHART: f64 = 4.0;
+
+// Black box: `methods/black_box.rs`.
+// Tests: `armax_finds_a_noisy_linear_bench_where_arx_of_its_order_does_not`.
+/// Orders of ARX that are tried.
+pub const ARX_ORDERS: [usize; 9] = [2, 3, 4, 6, 8, 12, 16, 24, 32];
+/// Orders of ARMAX that are tried.
+pub const ARMAX_ORDERS: [usize; 4] = [2, 3, 4, 5];
+/// Part of the record that is fitted; the rest is held back.
+pub const FITTED_PART: f64 = 2.0 / 3.0;
+/// A larger model must simulate better by this much, %.
+pub const WORTH: f64 = 0.1;
+
+// Free decay: `methods/free_decay.rs`.
+// Tests: `harness/cli/tests/all/recordings.rs`.
+/// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.
+pub const DECAY_MISFIT: f64 = 2.0;
+/// Part of the oscillation that another one in the residual has, from which on it is named.
+pub const NAMED_OSCILLATION: f64 = 0.02;
+
+// Frequency: `methods/frequency.rs`.
+// Tests: `ninety_five_percent_intervals_hold_the_truth_in_95_percent_of_records`.
+/// Lines on each side over which the residual's variance is averaged.
+pub const VARIANCE_LINES: usize = 40;
+/// Rounds of weights.
+pub const WEIGHT_ROUNDS: usize = 5;
+/// Residual over the gyro's noise beyond which the plant is not linear, or something else acts.
+pub const FREQUENCY_MISFIT: f64 = 1.3;
+
+// Multisine: `methods/multisine.rs`.
+// Tests: `noise_even_and_odd_distortion_are_told_apart`.
+/// Beginning that is left out, s: slosh of a bare tank decays with 23 s, to a thousandth in this time.
+pub const SETTLING: f64 = 150.0;
+/// Power of a line over the largest one above which it is excited.
+pub const EXCITED: f64 = 1e-4;
+/// Detection lines on each side that stand for the distortion at a line.
+pub const DETECTION_LINES: usize = 3;
+
+// Force records: `force_record.rs`.
+// Tests: `a_forced_record_of_another_integration_gives_the_whole_model`, `a_small_free_decay_does_not_state_mass_and_angle_but_their_product`.
+/// Largest standard deviation of a stated value, over that of its wide prior.
+pub const STATED: f64 = 0.3;
+/// The same where the residual is not noise: the errors of the model may then be ten times those that the fit states.
+pub const STATED_WITHOUT_FIT: f64 = 0.03;
+/// Phase of the first mode from one input to the next: the error of the line between them is a 12th of its square.
+pub const INPUT_PHASE: f64 = 0.05;
+/// Largest number of inputs from one row to the next.
+pub const MOST_INPUTS: f64 = 20.0;
+
+// Starts of force records: `force_record/start.rs`.
+// Tests: `a_tank_that_turns_about_another_point_is_found_from_loads_in_its_axes`.
+/// Standard deviation of the wide priors of s and κ. Liquids have 0.9 to 1.5 and 0.3 to 8.
+pub const WIDE_SHIFT: f64 = 2.0;
+/// Largest number of points of a spectrum.
+pub const SPECTRUM_POINTS: usize = 1 << 14;
+/// Padding of a record with zeros, over its length.
+pub const PADDING: usize = 4;
+/// Slosh angle that is assumed for a first mass, rad.
+pub const ASSUMED_ANGLE: f64 = 0.0873;
+/// Part of a liquid's mass that is assumed to slosh.
+pub const SLOSHING_PART: f64 = 0.4;
