@@ -1,8 +1,11 @@
 //! Progress bars on a terminal; the libraries only tell how far they are.
 
+use std::io;
+use std::sync::{Mutex, PoisonError};
+
 use anyhow::Result;
 use experiments::progress::Progress;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 
 use crate::terminal;
 
@@ -47,16 +50,82 @@ pub fn tell(bar: &ProgressBar, line: &str) {
 /// Returns a progress bar; it is hidden with `--quiet`, or if stderr is not a terminal.
 fn bar(template: &str) -> Result<ProgressBar> {
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?);
+    if terminal::has_reader() {
+        let messages = Box::new(Messages::default());
+        bar.set_draw_target(ProgressDrawTarget::term_like_with_hz(messages, 5));
+        return Ok(bar);
+    }
     if terminal::is_quiet() {
-        bar.set_draw_target(indicatif::ProgressDrawTarget::hidden());
+        bar.set_draw_target(ProgressDrawTarget::hidden());
         return Ok(bar);
     }
     #[cfg(unix)]
     if let Some((_, stderr)) = host::guard::streams() {
         let terminal = console::Term::read_write_pair(stderr.try_clone()?, stderr.try_clone()?);
-        bar.set_draw_target(indicatif::ProgressDrawTarget::term(terminal, 20));
+        bar.set_draw_target(ProgressDrawTarget::term(terminal, 20));
     }
     Ok(bar)
+}
+
+/// A terminal of one line, which is sent to the program that started this one.
+#[derive(Debug, Default)]
+struct Messages {
+    line: Mutex<String>,
+}
+
+impl Messages {
+    fn change(&self, change: impl FnOnce(&mut String)) -> io::Result<()> {
+        change(&mut self.line.lock().unwrap_or_else(PoisonError::into_inner));
+        Ok(())
+    }
+}
+
+impl TermLike for Messages {
+    fn width(&self) -> u16 {
+        100
+    }
+
+    fn move_cursor_up(&self, _: usize) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn move_cursor_down(&self, _: usize) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn move_cursor_right(&self, _: usize) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn move_cursor_left(&self, _: usize) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn write_line(&self, text: &str) -> io::Result<()> {
+        self.change(|line| {
+            // the rest of a line is filled with spaces
+            if !text.trim().is_empty() {
+                *line = text.trim().into();
+            }
+        })
+    }
+
+    fn write_str(&self, text: &str) -> io::Result<()> {
+        self.write_line(text)
+    }
+
+    fn clear_line(&self) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn flush(&self) -> io::Result<()> {
+        self.change(|line| {
+            if !line.is_empty() {
+                let text = serde_json::Value::from(std::mem::take(line));
+                terminal::message("progress", &text.to_string());
+            }
+        })
+    }
 }
 
 /// Shows a piece of news of the bench.

@@ -23,6 +23,9 @@ pub struct Terminal {
     /// Colours of messages; `auto`: on a terminal, unless NO_COLOR is set.
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     color: ColorChoice,
+    /// Internal: prints progress and results as JSON text sequences (RFC 7464), for the Python package.
+    #[arg(long, global = true, hide = true)]
+    messages: bool,
 }
 
 static TERMINAL: OnceLock<Terminal> = OnceLock::new();
@@ -42,6 +45,18 @@ fn terminal() -> Terminal {
 /// Returns true if only results, warnings and errors are printed.
 pub fn is_quiet() -> bool {
     terminal().quiet
+}
+
+/// Returns true if the program that started this one reads [`message`]s.
+pub fn has_reader() -> bool {
+    terminal().messages
+}
+
+/// Sends a message: `value` is JSON, which may have several lines.
+pub fn message(name: &str, value: &str) {
+    // a line break within a text is escaped, so the others only lay the JSON out
+    let value: String = value.lines().map(str::trim).collect();
+    say(format!("\u{1e}{{{name:?}:{value}}}\n"));
 }
 
 /// The choice of `--color` before the command line is parsed, for messages about the command line.

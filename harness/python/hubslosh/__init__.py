@@ -8,9 +8,9 @@
 `simulate` returns a table of time histories, `closed_loop` one under a sampled controller,
 `margins` how far that loop is from instability, `monte_carlo` many runs with drawn parameters,
 `linearize` a state-space model, `uncertain` one with uncertain parameters, `frequency_response` an
-estimate from a history, `fit` a transfer function through such an estimate; `analyse`, `campaign`,
-`identify` and `tank` call the program ``hubslosh``, `liquid_modes` finds slosh modes in three
-dimensions, `mode_errors` says how many a model needs, `posterior` samples what `identify` states.
+estimate from a history, `fit` a transfer function through such an estimate. `analyse`, `campaign`,
+`check`, `identify` and `view` call the program ``hubslosh``. `tank` and `liquid_modes` find slosh
+modes, `mode_errors` says how many a model needs, `posterior` samples the result of `identify`.
 `view` shows a run in 3-D, `plot` draws. `Plant` and `drive` are for those who step an instance
 themselves.
 """
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import attitude, plot
+    from .checking import Checked, CheckedRule, Finding, check
     from .craft import Craft, MassProperties, MountedTank
     from .files import to_csv, to_mat, to_parquet
     from .fitting import TransferFunction, fit
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 # numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
 # one of its names (PEP 562). The same as above, for Python itself; a test compares.
 _MODULES = {
+    "checking": ("Checked", "CheckedRule", "Finding", "check"),
     "craft": ("Craft", "MassProperties", "MountedTank"),
     "files": ("to_csv", "to_mat", "to_parquet"),
     "fitting": ("TransferFunction", "fit"),
@@ -76,8 +78,11 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 __all__ = [
     "COLUMNS",
     "TORQUE",
+    "Checked",
+    "CheckedRule",
     "Craft",
     "Estimated",
+    "Finding",
     "Fmu",
     "FmuError",
     "FmuWarning",
@@ -104,6 +109,7 @@ __all__ = [
     "attitude",
     "bottom_up",
     "campaign",
+    "check",
     "closed_loop",
     "draw",
     "drive",

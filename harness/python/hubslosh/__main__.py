@@ -12,9 +12,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from .command import find_program
 from .fmu import FmuError
 from .plant import COLUMNS, TORQUE, drive
-from .program import find_program
 from .tables import ending_of, read_table, setting, write_table
 
 

@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 
 from . import temporary
+from .command import call, find_program, settings_flags
 from .fmu import FmuError, fmu_path
-from .program import Free, Identification, Table, _asked, _file, _run, _settings, find_program
+from .program import Free, Identification, Table, _asked, _file
 
 
 def posterior(
@@ -56,20 +57,17 @@ def posterior(
     walkers = walkers or 4 * len(names)
     path = find_program(program)
     with temporary.folder() as folder:
-        result, points, answer = (
-            Path(folder) / name for name in ("result.json", "points.csv", "deviance.json")
-        )
+        result, points = Path(folder) / "result.json", Path(folder) / "points.csv"
         result.write_text(json.dumps(found.all), encoding="utf-8")
         tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
         files = [_file(t, (), Path(folder) / f"data{k}.csv") for k, t in enumerate(tables, 1)]
         flags = ["--fmu", str(fmu_path(fmu)), *_asked(free, inputs, outputs, prior or {})]
-        flags += [*_settings(settings or {}), *arguments]
-        flags += ["--points", str(points), "--found", str(result), "--out", str(answer)]
+        flags += [*settings_flags(settings), *arguments]
+        flags += ["--points", str(points), "--found", str(result)]
 
         def log_likelihood(x: np.ndarray) -> np.ndarray:
             pd.DataFrame(x, columns=names).to_csv(points, index=False)
-            _run(path, ["identify", *files, *flags])
-            deviance = json.loads(answer.read_text(encoding="utf-8"))
+            deviance = call(path, "identify", [*files, *flags])
             return np.array([-np.inf if d is None else -0.5 * d for d in deviance])
 
         random = np.random.default_rng(seed)

@@ -1,15 +1,7 @@
-"""Calls of the program ``hubslosh``: campaigns and identification.
+"""Calls of the program ``hubslosh``: campaigns, recordings and identification."""
 
-The program comes with this package's wheel, or from a build of the source.
-"""
-
-import json
-import os
-import shutil
-import subprocess
-import sysconfig
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -18,54 +10,9 @@ import numpy as np
 import pandas as pd
 
 from . import temporary
-from .fmu import FmuError, fmu_path, source_tree
-
-
-def find_program(path: str | Path | None = None) -> Path:
-    """Return the path of the program.
-
-    The search order is ``path``, $HUBSLOSH, pip's folder of scripts, PATH, the source tree.
-    """
-    exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
-    named = path or os.environ.get("HUBSLOSH")
-    if named:
-        found = shutil.which(str(named))
-        if found is None:
-            raise FmuError(f"there is no program at {named}")
-        return Path(found)
-    root = source_tree()
-    if not root and (packed := next(filter(os.path.isfile, _scripts(exe)), None)):
-        return packed
-    if found := shutil.which(exe):
-        return Path(found)
-    if root:
-        built = root / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / exe
-        if built.is_file():
-            return built
-    raise FmuError(
-        "the program hubslosh was not found, which does this; it comes with the wheel of this "
-        "package, or is built from the project's source (cargo build --release): put it on PATH, "
-        "name it in the environment variable HUBSLOSH, or give program="
-    )
-
-
-def _scripts(exe: str) -> Iterator[Path]:
-    """Yield where pip puts a wheel's programs: in an environment, for a user, with --target."""
-    yield Path(sysconfig.get_path("scripts")) / exe
-    yield Path(sysconfig.get_path("scripts", sysconfig.get_preferred_scheme("user"))) / exe
-    yield Path(__file__).resolve().parents[1] / "bin" / exe
-
-
-def _run(program: Path, arguments: Sequence[str | Path]) -> str:
-    """Run the program and return what it prints."""
-    try:
-        done = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
-    except OSError as error:
-        raise FmuError(f"{program} cannot be started: {error}") from None
-    if done.returncode != 0:
-        said = (done.stderr or done.stdout).strip().removeprefix("error: ")
-        raise FmuError(f"hubslosh {arguments[0]}: {said}")
-    return done.stdout
+from .command import call, find_program, settings_flags
+from .fmu import FmuError, fmu_path
+from .progress import Progress
 
 
 def campaign(
@@ -74,6 +21,7 @@ def campaign(
     *,
     model: str | Path = "HubSlosh",
     force: bool = False,
+    progress: Progress = None,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
     """Simulate a plan with the program ``hubslosh`` and return its table of runs.
@@ -81,6 +29,8 @@ def campaign(
     * ``plan``: A TOML file, the name of a built-in plan, or the TOML text itself (several lines).
     * ``out``: Directory for runs, tables and report.html; by default dist/ and the plan's name.
       Stored runs are reused, unless ``force``.
+    * ``progress``: Shows a line on stderr, by default on a terminal and in a notebook; or a
+      function that takes the line.
 
     Returns ``runs.csv``: a row per run with its settings and results. ``.attrs["directory"]`` is
     the directory.
@@ -94,9 +44,9 @@ def campaign(
             plan = Path(folder) / "plan.toml"
             plan.write_text(text, encoding="utf-8")
         directory = Path(out) if out is not None else Path("dist") / Path(plan).stem
-        arguments: list[str | Path] = ["campaign", "--plan", plan, "--fmu", fmu_path(model)]
+        arguments: list[str | Path] = ["--plan", plan, "--fmu", fmu_path(model)]
         arguments += ["--out", directory, *(["--force"] if force else [])]
-        _run(path, arguments)
+        call(path, "campaign", arguments, progress)
     table = pd.read_csv(directory / "runs.csv")
     table.attrs["directory"] = directory
     return table
@@ -109,6 +59,7 @@ def analyse(
     columns: str | None = None,
     settings: dict[str, object] | None = None,
     fmu: str | Path = "HubSlosh",
+    progress: Progress = None,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
     """Analyse recordings of a bench with ``hubslosh analyse``, and return its table of runs.
@@ -119,16 +70,15 @@ def analyse(
       ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``.
     * ``settings``: Known parameters of the bench by FMU name, ``{"tank.h": 0.1}``.
     * ``arguments``: Further flags of the command.
+    * ``progress``: As `campaign` has it.
 
     Returns ``runs.csv``, as `campaign` does; the model of a recording is ``recording``.
     """
     files = [recordings] if isinstance(recordings, str | Path) else list(recordings)
     flags = ["--columns", columns] if columns else []
-    for name, value in (settings or {}).items():
-        text = str(value).lower() if isinstance(value, bool) else str(value)
-        flags += ["--set", f"{name}={text}"]
     where: list[str | Path] = ["--fmu", fmu_path(fmu), "--out", out]
-    _run(find_program(program), ["analyse", *files, *flags, *arguments, *where])
+    flags += [*settings_flags(settings), *arguments]
+    call(find_program(program), "analyse", [*files, *flags, *where], progress)
     table = pd.read_csv(Path(out) / "runs.csv")
     table.attrs["directory"] = Path(out)
     return table
@@ -232,14 +182,6 @@ def _asked(
     return [*flags, *(["--outputs", ",".join(outputs)] if outputs else [])]
 
 
-def _settings(settings: Mapping[str, object]) -> list[str]:
-    """Return the flags ``--set``."""
-    flags = []
-    for name, value in settings.items():
-        flags += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
-    return flags
-
-
 Table = pd.DataFrame | str | Path
 """A table, or the file of one."""
 Free = float | tuple[float, float, float]
@@ -259,6 +201,7 @@ def identify(
     settings: Mapping[str, object] | None = None,
     tank: str | Path | bool = False,
     out: str | Path | None = None,
+    progress: Progress = None,
     program: str | Path | None = None,
 ) -> Identification:
     """Estimate an FMU's parameters from recordings, with the program ``hubslosh identify``.
@@ -269,6 +212,8 @@ def identify(
     * ``arguments``: Further flags of the command.
     * ``fmu``: The name of an FMU of this package, or the file of a HubSlosh.
     * ``out``: File for the result, .json.
+    * ``progress``: Shows the search in a line on stderr, by default on a terminal and in a
+      notebook; or a function that takes the line.
 
     The parameters with ``settings`` simulate the bench:
     ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
@@ -313,15 +258,14 @@ def identify(
             else ("time", *inputs, *outputs)
         )
         flags += _asked(free, inputs, outputs, prior or {})
-    flags += _settings(settings or {})
+    flags += [*settings_flags(settings), *arguments]
+    flags += [] if out is None else ["--out", str(out)]
     with temporary.folder() as folder:
-        result = Path(folder) / "result.json" if out is None else Path(out)
         tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
         files = [
             _file(table, needed, Path(folder) / f"data{k}.csv") for k, table in enumerate(tables, 1)
         ]
-        _run(path, ["identify", *files, *flags, *arguments, "--out", result])
-        loaded: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
+        loaded: dict[str, Any] = call(path, "identify", [*files, *flags], progress)
     estimates = {
         kind: {
             name: Estimated(**e | {"interval": tuple(e["interval"])})

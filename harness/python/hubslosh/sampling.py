@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
@@ -14,6 +13,7 @@ import numpy as np
 
 from .arguments import check_numbers, check_table, names_of
 from .fmu import FmuError
+from .progress import Line, Progress
 from .store import Store, encoded
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def monte_carlo(
     folder: str | Path | None = None,
     client: Any = None,
     workers: int | None = None,
-    progress: bool | None = None,
+    progress: Progress = None,
 ) -> "pd.DataFrame":
     """Draw random values, make a run with each draw, and return a row for each run.
 
@@ -109,8 +109,8 @@ def monte_carlo(
     * ``client``: Client of dask.distributed; its workers need this package. Without a client the
       study uses ``workers`` threads, by default one per core. `simulate` and loops with a linear
       controller run in parallel; a controller in Python runs on one core at a time.
-    * ``progress``: Shows a line on stderr with finished runs and remaining time; by default on a
-      terminal.
+    * ``progress``: Shows a line on stderr with finished runs and remaining time, by default on a
+      terminal and in a notebook; or a function that takes the line.
 
     Returns a table with the columns ``run``, the names of the ranges, and the names of the
     outcomes. If the FMU refuses a run, its outcomes are NaN, and the column ``refused`` has the
@@ -135,8 +135,7 @@ def monte_carlo(
     with _opened(folder, seed, ranges) as store:
         rows = {run: {"run": run} | draws[run] | row for run, row in store.rows(draws).items()}
         missing = [run for run in range(runs) if run not in rows]
-        shown = sys.stderr.isatty() if progress is None else progress
-        bar = _Progress(len(missing), runs - len(missing), shown)
+        left = _Left(len(missing), runs - len(missing), progress)
         jobs = ((run, draws[run]) for run in missing)
         made = _on_dask(client, outcome, jobs) if client else _in_threads(workers, outcome, jobs)
         try:
@@ -145,9 +144,9 @@ def monte_carlo(
                 refused = {FAILED: found[FAILED]} if FAILED in found else {}
                 numbers = {name: value for name, value in found.items() if name != FAILED}
                 store.add(run, draws[run], numbers, **refused)
-                bar.step(FAILED in found)
+                left.step(FAILED in found)
         finally:
-            bar.close()
+            left.line.close()
             made.close()
         table = ShortTable([rows[run] for run in sorted(rows)])
         if FAILED in table:
@@ -275,32 +274,26 @@ def _text(name: str, of: Range) -> str:
     return f"{float(low)!r} to {float(high)!r}"
 
 
-class _Progress:
-    """A line on stderr."""
+class _Left:
+    """Shows the number of finished runs and the remaining time."""
 
-    def __init__(self, runs: int, there: int, shown: bool) -> None:
+    def __init__(self, runs: int, there: int, progress: Progress) -> None:
         import time
 
-        self.runs, self.shown, self.done, self.failed = runs, shown and runs > 0, 0, 0
-        self.clock, self.start = time.monotonic, time.monotonic()
-        self.last = 0.0
-        if self.shown and there:
-            print(f"{there} runs are there already", file=sys.stderr)
+        self.runs, self.there, self.done, self.failed = runs, there, 0, 0
+        self.clock, self.start, self.last = time.monotonic, time.monotonic(), 0.0
+        self.line = Line(progress)
 
     def step(self, failed: bool) -> None:
         self.done += 1
         self.failed += failed
         now = self.clock()
-        if self.shown and (now - self.last > 0.2 or self.done == self.runs):
+        if now - self.last > 0.2 or self.done == self.runs:
             self.last = now
             left = (now - self.start) / self.done * (self.runs - self.done)
-            text = f"\r{self.done} of {self.runs} runs, {left:.0f} s left"
+            text = f"{self.done} of {self.runs} runs, {left:.0f} s left"
             text += f", {self.failed} refused" if self.failed else ""
-            print(f"{text}   ", end="", file=sys.stderr, flush=True)
-
-    def close(self) -> None:
-        if self.shown and self.done:
-            print(file=sys.stderr)
+            self.line.show(text + (f", {self.there} were there already" if self.there else ""))
 
 
 def quantiles(

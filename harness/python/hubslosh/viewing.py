@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from . import temporary
 from .arguments import check_table
+from .command import call, find_program
 from .fmu import DefinedUnit, Fmu, FmuError, Quantity, fmu_path
-from .program import _run, find_program
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +92,7 @@ def view(
             model = model or run.attrs.get("model")
             known = run.attrs.get("parameters", {})
         page = Path(out) if out is not None else Path(folder) / "run.html"
-        arguments: list[str | Path] = ["view", file, "--out", page]
+        arguments: list[str | Path] = [file, "--out", page]
         arguments += ["--fmu", fmu_path(model)] if model is not None else []
         for name, value in {**known, **(parameters or {})}.items():
             if isinstance(value, tuple) and isinstance(value[-1], DefinedUnit):
@@ -102,7 +102,7 @@ def view(
             arguments += ["--tank", f"{number}:{tank}"]
         arguments += [] if start is None else ["--from", str(start)]
         arguments += [] if stop is None else ["--to", str(stop)]
-        _run(path, arguments)
+        call(path, "view", arguments)
         return View(page.read_text(encoding="utf-8"), None if out is None else Path(out))
 
 

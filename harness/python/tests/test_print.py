@@ -39,6 +39,8 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
     runs = pd.DataFrame({f"result {i}": rng.random(50) for i in range(9)})
     estimates = {f"parameter[{i}]": Estimated(1.0, 0.1, 0.1, (0.8, 1.2), "kg") for i in range(30)}
     words = tuple(f"{i} " + 100 * "long word " for i in range(40))
+    finding = hubslosh.Finding("zip.names", "error", "a" * 300, "long word " * 100)
+    rule = hubslosh.CheckedRule("zip.names", "title", "2.1", (finding,) * 1000, None, 0.1)
     ranges = {
         f"{tank}.{of}[1]": "5%" for tank in tanks for of in ("frequency", "zeta", "mass", "bob")
     }
@@ -61,6 +63,9 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
         "Identification": lambda: hubslosh.Identification(
             estimates, estimates, "spherical", {}, True, True, words, {"all": [1.0] * 10_000}
         ),
+        "Finding": lambda: finding,
+        "CheckedRule": lambda: rule,
+        "Checked": lambda: hubslosh.Checked(Path("a.fmu"), 30_000, 0, (rule,) * 30),
         "LiquidModes": lambda: hubslosh.LiquidModes(
             10.0, (0, 0, 0), 0.1, 9.81, np.eye(3), table, table
         ),

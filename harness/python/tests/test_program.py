@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +116,59 @@ def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
             call()
     with pytest.raises(FmuError, match="there is no program at elsewhere"):
         hubslosh.campaign("thesis", program="elsewhere")
+
+
+def test_a_check_gives_typed_findings(fmu: Path, tmp_path: Path, request) -> None:
+    """An FMU whose binaries are no libraries breaks a rule; the FMU as it is breaks none."""
+    program, seen = option(request, "--hubslosh"), []
+    checked = hubslosh.check(fmu, only=["steps"], progress=seen.append, program=program)
+    assert (checked.errors, checked.warnings, checked.findings) == (0, 0, ())
+    assert len(checked.rules) > 3 and all(rule.skipped is None for rule in checked.rules)
+    assert any("rules of calls" in line for line in seen)
+    broken, sarif = tmp_path / "broken.fmu", tmp_path / "broken.sarif"
+    with zipfile.ZipFile(fmu) as packed, zipfile.ZipFile(broken, "w") as new:
+        for name in packed.namelist():
+            new.writestr(name, b"text" if "binaries/" in name else packed.read(name))
+    checked = hubslosh.check(
+        broken, "--sarif", str(sarif), only=["load"], progress=False, program=program
+    )
+    assert checked.errors == len(checked.findings) > 0 and sarif.is_file()
+    finding = checked.findings[0]
+    assert (finding.rule, finding.severity) == ("load.opens", "error")
+    assert f"error load.opens: {finding.place}: " in repr(checked)
+    with pytest.raises(FmuError, match=r"^hubslosh check: no rule is called sewers"):
+        hubslosh.check(fmu, only=["sewers"], program=program)
+
+
+def test_ctrl_c_ends_an_identification_and_its_processes(
+    fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """The signal comes with the first line of progress, when the guarded process lives."""
+    time = np.arange(0, 600, 0.02)
+    table = pd.DataFrame({"time": time, "tau_cmd": 0.1 * np.sin(time**2 / 30), "omega": 0.0})
+    table["omega"] = np.cumsum(table["tau_cmd"]) * 0.02 / 0.32
+    table.to_csv(file := tmp_path / "sweep.csv", index=False)
+
+    def living() -> list[str]:
+        commands = [
+            path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if path.is_file()
+        ]
+        return [text for text in commands if str(file).encode() in text]
+
+    def interrupt(_line: str) -> None:
+        assert sys.platform != "linux" or len(living()) == 2
+        signal.raise_signal(signal.SIGINT)
+
+    # a shell starts its background jobs with SIGINT ignored, and Python keeps that
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            hubslosh.identify(
+                file, fmu=fmu, progress=interrupt, program=option(request, "--hubslosh")
+            )
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert not living()
 
 
 def test_the_method_of_an_identification_is_an_argument() -> None:

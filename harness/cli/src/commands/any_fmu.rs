@@ -5,22 +5,19 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use experiments::sensors::Sensor;
-use files::output::atomically;
 use identify::any_fmu::{self, Identification};
 use identify::force_record::Task;
 use identify::input::names::list;
 use identify::input::question::{Question, Setting, Solver};
 use identify::input::record::Record;
 use identify::model::simulate::Model;
-use identify::news::News;
 use identify::uncertainty::foresee::{Bound, foresee};
 use identify::uncertainty::likelihood::deviances;
 use signals::recording::Columns;
 use signals::table::Table;
-use std::io::Write;
 
-use super::estimates::{deviation, print_estimates};
-use crate::{progress, terminal};
+use super::estimates::{Out, deviation, print_estimates};
+use crate::terminal;
 
 /// Options for fitting any FMU.
 #[derive(clap::Args)]
@@ -99,18 +96,6 @@ pub struct Told<'a> {
     pub fmu: &'a Path,
     /// JSON in place of tables.
     pub json: bool,
-}
-
-/// Files of the results.
-pub struct Out<'a> {
-    /// JSON.
-    pub result: &'a Path,
-    /// HTML.
-    pub report: Option<&'a Path>,
-    /// Prints each iteration.
-    pub verbose: bool,
-    /// Points in place of a fit.
-    pub points: &'a PointsArgs,
 }
 
 /// Items of a flag; the error lists every item that is wrong.
@@ -216,8 +201,8 @@ impl AnyFmuArgs {
         Ok(model)
     }
 
-    /// Identifies, writes and prints.
-    pub fn identify(&self, told: &Told, out: &Out) -> Result<()> {
+    /// Identifies, writes and prints; or returns the likelihood at `points`.
+    pub fn identify(&self, told: &Told, points: &PointsArgs, out: &Out) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;
         let columns = Columns::of_variables(list(told.columns))?.with_rate(told.rate)?;
@@ -235,7 +220,7 @@ impl AnyFmuArgs {
                 },
             )?);
         }
-        if let (Some(points), Some(found)) = (&out.points.points, &out.points.found) {
+        if let (Some(points), Some(found)) = (&points.points, &points.found) {
             let names: Vec<String> = question
                 .unknowns(model.description(), &records)?
                 .into_iter()
@@ -250,35 +235,12 @@ impl AnyFmuArgs {
             let result = files::input::text(found)
                 .with_context(|| format!("{} cannot be read", found.display()))?;
             let deviances = deviances(&model, &question, &records, &result, &rows)?;
-            let text = serde_json::to_string(&deviances)? + "\n";
-            atomically(out.result, |file| Ok(file.write_all(text.as_bytes())?))?;
-            return Ok(());
+            return out.keep(&(serde_json::to_string(&deviances)? + "\n"));
         }
-        let spinner = progress::of_search()?;
-        let found = any_fmu::identify(&model, &question, &records, &mut |news| match news {
-            News::Detail(line) if !out.verbose => spinner.set_message(line.clone()),
-            news => progress::tell(&spinner, news.line()),
-        });
-        spinner.finish_and_clear();
-        let mut found = found?;
+        let mut found = out.search(|news| any_fmu::identify(&model, &question, &records, news))?;
         found.done.splice(0..0, notes);
-        let text = found.json()?;
-        atomically(out.result, |file| Ok(file.write_all(text.as_bytes())?))?;
-        if told.json {
-            print!("{text}");
-        } else {
-            tell(&found);
-        }
-        if found.fits != Some(true) || !found.converged {
-            terminal::warn("the result cannot be trusted; its verdict says why");
-        }
-        if let Some(path) = out.report {
-            let page = any_fmu::page(&found);
-            atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
-            done!("{}", path.display());
-        }
-        done!("{}", out.result.display());
-        Ok(())
+        let is_trusted = found.fits == Some(true) && found.converged;
+        out.give(&found.json()?, is_trusted, || tell(&found), || any_fmu::page(&found))
     }
 
     /// Predicts the uncertainty of a fit to recordings with these inputs; `noise`: `OUTPUT=STD,…`.

@@ -89,6 +89,7 @@ impl CheckArgs {
         bar.finish_and_clear();
         match &self.json {
             Some(None) => json::write(&report, &mut terminal::stdout())?,
+            _ if terminal::has_reader() => {}
             _ => print!("{}", report.text()),
         }
         if let Some(path) = &self.junit {
@@ -103,11 +104,16 @@ impl CheckArgs {
         if let warnings @ 1.. = report.count(Severity::Warning) {
             terminal::warn(format_args!("{} draws {warnings} warnings", fmu.display()));
         }
-        if let Some(bug) = report.bug {
-            bail!(bug);
+        if let Some(bug) = &report.bug {
+            bail!("{bug}");
         }
-        if let Some(why) = report.unchecked {
+        if let Some(why) = &report.unchecked {
             return Err(Unchecked(format!("{}: {why}", fmu.display())).into());
+        }
+        if terminal::has_reader() {
+            let mut text = Vec::new();
+            json::write(&report, &mut text)?;
+            terminal::message("result", &String::from_utf8(text)?);
         }
         match report.count(Severity::Error) {
             0 => Ok(()),

@@ -1,22 +1,20 @@
 //! `hubslosh identify --tank`: from a record of force, moment and motion of a tank to its mechanical model.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use files::output::atomically;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, damping_of};
 use hubslosh_tank::{Fill, Tank, finite_amplitude};
 use identify::force_record::{self, Frame, Predicted, Prediction, Raw, Task};
 use identify::input::names::list;
 use identify::model::simulate::Model;
-use identify::news::News;
 use names::sloshtank::tank::{HINGE, LENGTH, MASS, NONLINEAR_INERTIA, NONLINEAR_STIFFNESS, ZETA};
 use signals::recording::Columns;
 
 use super::DEFAULT_FMU;
-use super::any_fmu::{AnyFmuArgs, Out, Told};
-use crate::{progress, terminal};
+use super::any_fmu::{AnyFmuArgs, Told};
+use super::estimates::Out;
+use crate::terminal;
 
 /// The FMU that is fitted.
 const FMU: &str = "SloshTank";
@@ -211,32 +209,10 @@ impl ForceRecordArgs {
                 notes.push(line);
             })?);
         }
-        let spinner = progress::of_search()?;
-        let found = force_record::identify(&model, &task, &raws, &mut |news| match news {
-            News::Detail(line) if !out.verbose => spinner.set_message(line.clone()),
-            news => progress::tell(&spinner, news.line()),
-        });
-        spinner.finish_and_clear();
-        let mut found = found?;
+        let mut found = out.search(|news| force_record::identify(&model, &task, &raws, news))?;
         found.found.done.splice(0..0, notes);
         let text = serde_json::to_string_pretty(&found)? + "\n";
-        atomically(out.result, |file| Ok(file.write_all(text.as_bytes())?))?;
-        if told.json {
-            print!("{text}");
-        } else {
-            for line in force_record::lines(&found) {
-                println!("{line}");
-            }
-        }
-        if !found.trusted {
-            terminal::warn("the result cannot be trusted; its verdict says why");
-        }
-        if let Some(path) = out.report {
-            let page = force_record::page(&found);
-            atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
-            done!("{}", path.display());
-        }
-        done!("{}", out.result.display());
-        Ok(())
+        let tables = || force_record::lines(&found).iter().for_each(|line| println!("{line}"));
+        out.give(&text, found.trusted, tables, || force_record::page(&found))
     }
 }

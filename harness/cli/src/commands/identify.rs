@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use files::output::atomically;
 use host::fmu::Fmu;
 use identify::fit::bench::options::Options;
 use identify::input::reading::{self, Source};
@@ -19,17 +18,15 @@ use identify::methods::{Method, Task};
 use identify::model::bench::nominal::{self, Nominal};
 use identify::model::bench::simulate::Intersample;
 use identify::model::bench::unknown::Unknown;
-use identify::news::News;
 use identify::words::identified::Identified;
 use names::hubslosh::fluid;
 use signals::recording::Columns;
-use std::io::Write;
 
-use super::any_fmu::{AnyFmuArgs, Out, PointsArgs, Told};
-use super::estimates::print_estimates;
+use super::any_fmu::{AnyFmuArgs, PointsArgs, Told};
+use super::estimates::{Out, print_estimates};
 use super::force_record::ForceRecordArgs;
 use super::{DEFAULT_FMU, open, setting};
-use crate::{progress, terminal};
+use crate::terminal;
 
 /// Finds the FMU's parameters from recordings of a bench, and how sure they are.
 ///
@@ -169,8 +166,8 @@ pub struct IdentifyArgs {
     #[arg(long)]
     json: bool,
     /// File for the result, .json.
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "messages")]
+    out: Option<PathBuf>,
     /// File for a report, .html.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -270,15 +267,18 @@ impl IdentifyArgs {
             self.settings.push((fluid::RHO.into(), "1e-6".into()));
             self.model = vec!["frozen".into()];
         }
-        let json = self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        ensure!(json, "{}: the name must end in .json", self.out.display());
+        for (path, ending) in [(&self.out, "json"), (&self.report, "html")] {
+            let Some(path) = path else { continue };
+            let is_named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+            ensure!(is_named, "{}: the name must end in .{ending}", path.display());
+        }
         ensure!(
             (0.0..1.0).contains(&self.gyro_scale),
             "--gyro-scale must be from 0 to 1, not {}",
             self.gyro_scale
         );
         // before a search that may take minutes
-        for path in [Some(&self.out), self.report.as_ref()].into_iter().flatten() {
+        for path in [&self.out, &self.report].into_iter().flatten() {
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
             let there = folder.is_none_or(Path::is_dir);
             ensure!(there, "{} cannot be written: there is no such directory", path.display());
@@ -307,10 +307,6 @@ impl IdentifyArgs {
             [from, to] if from < to => Some((from, to)),
             _ => bail!("--trim needs two times, the first less than the second, s"),
         };
-        if let Some(path) = &self.report {
-            let html = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
-            ensure!(html, "{}: the name must end in .html", path.display());
-        }
         if self.any.is_asked() || self.force_record.is_asked() {
             let told = Told {
                 data: &self.data,
@@ -320,12 +316,9 @@ impl IdentifyArgs {
                 fmu: self.force_record.fmu(&self.fmu),
                 json: self.json,
             };
-            let report = self.report.as_deref();
-            let out =
-                Out { result: &self.out, report, verbose: self.verbose, points: &self.points };
             return match self.force_record.is_asked() {
-                true => self.force_record.identify(&self.any, &told, &out),
-                false => self.any.identify(&told, &out),
+                true => self.force_record.identify(&self.any, &told, &self.outputs()),
+                false => self.any.identify(&told, &self.points, &self.outputs()),
             };
         }
         match self.method {
@@ -464,31 +457,17 @@ impl IdentifyArgs {
         notes: Vec<String>,
     ) -> Result<()> {
         let task = Task { fmu: fmu.as_ref(), recordings, validation };
-        let spinner = progress::of_search()?;
-        let found = method.identify(&task, &mut |news| match news {
-            News::Detail(line) if !self.verbose => spinner.set_message(line.clone()),
-            news => progress::tell(&spinner, news.line()),
-        });
-        spinner.finish_and_clear();
-        let mut found = found?;
+        let out = self.outputs();
+        let mut found = out.search(|news| method.identify(&task, news))?;
         found.done.splice(0..0, notes);
-        let text = found.json()?;
-        atomically(&self.out, |file| Ok(file.write_all(text.as_bytes())?))?;
-        if self.json {
-            print!("{text}");
-        } else {
-            self.tell::<M>(&found);
-        }
-        if found.fits == Some(false) || !found.converged {
-            terminal::warn("the result cannot be trusted; its verdict says why");
-        }
-        if let Some(path) = &self.report {
-            let page = M::page(&found);
-            atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
-            done!("{}", path.display());
-        }
-        done!("{}", self.out.display());
-        Ok(())
+        let is_trusted = found.fits != Some(false) && found.converged;
+        out.give(&found.json()?, is_trusted, || self.tell::<M>(&found), || M::page(&found))
+    }
+
+    /// Files and form of the results.
+    fn outputs(&self) -> Out<'_> {
+        let (result, report) = (self.out.as_deref(), self.report.as_deref());
+        Out { result, report, json: self.json, verbose: self.verbose }
     }
 
     /// Prints tables and verdict.

@@ -1,0 +1,120 @@
+"""Calls of the program ``hubslosh``, which comes with the wheel or from a build of the source.
+
+The program guards itself: an FMU that crashes or hangs ends a process of the program, not Python.
+It sends progress and results over its standard output as JSON text sequences (RFC 7464).
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sysconfig
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from .fmu import FmuError, source_tree
+from .progress import Line, Progress
+
+
+def find_program(path: str | Path | None = None) -> Path:
+    """Return the path of the program.
+
+    The search order is ``path``, $HUBSLOSH, pip's folder of scripts, PATH, the source tree.
+    """
+    exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
+    named = path or os.environ.get("HUBSLOSH")
+    if named:
+        found = shutil.which(str(named))
+        if found is None:
+            raise FmuError(f"there is no program at {named}")
+        return Path(found)
+    root = source_tree()
+    if not root and (packed := next(filter(os.path.isfile, _scripts(exe)), None)):
+        return packed
+    if found := shutil.which(exe):
+        return Path(found)
+    if root:
+        built = root / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / exe
+        if built.is_file():
+            return built
+    raise FmuError(
+        "the program hubslosh was not found, which does this; it comes with the wheel of this "
+        "package, or is built from the project's source (cargo build --release): put it on PATH, "
+        "name it in the environment variable HUBSLOSH, or give program="
+    )
+
+
+def _scripts(exe: str) -> Iterator[Path]:
+    """Yield where pip puts a wheel's programs: in an environment, for a user, with --target."""
+    yield Path(sysconfig.get_path("scripts")) / exe
+    yield Path(sysconfig.get_path("scripts", sysconfig.get_preferred_scheme("user"))) / exe
+    yield Path(__file__).resolve().parents[1] / "bin" / exe
+
+
+def call(
+    program: Path,
+    command: str,
+    arguments: Sequence[str | Path],
+    progress: Progress = False,
+    codes: Sequence[int] = (0,),
+) -> Any:
+    """Run a command of the program and return its result, or None if it has none.
+
+    * ``codes``: Exit codes of a command that has done its work.
+
+    KeyboardInterrupt, and whatever a function ``progress`` raises, ends the program and its guarded
+    processes. The program removes what it has written by halves.
+
+    Raises FmuError with the program's message.
+    """
+    try:
+        child = subprocess.Popen(
+            [program, command, "--messages", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            errors="replace",
+        )
+    except OSError as error:
+        raise FmuError(f"{program} cannot be started: {error}") from None
+    said: list[str] = []
+    reader = Thread(target=lambda: said.extend(child.stderr or ()), daemon=True)
+    line, result = Line(progress), None
+    with child:
+        reader.start()
+        try:
+            for text in child.stdout or ():
+                if not text.startswith("\x1e"):
+                    continue
+                message = json.loads(text[1:])
+                if "progress" in message:
+                    line.show(message["progress"])
+                result = message.get("result", result)
+        except BaseException:
+            _end(child)
+            raise
+        finally:
+            line.close()
+    reader.join()
+    if child.returncode not in codes or (child.returncode and result is None):
+        raise FmuError(f"hubslosh {command}: {''.join(said).strip().removeprefix('error: ')}")
+    return result
+
+
+def _end(child: "subprocess.Popen[str]") -> None:
+    """End the program, which ends its guarded processes first."""
+    child.terminate()
+    try:
+        child.wait(5)
+    except subprocess.TimeoutExpired:
+        child.kill()
+
+
+def settings_flags(settings: Mapping[str, object] | None) -> list[str]:
+    """Return the flags ``--set``."""
+    flags = []
+    for name, value in (settings or {}).items():
+        flags += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+    return flags

@@ -1,0 +1,41 @@
+"""The line on stderr that shows the progress of a long computation."""
+
+import shutil
+import sys
+from collections.abc import Callable
+from typing import Any
+
+Progress = bool | Callable[[str], Any] | None
+"""True or False shows a line on stderr or none; a function is called with each new line. None shows
+the line on a terminal and in a notebook."""
+
+
+def is_watched() -> bool:
+    """Return whether stderr is a terminal or the output of a notebook's cell."""
+    return sys.stderr.isatty() or type(sys.stderr).__module__ == "ipykernel.iostream"
+
+
+class Line:
+    """A line whose text changes."""
+
+    def __init__(self, progress: Progress = None) -> None:
+        """Take who sees the line; None: those on a terminal and in a notebook."""
+        show = is_watched() if progress is None else progress
+        self._show = show if callable(show) else self._write if show else None
+        self._width = 0
+
+    def show(self, text: str) -> None:
+        """Replace the text."""
+        if self._show is not None:
+            self._show(text)
+
+    def _write(self, text: str) -> None:
+        text = text[: shutil.get_terminal_size((100, 24)).columns - 1]
+        print(f"\r{text:{self._width}}", end="", file=sys.stderr, flush=True)
+        self._width = len(text)
+
+    def close(self) -> None:
+        """Remove the line."""
+        if self._width:
+            print(f"\r{'':{self._width}}\r", end="", file=sys.stderr, flush=True)
+            self._width = 0
