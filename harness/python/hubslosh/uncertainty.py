@@ -877,7 +877,12 @@ def uncertain(
                 table = table.loc[kept, kept]
             root = _root(table[list(table.index)].to_numpy(float))
         except (KeyError, ValueError, TypeError, np.linalg.LinAlgError):
-            problems.append("covariance must be a positive semidefinite table of the same names")
+            wide = [n for n in table.index if is_fit and not np.isfinite(table.loc[n, n])]
+            problems.append(
+                f"the fit does not determine {', '.join(wide)}: give identify a prior"
+                if wide
+                else "covariance must be a positive semidefinite table of the same names"
+            )
         of_axes = [str(name) for name in table.index]
         twice = set(of_axes)
         if is_fit:
