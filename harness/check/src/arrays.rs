@@ -5,7 +5,7 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::under_test::{FmuUnderTest, Interface, Reading, Session};
+use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest};
 use host::causality::Causality;
 use host::description::Type;
 use host::fmi2::guarded::Lists;
@@ -76,10 +76,13 @@ pub fn arrays(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         let lists = lists(&mut session)?;
-        fmu.doing(format!("calls with margins around their arrays ({})", interface.name()));
+        fmu.doing(format!(
+            "calls with margins around their arrays ({})",
+            FmuUnderTest::name(interface)
+        ));
         for beside in session.instance.writes_beside(&lists) {
             findings.add(
-                format!("{}, {} ({})", beside.call, beside.array, interface.name()),
+                format!("{}, {} ({})", beside.call, beside.array, FmuUnderTest::name(interface)),
                 format!(
                     "{} (allowed: to write as many values as the call says, into what is to be \
                      written)",

@@ -9,7 +9,7 @@ use anyhow::Result;
 use super::Findings;
 use super::description::{Unknown, Variable};
 use super::life::first;
-use super::under_test::{FmuUnderTest, Interface, Reading, Session, start_value};
+use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest, start_value};
 use super::values::items;
 use host::causality::Causality;
 use host::description::Type;

@@ -12,7 +12,7 @@ use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
 use super::exchange::continuous;
-use super::under_test::{FmuUnderTest, Interface, STEPS, Session, Sight};
+use super::under_test::{FmuUnderTest, Interface, Life, STEPS, Session, Sight};
 
 /// Starts from which runs are made: the first as declared, then with other parameters.
 const STARTS: u64 = 12;

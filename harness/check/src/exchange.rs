@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::Findings;
 use super::life::expect_refusal;
-use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session};
+use super::under_test::{FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest};
 
 /// An instance in continuous-time mode, or the reason why there is none.
 pub fn continuous<'f>(

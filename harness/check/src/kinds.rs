@@ -12,7 +12,7 @@ use super::Findings;
 use super::dependencies::moved;
 use super::description::{Unknown, Variable};
 use super::life::first;
-use super::under_test::{FmuUnderTest, Interface, Reading, Session};
+use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
 
 /// Starts at which factors are measured: the first as declared, then with other parameters.
 const STARTS: u64 = 12;

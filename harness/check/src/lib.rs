@@ -18,6 +18,7 @@ pub mod json;
 pub mod junit;
 pub mod kinds;
 pub mod life;
+pub mod loaded;
 pub mod log;
 pub mod memory;
 pub mod options;

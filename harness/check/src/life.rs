@@ -4,12 +4,13 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, Stage, Unusable};
+use super::loaded::{Life, Readings, STEPS, UnderTest, Unusable};
+use super::under_test::{FmuUnderTest, Interface, Reading, Session, Stage};
 use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Status, file_uri};
 
 /// `load.opens`: what came before is the check, but for the second binary of two.
-pub fn opens(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    if let Some(why) = fmu.broken() {
+pub fn opens<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    for why in fmu.broken() {
         findings.add("the binary of one interface", why);
     }
     Ok(())
@@ -28,32 +29,36 @@ pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 }
 
 /// `load.version`
-pub fn version(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    fmu.doing("fmi2GetVersion");
+pub fn version<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    let call = format!("{}GetVersion", F::FMI);
+    fmu.doing(&call);
     for binary in fmu.binaries() {
         let answer = binary.version();
-        if answer != "2.0" {
-            findings.add("fmi2GetVersion", format!("{answer:?} (allowed: \"2.0\")"));
+        // of FMI 3.0 there are bug fixes: 3.0.1
+        let is_fixed = F::NUMBER == "3.0" && answer.starts_with("3.0.");
+        if answer != F::NUMBER && !is_fixed {
+            findings.add(&call, format!("{answer:?} (allowed: {:?})", F::NUMBER));
         }
     }
     Ok(())
 }
 
 /// `load.instance`
-pub fn instance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in fmu.interfaces() {
-        fmu.session(interface)?;
+pub fn instance<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    for using in fmu.uses() {
+        fmu.session(using)?;
     }
     if fmu.interfaces().is_empty() {
-        findings.add("fmi2Instantiate", "the binary lacks the functions of the declared interface");
+        let call = format!("{}Instantiate", F::FMI);
+        findings.add(call, "the binary lacks the functions of the declared interface");
     }
     Ok(())
 }
 
 /// `load.initialises`
-pub fn initialises(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
-    for interface in fmu.interfaces() {
-        fmu.running(interface)?;
+pub fn initialises<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
+    for using in fmu.uses() {
+        fmu.running(using)?;
     }
     Ok(())
 }
@@ -83,7 +88,7 @@ pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// The interface most rules use.
 pub fn first(fmu: &FmuUnderTest) -> Result<Interface> {
-    let why = || super::under_test::Unusable {
+    let why = || Unusable {
         rule: "load.instance",
         why: "it offers no interface that can be called".into(),
     };
@@ -93,16 +98,12 @@ pub fn first(fmu: &FmuUnderTest) -> Result<Interface> {
 /// `instantiate.guid`
 pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = first(fmu)?;
-    let wrong = format!("{}x", fmu.binary(interface).description().guid);
-    let with = Instantiation { guid: Some(&wrong), ..arguments(fmu, interface) };
+    let wrong = format!("{}x", fmu.binary(interface)?.description().guid);
+    let with = Instantiation { guid: Some(&wrong), ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with another GUID";
     fmu.doing(place);
     expect_null(findings, place, fmu.instantiate(interface, &with)?);
     Ok(())
-}
-
-fn arguments(fmu: &FmuUnderTest, interface: Interface) -> Instantiation<'_> {
-    Instantiation { kind: interface.kind(), ..fmu.binary(interface).instantiation("check") }
 }
 
 fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, CallError>) {
@@ -121,7 +122,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     let interface = first(fmu)?;
     // the standard asks for a URI: only a FMU that needs no resources can do without
     let place = "fmi2Instantiate with the resource location NULL";
-    let with = Instantiation { resources: None, ..arguments(fmu, interface) };
+    let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
     let answer = fmu.left_open(place, findings, || fmu.instantiate(interface, &with))?;
     if let Err(error) = answer
         && fmu.description().co_simulation.is_some()
@@ -129,11 +130,10 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         findings.add(place, error.to_string());
     }
     // what no host may pass, so that the standard does not say what happens
-    let good = || arguments(fmu, interface);
     for (what, with) in [
-        ("the instance name NULL", Instantiation { name: None, ..good() }),
-        ("an empty instance name", Instantiation { name: Some(""), ..good() }),
-        ("the GUID NULL", Instantiation { guid: None, ..good() }),
+        ("the instance name NULL", Instantiation { name: None, ..fmu.arguments(interface)? }),
+        ("an empty instance name", Instantiation { name: Some(""), ..fmu.arguments(interface)? }),
+        ("the GUID NULL", Instantiation { guid: None, ..fmu.arguments(interface)? }),
     ] {
         let place = format!("fmi2Instantiate with {what}");
         let answer = fmu.left_open(&place, findings, || fmu.instantiate(interface, &with))?;
@@ -155,7 +155,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             None => fmu.session(interface)?,
             Some(_) => {
                 fmu.doing("fmi2Instantiate with another resource location");
-                let with = arguments(fmu, interface);
+                let with = fmu.arguments(interface)?;
                 let with = Instantiation { resources: location, logging: false, ..with };
                 fmu.session_with(interface, &with)?
             }
@@ -216,7 +216,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     refuse_as_usual(fmu, interface)?;
     let place = "fmi2Instantiate with NULL for the memory functions";
     fmu.doing(place);
-    let with = Instantiation { callbacks: Callbacks::Logger, ..arguments(fmu, interface) };
+    let with = Instantiation { callbacks: Callbacks::Logger, ..fmu.arguments(interface)? };
     let made = fmu.instantiate(interface, &with)?;
     match made.map_err(anyhow::Error::from).and_then(|instance| live(fmu, instance)) {
         Ok(()) => {}
@@ -225,7 +225,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     }
     // Hosts must give a logger: without one it may refuse, and should not crash.
-    let with = Instantiation { callbacks: Callbacks::Empty, ..arguments(fmu, interface) };
+    let with = Instantiation { callbacks: Callbacks::Empty, ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with callbacks that are all NULL";
     let answer = fmu.left_open(place, findings, || {
         fmu.instantiate(interface, &with)?.map_or(Ok(()), |instance| live(fmu, instance))
@@ -253,7 +253,7 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = first(fmu)?;
     let logs = refuse_as_usual(fmu, interface)?;
     fmu.doing("fmi2Instantiate with callbacks that are wiped afterwards");
-    let with = Instantiation { callbacks: Callbacks::Fleeting, ..arguments(fmu, interface) };
+    let with = Instantiation { callbacks: Callbacks::Fleeting, ..fmu.arguments(interface)? };
     let mut instance = fmu.instantiate(interface, &with)??;
     fmu.doing("a refused call after the callbacks' struct was wiped");
     if let Err(error) = instance.get_real(&[u32::MAX], &mut [0.0])
@@ -266,8 +266,8 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `instantiate.free_null`: a crash is the finding.
-pub fn free_null(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
-    fmu.doing("fmi2FreeInstance(NULL)");
+pub fn free_null<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
+    fmu.doing(format!("{}FreeInstance(NULL)", F::FMI));
     for binary in fmu.binaries() {
         binary.free_null_instance();
     }
@@ -293,14 +293,14 @@ pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `life.instances`
-pub fn instances(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in fmu.interfaces() {
+pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    for using in fmu.uses() {
         let alone = {
-            let mut session = fmu.running(interface)?;
+            let mut session = fmu.running(using)?;
             session.advance(STEPS)?;
             session.readings()?
         };
-        let (mut one, mut two) = (fmu.running(interface)?, fmu.running(interface)?);
+        let (mut one, mut two) = (fmu.running(using)?, fmu.running(using)?);
         two.advance(3)?;
         for _ in 0..STEPS {
             one.advance(1)?;
@@ -308,8 +308,8 @@ pub fn instances(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
         let readings = one.readings()?;
         if let Some(text) = one.difference(&readings, &alone) {
-            is_deterministic(fmu, interface)?;
-            findings.add(format!("{}, two instances in turn", interface.name()), text);
+            is_deterministic(fmu, using)?;
+            findings.add(format!("{}, two instances in turn", F::name(using)), text);
         }
         drop(two);
         one.advance(1)?;
@@ -318,19 +318,19 @@ pub fn instances(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `life.deterministic`
-pub fn deterministic(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in fmu.interfaces() {
-        if let Some(text) = differs_when_run_again(fmu, interface)? {
-            findings.add(format!("{}, the same run again", interface.name()), text);
+pub fn deterministic<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    for using in fmu.uses() {
+        if let Some(text) = differs_when_run_again(fmu, using)? {
+            findings.add(format!("{}, the same run again", F::name(using)), text);
         }
     }
     Ok(())
 }
 
 /// Makes the same run twice and returns the first difference.
-fn differs_when_run_again(fmu: &FmuUnderTest, interface: Interface) -> Result<Option<String>> {
+fn differs_when_run_again<F: UnderTest>(fmu: &F, using: F::Use) -> Result<Option<String>> {
     let run = || -> Result<_> {
-        let mut session = fmu.running(interface)?;
+        let mut session = fmu.running(using)?;
         session.advance(STEPS)?;
         Ok((session.readings()?, session))
     };
@@ -341,34 +341,29 @@ fn differs_when_run_again(fmu: &FmuUnderTest, interface: Interface) -> Result<Op
 }
 
 /// Fails if the same run differs: then a comparison of runs says nothing, and `life.deterministic` reports it.
-fn is_deterministic(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
-    match differs_when_run_again(fmu, interface)? {
+pub fn is_deterministic<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
+    match differs_when_run_again(fmu, using)? {
         None => Ok(()),
         Some(why) => Err(Unusable { rule: "life.deterministic", why }.into()),
     }
 }
 
 /// `life.reset`
-pub fn reset(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in fmu.interfaces() {
-        let fresh = history(&mut fmu.session(interface)?)?;
-        let mut session = fmu.session(interface)?;
-        // Before the run that counts: another time, another tolerance, another history.
-        perturb(&mut session);
-        let start = fmu.experiment().start;
-        if session.initialise_at(start + 1.0, None, Some(1e-3)).is_ok() {
-            session.count = 7;
-            let _ = session.advance(5); // these parameters may have no solution
-        }
-        fmu.doing("fmi2Reset after steps");
-        session.instance.reset()?;
-        session.count = 0;
-        let again = history(&mut session)
-            .map_err(|error| anyhow::anyhow!("a run after fmi2Reset: {error:#}"))?;
+pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    let call = format!("{}Reset", F::FMI);
+    for using in fmu.uses() {
+        let fresh = history::<F>(&mut fmu.session(using)?)?;
+        let mut session = fmu.session(using)?;
+        session.stray()?;
+        fmu.doing(format!("{call} after steps"));
+        session.instance().reset()?;
+        session.rewind();
+        let again = history::<F>(&mut session)
+            .map_err(|error| anyhow::anyhow!("a run after {call}: {error:#}"))?;
         for (fresh, again) in fresh.iter().zip(&again) {
             if let Some(text) = session.difference(again, fresh) {
-                is_deterministic(fmu, interface)?;
-                findings.add(format!("{}, a run after fmi2Reset", interface.name()), text);
+                is_deterministic(fmu, using)?;
+                findings.add(format!("{}, a run after {call}", F::name(using)), text);
                 break;
             }
         }
@@ -377,26 +372,12 @@ pub fn reset(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// All values after initialisation and after a run.
-fn history(session: &mut Session) -> Result<Vec<Vec<Reading>>> {
+fn history<'f, F: UnderTest + 'f>(session: &mut F::Session<'f>) -> Result<Vec<Readings<'f, F>>> {
     session.initialise()?;
     let mut all = vec![session.readings()?];
     session.advance(STEPS)?;
     all.push(session.readings()?);
     Ok(all)
-}
-
-/// Changes parameters a little, those that let it.
-fn perturb(session: &mut Session) {
-    let fmu = session.fmu;
-    for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
-        let Some(Reading::Real(start)) = super::under_test::start_value(v) else { continue };
-        let (min, max) = v.bounds();
-        let moved = start * 1.01;
-        if moved >= min && moved <= max {
-            // one that is refused keeps its value
-            let _ = session.set(v, &Reading::Real(moved));
-        }
-    }
 }
 
 /// `life.reset_anywhere`
@@ -416,7 +397,7 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
                     let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
                 });
             }
-            let place = format!("fmi2Reset, {from} ({})", interface.name());
+            let place = format!("fmi2Reset, {from} ({})", FmuUnderTest::name(interface));
             fmu.doing(&place);
             if let Err(error) = session.instance.reset() {
                 findings.add(place, error.to_string());
@@ -431,17 +412,18 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 }
 
 /// `life.terminate`
-pub fn terminate(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in fmu.interfaces() {
-        let mut session = fmu.running(interface)?;
+pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    let call = format!("{}Terminate", F::FMI);
+    for using in fmu.uses() {
+        let mut session = fmu.running(using)?;
         session.advance(3)?;
         let before = session.readings()?;
-        fmu.doing("fmi2Terminate");
-        session.instance.terminate()?;
-        fmu.doing("reading values after fmi2Terminate");
+        fmu.doing(&call);
+        session.instance().terminate()?;
+        fmu.doing(format!("reading values after {call}"));
         let after = session.readings()?;
         if let Some(text) = session.difference(&after, &before) {
-            findings.add(format!("after fmi2Terminate ({})", interface.name()), text);
+            findings.add(format!("after {call} ({})", F::name(using)), text);
         }
     }
     Ok(())
@@ -487,7 +469,8 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             for (call, made) in calls.iter().chain(more) {
                 let mut session = fmu.session_in(interface, *stage)?;
                 let state = stage.name();
-                let place = format!("{call} in state \"{state}\" ({})", interface.name());
+                let place =
+                    format!("{call} in state \"{state}\" ({})", FmuUnderTest::name(interface));
                 let answer = fmu.left_open(&place, findings, || made(&mut session));
                 expect_refusal(findings, place, answer);
             }

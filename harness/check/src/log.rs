@@ -4,20 +4,16 @@ use anyhow::Result;
 
 use super::Findings;
 use super::life::first;
-use super::under_test::{FmuUnderTest, Interface, STEPS, Unusable};
+use super::under_test::{FmuUnderTest, Interface, Life, STEPS, UnderTest, Unusable};
 use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
 
 /// Messages of an FMU about several mistakes, and how many of its ordinary instance have the category NULL.
-fn complaints(fmu: &FmuUnderTest) -> Result<(Vec<Message>, usize)> {
+pub fn complaints(fmu: &FmuUnderTest) -> Result<(Vec<Message>, usize)> {
     let interface = first(fmu)?;
     let mut all = Vec::new();
     fmu.doing("fmi2Instantiate with another GUID");
-    let with = Instantiation {
-        kind: interface.kind(),
-        guid: Some("another"),
-        ..fmu.binary(interface).instantiation("check")
-    };
+    let with = Instantiation { guid: Some("another"), ..fmu.arguments(interface)? };
     if let Err(error) = fmu.instantiate(interface, &with)? {
         all.extend(error.messages);
     }
@@ -50,11 +46,7 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut told = Vec::new();
     let place = format!("a message about {TEXT:?}");
     fmu.doing(&place);
-    let with = Instantiation {
-        kind: interface.kind(),
-        guid: Some(TEXT),
-        ..fmu.binary(interface).instantiation(TEXT)
-    };
+    let with = Instantiation { name: Some(TEXT), guid: Some(TEXT), ..fmu.arguments(interface)? };
     if let Err(error) = fmu.instantiate(interface, &with)? {
         told.extend(error.messages);
     }
@@ -81,14 +73,14 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `log.categories`
-pub fn categories(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let root = &fmu.description().root;
-    let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
+pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    let declared: Vec<&str> =
+        fmu.root().list("LogCategories").filter_map(|c| c.get("name")).collect();
     if declared.is_empty() {
         findings.skip("no categories are declared");
         return Ok(());
     }
-    let (messages, uncategorised) = complaints(fmu)?;
+    let (messages, uncategorised) = fmu.complaints()?;
     if uncategorised > 0 {
         let all = declared.join(", ");
         findings.add("a message", format!("its category is NULL (declared: {all})"));
@@ -132,8 +124,7 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Makes an ordinary run with loggingOn and returns its messages.
 fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<Vec<Message>> {
     fmu.doing("fmi2Instantiate, loggingOn");
-    let with =
-        Instantiation { kind: interface.kind(), ..fmu.binary(interface).instantiation("check") };
+    let with = fmu.arguments(interface)?;
     let mut session = fmu.session_with(interface, &with)?;
     session.initialise()?;
     if changing {
@@ -156,7 +147,7 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         messages.retain(|message| !changing || message.status == Status::Ok);
         if let Some(message) = messages.first() {
             findings.add(
-                format!("an ordinary run, {inputs}, loggingOn ({})", interface.name()),
+                format!("an ordinary run, {inputs}, loggingOn ({})", FmuUnderTest::name(interface)),
                 format!("{} messages, the first {:?}", messages.len(), message.text),
             );
         }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 
 use super::Findings;
-use super::under_test::{FmuUnderTest, Interface};
+use super::under_test::{FmuUnderTest, Interface, Life, UnderTest};
 
 /// Calls of a window.
 const MOST: usize = 500;
@@ -69,7 +69,7 @@ pub fn memory(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Result<()> {
-    let name = interface.name();
+    let name = FmuUnderTest::name(interface);
     let mut session = fmu.running(interface)?;
     let step = || -> Result<()> {
         session.advance(1)?;

@@ -10,8 +10,9 @@ use anyhow::{Context, Result};
 use host::guard::{self, Cause, Limits, Output};
 use host::xml::Element;
 
+use super::loaded::Unusable;
 use super::trace::{self, Answer, Crash};
-use super::under_test::{FmuUnderTest, Unusable};
+use super::under_test::FmuUnderTest;
 use super::{Check, Description, Findings, Options, RULES, Rule, life, v3};
 
 /// The hidden subcommand of `hubslosh`.

@@ -8,7 +8,7 @@ use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
 use super::life::first;
-use super::under_test::{FmuUnderTest, Reading, STEPS, Session, start_value};
+use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use super::values::{items, mentions};
 use host::description::Type;
 
@@ -49,7 +49,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                         format!(
                             "it is {x} after {step} steps of an ordinary run ({}) (allowed by its min \
                              and max: {min} to {max})",
-                            interface.name()
+                            FmuUnderTest::name(interface)
                         ),
                     );
                 }

@@ -3,66 +3,72 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::under_test::{FmuUnderTest, Interface, Mark, Reading, STEPS, Session, Stage, Unusable};
+use super::loaded::{Life, Mark, Readings, STEPS, UnderTest, Unusable};
+use super::under_test::{FmuUnderTest, Stage};
 
-/// Interfaces that declare a capability; none is a reason to skip.
-fn with(fmu: &FmuUnderTest, flag: &str, findings: &mut Findings) -> Vec<Interface> {
-    let mut all = fmu.interfaces();
-    all.retain(|interface| fmu.can(*interface, flag));
+/// Uses whose interface declares a capability, such as "canSerialize" with the word for the state; none is a reason to skip.
+pub fn with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> Vec<F::Use> {
+    let flag = format!("{can}{}", F::STATE);
+    let mut all = fmu.uses();
+    all.retain(|using| fmu.can(F::interface(*using), &flag));
     if all.is_empty() {
         findings.skip(format!("{flag} is not declared"));
     }
     all
 }
 
-const SAVE: &str = "canGetAndSetFMUstate";
-const SERIALIZE: &str = "canSerializeFMUstate";
+const SAVE: &str = "canGetAndSet";
+const SERIALIZE: &str = "canSerialize";
 
 /// Goes on by some steps from where the host was when it saved the state.
-fn continued(session: &mut Session, from: &Mark) -> Result<Vec<Reading>> {
+fn continued<'f, F: UnderTest + 'f>(
+    session: &mut F::Session<'f>,
+    from: &Mark<'f, F>,
+) -> Result<Readings<'f, F>> {
     session.go_back(from);
     session.advance(STEPS)?;
     session.readings()
 }
 
 /// Fails if a run from a saved state differs in the instance that has saved it: `states.rollback` reports that.
-fn rolls_back(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
-    let mut session = fmu.running(interface)?;
+fn rolls_back<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
+    let mut session = fmu.running(using)?;
     session.advance(3)?;
-    let (state, here) = (session.instance.get_state()?, session.mark());
-    let first = continued(&mut session, &here)?;
-    session.instance.set_state(&state)?;
-    let second = continued(&mut session, &here)?;
-    session.instance.free_state(state)?;
+    let (state, here) = (session.instance().get_state()?, session.mark());
+    let first = continued::<F>(&mut session, &here)?;
+    session.instance().set_state(&state)?;
+    let second = continued::<F>(&mut session, &here)?;
+    session.instance().free_state(state)?;
     match session.difference(&second, &first) {
         None => Ok(()),
         Some(why) => Err(Unusable { rule: "states.rollback", why }.into()),
     }
 }
 
-/// `states.rollback`
-pub fn rollback(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in with(fmu, SAVE, findings) {
-        let mut session = fmu.running(interface)?;
+/// `states.rollback`; of FMI 3.0 `states.restore`
+pub fn rollback<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+    let call = |verb: &str| format!("{}{verb}{}", F::FMI, F::STATE);
+    for using in with(fmu, SAVE, findings) {
+        let mut session = fmu.running(using)?;
         session.advance(3)?;
-        fmu.doing("fmi2GetFMUstate");
-        let state = session.instance.get_state()?;
+        fmu.doing(call("Get"));
+        let state = session.instance().get_state()?;
         let here = session.mark();
         let before = session.readings()?;
-        let first = continued(&mut session, &here)?;
-        fmu.doing("fmi2SetFMUstate");
-        session.instance.set_state(&state)?;
+        let first = continued::<F>(&mut session, &here)?;
+        fmu.doing(call("Set"));
+        session.instance().set_state(&state)?;
         let restored = session.readings()?;
+        let set = format!("after {} ({})", call("Set"), F::name(using));
         if let Some(text) = session.difference(&restored, &before) {
-            findings.add(format!("right after fmi2SetFMUstate ({})", interface.name()), text);
+            findings.add(format!("right {set}"), text);
         }
-        let second = continued(&mut session, &here)?;
+        let second = continued::<F>(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
-            let place = format!("{STEPS} steps after fmi2SetFMUstate ({})", interface.name());
-            findings.add(place, text);
+            findings.add(format!("{STEPS} steps {set}"), text);
         }
-        fmu.doing("fmi2FreeFMUstate");
-        session.instance.free_state(state)?;
+        fmu.doing(call("Free"));
+        session.instance().free_state(state)?;
     }
     Ok(())
 }
@@ -76,12 +82,12 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.doing("fmi2GetFMUstate into a handle that is there already");
         session.instance.get_state_into(&mut state)?;
         let here = session.mark();
-        let first = continued(&mut session, &here)?;
+        let first = continued::<FmuUnderTest>(&mut session, &here)?;
         session.instance.set_state(&state)?;
-        let second = continued(&mut session, &here)?;
+        let second = continued::<FmuUnderTest>(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             rolls_back(fmu, interface)?;
-            findings.add(format!("a handle used again ({})", interface.name()), text);
+            findings.add(format!("a handle used again ({})", FmuUnderTest::name(interface)), text);
         }
         session.instance.free_state(state)?;
         fmu.doing("fmi2FreeFMUstate of NULL");
@@ -107,7 +113,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             session.instance.free_state(state)?;
             let here = session.mark();
-            (continued(&mut session, &here)?, here, bytes)
+            (continued::<FmuUnderTest>(&mut session, &here)?, here, bytes)
         };
         // One instance that has lived, one that was neither set up nor initialised.
         for lived in [true, false] {
@@ -121,9 +127,9 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             });
             let state = other.instance.deserialize(&bytes)?;
             other.instance.set_state(&state)?;
-            let second = continued(&mut other, &here)?;
+            let second = continued::<FmuUnderTest>(&mut other, &here)?;
             if let Some(text) = other.difference(&second, &first) {
-                let place = format!("{} ({})", fmu.now(), interface.name());
+                let place = format!("{} ({})", fmu.now(), FmuUnderTest::name(interface));
                 rolls_back(fmu, interface)?;
                 findings.add(place, text);
             }
@@ -155,7 +161,8 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             ("zeros", vec![0; bytes.len()]),
             ("one byte changed", flipped),
         ] {
-            let place = format!("fmi2DeSerializeFMUstate with {what} ({})", interface.name());
+            let place =
+                format!("fmi2DeSerializeFMUstate with {what} ({})", FmuUnderTest::name(interface));
             let mut session = fmu.running(interface)?;
             session.advance(3)?;
             let before = session.readings()?;
@@ -194,8 +201,10 @@ pub fn modes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for stage in [Stage::Instantiated, Stage::Initialization, Stage::Terminated] {
             let mut session = fmu.session_in(interface, stage)?;
             let mode = stage.name();
-            let place =
-                format!("fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({})", interface.name());
+            let place = format!(
+                "fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({})",
+                FmuUnderTest::name(interface)
+            );
             fmu.doing(&place);
             let done = session.instance.get_state().and_then(|state| {
                 let set = session.instance.set_state(&state);

@@ -6,7 +6,9 @@ use super::Findings;
 use super::dependencies::elsewhere;
 use super::description::Variable;
 use super::life::expect_refusal;
-use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, Unusable};
+use super::under_test::{
+    FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest, Unusable,
+};
 use host::causality::Causality;
 use host::fmi2::{CallError, Status};
 
@@ -145,7 +147,7 @@ pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.running(interface)?.advance(STEPS)?;
         for start in [fmu.experiment().start + 1000.0, fmu.experiment().start - 3.0] {
             let mut session = fmu.session(interface)?;
-            let place = format!("start time {start} s ({})", interface.name());
+            let place = format!("start time {start} s ({})", FmuUnderTest::name(interface));
             if let Err(error) = session.initialise_at(start, None, fmu.experiment().tolerance) {
                 findings.add(place, error.to_string());
             } else if let Err(error) = session.advance(STEPS) {
@@ -191,7 +193,11 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 session.initialise_at(start, None, tolerance).and_then(|()| session.advance(3));
             if let Err(error) = done {
                 let given = tolerance.map_or("none".into(), |x: f64| x.to_string());
-                fails.push((interface, format!("tolerance {given} ({})", interface.name()), error));
+                fails.push((
+                    interface,
+                    format!("tolerance {given} ({})", FmuUnderTest::name(interface)),
+                    error,
+                ));
             }
         }
     }

@@ -5,7 +5,9 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, start_value};
+use super::under_test::{
+    FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest, start_value,
+};
 use super::values::other_value;
 use host::causality::{Causality, Variability};
 use host::fmi2::Called;
@@ -58,7 +60,7 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 let place = format!(
                     "setting the tunable parameter {} to {value} after a step ({})",
                     v.name,
-                    interface.name()
+                    FmuUnderTest::name(interface)
                 );
                 fmu.doing(&place);
                 if let Err(error) = set_between_steps(&mut session, v, &value)? {
@@ -134,7 +136,7 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 "set to {value} before initialisation it changes {name} within {STEPS} steps; set \
                  after initialisation it changes nothing ({}) (allowed: a tunable parameter that \
                  acts)",
-                interface.name()
+                FmuUnderTest::name(interface)
             );
             findings.add(v.place(), text);
         }

@@ -2,28 +2,26 @@
 
 mod sight;
 
-use std::cell::{Cell, RefCell};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 
-use super::Findings;
 use super::description::{Description, Variable};
-use super::trace::{self, Crash};
+use super::loaded::{Loaded, declared};
 use host::causality::Causality;
 use host::description::Type;
 use host::fmi2::{
-    CO_SIMULATION, CallError, Called, Fmu, Instance, Instantiation, MODEL_EXCHANGE, PLATFORM,
-    Status,
+    CO_SIMULATION, CallError, Called, Fmi2, Fmu, Instance, Instantiation, MODEL_EXCHANGE, Message,
+    PLATFORM, Status,
 };
 use host::xml::Element;
 
 pub use self::sight::Sight;
+pub use super::loaded::{Life, STEPS, UnderTest, Unusable};
+pub use host::fmi3::Interface;
 
-/// Steps of a short run.
-pub const STEPS: usize = 20;
 /// Calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
 /// Largest number of events in succession: an FMU that always requests the next one at once is a finding.
@@ -32,56 +30,27 @@ const IMMEDIATE: usize = 3;
 const ASKED: usize = 20;
 /// Share of a state below which its change at an event is rounding.
 const JUMP: f64 = 1e-9;
-/// Time for a call that the standard leaves open and that need not return.
-const PATIENCE: Duration = Duration::from_secs(3);
 /// Order of magnitude of a state that does not tell its own.
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
-/// One of the two interfaces of FMI 2.0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interface {
-    /// The FMU integrates.
-    CoSimulation,
-    /// The host integrates.
-    ModelExchange,
-}
-
-/// Most rules cannot be checked: one rule gives the reason, the others are skipped.
-#[derive(Debug)]
-pub struct Unusable {
-    /// The rule that tells; empty if it is not a fault.
-    pub rule: &'static str,
-    /// Reason.
-    pub why: String,
-}
-
-impl std::fmt::Display for Unusable {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(&self.why)
-    }
-}
-
-impl std::error::Error for Unusable {}
-
 /// The loaded FMU.
 pub struct FmuUnderTest {
-    /// The binaries: one, or two where modelIdentifier differs between the interfaces.
-    binaries: Vec<Fmu>,
-    /// The interfaces that can be called, Co-Simulation first, and the binary of each.
-    interfaces: Vec<(Interface, usize)>,
-    /// Reason why an existing binary cannot be loaded.
-    broken: Option<String>,
-    deadline: Instant,
+    loaded: Loaded<Fmi2>,
     description: &'static Description,
     /// Places of the continuous inputs among the variables.
     inputs: Vec<usize>,
-    doing: RefCell<String>,
-    crash: RefCell<Crash>,
-    sessions: Cell<usize>,
     directory: PathBuf,
     path: PathBuf,
     /// State of the process before the binary was loaded.
     pub before: Vec<(&'static str, String)>,
+}
+
+impl Deref for FmuUnderTest {
+    type Target = Loaded<Fmi2>;
+
+    fn deref(&self) -> &Loaded<Fmi2> {
+        &self.loaded
+    }
 }
 
 /// A value as it was read.
@@ -134,18 +103,6 @@ pub struct Experiment {
     pub step: f64,
 }
 
-/// An error if a rule may not make another instance: the FMU can have one in a process, or time is over.
-pub fn allowed(made: usize, is_once: bool, deadline: Instant) -> Result<()> {
-    let why = if made > 0 && is_once {
-        "it can be instantiated only once per process".into()
-    } else if Instant::now() > deadline {
-        format!("the time for its calls is over after {made} instances (--limit gives more)")
-    } else {
-        return Ok(());
-    };
-    Err(Unusable { rule: "", why }.into())
-}
-
 impl FmuUnderTest {
     /// Loads the FMU that is unpacked in `directory` and has this model description, which lives as long as the process
     /// of the rule. Makes no instances after `deadline`.
@@ -155,47 +112,19 @@ impl FmuUnderTest {
         description: &'static Description,
         deadline: Instant,
     ) -> Result<FmuUnderTest> {
-        let identifier = |interface: &Option<Element>| {
-            interface.as_ref().and_then(|i| i.get("modelIdentifier")).map(str::to_string)
+        let root = &description.root;
+        let mut loaded = Loaded::new(declared(root), deadline, |interface| {
+            Fmu::load_for(kind(interface), directory, path, root)
+        })?;
+        // that one of two is missing is a rule of its own
+        let is_there = |identifier: &str| {
+            let file = format!("binaries/{PLATFORM}/{identifier}{}", std::env::consts::DLL_SUFFIX);
+            directory.join(file).exists()
         };
-        let declared = [
-            (Interface::CoSimulation, identifier(&description.co_simulation)),
-            (Interface::ModelExchange, identifier(&description.model_exchange)),
-        ];
-        let (mut binaries, mut interfaces) = (Vec::<Fmu>::new(), Vec::new());
-        let (mut broken, mut is_there, mut loaded) = (None, false, Vec::new());
-        for (interface, identifier) in declared {
-            let Some(identifier) = identifier else { continue };
-            let at = match loaded.iter().position(|known| *known == identifier) {
-                Some(at) => at,
-                None => match Fmu::load_for(interface.kind(), directory, path, &description.root) {
-                    Ok(binary) => {
-                        binaries.push(binary);
-                        loaded.push(identifier);
-                        binaries.len() - 1
-                    }
-                    Err(error) => {
-                        let suffix = std::env::consts::DLL_SUFFIX;
-                        let file = format!("binaries/{PLATFORM}/{identifier}{suffix}");
-                        // that one of two is missing is a rule of its own
-                        is_there |= directory.join(file).exists();
-                        broken.get_or_insert(format!("{error:#}"));
-                        continue;
-                    }
-                },
-            };
-            if interface == Interface::CoSimulation || binaries[at].has_exchange() {
-                interfaces.push((interface, at));
-            }
-        }
-        if binaries.is_empty() {
-            bail!("{}", broken.unwrap_or_else(|| "it declares no interface".into()));
-        }
+        loaded
+            .retain(|of, binary| of == Interface::CoSimulation || binary.has_exchange(), is_there);
         Ok(FmuUnderTest {
-            binaries,
-            interfaces,
-            broken: broken.filter(|_| is_there),
-            deadline,
+            loaded,
             description,
             inputs: (0..description.variables.len())
                 .filter(|k| {
@@ -203,9 +132,6 @@ impl FmuUnderTest {
                     v.causality == Causality::Input && v.is_continuous()
                 })
                 .collect(),
-            doing: RefCell::default(),
-            crash: RefCell::new(Crash::Error),
-            sessions: Cell::new(0),
             directory: directory.to_path_buf(),
             path: path.to_path_buf(),
             before: Vec::new(),
@@ -221,85 +147,6 @@ impl FmuUnderTest {
     /// The folder of the unpacked FMU.
     pub fn directory(&self) -> &Path {
         &self.directory
-    }
-
-    /// Announces the next call: a crash or a hang is then reported at this place.
-    pub fn doing(&self, what: impl Into<String>) {
-        let what = what.into();
-        trace::doing(&what, self.crash.borrow().clone());
-        *self.doing.borrow_mut() = what;
-    }
-
-    /// Makes calls whose crash another rule reports, which makes them as well.
-    pub fn told_by<T>(&self, rule: &str, calls: impl FnOnce() -> T) -> T {
-        self.with_crash(Crash::ToldBy(rule.into()), calls)
-    }
-
-    /// Makes calls of which the standard does not say what they do: a crash is as bad as the rule.
-    /// After [`PATIENCE`] the process tells what was found so far and that they do not return, and
-    /// ends.
-    pub fn left_open<T>(
-        &self,
-        what: impl Into<String>,
-        findings: &Findings,
-        calls: impl FnOnce() -> T,
-    ) -> T {
-        let what = what.into();
-        let mut found = findings.clone();
-        let place = what.clone();
-        let (returned, waiting) = mpsc::channel::<()>();
-        std::thread::spawn(move || {
-            if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
-                found
-                    .add(place, format!("no end after {PATIENCE:?} (allowed: every call returns)"));
-                // if that cannot be written, the time limit tells
-                let _ = trace::done(found);
-                std::process::exit(0);
-            }
-        });
-        let answer = self.with_crash(Crash::Open, || {
-            self.doing(what);
-            calls()
-        });
-        drop(returned);
-        answer
-    }
-
-    /// Notes that parameters now have values that the check has chosen, with which a model may have no solution. A crash
-    /// or a call without end then ends the rule, and is not a finding.
-    pub fn chose_values(&self) {
-        *self.crash.borrow_mut() = Crash::ToldBy(String::new());
-    }
-
-    fn with_crash<T>(&self, crash: Crash, calls: impl FnOnce() -> T) -> T {
-        let before = self.crash.replace(crash);
-        let answer = calls();
-        self.crash.replace(before);
-        // what comes next is no longer that
-        self.doing(self.now());
-        answer
-    }
-
-    /// Last announced call.
-    pub fn now(&self) -> String {
-        let doing = self.doing.borrow();
-        if doing.is_empty() { "a first call".into() } else { doing.clone() }
-    }
-
-    /// The binary of an interface.
-    pub fn binary(&self, interface: Interface) -> &Fmu {
-        let of = self.interfaces.iter().find(|(i, _)| *i == interface);
-        &self.binaries[of.map_or(0, |(_, at)| *at)]
-    }
-
-    /// The loaded binaries.
-    pub fn binaries(&self) -> &[Fmu] {
-        &self.binaries
-    }
-
-    /// Reason why the existing binary of one interface cannot be loaded.
-    pub fn broken(&self) -> Option<&str> {
-        self.broken.as_deref()
     }
 
     /// Model description of the FMU.
@@ -320,20 +167,6 @@ impl FmuUnderTest {
             Some((derivative, d.at(derivative.derivative_of()?)?))
         };
         d.derivatives.iter().filter_map(|unknown| pair(unknown.index)).collect()
-    }
-
-    /// The interfaces that can be called, Co-Simulation first.
-    pub fn interfaces(&self) -> Vec<Interface> {
-        self.interfaces.iter().map(|(interface, _)| *interface).collect()
-    }
-
-    /// Returns true if an interface declares a capability.
-    pub fn can(&self, interface: Interface, flag: &str) -> bool {
-        let element = match interface {
-            Interface::CoSimulation => &self.description.co_simulation,
-            Interface::ModelExchange => &self.description.model_exchange,
-        };
-        element.as_ref().is_some_and(|element| element.flag(flag))
     }
 
     /// Default experiment of the FMU.
@@ -358,18 +191,14 @@ impl FmuUnderTest {
         with: &Instantiation,
     ) -> Result<Result<Instance<'_>, CallError>> {
         let is_once = self.can(interface, "canBeInstantiatedOnlyOncePerProcess");
-        allowed(self.sessions.get(), is_once, self.deadline)?;
-        let made = self.binary(interface).instantiate_with(with);
-        self.sessions.set(self.sessions.get() + usize::from(made.is_ok()));
-        Ok(made)
+        let binary = self.binary(interface)?;
+        self.make(is_once, || binary.instantiate_with(with))
     }
 
-    /// A new instance.
-    pub fn session(&self, interface: Interface) -> Result<Session<'_>> {
-        self.doing("fmi2Instantiate");
-        let mut with = self.binary(interface).instantiation("check");
-        with.logging = false;
-        self.session_with(interface, &Instantiation { kind: interface.kind(), ..with })
+    /// The arguments of a plain instance.
+    pub fn arguments(&self, interface: Interface) -> Result<Instantiation<'_>> {
+        let plain = self.binary(interface)?.instantiation("check");
+        Ok(Instantiation { kind: kind(interface), ..plain })
     }
 
     /// A new instance that is made with these arguments.
@@ -408,11 +237,6 @@ impl FmuUnderTest {
         })
     }
 
-    /// A new instance, initialised with what the FMU suggests.
-    pub fn running(&self, interface: Interface) -> Result<Session<'_>> {
-        self.session_in(interface, Stage::Initialised)
-    }
-
     /// A new instance in a state of its life.
     pub fn session_in(&self, interface: Interface, stage: Stage) -> Result<Session<'_>> {
         let mut session = self.session(interface)?;
@@ -434,6 +258,48 @@ impl FmuUnderTest {
             }
         }
         Ok(session)
+    }
+}
+
+impl UnderTest for FmuUnderTest {
+    type Version = Fmi2;
+    type Use = Interface;
+    type Session<'f> = Session<'f>;
+    const FMI: &'static str = "fmi2";
+    const NUMBER: &'static str = "2.0";
+    const STATE: &'static str = "FMUstate";
+
+    fn root(&self) -> &Element {
+        &self.description.root
+    }
+
+    fn uses(&self) -> Vec<Interface> {
+        self.interfaces()
+    }
+
+    fn name(interface: Interface) -> &'static str {
+        match interface {
+            Interface::CoSimulation => "Co-Simulation",
+            Interface::ModelExchange => "Model Exchange",
+        }
+    }
+
+    fn interface(interface: Interface) -> Interface {
+        interface
+    }
+
+    fn session(&self, interface: Interface) -> Result<Session<'_>> {
+        self.doing("fmi2Instantiate");
+        let with = Instantiation { logging: false, ..self.arguments(interface)? };
+        self.session_with(interface, &with)
+    }
+
+    fn running(&self, interface: Interface) -> Result<Session<'_>> {
+        self.session_in(interface, Stage::Initialised)
+    }
+
+    fn complaints(&self) -> Result<(Vec<Message>, usize)> {
+        super::log::complaints(self)
     }
 }
 
@@ -462,21 +328,11 @@ impl Stage {
     }
 }
 
-impl Interface {
-    /// `fmi2Type`.
-    pub fn kind(self) -> i32 {
-        match self {
-            Interface::CoSimulation => CO_SIMULATION,
-            Interface::ModelExchange => MODEL_EXCHANGE,
-        }
-    }
-
-    /// Name in findings.
-    pub fn name(self) -> &'static str {
-        match self {
-            Interface::CoSimulation => "Co-Simulation",
-            Interface::ModelExchange => "Model Exchange",
-        }
+/// `fmi2Type`.
+pub fn kind(interface: Interface) -> i32 {
+    match interface {
+        Interface::CoSimulation => CO_SIMULATION,
+        Interface::ModelExchange => MODEL_EXCHANGE,
     }
 }
 
@@ -525,16 +381,6 @@ pub struct Mark {
 }
 
 impl<'f> Session<'f> {
-    /// fmi2SetupExperiment to fmi2ExitInitializationMode, and in Model Exchange on to
-    /// continuous-time mode, with what the FMU suggests.
-    pub fn initialise(&mut self) -> Result<()> {
-        let Experiment { start, tolerance, .. } = self.fmu.experiment();
-        self.initialise_at(start, None, tolerance).map_err(|error| match error.downcast() {
-            Ok(unusable) => Unusable { ..unusable }.into(),
-            Err(error) => Unusable { rule: "load.initialises", why: error.to_string() }.into(),
-        })
-    }
-
     /// Makes these calls with the given times (s) and tolerance.
     pub fn initialise_at(
         &mut self,
@@ -712,15 +558,7 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// Makes steps of the usual size, inputs changing, until the FMU asks for the end.
-    ///
-    /// # Errors
-    /// If one fails, which is the business of a rule of its own.
-    pub fn advance(&mut self, steps: usize) -> Result<()> {
-        self.steps(steps, Session::stimulate)
-    }
-
-    /// [`Session::advance`] with unchanged inputs.
+    /// [`Life::advance`] with unchanged inputs.
     ///
     /// # Errors
     /// The same.
@@ -746,17 +584,6 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// Position of the host, which a saved state does not contain.
-    pub fn mark(&self) -> Mark {
-        Mark { time: self.time, count: self.count, next_event: self.next_event, ended: self.ended }
-    }
-
-    /// Back to where the host was.
-    pub fn go_back(&mut self, to: &Mark) {
-        (self.time, self.count) = (to.time, to.count);
-        (self.next_event, self.ended) = (to.next_event, to.ended);
-    }
-
     /// Returns true if a step was discarded because the FMU wants to end the simulation.
     pub(super) fn has_terminated(&mut self, error: &CallError) -> bool {
         const TERMINATED: i32 = 3; // fmi2Terminated of fmi2StatusKind
@@ -770,7 +597,7 @@ impl<'f> Session<'f> {
         self.fmu.doing(format!(
             "a step from {:?} s by {h:?} s ({})",
             self.time,
-            self.interface.name()
+            FmuUnderTest::name(self.interface)
         ));
         match self.interface {
             Interface::CoSimulation => match self.instance.do_step(self.time, h) {
@@ -834,15 +661,36 @@ impl<'f> Session<'f> {
             Unusable { rule: "values.readable", why }.into()
         })
     }
+}
 
-    /// Every value there is, one call each.
-    pub fn readings(&mut self) -> Result<Vec<Reading>> {
+impl<'f> Life<'f, Fmi2> for Session<'f> {
+    type Reading = Reading;
+    type Mark = Mark;
+
+    fn instance(&mut self) -> &mut Instance<'f> {
+        &mut self.instance
+    }
+
+    /// fmi2SetupExperiment to fmi2ExitInitializationMode, and in Model Exchange on to
+    /// continuous-time mode, with what the FMU suggests.
+    fn initialise(&mut self) -> Result<()> {
+        let Experiment { start, tolerance, .. } = self.fmu.experiment();
+        self.initialise_at(start, None, tolerance).map_err(|error| match error.downcast() {
+            Ok(unusable) => Unusable { ..unusable }.into(),
+            Err(error) => Unusable { rule: "load.initialises", why: error.to_string() }.into(),
+        })
+    }
+
+    fn advance(&mut self, steps: usize) -> Result<()> {
+        self.steps(steps, Session::stimulate)
+    }
+
+    fn readings(&mut self) -> Result<Vec<Reading>> {
         let fmu = self.fmu;
         fmu.variables().iter().map(|v| self.read(v)).collect()
     }
 
-    /// The first variable whose value is not the same to the last bit, as a sentence.
-    pub fn difference(&self, ours: &[Reading], theirs: &[Reading]) -> Option<String> {
+    fn difference(&self, ours: &[Reading], theirs: &[Reading]) -> Option<String> {
         let all = self.fmu.variables().iter().zip(ours.iter().zip(theirs));
         let mut different = all.filter(|(_, (a, b))| !a.is(b));
         let (v, (a, b)) = different.next()?;
@@ -851,6 +699,38 @@ impl<'f> Session<'f> {
             n => format!(" ({n} more differ)"),
         };
         Some(format!("{} is {a}, not {b}{more}", v.name))
+    }
+
+    fn mark(&self) -> Mark {
+        Mark { time: self.time, count: self.count, next_event: self.next_event, ended: self.ended }
+    }
+
+    fn go_back(&mut self, to: &Mark) {
+        (self.time, self.count) = (to.time, to.count);
+        (self.next_event, self.ended) = (to.next_event, to.ended);
+    }
+
+    /// Another time, other parameters, another tolerance.
+    fn stray(&mut self) -> Result<()> {
+        let fmu = self.fmu;
+        for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
+            let Some(Reading::Real(start)) = start_value(v) else { continue };
+            let (min, max) = v.bounds();
+            let moved = start * 1.01;
+            if moved >= min && moved <= max {
+                // one that is refused keeps its value
+                let _ = self.set(v, &Reading::Real(moved));
+            }
+        }
+        if self.initialise_at(fmu.experiment().start + 1.0, None, Some(1e-3)).is_ok() {
+            self.count = 7;
+            let _ = self.advance(5); // these parameters may have no solution
+        }
+        Ok(())
+    }
+
+    fn rewind(&mut self) {
+        self.count = 0;
     }
 }
 

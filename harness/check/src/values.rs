@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::Findings;
 use super::description::Variable;
 use super::life::{expect_refusal, first};
-use super::under_test::{FmuUnderTest, Reading, STEPS, Session, start_value};
+use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::fmi2::{Called, Instance};
@@ -442,7 +442,7 @@ pub fn no_warning(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.readings()?;
         if let Some(call) = session.instance.take_warning() {
             findings.add(
-                format!("an ordinary run ({})", interface.name()),
+                format!("an ordinary run ({})", FmuUnderTest::name(interface)),
                 format!("{call} returns fmi2Warning (allowed: fmi2OK)"),
             );
         }

@@ -4,7 +4,7 @@ use crate::findings::Severity::{Error, Warning};
 use crate::rule::Check::{Archive, Binaries3, Calls3, Description3};
 use crate::rule::{Rule, rule};
 use crate::v3::{archive, calls, definitions, schema, steps, structure, variables};
-use crate::{portable, reading};
+use crate::{life, log, portable, reading};
 
 /// Every rule for FMI 3.0, group by group.
 #[rustfmt::skip]
@@ -69,18 +69,18 @@ pub static RULES: &[Rule] = &[
     rule("bin.symbols", Error, "all 75 functions are exported", "2.5", Binaries3(archive::symbols)),
     rule("bin.this_platform", Warning, "there is a library for the platform of the check; without it no calls are made", "what is not called is not checked", Binaries3(archive::this_platform)),
 
-    rule("load.opens", Error, "the library for this platform can be loaded", "2.5.1.4", Calls3(calls::opens)),
-    rule("load.version", Error, "fmi3GetVersion says 3.0", "2.2.5", Calls3(calls::version)),
-    rule("load.instance", Error, "instances are made for every declared use", "2.3.1", Calls3(calls::instance)),
-    rule("load.initialises", Error, "an instance initialises with the declared start values", "2.3.2, 2.3.3", Calls3(calls::initialises)),
+    rule("load.opens", Error, "the library for this platform can be loaded", "2.5.1.4", Calls3(life::opens)),
+    rule("load.version", Error, "fmi3GetVersion says 3.0", "2.2.5", Calls3(life::version)),
+    rule("load.instance", Error, "instances are made for every declared use", "2.3.1", Calls3(life::instance)),
+    rule("load.initialises", Error, "an instance initialises with the declared start values", "2.3.2, 2.3.3", Calls3(life::initialises)),
 
     rule("instantiate.token", Error, "another instantiationToken is refused with NULL and a message", "2.3.1", Calls3(calls::token)),
     rule("instantiate.callbacks", Error, "logMessage and intermediateUpdate may be NULL", "2.3.1, 4.2.2", Calls3(calls::callbacks)),
-    rule("instantiate.free_null", Error, "fmi3FreeInstance(NULL) does nothing", "2.3.1", Calls3(calls::free_null)),
+    rule("instantiate.free_null", Error, "fmi3FreeInstance(NULL) does nothing", "2.3.1", Calls3(life::free_null)),
 
     rule("life.deterministic", Error, "the same run gives the same bits, whatever other instances do", "2.3.1; hosts that compare with a reference", Calls3(calls::deterministic)),
-    rule("life.reset", Error, "after fmi3Reset a run is that of a new instance to the last bit", "2.3.1", Calls3(calls::reset)),
-    rule("life.terminate", Error, "fmi3Terminate returns fmi3OK, and values can be read after it", "2.3.6", Calls3(calls::terminate)),
+    rule("life.reset", Error, "after fmi3Reset a run is that of a new instance to the last bit", "2.3.1", Calls3(life::reset)),
+    rule("life.terminate", Error, "fmi3Terminate returns fmi3OK, and values can be read after it", "2.3.6", Calls3(life::terminate)),
 
     rule("values.readable", Error, "every variable can be read once it is initialised", "2.2.6.2", Calls3(calls::readable)),
     rule("values.start", Error, "what has initial=exact starts as modelDescription.xml says", "2.4.7.5", Calls3(calls::start)),
@@ -95,14 +95,14 @@ pub static RULES: &[Rule] = &[
     rule("states.serialize", Error, "a serialised state is the state; bytes cut short are refused", "2.2.7.4", Calls3(calls::serialize)),
 
     rule("log.environment", Error, "logMessage and intermediateUpdate are given the instanceEnvironment of the instance", "2.3.1, 4.2.2; hosts follow that pointer and crash", Calls3(calls::log_environment)),
-    rule("log.categories", Error, "messages have a declared category", "2.3.1, 2.4.5", Calls3(calls::log_categories)),
+    rule("log.categories", Error, "messages have a declared category", "2.3.1, 2.4.5", Calls3(log::categories)),
     rule("log.errors", Warning, "an error comes with a message", "2.2.3", Calls3(calls::log_errors)),
 
-    rule("steps.run", Error, "an ordinary run succeeds in every declared use", "3.2, 4.2", Calls3(steps::runs)),
+    rule("steps.run", Error, "an ordinary run succeeds in every declared use, and outputs are finite after each step", "3.2, 4.2", Calls3(steps::runs)),
     rule("steps.answers", Error, "fmi3DoStep writes its four answers; no early return and no event where the host did not allow them; lastSuccessfulTime is where the FMU is", "4.2.1", Calls3(steps::answers)),
     rule("steps.wrong", Warning, "a step of negative size is refused", "4.2.1", Calls3(steps::wrong)),
 
-    rule("events.iteration", Error, "an event iteration ends, and so do events in one step", "2.3.5", Calls3(steps::runs)),
+    rule("events.iteration", Error, "an event iteration ends, and so do events in one step", "2.3.5", Calls3(steps::iterates)),
     rule("events.answers", Error, "fmi3UpdateDiscreteStates writes its answers; nextEventTime lies ahead", "2.3.5", Calls3(steps::event_answers)),
     rule("events.idempotent", Error, "another fmi3UpdateDiscreteStates at the same instant changes nothing", "2.3.5", Calls3(steps::idempotent)),
     rule("events.discrete_held", Error, "with event mode discrete variables change in event mode alone", "2.4.7.4", Calls3(steps::discrete_held)),

@@ -3,45 +3,13 @@
 use anyhow::Result;
 
 use super::Subject;
-use super::subject::{STEPS, Use, difference, start_values};
-use crate::Findings;
+use super::subject::{STEPS, Use, start_values};
+use crate::loaded::{Life as _, UnderTest as _};
+use crate::{Findings, life, states};
 use host::c_abi::{CallError, Status, foreign_environments};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type, Value};
 use host::fmi3::Interface;
-
-/// `load.opens`
-pub fn opens(_: &Subject, _: &mut Findings) -> Result<()> {
-    Ok(()) // a failure to open is reported where it is opened
-}
-
-/// `load.version`
-pub fn version(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    for interface in subject.interfaces() {
-        subject.doing("fmi3GetVersion");
-        let own = subject.binary(interface).map(|fmu| fmu.version()).unwrap_or_default();
-        if own != "3.0" && !own.starts_with("3.0.") {
-            findings.add("fmi3GetVersion", format!("it says {own:?} (allowed: \"3.0\")"));
-        }
-    }
-    Ok(())
-}
-
-/// `load.instance`
-pub fn instance(subject: &Subject, _: &mut Findings) -> Result<()> {
-    for using in subject.uses() {
-        subject.session(using)?;
-    }
-    Ok(())
-}
-
-/// `load.initialises`
-pub fn initialises(subject: &Subject, _: &mut Findings) -> Result<()> {
-    for using in subject.uses() {
-        subject.running(using)?;
-    }
-    Ok(())
-}
 
 /// `instantiate.token`
 pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
@@ -85,70 +53,13 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `instantiate.free_null`
-pub fn free_null(subject: &Subject, _: &mut Findings) -> Result<()> {
-    for interface in subject.interfaces() {
-        subject.doing("fmi3FreeInstance(NULL)");
-        if let Some(fmu) = subject.binary(interface) {
-            fmu.free_null_instance();
-        }
-    }
-    Ok(())
-}
-
-/// Runs the FMU and returns every variable.
-fn run(subject: &Subject, using: Use) -> Result<Vec<(String, Vec<Value>)>> {
-    let mut session = subject.running(using)?;
-    session.advance(STEPS)?;
-    session.readings()
-}
-
 /// `life.deterministic`
 pub fn deterministic(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    for using in subject.uses() {
-        let first = run(subject, using)?;
-        // another instance lives meanwhile
-        let mut other = subject.running(using)?;
-        other.advance(3)?;
-        if let Some(text) = difference(&first, &run(subject, using)?) {
-            findings.add(using.name(), format!("after two equal runs {text}"));
-        }
+    life::deterministic(subject, findings)?;
+    match findings.list.is_empty() {
+        true => life::instances(subject, findings),
+        false => Ok(()),
     }
-    Ok(())
-}
-
-/// `life.reset`
-pub fn reset(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    for using in subject.uses() {
-        let mut session = subject.running(using)?;
-        session.advance(STEPS)?;
-        subject.doing("fmi3Reset");
-        session.instance.reset()?;
-        (session.time, session.ended) = (subject.start(), false);
-        session.initialise()?;
-        let mut fresh = subject.running(using)?;
-        let begin = difference(&fresh.readings()?, &session.readings()?);
-        session.advance(STEPS)?;
-        fresh.advance(STEPS)?;
-        let end = difference(&fresh.readings()?, &session.readings()?);
-        if let Some(text) = begin.or(end) {
-            findings.add(using.name(), format!("of a new instance and after fmi3Reset {text}"));
-        }
-    }
-    Ok(())
-}
-
-/// `life.terminate`
-pub fn terminate(subject: &Subject, _: &mut Findings) -> Result<()> {
-    for using in subject.uses() {
-        let mut session = subject.running(using)?;
-        session.advance(2)?;
-        subject.doing("fmi3Terminate");
-        session.instance.terminate()?;
-        subject.doing("reading after fmi3Terminate");
-        session.readings()?;
-    }
-    Ok(())
 }
 
 // ---------------------------------------------------------------- values
@@ -231,7 +142,8 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
             }
             continue;
         }
-        if session.enter_initialization().is_err() {
+        // with such a value the model may have no solution
+        if subject.told_by("", || session.enter_initialization()).is_err() {
             continue;
         }
         let read = session.read(v)?;
@@ -250,13 +162,13 @@ pub fn of_type(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
     for v in subject.readable() {
         let n = v.length();
-        subject.doing(format!("reading {} by the call of another type", v.name));
-        let (call, answer) = match v.c_type {
+        let place = format!("reading {} by the call of another type", v.name);
+        let (call, answer) = subject.left_open(place, findings, || match v.c_type {
             CType::Float64 => {
                 ("fmi3GetInt32", session.instance.fetch(&[v.reference], &mut vec![0i32; n]))
             }
             _ => ("fmi3GetFloat64", session.instance.fetch(&[v.reference], &mut vec![0.0f64; n])),
-        };
+        });
         if answer.is_ok() {
             findings.add(
                 v.place(),
@@ -291,9 +203,11 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let n = v.length();
         // nValues is n, then n - 1; the array is longer
         for told in [n, n.saturating_sub(1)] {
-            subject.doing(format!("fmi3GetFloat64 of {} with nValues = {told}", v.name));
+            let place = format!("fmi3GetFloat64 of {} with nValues = {told}", v.name);
             let mut values = vec![CANARY; n + 8];
-            let answer = session.instance.fetch(&[v.reference], &mut values[..told]);
+            let answer = subject.left_open(place, findings, || {
+                session.instance.fetch(&[v.reference], &mut values[..told])
+            });
             if values[told..].iter().any(|x| x.to_bits() != CANARY.to_bits()) {
                 findings.add(
                     v.place(),
@@ -349,8 +263,10 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
             .iter()
             .map(|x| if let Value::Real(x) = x { x + 0.125 * v.nominal() } else { 0.0 })
             .collect();
-        subject.doing(format!("setting the fixed parameter {} after initialisation", v.name));
-        if session.instance.give(&[v.reference], &moved).is_ok() && session.read(v)? != before {
+        let place = format!("setting the fixed parameter {} after initialisation", v.name);
+        let set =
+            subject.left_open(place, findings, || session.instance.give(&[v.reference], &moved));
+        if set.is_ok() && session.read(v)? != before {
             findings.add(
                 v.place(),
                 "it is fixed, and fmi3SetFloat64 after initialization changes it (allowed: fmi3Error)",
@@ -365,69 +281,34 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- states
 
-/// Returns the uses in which states can be got and set.
-fn saving(subject: &Subject, flag: &str) -> Vec<Use> {
-    subject.uses().into_iter().filter(|u| subject.can(u.interface, flag)).collect()
-}
-
 /// `states.restore`
 pub fn restore(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let uses = saving(subject, "canGetAndSetFMUState");
-    if uses.is_empty() {
-        findings.skip("canGetAndSetFMUState is not declared");
+    states::rollback(subject, findings)?;
+    match subject.plain_uses().first().filter(|_| findings.skipped.is_none()) {
+        Some(using) => Ok(subject.running(*using)?.instance.free_state_null()?),
+        None => Ok(()),
     }
-    for using in uses {
-        let mut session = subject.running(using)?;
-        session.advance(5)?;
-        subject.doing("fmi3GetFMUState");
-        let state = session.instance.get_state()?;
-        let (time, next) = (session.time, session.next_event);
-        let at = session.readings()?;
-        session.advance(STEPS)?;
-        let first = session.readings()?;
-        subject.doing("fmi3SetFMUState");
-        session.instance.set_state(&state)?;
-        (session.time, session.next_event, session.ended) = (time, next, false);
-        let back = difference(&at, &session.readings()?);
-        session.advance(STEPS)?;
-        let again = difference(&first, &session.readings()?);
-        if let Some(text) = back.or(again) {
-            findings.add(
-                using.name(),
-                format!(
-                    "before and after fmi3SetFMUState {text} (allowed: the same to the last bit)"
-                ),
-            );
-        }
-        subject.doing("fmi3FreeFMUState");
-        session.instance.free_state(state)?;
-        session.instance.free_state_null()?;
-    }
-    Ok(())
 }
 
 /// `states.serialize`
 pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let uses = saving(subject, "canSerializeFMUState");
-    if uses.is_empty() {
-        findings.skip("canSerializeFMUState is not declared");
-    }
-    for using in uses {
+    for using in states::with(subject, "canSerialize", findings) {
         let mut session = subject.running(using)?;
         session.advance(5)?;
         let state = session.instance.get_state()?;
         subject.doing("fmi3SerializeFMUState");
         let bytes = session.instance.serialize(&state)?;
-        let (time, next) = (session.time, session.next_event);
+        let mark = session.mark();
         session.advance(STEPS)?;
         let first = session.readings()?;
         subject.doing("fmi3DeserializeFMUState");
         let copy = session.instance.deserialize(&bytes)?;
         session.instance.set_state(&copy)?;
-        (session.time, session.next_event, session.ended) = (time, next, false);
+        session.go_back(&mark);
         session.advance(STEPS)?;
-        if let Some(text) = difference(&first, &session.readings()?) {
-            findings.add(using.name(), format!("before and after a serialised state {text}"));
+        let again = session.readings()?;
+        if let Some(text) = session.difference(&again, &first) {
+            findings.add(format!("{}, from a serialised state", using.name()), text);
         }
         if let Some(half) = bytes.len().checked_div(2).filter(|half| *half > 0) {
             subject.doing("fmi3DeserializeFMUState of half the bytes");
@@ -458,9 +339,7 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
         using.updates = stepping && subject.can(using.interface, "providesIntermediateUpdate");
         let mut session = subject.running(using)?;
         session.advance(2)?;
-        subject.doing("fmi3GetFloat64 of a valueReference that no variable has");
-        let refused = session.instance.fetch(&[u32::MAX], &mut [0.0f64]);
-        heard += refused.err().map_or(0, |error| error.messages.len());
+        heard += subject.refused(&mut session).map_or(0, |error| error.messages.len());
         heard += session.instance.take_messages().len() + session.instance.updates();
         Ok(())
     };
@@ -483,42 +362,10 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-/// `log.categories`
-pub fn log_categories(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let declared: Vec<&str> =
-        subject.description.root.list("LogCategories").filter_map(|c| c.get("name")).collect();
-    if declared.is_empty() {
-        findings.skip("no log categories are declared");
-        return Ok(());
-    }
-    let mut session = subject.running(subject.plain_uses()[0])?;
-    session.advance(2)?;
-    // something to be refused, and said
-    subject.doing("fmi3GetFloat64 of a valueReference that no variable has");
-    let refused = session.instance.fetch(&[u32::MAX], &mut [0.0f64]);
-    let mut messages = session.instance.take_messages();
-    messages.extend(refused.err().into_iter().flat_map(|error| error.messages));
-    if session.instance.uncategorised() > 0 {
-        findings
-            .add("logMessage", "a message has the category NULL (allowed: one of those declared)");
-    }
-    for message in messages {
-        let known = declared.contains(&message.category.as_str());
-        if !known && !message.category.is_empty() {
-            findings.add(
-                "logMessage",
-                format!("category \"{}\" (declared: {})", message.category, declared.join(", ")),
-            );
-        }
-    }
-    Ok(())
-}
-
 /// `log.errors`
 pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
-    subject.doing("fmi3GetFloat64 of a valueReference that no variable has");
-    if let Err(error) = session.instance.fetch(&[u32::MAX], &mut [0.0f64])
+    if let Some(error) = subject.refused(&mut session)
         && error.status == Status::Error
         && error.messages.is_empty()
     {
@@ -531,7 +378,7 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 /// `exchange.counts`
 pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_none() {
+    if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip("it offers no Model Exchange");
         return Ok(());
     }
@@ -565,7 +412,7 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
 
 /// `exchange.vectors`
 pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_none() {
+    if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip("it offers no Model Exchange");
         return Ok(());
     }
@@ -607,7 +454,7 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
 
 /// `exchange.states_set`
 pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_none() {
+    if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip("it offers no Model Exchange");
         return Ok(());
     }
@@ -634,7 +481,7 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 /// `exchange.indicators`
 pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_none() {
+    if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip("it offers no Model Exchange");
         return Ok(());
     }

@@ -6,6 +6,7 @@ use anyhow::Result;
 use super::subject::{STEPS, Session, Use};
 use super::{Subject, Variable};
 use crate::Findings;
+use crate::loaded::{Life as _, UnderTest as _};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
@@ -52,7 +53,7 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
 }
 
 fn stepping(subject: &Subject, findings: &mut Findings) -> bool {
-    let is_there = subject.binary(Interface::CoSimulation).is_some();
+    let is_there = subject.binary(Interface::CoSimulation).is_ok();
     if !is_there {
         findings.skip("it offers no Co-Simulation");
     }
@@ -79,11 +80,28 @@ fn uses_with_events(subject: &Subject, findings: &mut Findings) -> Vec<Use> {
 const LONG: usize = 200;
 
 /// `steps.run`
-pub fn runs(subject: &Subject, _: &mut Findings) -> Result<()> {
+pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.uses() {
-        subject.running(using)?.advance(STEPS)?;
+        let mut session = subject.running(using)?;
+        for _ in 0..STEPS {
+            session.advance(1)?;
+            let wrong = |(_, x): &&(String, f64)| !x.is_finite();
+            let outputs = outputs(&mut session, false)?;
+            if let Some((name, x)) = outputs.iter().find(wrong) {
+                findings.add(
+                    format!("{name}, t = {:?} s ({})", session.time, using.name()),
+                    format!("it is {x} after a step that returned fmi3OK (allowed: finite)"),
+                );
+                break;
+            }
+        }
     }
     Ok(())
+}
+
+/// `events.iteration`
+pub fn iterates(subject: &Subject, _: &mut Findings) -> Result<()> {
+    subject.uses().into_iter().try_for_each(|using| subject.running(using)?.advance(STEPS))
 }
 
 /// `steps.answers`
@@ -136,9 +154,10 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
     }
     let mut session = subject.running(Use::PLAIN)?;
     session.advance(1)?;
-    subject.doing("fmi3DoStep with a communicationStepSize below 0");
-    if session.instance.do_step(session.time, -session.h).is_ok() {
-        findings.add(subject.now(), "it returns fmi3OK (allowed: fmi3Error)");
+    let place = "fmi3DoStep with a communicationStepSize below 0";
+    let (time, h) = (session.time, -session.h);
+    if subject.left_open(place, findings, || session.instance.do_step(time, h)).is_ok() {
+        findings.add(place, "it returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
 }
@@ -210,17 +229,16 @@ pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
         session.iterate()?;
         let before = session.readings()?;
         let info = session.iterate()?;
+        let after = session.readings()?;
         let clocks =
             subject.description.variables.iter().any(|v| v.written.get("clocks").is_some());
-        if let Some(text) = super::subject::difference(&before, &session.readings()?)
+        if let Some(text) = session.difference(&after, &before)
             && !clocks
             && info.terminate != 1
         {
             findings.add(
-                using.name(),
-                format!(
-                    "after fmi3UpdateDiscreteStates, and after another at the same instant, {text}"
-                ),
+                format!("{}, another fmi3UpdateDiscreteStates at the same instant", using.name()),
+                text,
             );
         }
     }
@@ -346,7 +364,7 @@ pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()>
 fn updating(subject: &Subject, findings: &mut Findings) -> bool {
     let stepping = Interface::CoSimulation;
     let is =
-        subject.binary(stepping).is_some() && subject.can(stepping, "providesIntermediateUpdate");
+        subject.binary(stepping).is_ok() && subject.can(stepping, "providesIntermediateUpdate");
     if !is {
         findings.skip("providesIntermediateUpdate is not declared");
     }
@@ -567,7 +585,7 @@ fn displaced(
 
 fn deriving(subject: &Subject, flag: &str, findings: &mut Findings) -> Option<Use> {
     // where derivatives follow from states and inputs at once: Model Exchange
-    if subject.binary(Interface::ModelExchange).is_none() {
+    if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip(
             "it offers no Model Exchange, where derivatives can be compared with differences",
         );
@@ -727,7 +745,7 @@ fn follows(after: f64, before: f64) -> bool {
 
 /// `dependencies.declared`
 pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_none() {
+    if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip(
             "it offers no Model Exchange, where a value follows from states and inputs at once",
         );

@@ -1,22 +1,21 @@
 //! The FMU 3.0 under test, loaded and called as hosts do, and what rules need to do so shortly.
 
-use std::cell::{Cell, RefCell};
+use std::ops::Deref;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
 
 use super::{Description, Variable};
-use crate::trace::{self, Crash};
-use crate::under_test::{Unusable, allowed};
-use host::c_abi::{CallError, Called};
+use crate::loaded::{Life, Loaded, UnderTest, Unusable, declared};
+use host::c_abi::{CallError, Called, Message};
 use host::causality::Causality;
 use host::description::{Type, Value};
-use host::fmi3::{EventInfo, Fmu, Instance, Instantiation, Interface, Step, Update};
+use host::fmi3::{EventInfo, Fmi3, Fmu, Instance, Instantiation, Interface, Step, Update};
 use host::xml::{Element, double};
 
-/// Steps of a short run.
-pub const STEPS: usize = 20;
+pub use crate::loaded::STEPS;
+
 /// Calls of fmi3UpdateDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
 /// Events in one communication step after which its FMU is not followed any more.
@@ -27,12 +26,17 @@ pub type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
 
 /// The loaded FMU.
 pub struct Subject {
-    binaries: Vec<(Interface, Fmu)>,
+    loaded: Loaded<Fmi3>,
     /// Model description of the FMU.
     pub description: Description,
-    doing: RefCell<String>,
-    deadline: Instant,
-    sessions: Cell<usize>,
+}
+
+impl Deref for Subject {
+    type Target = Loaded<Fmi3>;
+
+    fn deref(&self) -> &Loaded<Fmi3> {
+        &self.loaded
+    }
 }
 
 /// Use of an instance.
@@ -83,78 +87,23 @@ impl Subject {
         deadline: Instant,
     ) -> Result<Subject> {
         let description = Description::new(root);
-        let mut binaries = Vec::new();
         // clocks ask for event mode with clock activation, which is not called
         let has_clocks = description.has_clocks();
-        for (name, interface) in
-            [("CoSimulation", Interface::CoSimulation), ("ModelExchange", Interface::ModelExchange)]
-        {
-            let is_called = interface == Interface::ModelExchange || !has_clocks;
-            if description.interface(name).is_some() && is_called {
-                binaries.push((
-                    interface,
-                    Fmu::load_for(Some(interface), directory, path, &description.root)?,
-                ));
-            }
-        }
-        if binaries.is_empty() {
-            bail!("it offers neither Co-Simulation nor Model Exchange, which alone are called");
-        }
-        let doing = RefCell::default();
-        let sessions = Cell::new(0);
-        Ok(Subject { binaries, description, doing, deadline, sessions })
-    }
-
-    /// Announces the next call: a crash or a hang is then reported at this place.
-    pub fn doing(&self, what: impl Into<String>) {
-        let what = what.into();
-        trace::doing(&what, Crash::Error);
-        *self.doing.borrow_mut() = what;
-    }
-
-    /// Last announced call.
-    pub fn now(&self) -> String {
-        let doing = self.doing.borrow();
-        if doing.is_empty() { "a first call".into() } else { doing.clone() }
-    }
-
-    /// The interfaces that are called, Co-Simulation first.
-    pub fn interfaces(&self) -> Vec<Interface> {
-        self.binaries.iter().map(|(interface, _)| *interface).collect()
-    }
-
-    /// The binary of an interface, if it has that.
-    pub fn binary(&self, interface: Interface) -> Option<&Fmu> {
-        self.binaries.iter().find(|(of, _)| *of == interface).map(|(_, fmu)| fmu)
-    }
-
-    /// Returns true if an interface declares a capability.
-    pub fn can(&self, interface: Interface, flag: &str) -> bool {
-        let name = match interface {
-            Interface::CoSimulation => "CoSimulation",
-            Interface::ModelExchange => "ModelExchange",
-        };
-        self.description.interface(name).is_some_and(|element| element.flag(flag))
+        let mut called = declared(&description.root);
+        called.retain(|(of, _)| *of == Interface::ModelExchange || !has_clocks);
+        called.first().context(
+            "it offers neither Co-Simulation nor Model Exchange, which alone are called",
+        )?;
+        let loaded = Loaded::new(called, deadline, |interface| {
+            Fmu::load_for(Some(interface), directory, path, &description.root)
+        })?;
+        Ok(Subject { loaded, description })
     }
 
     /// The plain use of each interface there is.
     pub fn plain_uses(&self) -> Vec<Use> {
         let uses = [Use::PLAIN, Use::EXCHANGE].into_iter();
-        uses.filter(|u| self.binary(u.interface).is_some()).collect()
-    }
-
-    /// Every use of the interfaces that the FMU declares.
-    pub fn uses(&self) -> Vec<Use> {
-        let mut uses = self.plain_uses();
-        let stepping = Interface::CoSimulation;
-        if self.binary(stepping).is_some() && self.can(stepping, "hasEventMode") {
-            uses.push(Use { event_mode: true, ..Use::PLAIN });
-            uses.push(Use { event_mode: true, early_return: true, ..Use::PLAIN });
-        }
-        if self.binary(stepping).is_some() && self.can(stepping, "mightReturnEarlyFromDoStep") {
-            uses.push(Use { early_return: true, ..Use::PLAIN });
-        }
-        uses
+        uses.filter(|u| self.binary(u.interface).is_ok()).collect()
     }
 
     fn number(&self, name: &str) -> Option<f64> {
@@ -185,8 +134,7 @@ impl Subject {
 
     /// The arguments of an instance.
     pub fn instantiation(&self, using: Use) -> Result<Instantiation<'_>> {
-        let Some(binary) = self.binary(using.interface) else { bail!("no such interface") };
-        let mut with = binary.instantiation("check");
+        let mut with = self.binary(using.interface)?.instantiation("check");
         with.interface = using.interface;
         with.event_mode = using.event_mode;
         with.early_return = using.early_return;
@@ -199,39 +147,17 @@ impl Subject {
 
     /// Instantiates the FMU as `with` says, unless it may have one instance per process and had it.
     pub fn instantiate(&self, with: &Instantiation) -> Result<Result<Instance<'_>, CallError>> {
-        let Some(binary) = self.binary(with.interface) else { bail!("no such interface") };
+        let binary = self.binary(with.interface)?;
         let is_once = self.can(with.interface, "canBeInstantiatedOnlyOncePerProcess");
-        allowed(self.sessions.get(), is_once, self.deadline)?;
-        let made = binary.instantiate_with(with);
-        self.sessions.set(self.sessions.get() + usize::from(made.is_ok()));
-        Ok(made)
+        self.make(is_once, || binary.instantiate_with(with))
     }
 
-    /// A new instance.
-    pub fn session(&self, using: Use) -> Result<Session<'_>> {
-        self.doing(format!("making an instance for {}", using.name()));
-        let instance = self
-            .instantiate(&self.instantiation(using)?)?
-            .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
-        let (time, h) = (self.start(), self.step());
-        Ok(Session {
-            subject: self,
-            using,
-            instance,
-            time,
-            h,
-            next_event: None,
-            events: 0,
-            zero_indicator: None,
-            ended: false,
+    /// Reads a value reference that no variable has; `values.unknown` reports a crash. The messages of the refusal.
+    pub fn refused(&self, session: &mut Session) -> Option<CallError> {
+        self.told_by("values.unknown", || {
+            self.doing("fmi3GetFloat64 of a valueReference that no variable has");
+            session.instance.fetch(&[u32::MAX], &mut [0.0f64]).err()
         })
-    }
-
-    /// A new instance, initialised and ready for a step.
-    pub fn running(&self, using: Use) -> Result<Session<'_>> {
-        let mut session = self.session(using)?;
-        session.initialise()?;
-        Ok(session)
     }
 
     /// Variables whose values rules read.
@@ -249,6 +175,75 @@ impl Subject {
     }
 }
 
+impl UnderTest for Subject {
+    type Version = Fmi3;
+    type Use = Use;
+    type Session<'f> = Session<'f>;
+    const FMI: &'static str = "fmi3";
+    const NUMBER: &'static str = "3.0";
+    const STATE: &'static str = "FMUState";
+
+    fn root(&self) -> &Element {
+        &self.description.root
+    }
+
+    fn uses(&self) -> Vec<Use> {
+        let mut uses = self.plain_uses();
+        let stepping = Interface::CoSimulation;
+        if self.binary(stepping).is_ok() && self.can(stepping, "hasEventMode") {
+            uses.push(Use { event_mode: true, ..Use::PLAIN });
+            uses.push(Use { event_mode: true, early_return: true, ..Use::PLAIN });
+        }
+        if self.binary(stepping).is_ok() && self.can(stepping, "mightReturnEarlyFromDoStep") {
+            uses.push(Use { early_return: true, ..Use::PLAIN });
+        }
+        uses
+    }
+
+    fn name(using: Use) -> &'static str {
+        using.name()
+    }
+
+    fn interface(using: Use) -> Interface {
+        using.interface
+    }
+
+    fn session(&self, using: Use) -> Result<Session<'_>> {
+        self.doing(format!("making an instance for {}", using.name()));
+        let instance = self
+            .instantiate(&self.instantiation(using)?)?
+            .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
+        let (time, h) = (self.start(), self.step());
+        Ok(Session {
+            subject: self,
+            using,
+            instance,
+            time,
+            h,
+            count: 0,
+            next_event: None,
+            events: 0,
+            zero_indicator: None,
+            ended: false,
+        })
+    }
+
+    fn running(&self, using: Use) -> Result<Session<'_>> {
+        let mut session = self.session(using)?;
+        session.initialise()?;
+        Ok(session)
+    }
+
+    fn complaints(&self) -> Result<(Vec<Message>, usize)> {
+        let mut session = self.running(self.plain_uses()[0])?;
+        session.advance(2)?;
+        let refused = self.refused(&mut session);
+        let mut messages = session.instance.take_messages();
+        messages.extend(refused.into_iter().flat_map(|error| error.messages));
+        Ok((messages, session.instance.uncategorised()))
+    }
+}
+
 /// An instance and how far it is.
 pub struct Session<'s> {
     /// The FMU.
@@ -261,6 +256,8 @@ pub struct Session<'s> {
     pub time: f64,
     /// Communication step, s.
     pub h: f64,
+    /// Steps of [`Life::advance`]; inputs follow it.
+    pub count: usize,
     /// The next event that the FMU has told.
     pub next_event: Option<f64>,
     /// Event modes entered after the start.
@@ -272,12 +269,6 @@ pub struct Session<'s> {
 }
 
 impl Session<'_> {
-    /// Initialises the instance, up to the first step.
-    pub fn initialise(&mut self) -> Result<()> {
-        self.enter_initialization()?;
-        self.leave_initialization()
-    }
-
     /// Into initialization mode.
     pub fn enter_initialization(&mut self) -> Result<()> {
         self.subject.doing("fmi3EnterInitializationMode");
@@ -442,18 +433,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Makes short steps, continuous inputs changing.
-    pub fn advance(&mut self, steps: usize) -> Result<()> {
-        for k in 0..steps {
-            if self.ended {
-                break;
-            }
-            self.stimulate(k)?;
-            self.advance_to(self.time + self.h)?;
-        }
-        Ok(())
-    }
-
     /// Sets all continuous Float64 inputs to values that differ from step to step.
     pub fn stimulate(&mut self, k: usize) -> Result<()> {
         for (n, v) in self.subject.inputs().enumerate() {
@@ -475,11 +454,86 @@ impl Session<'_> {
     pub fn get(&mut self, v: &Variable) -> Called<Vec<Value>> {
         self.instance.values(v.c_type, v.reference, v.length())
     }
+}
 
-    /// Every value there is.
-    pub fn readings(&mut self) -> Result<Vec<(String, Vec<Value>)>> {
-        let all: Vec<Variable> = self.subject.readable().cloned().collect();
-        all.iter().map(|v| Ok((v.name.clone(), self.read(v)?))).collect()
+impl<'f> Life<'f, Fmi3> for Session<'f> {
+    type Reading = (String, Vec<Value>);
+    /// Time, s, steps and the next event.
+    type Mark = (f64, usize, Option<f64>);
+
+    fn instance(&mut self) -> &mut Instance<'f> {
+        &mut self.instance
+    }
+
+    fn initialise(&mut self) -> Result<()> {
+        self.enter_initialization()?;
+        self.leave_initialization()
+    }
+
+    fn advance(&mut self, steps: usize) -> Result<()> {
+        for _ in 0..steps {
+            if self.ended {
+                break;
+            }
+            self.stimulate(self.count)?;
+            self.count += 1;
+            self.advance_to(self.time + self.h)?;
+        }
+        Ok(())
+    }
+
+    fn readings(&mut self) -> Result<Vec<(String, Vec<Value>)>> {
+        let subject = self.subject;
+        subject.readable().map(|v| Ok((v.name.clone(), self.read(v)?))).collect()
+    }
+
+    fn difference(
+        &self,
+        ours: &[(String, Vec<Value>)],
+        theirs: &[(String, Vec<Value>)],
+    ) -> Option<String> {
+        let same = |a: &Value, b: &Value| match (a, b) {
+            (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
+            (a, b) => a == b,
+        };
+        let mut different = ours.iter().zip(theirs).filter_map(|((name, a), (_, b))| {
+            let pair = a.iter().zip(b).find(|(a, b)| !same(a, b))?;
+            Some((name, pair))
+        });
+        let (name, (a, b)) = different.next()?;
+        let more = match different.count() {
+            0 => String::new(),
+            n => format!(" ({n} more differ)"),
+        };
+        Some(format!("{name} is {}, not {}{more}", shown(a), shown(b)))
+    }
+
+    fn mark(&self) -> (f64, usize, Option<f64>) {
+        (self.time, self.count, self.next_event)
+    }
+
+    fn go_back(&mut self, to: &(f64, usize, Option<f64>)) {
+        (self.time, self.count, self.next_event) = *to;
+        self.ended = false;
+    }
+
+    fn stray(&mut self) -> Result<()> {
+        self.initialise()?;
+        self.advance(STEPS)
+    }
+
+    fn rewind(&mut self) {
+        self.go_back(&(self.subject.start(), 0, None));
+    }
+}
+
+/// A value in a finding.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Real(x) => format!("{x:?}"),
+        Value::Integer(n) => n.to_string(),
+        Value::Boolean(yes) => yes.to_string(),
+        Value::String(text) => format!("{text:?}"),
     }
 }
 
@@ -503,21 +557,6 @@ pub fn stimulus(v: &Variable, k: usize) -> Vec<f64> {
         (x + swing * size).max(min).min(max.max(min))
     };
     (0..v.length()).map(one).collect()
-}
-
-/// The first variable whose values are not the same to the last bit, as a sentence.
-pub fn difference(
-    ours: &[(String, Vec<Value>)],
-    theirs: &[(String, Vec<Value>)],
-) -> Option<String> {
-    let same = |a: &Value, b: &Value| match (a, b) {
-        (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
-        (a, b) => a == b,
-    };
-    ours.iter().zip(theirs).find_map(|((name, a), (_, b))| {
-        let (x, y) = a.iter().zip(b).find(|(x, y)| !same(x, y))?;
-        Some(format!("{name} is {x:?} and {y:?}"))
-    })
 }
 
 /// The start values that the description gives, one for each element.

@@ -201,6 +201,9 @@ const BEHAVIOUR: &[(u32, &str)] = &[
     (33, "steps.answers"),
     (34, "steps.answers"),
     (35, "log.environment"),
+    (37, "steps.run"),
+    (38, "steps.run"),
+    (39, "life.deterministic"),
 ];
 
 #[test]
@@ -219,6 +222,31 @@ fn an_fmu_3_that_misbehaves_is_told_by_the_rule_that_is_meant() {
 fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule() {
     let report = report(&files(35), &["log", "instantiate", "intermediate", "steps", "values"]);
     assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
+}
+
+/// A comparison of runs says nothing where no two are the same.
+#[test]
+fn a_reset_is_not_blamed_for_runs_that_always_differ() {
+    let report = report(&files(39), &["life"]);
+    assert_eq!(broken(&report), BTreeSet::from(["life.deterministic"]), "{}", report.text());
+}
+
+/// The first library cannot be loaded; the other interface is checked.
+#[test]
+fn one_interface_that_cannot_be_loaded_is_told_and_the_other_is_called() {
+    let mut files = files(0);
+    files[0].1 = XML
+        .replace(
+            "CoSimulation modelIdentifier=\"Model3\"",
+            "CoSimulation modelIdentifier=\"Other\"",
+        )
+        .into_bytes();
+    files.push((binary().replace("Model3", "Other"), b"text".to_vec()));
+    let report = report(&files, &["load", "exchange", "steps.answers"]);
+    assert_eq!(broken(&report), BTreeSet::from(["load.opens"]), "{}", report.text());
+    let skipped = report.outcomes.iter().filter(|o| o.findings.skipped.is_some());
+    let skipped: Vec<_> = skipped.map(|o| o.rule.id).collect();
+    assert_eq!(skipped, ["steps.answers"], "{}", report.text());
 }
 
 /// With fault 36 the library makes one instance in each process, which is a fault if it is not declared.
