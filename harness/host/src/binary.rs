@@ -14,10 +14,15 @@ use object::read::pe::PeFile64;
 use object::{Architecture, Endianness, FileKind, LittleEndian, Object, elf};
 use sha2::{Digest, Sha256};
 
+use crate::symbol::readable;
+
 /// The newest glibc a binary may need: that of the oldest Linux still in use with simulation tools.
 pub const GLIBC: Version = Version(2, 17);
 /// The newest macOS a binary may need: the first one on both architectures.
 pub const MACOS: Version = Version(11, 0);
+
+/// Surplus exports that are named.
+const NAMED: usize = 8;
 
 /// Libraries that are part of glibc.
 const LINUX_LIBRARIES: [&str; 8] = [
@@ -191,10 +196,16 @@ impl Binary {
         // the linker that links it elsewhere exports a few of Rust's.
         // One library may serve several versions of FMI (FMI 3.0, 2.5).
         let own = |name: &&str| name.starts_with("fmi2") || name.starts_with("fmi3");
-        let others: Vec<_> =
-            self.exports.iter().map(String::as_str).filter(|name| !own(name)).collect();
-        (self.kind != Kind::MacOs && !others.is_empty())
-            .then(|| format!("it also exports {}", others.join(", ")))
+        let others = || self.exports.iter().map(String::as_str).filter(|name| !own(name));
+        let count = others().count();
+        let mut named: Vec<String> = others().filter_map(readable).collect();
+        named.dedup();
+        named.truncate(NAMED);
+        (self.kind != Kind::MacOs && count > 0).then(|| match (named.len(), count) {
+            (0, _) => format!("it also exports {count} mangled symbols"),
+            (some, all) if some == all => format!("it also exports {}", named.join(", ")),
+            _ => format!("it also exports {count} symbols, among them {}", named.join(", ")),
+        })
     }
 }
 

@@ -10,11 +10,12 @@ use std::ptr::null;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use files::output::sha256;
 use libloading::Library;
 
 use crate::guard::{self, Calls};
+use crate::symbol::readable;
 
 pub mod version;
 
@@ -382,11 +383,25 @@ pub(crate) fn load(
     let (before, calls) = (HostState::now(), Calls::one());
     // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
     let library = unsafe { Library::new(&path) }.map_err(|error| {
-        let needs = needs(&error.to_string());
-        anyhow::Error::new(error).context(format!("{binary} in {name} cannot be loaded{needs}"))
+        // the symbol stands in the cause of the loader's error
+        let error = format!("{:#}", anyhow::Error::new(error));
+        let needs = needs(&error);
+        anyhow!(told(&error)).context(format!("{binary} in {name} cannot be loaded{needs}"))
     })?;
     drop(calls);
     Ok(Loaded { library, hash, changed: before.changed(), binary })
+}
+
+/// The loader's message with an undefined symbol as people read it.
+fn told(error: &str) -> String {
+    const UNDEFINED: &str = "undefined symbol: ";
+    match error.split_once(UNDEFINED) {
+        Some((before, symbol)) => {
+            let name = readable(symbol).unwrap_or_else(|| "a mangled one".into());
+            format!("{before}{UNDEFINED}{name}")
+        }
+        None => error.into(),
+    }
 }
 
 /// Names the host that a binary needs, by the loader's message; empty if it needs none.

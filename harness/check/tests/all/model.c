@@ -544,3 +544,13 @@ Status fmi2GetNominalsOfContinuousStates(Component m, double *x, size_t n)
     return OK;
 }
 #endif
+
+#ifdef UNDEFINED
+/* nobody defines it, and 1,000 functions of C++ are exported besides */
+extern void UNDEFINED(void);
+void (*const undefined)(void) = UNDEFINED;
+#define ONE(n) void _ZN9pythonfmu4m##n##Ev(void) {}
+#define TEN(n) ONE(n##0) ONE(n##1) ONE(n##2) ONE(n##3) ONE(n##4) ONE(n##5) ONE(n##6) ONE(n##7) ONE(n##8) ONE(n##9)
+#define HUNDRED(n) TEN(n##0) TEN(n##1) TEN(n##2) TEN(n##3) TEN(n##4) TEN(n##5) TEN(n##6) TEN(n##7) TEN(n##8) TEN(n##9)
+HUNDRED(0) HUNDRED(1) HUNDRED(2) HUNDRED(3) HUNDRED(4) HUNDRED(5) HUNDRED(6) HUNDRED(7) HUNDRED(8) HUNDRED(9)
+#endif

@@ -244,6 +244,26 @@ fn a_fault_is_told_by_its_own_rule_and_as_severe_as_it_is() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn symbols_of_other_languages_do_not_fill_a_report() {
+    for (symbol, told) in [
+        ("_ZNK9pythonfmu7PyState4callEv", "undefined symbol: pythonfmu::PyState::call"),
+        ("_Py_NoneStruct", "needs a Python host"),
+    ] {
+        let undefined = format!("-DUNDEFINED={symbol}");
+        let definitions = [BOTH, &[&undefined]].concat();
+        let small = Small { definitions: &definitions, rate: 1.0, experiment: USUAL };
+        let report = look(&small.packed(), &["bin", "load"]);
+        let text = report.text();
+        assert!(broken(&report).contains("load.opens"), "{text}");
+        assert!(text.contains(told), "{text}");
+        assert!(text.contains("1001 symbols, among them pythonfmu::m000, "), "{text}");
+        let longest = report.all().map(|(_, finding)| finding.text.len()).max();
+        assert!(longest < Some(500) && !text.contains("_ZN"), "{longest:?}: {text}");
+    }
+}
+
 #[test]
 fn windows_finds_a_library_in_other_capitals() {
     let small = Small { definitions: BOTH, rate: 1.0, experiment: USUAL };
