@@ -277,6 +277,12 @@ impl<'f> Bench<'f> {
     fn bounds(&self, time: &[f64], torque: &[f64]) -> Result<Bounds> {
         let rows = (time.to_vec(), torque.to_vec());
         let unknowns = self.unknowns.clone();
+        ensure!(
+            time.len() > unknowns.len(),
+            "the plan has {} rows at {STEP} s for {} unknowns (allowed: more rows than unknowns; --duration makes it longer)",
+            time.len(),
+            unknowns.len()
+        );
         design::cramer_rao(self.fmu, self.fitted.clone(), rows, unknowns, self.noise)
     }
 }

@@ -89,7 +89,8 @@ pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     for (name, p) in tables.iter().flat_map(|table| table.iter()) {
         let percent =
             p.percent(p.std).map_or("–".into(), |percent| format!("{:.4}", percent.abs()));
-        println!("{name:24} {:>14.7} {:>12.2e} {percent:>9}  {}", p.value, p.std, p.unit);
+        let std = if p.std.is_nan() { "–".into() } else { format!("{:.2e}", p.std) };
+        println!("{name:24} {:>14.7} {std:>12} {percent:>9}  {}", p.value, p.unit);
     }
 }
 

@@ -6,7 +6,7 @@ use std::process::Command;
 use host::fmi3::PLATFORM;
 
 /// Packs model3.c with the fault of this number.
-fn model(path: &Path, mutant: u32) {
+pub fn model(path: &Path, mutant: u32) {
     changed_model(path, mutant, &[]);
 }
 

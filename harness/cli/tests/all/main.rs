@@ -11,6 +11,7 @@ mod outputs;
 mod plans;
 mod recordings;
 mod report;
+mod sizes;
 mod step_cost;
 mod tank;
 mod view;

@@ -537,12 +537,16 @@ pub fn lines(found: &Identification) -> Vec<String> {
         "output", "rows", "noise", "fit %", "worst test"
     )];
     for o in &found.details.outputs {
+        // an output that stands still has no share that is explained
+        let fit = match o.fit_percent.is_finite() {
+            true => format!("{:.2}", o.fit_percent),
+            false => "–".into(),
+        };
         lines.push(format!(
-            "{:24} {:>8} {:>12.3e} {:>8.2} {:>10.1}  {}",
+            "{:24} {:>8} {:>12.3e} {fit:>8} {:>10.1}  {}",
             o.name,
             o.rows,
             o.noise_white,
-            o.fit_percent,
             o.tests.worst().max(o.mean.abs()),
             o.recording
         ));
