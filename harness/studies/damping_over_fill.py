@@ -14,7 +14,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pandas as pd
 
-from hubslosh.program import find_program
+from hubslosh.command import find_program
 
 PICTURE = Path(__file__).resolve().parents[2] / "book" / "damping.svg"
 RADIUS = 0.3  # m

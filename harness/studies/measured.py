@@ -27,7 +27,7 @@ from scipy.signal import butter, hilbert, sosfiltfilt
 from scipy.stats import binom
 
 import hubslosh
-from hubslosh.program import find_program
+from hubslosh.command import find_program
 from rotary_branch import STYLE, Panel
 
 ROOT = Path(__file__).resolve().parents[2]
