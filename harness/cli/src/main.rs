@@ -73,8 +73,8 @@ impl Cli {
         use Command::*;
         match self.command.as_ref()? {
             Run(args) => Some(&args.fmu),
-            Campaign(args) => Some(&args.fmu),
-            Analyse(args) => Some(&args.fmu),
+            Campaign(args) => Some(&args.runs.fmu),
+            Analyse(args) => Some(&args.runs.fmu),
             Gyro(args) => args.needs_fmu().then_some(&args.fmu),
             Example(args) => Some(&args.fmu),
             Identify(args) => args.fmu(),

@@ -3,16 +3,18 @@
 use anyhow::Result;
 use host::description::ModelDescription;
 use host::fmu::{Fmu, Instance};
-use names::hubslosh::init;
+use names::{hubslosh, sloshtank, spacecraft};
 
 /// Parameters and inputs by which this project's FMUs move if nobody sets anything, for the first plot of any host; 0 is at
 /// rest. FMUs of others have none.
-pub fn moving_starts(description: &ModelDescription) -> &'static [&'static str] {
+pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
     match description.model_name.as_str() {
-        "HubSlosh" => &[init::SLOSH_ANGLE],
-        name if name.starts_with("Spacecraft") => &["init.omega[1]", "init.omega[3]"],
-        "SloshTank" => &["a[1]", "a[3]"],
-        _ => &[],
+        "HubSlosh" => vec![hubslosh::init::SLOSH_ANGLE.into()],
+        name if name.starts_with("Spacecraft") => {
+            [1, 3].map(|i| spacecraft::init::OMEGA.at([i])).into()
+        }
+        "SloshTank" => [1, 3].map(|i| sloshtank::A.at([i])).into(),
+        _ => Vec::new(),
     }
 }
 
@@ -23,7 +25,7 @@ pub fn moving_starts(description: &ModelDescription) -> &'static [&'static str] 
 pub fn instantiate<'fmu>(fmu: &'fmu Fmu, name: &str) -> Result<Instance<'fmu>> {
     let mut instance = fmu.instantiate(name)?;
     for start in moving_starts(fmu.description()) {
-        instance.set(start, "0")?;
+        instance.set(&start, "0")?;
     }
     Ok(instance)
 }

@@ -46,6 +46,18 @@ def check_table(table: Any, what: str) -> None:
         raise FmuError(f"{what} must be a pandas.DataFrame, not {table!r}")
 
 
+def column_of(table: Any, name: Any, what: str, problems: list[str]) -> np.ndarray | None:
+    """Return a column of finite numbers; what is wrong goes to ``problems``."""
+    try:
+        values = table[name].to_numpy(float)
+    except (TypeError, ValueError) as error:
+        problems.append(f"the column {name} of {what} is not of numbers: {error}")
+        return None
+    if len(bad := np.flatnonzero(~np.isfinite(values))):
+        problems.append(f"the column {name} of {what} is not finite in row {bad[0]}")
+    return values
+
+
 def vector(values: Any, length: int, what: str) -> np.ndarray:
     """Return so many finite numbers as an array."""
     try:

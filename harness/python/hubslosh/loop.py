@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import names_of, not_numbers
+from .arguments import column_of, names_of, not_numbers
 from .feedback import Feedback, Linear
 from .fmu import Fmu, FmuError, Quantity, did_you_mean
 from .linearization import LinearModel, linearize, split_delay, wrong_seconds
@@ -435,14 +435,8 @@ def _reference(
             hint = did_you_mean(str(name), allowed)
             problems.append(f"reference has {name}, which is neither measured nor a command{hint}")
             continue
-        try:
-            values = reference[name].to_numpy(float)
-        except (TypeError, ValueError) as error:
-            problems.append(f"the column {name} of reference is not of numbers: {error}")
-            continue
-        if not np.isfinite(values).all():
-            problems.append(f"the column {name} of reference is not finite everywhere")
-        histories[str(name)] = values
+        if (values := column_of(reference, name, "reference", problems)) is not None:
+            histories[str(name)] = values
     some = [name for name in QUATERNION if name in histories]
     if 0 < len(some) < 4 and any(name not in measured for name in some):
         problems.append(f"reference has {', '.join(some)} of q[1], …, q[4]: all four are needed")

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import names_of, not_numbers
+from .arguments import column_of, names_of, not_numbers
 from .fmu import INTEGERS, Fmu, FmuError, Quantity, did_you_mean
 from .plant import TORQUE, Plant
 from .run import Run
@@ -258,15 +258,8 @@ def histories_of(
     for name in inputs.columns:
         if name in wrong:
             continue
-        try:
-            values = inputs[name].to_numpy(float)
-        except (TypeError, ValueError) as error:
-            problems.append(f"the column {name} of inputs is not of numbers: {error}")
-            continue
-        bad = np.flatnonzero(~np.isfinite(values))
-        if len(bad):
-            problems.append(f"the column {name} of inputs is not finite in row {bad[0]}")
-        columns[name] = values
+        if (values := column_of(inputs, name, "inputs", problems)) is not None:
+            columns[name] = values
     if "time" not in inputs.columns:
         problems.append("inputs has no column time")
     if len(inputs) < 2:

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use experiments::campaign::{Campaign, recorded};
-use experiments::plan::{Plan, Recorded};
+use experiments::plan::{AMPLITUDE, Plan, Recorded};
 use experiments::profile::{Torque, Written};
 use names::hubslosh::TAU_CMD;
 use signals::recording::Columns;
 
-use super::{DEFAULT_FMU, bench_day, campaign, open, setting};
+use super::{RunsArgs, bench_day, campaign, open, setting};
 
 /// Analyses recordings of a bench as `campaign` analyses its runs, and compares them with the model's runs under the same torque.
 ///
@@ -45,12 +45,8 @@ pub struct AnalyseArgs {
     /// one report.
     #[arg(long, value_name = "DIRECTORY", conflicts_with_all = ["recordings", "columns", "profile", "model", "settings", "plan"])]
     bench_day: Option<PathBuf>,
-    /// Runs at once [default: as many as the machine has cores].
-    #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
-    jobs: usize,
-    /// The FMU: a file, or the name of one of this project.
-    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
-    pub fmu: PathBuf,
+    #[command(flatten)]
+    pub runs: RunsArgs,
     /// Directory for runs, tables and report.html [default: dist/ and the first recording's or the plan's name].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
@@ -60,7 +56,7 @@ impl AnalyseArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         if let Some(directory) = &self.bench_day {
-            return bench_day::run(directory, &self.fmu, self.jobs, self.out.clone());
+            return bench_day::run(directory, &self.runs.fmu, self.runs.jobs, self.out.clone());
         }
         let first =
             self.plan.as_ref().map(Path::new).or(self.recordings.first().map(PathBuf::as_path));
@@ -70,14 +66,14 @@ impl AnalyseArgs {
             Some(file) => Plan::read(file)?,
             None => Plan::parse(&self.written()?)?,
         };
-        let fmu = open(&self.fmu)?;
+        let fmu = open(&self.runs.fmu)?;
         plan.convert_units(fmu.description());
         let cases = plan.cases(fmu.description())?;
         ensure!(
             cases.iter().any(|case| case.recording.is_some()),
             "no [[run]] of the plan has recording = \"FILE\"; hubslosh campaign --plan simulates it"
         );
-        let campaign = Campaign { plan, force: false, jobs: self.jobs, compare: None, out };
+        let campaign = Campaign { plan, force: false, jobs: self.runs.jobs, compare: None, out };
         let folder = campaign.take()?;
         ensure!(
             !campaign.holds_another() || self.out.is_some(),
@@ -121,10 +117,7 @@ impl AnalyseArgs {
             }
             // to four digits: what a command was meant to be
             let digits = 10f64.powi(3 - amplitude.log10().floor() as i32);
-            runs.push_str(&format!(
-                "profile.amplitude = {:?}\n",
-                (amplitude * digits).round() / digits
-            ));
+            runs.push_str(&format!("{AMPLITUDE} = {:?}\n", (amplitude * digits).round() / digits));
         }
         let step = step.map_or(0.02, |step| (step * 1e9).round() / 1e9);
         plan.push_str(&format!("step = {step:?}\n"));

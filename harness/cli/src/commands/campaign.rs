@@ -13,7 +13,7 @@ use host::guard;
 use names::hubslosh::{TAU_CMD, slosh, tank};
 use report::campaign::Chapter;
 
-use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting, view};
+use super::{DEFAULT_CAMPAIGN, RunsArgs, open, setting, view};
 use crate::{progress, terminal};
 
 /// Simulates a plan's runs, or the sine sweeps of Rubaga's thesis at several fills and amplitudes,
@@ -55,12 +55,8 @@ pub struct CampaignArgs {
     /// Simulate again what is stored already.
     #[arg(long)]
     force: bool,
-    /// Runs at once [default: as many as the machine has cores].
-    #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
-    jobs: usize,
-    /// The FMU: a file, or the name of one of this project.
-    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
-    pub fmu: PathBuf,
+    #[command(flatten)]
+    pub runs: RunsArgs,
     /// Directory for runs, tables and report.html [default: dist/campaign, with flags that change
     /// the campaign dist/campaign_ and these flags, with --plan dist/ and the plan's name].
     #[arg(long, value_name = "DIRECTORY")]
@@ -98,10 +94,10 @@ impl CampaignArgs {
         let named = self.out.is_some();
         let out = self.out.clone().unwrap_or(out);
         let compare = self.compare.clone();
-        let mut campaign = Campaign { plan, force: self.force, jobs: self.jobs, compare, out };
-        let fmu = open(&self.fmu)?;
+        let mut campaign = Campaign { plan, force: self.force, jobs: self.runs.jobs, compare, out };
+        let fmu = open(&self.runs.fmu)?;
         campaign.plan.convert_units(fmu.description());
-        seek_onset(&mut campaign.plan, &fmu, self.jobs, &|news| {
+        seek_onset(&mut campaign.plan, &fmu, self.runs.jobs, &|news| {
             if let Progress::Note(line) = news {
                 terminal::note(format_args!("{line}"));
             }

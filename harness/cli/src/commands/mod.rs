@@ -1,7 +1,7 @@
 //! The commands, one file each.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use host::fmu::Fmu;
@@ -39,6 +39,17 @@ pub mod view;
 pub const DEFAULT_FMU: &str = "HubSlosh";
 /// Default folder of a campaign.
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
+
+/// Options of commands that make many runs.
+#[derive(clap::Args)]
+pub struct RunsArgs {
+    /// Runs at once [default: as many as the machine has cores].
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
+    pub jobs: usize,
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
+}
 
 /// Opens the FMU that `--fmu` names, and says what that has changed.
 pub fn open(name: &Path) -> Result<Fmu> {

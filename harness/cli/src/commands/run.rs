@@ -137,8 +137,7 @@ impl RunArgs {
         let named: Vec<String> =
             run.input.iter().chain(run.others.iter().map(|(name, _)| name)).cloned().collect();
         // at rest, but for what is set
-        let rest =
-            rest::moving_starts(description).iter().map(|name| (name.to_string(), "0".into()));
+        let rest = rest::moving_starts(description).into_iter().map(|name| (name, "0".into()));
         let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
         let parameters = run::parameters(description, &settings, &named);
         let columns = match self.columns.is_empty() {

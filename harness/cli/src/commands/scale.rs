@@ -28,18 +28,8 @@ enum Scale {
     Thesis,
     /// Bond number of an acceleration, and the flight tank that has the same.
     Bond {
-        /// Density of the bench's liquid, kg/m³.
-        #[arg(long, default_value_t = scaling::WATER.density)]
-        density: f64,
-        /// Surface tension, N/m.
-        #[arg(long, default_value_t = scaling::WATER.tension)]
-        tension: f64,
-        /// Acceleration along the tank's axis, m/s².
-        #[arg(long, default_value_t = 9.81)]
-        acceleration: f64,
-        /// Radius of the bench's tank, m.
-        #[arg(long, default_value_t = scaling::BENCH.0)]
-        radius: f64,
+        #[command(flatten)]
+        bench: TankAtRest,
         /// Density of the liquid in flight, kg/m³ [default: the bench's].
         #[arg(long)]
         flight_density: Option<f64>,
@@ -55,18 +45,8 @@ enum Scale {
     },
     /// Bond, Weber and Froude numbers of a moving liquid: which force rules, and how fast.
     Numbers {
-        /// Density of the liquid, kg/m³.
-        #[arg(long, default_value_t = scaling::WATER.density)]
-        density: f64,
-        /// Surface tension, N/m.
-        #[arg(long, default_value_t = scaling::WATER.tension)]
-        tension: f64,
-        /// Acceleration along the tank's axis, m/s².
-        #[arg(long, default_value_t = 9.81)]
-        acceleration: f64,
-        /// Radius of the tank, m.
-        #[arg(long, default_value_t = scaling::BENCH.0)]
-        radius: f64,
+        #[command(flatten)]
+        tank: TankAtRest,
         /// Velocity of the liquid in the tank, m/s.
         #[arg(long)]
         velocity: f64,
@@ -109,16 +89,30 @@ enum Scale {
     },
 }
 
+/// A tank under acceleration; by default the bench's with water.
+#[derive(clap::Args)]
+struct TankAtRest {
+    /// Density of the liquid, kg/m³.
+    #[arg(long, default_value_t = scaling::WATER.density)]
+    density: f64,
+    /// Surface tension, N/m.
+    #[arg(long, default_value_t = scaling::WATER.tension)]
+    tension: f64,
+    /// Acceleration along the tank's axis, m/s².
+    #[arg(long, default_value_t = 9.81)]
+    acceleration: f64,
+    /// Radius of the tank, m.
+    #[arg(long, default_value_t = scaling::BENCH.0)]
+    radius: f64,
+}
+
 impl ScaleArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let found = match self.what {
             Scale::Thesis => scaling::thesis_found(),
             Scale::Bond {
-                density,
-                tension,
-                acceleration,
-                radius,
+                bench: TankAtRest { density, tension, acceleration, radius },
                 flight_density,
                 flight_tension,
                 flight_radius,
@@ -134,7 +128,8 @@ impl ScaleArgs {
                     .or(flight_acceleration.map(Flight::Acceleration));
                 scaling::bond(bench, (acceleration, radius), liquid, flight)?
             }
-            Scale::Numbers { density, tension, acceleration, radius, velocity } => {
+            Scale::Numbers { tank, velocity } => {
+                let TankAtRest { density, tension, acceleration, radius } = tank;
                 scaling::numbers(Liquid { density, tension }, (acceleration, radius), velocity)?
             }
             Scale::Rotation { density, tension, radius, arm, alpha, omega, flight_alpha } => {

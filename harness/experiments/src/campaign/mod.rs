@@ -294,10 +294,10 @@ impl Campaign {
                     columns.push(name.to_string());
                 }
             }
-            let starts = rest::moving_starts(description).iter();
-            let at_rest = starts.filter(|name| Some(**name) != run.input.as_deref());
+            let starts = rest::moving_starts(description).into_iter();
+            let at_rest = starts.filter(|name| Some(name) != run.input.as_ref());
             let mut settings: serde_json::Map<_, _> =
-                at_rest.map(|name| (name.to_string(), json!(0.0))).collect();
+                at_rest.map(|name| (name, json!(0.0))).collect();
             for (name, text) in &case.settings {
                 let value = match description.value(description.variable(name)?, text)? {
                     // an enumeration keeps the name of its item

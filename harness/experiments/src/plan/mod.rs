@@ -57,7 +57,11 @@ pub const BUILT_IN: &[(&str, &str)] = &[
 /// Communication step of a plan without one: the thesis's IMU at 50 Hz, s.
 const STEP: f64 = 0.02;
 /// Variables of the file names `<model>_<fill>mm_<amplitude>`, which the interface fixes.
-const NAMING: [&str; 3] = [slosh::MODEL, tank::H, "profile.amplitude"];
+const NAMING: [&str; 3] = [slosh::MODEL, tank::H, AMPLITUDE];
+/// Name of a profile's amplitude in a plan.
+pub const AMPLITUDE: &str = "profile.amplitude";
+/// Name of a profile's frequency in a plan.
+const FREQUENCY: &str = "profile.frequency";
 
 /// Value for a name in a plan file: an FMU variable, `profile`, `profile.PARAMETER`.
 #[derive(Clone, Debug)]
@@ -292,14 +296,15 @@ impl Plan {
         }
         let mut owner: BTreeMap<&str, (&str, &Lines)> = BTreeMap::new();
         let listed = self.listed.iter().flat_map(|run| all(&run.values, "[[run]]"));
-        let named = all(&self.set, "[set]")
-            .chain(all(&self.vary, "[vary]"))
-            .chain(listed)
-            .chain(all(&self.count, "[count]"))
-            .chain(self.draws.iter().flat_map(|draws| all(&draws.draw, "[random.draw]")))
-            .chain(self.onset.iter().flat_map(|onset| {
-                ["profile.frequency", "profile.amplitude"].map(|n| (n, "[onset]", &onset.lines))
-            }));
+        let named =
+            all(&self.set, "[set]")
+                .chain(all(&self.vary, "[vary]"))
+                .chain(listed)
+                .chain(all(&self.count, "[count]"))
+                .chain(self.draws.iter().flat_map(|draws| all(&draws.draw, "[random.draw]")))
+                .chain(self.onset.iter().flat_map(|onset| {
+                    [FREQUENCY, AMPLITUDE].map(|n| (n, "[onset]", &onset.lines))
+                }));
         for (name, place, lines) in named {
             match owner.insert(name, (place, lines)) {
                 Some((other, others)) if other != place => {
@@ -405,8 +410,8 @@ impl Plan {
                 let values = names.iter().zip(&case.varied).filter(|(_, value)| !value.is_empty());
                 let mut values: Vec<_> =
                     values.map(|(name, value)| named(name, value.clone())).collect();
-                values.push(named("profile.frequency", frequency.to_string()));
-                values.push(named("profile.amplitude", torque.to_string()));
+                values.push(named(FREQUENCY, frequency.to_string()));
+                values.push(named(AMPLITUDE, torque.to_string()));
                 listed.push(Listed { values, ..Listed::default() });
             }
         }

@@ -6,6 +6,7 @@ use analysis::features::Features;
 use analysis::lengths::Lengths;
 use analysis::{BAND, demodulation};
 use experiments::campaign::{Campaign, Estimate, Results};
+use experiments::plan::AMPLITUDE;
 use experiments::rounding::thousandths;
 use host::fmu::Fmu;
 use maud::{Markup, html};
@@ -112,7 +113,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
         .varied()
         .into_iter()
         .enumerate()
-        .filter(|(_, name)| ![slosh::MODEL, tank::H, "profile.amplitude"].contains(name))
+        .filter(|(_, name)| ![slosh::MODEL, tank::H, AMPLITUDE].contains(name))
         .map(|(place, _)| place)
         .collect();
     let head = |place: &usize| {

@@ -5,7 +5,7 @@ use analysis::features::Features;
 use analysis::sweep::Sweep;
 use analysis::{BAND, FrequencyResponse, logarithmic_grid};
 use experiments::campaign::{Curve, Estimate, Outcome, Results};
-use experiments::plan::Plan;
+use experiments::plan::{AMPLITUDE, Plan};
 use experiments::profile::Torque;
 use host::fmu::Fmu;
 use names::hubslosh::{slosh, tank};
@@ -169,7 +169,7 @@ impl Varied {
             None => (variable, unit(fmu, variable).unwrap_or_default()),
         };
         let (unit, scale) = match &*unit {
-            "N·m" if variable == "profile.amplitude" => ("mN·m".into(), 1e3),
+            "N·m" if variable == AMPLITUDE => ("mN·m".into(), 1e3),
             "m" => ("mm".into(), 1e3),
             "1" => (String::new(), 1.0),
             _ => (unit, 1.0),

@@ -6,6 +6,7 @@ use host::causality::Causality;
 use names::hubslosh::{
     F_RADIAL, F_TANGENTIAL, TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FLUID, TAU_FRICTION,
 };
+use names::spacecraft;
 use serde_json::{Map, Value, json};
 use signals::table::Table;
 
@@ -162,7 +163,7 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
     let at = |tank: &Tank| length(&tank.position) + tank.extent();
     let mut reach = tanks.iter().map(at).fold(0.0, f64::max);
     let size = geometry::craft_box(arrows.parameters);
-    let center: [f64; 3] = arrows.parameters.vector("craft.r");
+    let center = [1, 2, 3].map(|i| arrows.parameters.number(&spacecraft::craft::R.at([i])));
     if let Some(size) = size {
         reach = reach.max(0.5 * length(&size) + length(&center));
         notes.push(

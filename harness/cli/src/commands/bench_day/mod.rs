@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use experiments::campaign::{Campaign, recorded};
-use experiments::plan::{Plan, Recorded};
+use experiments::plan::{AMPLITUDE, Plan, Recorded};
 use files::{input, output};
 use identify::input::tolerance::Tolerances;
+use names::hubslosh::tank;
 use serde::Deserialize;
 use signals::recording::Columns;
 
@@ -188,7 +189,7 @@ impl Day {
             if !columns.is_empty() {
                 plan.push_str(&format!("columns = {}\n", text(&columns)));
             }
-            for (key, value) in [("tank.h", &item.fill), ("profile.amplitude", &item.amplitude)] {
+            for (key, value) in [(tank::H, &item.fill), (AMPLITUDE, &item.amplitude)] {
                 plan.extend(value.iter().map(|value| format!("{key} = {value}\n")));
             }
         }
