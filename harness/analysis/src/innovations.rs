@@ -37,9 +37,9 @@ pub struct Tests {
     pub in_time: (f64, f64),
     /// Largest excess of the power in a band, and its frequency, Hz.
     pub in_frequency: (f64, f64),
-    /// Largest cross-correlation with the torque up to 2 s.
+    /// Largest cross-correlation with an input up to 2 s.
     pub torque: f64,
-    /// Largest cross-correlation with the torque's square.
+    /// Largest cross-correlation with the square of an input.
     pub torque_squared: f64,
     /// Root mean square of the residual above the noise in the worst band, rad/s.
     #[serde(rename = "left")]
@@ -59,9 +59,9 @@ impl Tests {
             .fold(0.0, f64::max)
     }
 
-    /// Tests innovations `e` at `time` (s) under `torque`; `white` is the standard deviation of the
-    /// noise, rad/s.
-    pub fn of(time: &[f64], torque: &[f64], e: &[f64], white: f64) -> Self {
+    /// Tests innovations `e` at `time` (s) under `inputs`, such as a torque; `white` is the standard deviation of the noise in the
+    /// unit of the signal.
+    pub fn of(time: &[f64], inputs: &[&[f64]], e: &[f64], white: f64) -> Self {
         let count = e.len() as f64;
         let middle = mean(e);
         let e: Vec<f64> = e.iter().map(|v| v - middle).collect();
@@ -93,13 +93,15 @@ impl Tests {
         let in_frequency = worst(&levels, 2.0 * per_band);
         let middle = median(&bands).unwrap_or(0.0);
         let excess: f64 = bands.iter().map(|p| (p - middle).max(0.0)).fold(0.0, f64::max);
-        let squared: Vec<f64> = torque.iter().map(|t| t * t).collect();
+        let squared = |input: &&[f64]| input.iter().map(|u| u * u).collect::<Vec<f64>>();
+        let largest =
+            |crossed: &dyn Fn(&&[f64]) -> f64| inputs.iter().map(crossed).fold(0.0, f64::max);
         Tests {
             whiteness: normal(q, lags as f64),
             in_time,
             in_frequency,
-            torque: crossed(&e, torque, step),
-            torque_squared: crossed(&e, &squared, step),
+            torque: largest(&|input| crossed(&e, input, step)),
+            torque_squared: largest(&|input| crossed(&e, &squared(input), step)),
             excess: white * (excess / bands.len() as f64).sqrt(),
         }
     }
@@ -168,7 +170,7 @@ mod tests {
             let time: Vec<f64> = (0..rows).map(|k| 0.05 * f64::from(k)).collect();
             for _ in 0..100 {
                 let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
-                let tests = Tests::of(&time, &vec![0.0; white.len()], &white, 1.0);
+                let tests = Tests::of(&time, &[], &white, 1.0);
                 assert!(tests.passed(), "{rows}: {tests:?}");
             }
         }
@@ -180,16 +182,16 @@ mod tests {
         let time: Vec<f64> = (0..50_000).map(|k| 0.02 * f64::from(k)).collect();
         let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.005 * t)).sin()).collect();
         let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
-        let tests = Tests::of(&time, &torque, &white, 1.0);
+        let tests = Tests::of(&time, &[&torque], &white, 1.0);
         assert!(tests.passed(), "{tests:?}");
         // a tenth of the noise, only in the band of the torque
         let leaking: Vec<f64> = white.iter().zip(&torque).map(|(e, t)| e + t).collect();
-        let tests = Tests::of(&time, &torque, &leaking, 1.0);
+        let tests = Tests::of(&time, &[&torque], &leaking, 1.0);
         assert!(tests.torque > 10.0 && !tests.passed(), "{tests:?}");
         // a burst of 20 s
         let mut burst = white.clone();
         burst[20_000..21_000].iter_mut().for_each(|e| *e *= 1.5);
-        let tests = Tests::of(&time, &torque, &burst, 1.0);
+        let tests = Tests::of(&time, &[&torque], &burst, 1.0);
         assert!(tests.in_time.0 > LIMIT && (tests.in_time.1 - 400.0).abs() < 1.0, "{tests:?}");
     }
 }

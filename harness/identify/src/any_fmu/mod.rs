@@ -12,6 +12,7 @@ use maud::Markup;
 use serde::Serialize;
 
 use crate::estimate::{Estimated, prose};
+use crate::fit::covariance::Covariance;
 use crate::fit::decomposition::Curvature;
 use crate::fit::problem::{Channel, Motion, Problem};
 use crate::fit::search::{self, Minimum};
@@ -27,7 +28,7 @@ use crate::uncertainty::profile::{self, Interval};
 use crate::uncertainty::solver_error::{self, SolverError};
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
-use analysis::innovations::{LIMIT, Tests, crossed};
+use analysis::innovations::{LIMIT, Tests};
 use analysis::statistics::{mean, variance};
 
 /// Results other than the estimates.
@@ -220,12 +221,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
             .collect(),
     });
     let names = problem.names();
-    let correlation = |i: usize, j: usize| {
-        let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
-        if size > 0.0 && size.is_finite() { covariance[(i, j)] / size } else { f64::from(i == j) }
-    };
-    let correlations: Vec<Vec<f64>> =
-        (0..n).map(|i| (0..n).map(|j| correlation(i, j)).collect()).collect();
+    let correlations = Covariance::correlations(&covariance);
     found.converged = minimum.converged();
     let fits = found.details.outputs.iter().all(Output::passed);
     let decided: Vec<usize> = (0..n).filter(|&j| decided_by_solver[j]).collect();
@@ -499,16 +495,9 @@ fn outputs(problem: &Problem, motion: &Motion, x: &[f64], question: &Question) -
         let (time, e) = (picked(&record.time), picked(e));
         let white = channel.noise.white;
         let inputs: Vec<Vec<f64>> = record.inputs.iter().map(|input| picked(input)).collect();
-        let none = vec![0.0; time.len()];
-        let mut tests = Tests::of(&time, inputs.first().unwrap_or(&none), &e, white);
+        let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+        let tests = Tests::of(&time, &inputs, &e, white);
         let count = e.len() as f64;
-        let step = (time[time.len() - 1] - time[0]) / (count - 1.0);
-        let centred: Vec<f64> = e.iter().map(|v| v - mean(&e)).collect();
-        for input in inputs.iter().skip(1) {
-            let squared: Vec<f64> = input.iter().map(|u| u * u).collect();
-            tests.torque = tests.torque.max(crossed(&centred, input, step));
-            tests.torque_squared = tests.torque_squared.max(crossed(&centred, &squared, step));
-        }
         let measured = picked(&record.outputs[channel.output]);
         let squares: f64 = residual.iter().map(|r| r * r).sum();
         let name = &question.outputs[channel.output];

@@ -49,10 +49,15 @@ impl Covariance {
         &self.x * middle * &self.x
     }
 
-    /// Correlations, row by row.
+    /// Correlations, row by row; none of what has no finite variance.
     pub fn correlations(covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
         let of = |i: usize, j: usize| {
-            covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt()
+            let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+            if size > 0.0 && size.is_finite() {
+                covariance[(i, j)] / size
+            } else {
+                f64::from(i == j)
+            }
         };
         let n = covariance.nrows();
         (0..n).map(|i| (0..n).map(|j| of(i, j)).collect()).collect()

@@ -41,7 +41,8 @@ use crate::fit::decomposition;
 use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::model::bench::nominal::{self, Nominal};
-use crate::model::bench::unknown::{self, Scale};
+use crate::model::bench::unknown::Scale;
+use crate::model::unknown;
 use crate::news::News;
 use crate::tuning::{
     ACCELERATION_MISFIT, ACCELERATION_REACH, BLOCK, CERTAIN_SIGN, DRIVING_FRICTION, FEWEST_BLOCKS,

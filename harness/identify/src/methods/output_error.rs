@@ -27,7 +27,6 @@ use crate::fit::bench::problem::{self, Answer, Differences, Polished, Problem};
 use crate::fit::bench::start::{self, Response};
 use crate::fit::covariance::{self, Covariance};
 use crate::fit::evidence;
-
 use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};

@@ -6,7 +6,6 @@ use host::description::{ModelDescription, Value, Variable};
 
 use crate::input::question::{Bias, EACH, Free, Question, Size, Tolerance, Triad, real, scaled};
 use crate::input::record::Record;
-use crate::model::bench::unknown::range;
 use crate::tuning::{KNOWN_REACH, SCALE_REACH};
 
 /// Kinds of unknowns.
@@ -356,6 +355,15 @@ impl Unknown {
 
 /// Name of the clock among the scales.
 const CLOCK: &str = "time";
+
+/// Least and largest value that the FMU's description declares for a variable; infinite where it declares none.
+pub fn range(variable: &Variable) -> [f64; 2] {
+    let attributes = variable.attributes();
+    let number = |text: &Option<String>, otherwise: f64| {
+        text.as_ref().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+    };
+    [number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY)]
+}
 
 /// A standard deviation in a variable's own unit, from a number with or without a unit.
 fn deviation(variable: &Variable, description: &ModelDescription, text: &str) -> Result<f64> {

@@ -6,6 +6,7 @@ use anyhow::Result;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use crate::fit::covariance::spread_out;
 use crate::fit::decomposition::Curvature;
 use crate::fit::problem::Problem;
 use crate::tuning::{DIRECTION_PART, SOLVER_DECIDES};
@@ -53,13 +54,7 @@ pub(crate) fn knowledge(
 ) -> Result<Knowledge> {
     let n = problem.unknowns.len();
     let curvature = Curvature::of(jacobian, &problem.names(), which)?;
-    let inverse = curvature.inverse();
-    let mut covariance = DMatrix::zeros(n, n);
-    for (a, &i) in which.iter().enumerate() {
-        for (b, &j) in which.iter().enumerate() {
-            covariance[(i, j)] = inverse[(a, b)];
-        }
-    }
+    let mut covariance = spread_out(&curvature.inverse(), which, n);
     let (noise, both): (Vec<f64>, Vec<f64>) = which.iter().map(|&j| solver.derivative[j]).unzip();
     // what curvature alone leaves unresolved is a property of the model; what noise adds is one of the solver
     let curved: Vec<f64> =

@@ -29,7 +29,6 @@ use rayon::prelude::*;
 use crate::fit::bench::goodness::tests;
 use crate::fit::bench::problem::{self, Differences, Known, Polished, Problem, Until};
 use crate::fit::covariance::spread_out;
-
 use crate::input::recording::Recording;
 use crate::model::bench::stribeck::Indices;
 use crate::tuning::{

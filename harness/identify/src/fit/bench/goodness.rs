@@ -13,7 +13,7 @@ pub fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
             Signal::Rate => recording.of_fresh(x),
             Signal::Angle => recording.of_fresh_angle(x),
         };
-        Tests::of(&of(&recording.time), &of(&recording.torque), &of(e), channel.noise.white)
+        Tests::of(&of(&recording.time), &[&of(&recording.torque)], &of(e), channel.noise.white)
     };
     problem.channels.iter().zip(&problem.innovations(answer)).map(one).collect()
 }

@@ -1,10 +1,11 @@
 //! Unknowns: parameters of the FMU, and properties of sensors and data link.
 
-use host::description::{ModelDescription, Variable};
+use host::description::ModelDescription;
 use names::hubslosh::{friction, init, slosh};
 use serde::Serialize;
 
 use crate::model::bench::breaking;
+use crate::model::unknown::range;
 use crate::tuning::RANGE_MARGIN;
 
 /// One unknown number.
@@ -24,15 +25,6 @@ pub struct Unknown {
     pub scale: Scale,
     /// Least and largest value that the FMU allows.
     pub range: [f64; 2],
-}
-
-/// Least and largest value that the FMU's description declares for a variable; infinite where it declares none.
-pub fn range(variable: &Variable) -> [f64; 2] {
-    let attributes = variable.attributes();
-    let number = |text: &Option<String>, otherwise: f64| {
-        text.as_ref().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
-    };
-    [number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY)]
 }
 
 /// Kinds of unknowns.

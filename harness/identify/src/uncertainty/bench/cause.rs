@@ -14,7 +14,6 @@ use serde::Serialize;
 use crate::estimate::prose;
 use crate::fit::bench::goodness::tests;
 use crate::fit::bench::problem::{Problem, Rough};
-
 use crate::model::bench::unknown::{Quantity, Unknown};
 use crate::tuning::{ACTUATOR_LIMIT, BIC_DECIDES, CAUSE_LEAST, CAUSE_PART, REFITTED};
 use analysis::innovations::Tests;
