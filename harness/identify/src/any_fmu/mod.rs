@@ -13,12 +13,11 @@ use serde::Serialize;
 
 use crate::estimate::{Estimated, prose};
 use crate::fit::covariance::Covariance;
-use crate::fit::decomposition::Curvature;
-use crate::fit::problem::{Channel, Motion, Problem};
+use crate::fit::goodness::{Output, outputs};
+use crate::fit::problem::Problem;
 use crate::fit::search::{self, Minimum};
 use crate::input::question::Question;
 use crate::input::record::Record;
-use crate::input::tolerance::{self, Share};
 use crate::model::simulate::{Model, Setup};
 use crate::model::unknown::{Unknown, What};
 use crate::news::News;
@@ -26,13 +25,13 @@ use crate::tuning::{DECREMENT, PAIR_CORRELATION, PRIOR_ALONE, SOLVER_ADDED, TURN
 use crate::uncertainty::knowledge::{Inseparable, Knowledge, finite, knowledge};
 use crate::uncertainty::profile::{self, Interval};
 use crate::uncertainty::solver_error::{self, SolverError};
+use crate::uncertainty::tolerated::Tolerated;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
-use analysis::innovations::{LIMIT, Tests};
-use analysis::statistics::{mean, variance};
+use analysis::innovations::LIMIT;
 
 /// Results other than the estimates.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
     /// The outputs of the recordings.
     pub outputs: Vec<Output>,
@@ -56,35 +55,6 @@ pub struct Details {
     pub decrement: f64,
     /// Covariance of the estimates, in the order of the correlations' names.
     pub covariance: Vec<Vec<f64>>,
-}
-
-/// One output of one recording.
-#[derive(Clone, Debug, Serialize)]
-pub struct Output {
-    /// The recording's name.
-    pub recording: String,
-    /// The output's.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Rows with a value.
-    pub rows: usize,
-    /// White noise of a row.
-    pub noise_white: f64,
-    /// Gauss–Markov bias: standard deviation and correlation time, s.
-    pub drift: Option<(f64, f64)>,
-    /// 100 (1 − |y − ŷ|/|y − mean y|), %.
-    pub fit_percent: f64,
-    /// Tests of the residual.
-    pub tests: Tests,
-    /// Mean over the mean's standard deviation.
-    pub mean: f64,
-}
-
-impl Output {
-    fn passed(&self) -> bool {
-        self.tests.passed() && self.mean.abs() < LIMIT
-    }
 }
 
 /// Result of fitting any FMU.
@@ -207,18 +177,14 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
     let outputs = outputs(problem, &minimum.answer.motion, &minimum.x, question);
     let mut found = Identified::new(Details {
         outputs,
-        not_determined: Vec::new(),
         cannot_tell_apart: inseparable,
-        decided_by_solver: Vec::new(),
-        solver_shift: BTreeMap::new(),
-        at_bound: Vec::new(),
-        not_quadratic: Vec::new(),
         deviance: problem.deviance(&minimum.answer),
         starts: 1,
         decrement: minimum.decrement,
         covariance: (0..n)
             .map(|i| covariance.row(i).iter().copied().map(finite).collect())
             .collect(),
+        ..Details::default()
     });
     let names = problem.names();
     let correlations = Covariance::correlations(&covariance);
@@ -314,19 +280,15 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
         .zip(&residuals)
         .map(|(channel, residual)| {
             let record = &problem.records[channel.recording];
-            let picked = |values: &[f64]| -> Vec<f64> {
-                let there = values.iter().zip(&channel.sampled).filter(|(_, sampled)| **sampled);
-                there.map(|(value, _)| *value).collect()
-            };
             let name = &question.outputs[channel.output];
             let description = problem.model.description();
             let unit = description.variable(name).map_or("1", |v| description.unit(v));
             Residual {
                 name: format!("{}, {name}", record.name),
                 label: prose(if unit.is_empty() { "1" } else { unit }),
-                time: picked(&record.time),
-                measured: picked(&record.outputs[channel.output]),
-                residual: picked(residual),
+                time: channel.picked(&record.time),
+                measured: channel.picked(&record.outputs[channel.output]),
+                residual: channel.picked(residual),
                 noise: Some(channel.noise.white),
                 torque: None,
             }
@@ -337,69 +299,6 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
 
 /// Sentence about intervals of a fit without tolerances.
 pub(crate) const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
-
-/// Contribution of known values to the uncertainty.
-struct Tolerated {
-    /// Standard deviation of each unknown if all known values were exact.
-    noise_only: Vec<f64>,
-    /// Known values, by number, with the change of each unknown by their standard deviations.
-    effects: Vec<(usize, Vec<f64>)>,
-}
-
-impl Tolerated {
-    /// Returns the contribution; `None`: there are no tolerances.
-    fn of(problem: &Problem, minimum: &Minimum, inner: &[usize]) -> Result<Option<Self>> {
-        let unknowns = &problem.unknowns;
-        let (known, asked): (Vec<usize>, Vec<usize>) =
-            inner.iter().partition(|j| unknowns[**j].is_known);
-        if known.is_empty() {
-            return Ok(None);
-        }
-        let jacobian = &minimum.jacobian;
-        let curvature = Curvature::of(jacobian, &problem.names(), &asked)?;
-        let at_places = |values: &[f64]| -> Vec<f64> {
-            let mut all = vec![0.0; unknowns.len()];
-            asked.iter().zip(values).for_each(|(&j, value)| all[j] = *value);
-            all
-        };
-        let picked = jacobian.select_columns(&asked);
-        let effect = |&q: &usize| {
-            let std = unknowns[q].prior.map_or(0.0, |(_, std)| std);
-            let moved = curvature.solve(&picked.tr_mul(&(jacobian.column(q) * std)), 0.0);
-            (q, at_places(moved.as_slice()))
-        };
-        let noise = curvature.inverse().diagonal().map(f64::sqrt);
-        Ok(Some(Tolerated {
-            noise_only: at_places(noise.as_slice()),
-            effects: known.iter().map(effect).collect(),
-        }))
-    }
-
-    /// Returns the sentence on estimates that they dominate.
-    fn words(&self, problem: &Problem, std: &[f64]) -> Option<String> {
-        let unknowns = &problem.unknowns;
-        let size = |&(q, _): &(usize, Vec<f64>)| {
-            let Unknown { name, what, unit, prior, .. } = &unknowns[q];
-            let (mean, std) = prior.unwrap_or_default();
-            let whole = if matches!(what, What::Parameter { .. }) { mean.abs() } else { 1.0 };
-            match whole > 0.0 {
-                true => format!("{name} {:.2} %", 100.0 * std / whole),
-                false => format!("{name} ± {std:.1e} {}", prose(unit)),
-            }
-        };
-        let of = |j: usize| {
-            let most = self.effects.iter().max_by(|a, b| a.1[j].abs().total_cmp(&b.1[j].abs()))?;
-            Some(Share {
-                name: unknowns[j].name.clone(),
-                share: 1.0 - (self.noise_only[j] / std[j]).powi(2),
-                most: unknowns[most.0].name.clone(),
-            })
-        };
-        let asked = (0..unknowns.len()).filter(|j| !unknowns[*j].is_known && std[*j].is_finite());
-        let known: Vec<String> = self.effects.iter().map(size).collect();
-        tolerance::shares(&known, &asked.filter_map(of).collect::<Vec<_>>())
-    }
-}
 
 /// Writes remarks about one estimate.
 fn say(
@@ -481,42 +380,6 @@ fn fit_in_words(outputs: &[Output]) -> String {
         o.recording,
         why.join(", ")
     )
-}
-
-fn outputs(problem: &Problem, motion: &Motion, x: &[f64], question: &Question) -> Vec<Output> {
-    let residuals = problem.residuals(motion, x);
-    let innovations = problem.innovations(motion, x);
-    let one = |((channel, e), residual): ((&Channel, &Vec<f64>), &Vec<f64>)| {
-        let record = &problem.records[channel.recording];
-        let picked = |values: &[f64]| -> Vec<f64> {
-            let there = values.iter().zip(&channel.sampled).filter(|(_, sampled)| **sampled);
-            there.map(|(value, _)| *value).collect()
-        };
-        let (time, e) = (picked(&record.time), picked(e));
-        let white = channel.noise.white;
-        let inputs: Vec<Vec<f64>> = record.inputs.iter().map(|input| picked(input)).collect();
-        let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        let tests = Tests::of(&time, &inputs, &e, white);
-        let count = e.len() as f64;
-        let measured = picked(&record.outputs[channel.output]);
-        let squares: f64 = residual.iter().map(|r| r * r).sum();
-        let name = &question.outputs[channel.output];
-        let description = problem.model.description();
-        let unit = description.variable(name).map_or("", |v| description.unit(v));
-        Output {
-            recording: record.name.clone(),
-            name: name.clone(),
-            unit: unit.into(),
-            rows: e.len(),
-            noise_white: white,
-            drift: (channel.noise.drift > 0.0)
-                .then_some((channel.noise.drift * white, channel.noise.time)),
-            fit_percent: 100.0 * (1.0 - (squares / (count * variance(&measured))).sqrt()),
-            tests,
-            mean: mean(&e) * count.sqrt(),
-        }
-    };
-    problem.channels.iter().zip(&innovations).zip(&residuals).map(one).collect()
 }
 
 /// Lines for a terminal, below the table of estimates.

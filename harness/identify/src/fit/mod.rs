@@ -4,6 +4,7 @@ pub mod bench;
 pub mod covariance;
 pub mod decomposition;
 pub mod evidence;
+pub mod goodness;
 pub mod minimum;
 pub mod problem;
 pub mod search;

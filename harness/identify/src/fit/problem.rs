@@ -454,6 +454,12 @@ impl<'a> Problem<'a> {
 }
 
 impl Channel {
+    /// Values of a signal in the rows with a value.
+    pub fn picked(&self, values: &[f64]) -> Vec<f64> {
+        let there = values.iter().zip(&self.sampled).filter(|(_, sampled)| **sampled);
+        there.map(|(value, _)| *value).collect()
+    }
+
     /// Rows with a value.
     pub fn count(&self) -> usize {
         self.sampled.iter().filter(|sampled| **sampled).count()

@@ -6,3 +6,4 @@ pub mod knowledge;
 pub mod likelihood;
 pub mod profile;
 pub mod solver_error;
+pub mod tolerated;
