@@ -220,7 +220,7 @@ pub const WINDOW_NOISE: f64 = 0.03;
 /// Residual over the noise from row to row beyond which a fit counts as bad, and another start is tried.
 pub const BAD_START: f64 = 1.5;
 
-// Derivatives and search of the bench: `fit/bench/problem.rs`.
+// Derivatives and search of the bench: `fit/bench/problem.rs` and its folder.
 // Tests: `sensitivities_are_those_of_smaller_and_larger_steps`, `after_its_noise_is_renewed_a_minimum_is_of_that_noise`, `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale`.
 /// Change of the answer by a difference, in units of the noise's norm of one degree of freedom.
 pub const BENCH_MOVE: f64 = 0.3;

@@ -8,7 +8,6 @@ use analysis::statistics::{deviation, mean, median};
 use nalgebra::{DMatrix, DVector};
 
 use super::{Problem, Rows, rough_inertia};
-
 use crate::tuning::{
     CREEPS, FOLLOWED, FREE_TORQUE, LOADED, MOVING_SHARE, REST, SPEED_GRID, STILL, STILL_RUN,
 };
