@@ -8,6 +8,7 @@
 //! | `two` | the same, two tanks of one mode, as in the comparison with Basilisk |
 //! | `four` | the same, four tanks of three modes each |
 //! | `telecom`, `pendulums` | the satellite of example 14 at a fill of 60 %, with and without s and κ |
+//! | `drain`, `drain_bent` | `one` with three modes while its tank drains, with and without s and κ |
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*Spacecraft*step*' cost bench 1000 1e-6` counts the
 //! steps alone (`'*Plant*step*'` for `hubslosh`).
@@ -66,7 +67,7 @@ fn telecom(p: &mut Parameters) {
 fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
     let mut p = Parameters::default();
     p.tank[0].p_0[0] = [0.05, 0.1, -0.99];
-    let (mut thrust, mut size, mut w, mut step) = (2400.0, 20.0, 2.5, STEP);
+    let (mut thrust, mut size, mut w, mut step, mut flow) = (2400.0, 20.0, 2.5, STEP, 0.0);
     match kind {
         "bench" => {
             let mass = 1e9;
@@ -95,6 +96,15 @@ fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
             }
             p.init.omega = [0.01, -0.02, 0.03];
         }
+        "drain" | "drain_bent" => {
+            let tank = &mut p.tank[0];
+            (tank.modes, tank.fill.points) = (3, craft::POINTS);
+            if kind == "drain_bent" {
+                (tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]) = (1.408, 0.734);
+            }
+            p.init.omega = [0.01, -0.02, 0.03];
+            flow = 1.0;
+        }
         "telecom" | "pendulums" => {
             telecom(&mut p);
             (thrust, size, w) = (400.0, 1.0, 0.7);
@@ -106,17 +116,17 @@ fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
         }
         _ => p.init.omega = [0.01, -0.02, 0.03],
     }
-    let force = Ramp::held([0.0, 0.0, thrust]);
-    let mut craft =
-        Spacecraft::new(&p, &Inputs { force, ..Inputs::default() }, 0.0, tolerance).unwrap();
+    let mut inputs = Inputs { force: Ramp::held([0.0, 0.0, thrust]), ..Inputs::default() };
+    inputs.mass_flow[0].value = flow;
+    let mut craft = Spacecraft::new(&p, &inputs, 0.0, tolerance).unwrap();
     for k in 0..steps {
         let (value, slope) = torque(size, w, step, k);
         let across = if kind == "bench" { 0.0 } else { 1.0 };
-        let torque = Ramp {
+        inputs.torque = Ramp {
             value: [across * value, 0.5 * across * value, value],
             slope: [across * slope, 0.5 * across * slope, slope],
         };
-        craft.step(&Inputs { force, torque, ..Inputs::default() }, step).unwrap();
+        craft.step(&inputs, step).unwrap();
     }
 }
 

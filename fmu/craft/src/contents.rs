@@ -84,7 +84,8 @@ pub struct MountedTank {
     /// True if there are planar modes; their b, body axes.
     planar: bool,
     across: [Option<Vec3>; MODES],
-    /// True if a bob is on a surface other than a sphere; the surfaces of all modes.
+    /// True if a bob is on a surface other than a sphere; the surfaces of all modes, as at the start where the table
+    /// gives them.
     curved: bool,
     surfaces: [Option<Surface>; MODES],
     /// The rigid liquid and all liquid at rest of a tank that does not drain.
@@ -233,17 +234,23 @@ impl MountedTank {
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
     }
 
-    /// Returns surface and height of the bob of mode n (from 0) from l with its derivatives, and p and p'.
+    /// Returns surface and height of the bob of mode n (from 0) from l with its derivatives, and p and p'. `changing` has s
+    /// and kappa with their derivatives if the table gives them.
     #[inline(never)]
     fn on_surface<T: Number>(
         &self,
         n: usize,
         l: Jet<T>,
         [p, p_d]: [Vec3<T>; 2],
+        changing: Option<[Jet<T>; 2]>,
     ) -> Option<(Meridian<T>, Lift<T>)> {
         let across = self.across[n].map(constant);
-        let meridian = Meridian::new(self.surfaces[n]?, constant(self.e), p, across);
-        let lift = meridian.lift(l, p_d);
+        let surface = match changing {
+            Some([[s, ..], [kappa, ..]]) => Surface::of([s, kappa]),
+            None => self.surfaces[n]?.lift_to(),
+        };
+        let meridian = Meridian::new(surface, constant(self.e), p, across);
+        let lift = meridian.lift(l, p_d, changing);
         Some((meridian, lift))
     }
 
@@ -321,27 +328,33 @@ impl MountedTank {
     }
 
     /// Returns true if a bob is where the inertia along its meridian is too small; x as in [`MountedTank::contents`].
+    /// `liquid` matters only for tanks with a table.
     #[inline(never)]
-    pub fn is_beyond(&self, x: &[f64]) -> bool {
-        (0..MODES).any(|n| self.inertia_along_meridian(n, x) < LEAST_INERTIA)
+    pub fn is_beyond(&self, x: &[f64], liquid: f64) -> bool {
+        (0..MODES).any(|n| self.inertia_along_meridian(n, x, liquid) < LEAST_INERTIA)
     }
 
     /// Returns the inertia along its meridian of the bob of mode n (from 0), relative to a pendulum's.
-    fn inertia_along_meridian(&self, n: usize, x: &[f64]) -> f64 {
-        let Some(surface) = self.surfaces[n] else { return 1.0 };
+    fn inertia_along_meridian(&self, n: usize, x: &[f64], liquid: f64) -> f64 {
+        let Some(mut surface) = self.surfaces[n] else { return 1.0 };
+        if self.tank.fill.points > 0
+            && let Some([[s, ..], [kappa, ..]]) = self.curves.surface(n, self.curves.place(liquid))
+        {
+            surface = Surface::of([s, kappa]);
+        }
         let [p, _] = on_sphere(vec_of(x, 6 * n), [0.0; 3]);
         surface.meridian_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
     /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's number from 1, 0
     /// if the system has only one. The slack recognises a step that could not pass the bound.
-    pub fn check_surfaces(&self, x: &[f64], tank: usize) -> Result<(), StepError> {
+    pub fn check_surfaces(&self, x: &[f64], liquid: f64, tank: usize) -> Result<(), StepError> {
+        let is_near =
+            |n: &usize| self.inertia_along_meridian(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
+        let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
         let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
-        let is_near = |n: &usize| self.inertia_along_meridian(*n, x) < LEAST_INERTIA * (1.0 + 1e-6);
-        match (0..MODES).find(is_near) {
-            Some(n) => Err(StepError::Model(self.tank.beyond(n, &format!("tank{index}")))),
-            None => Ok(()),
-        }
+        let now = Tank { liquid_0: liquid, ..self.tank }.resolve();
+        Err(StepError::Model(now.beyond(n, &format!("tank{index}"))))
     }
 
     /// Returns true if any bob is on a surface other than a sphere.
@@ -468,7 +481,12 @@ impl<T: Number> Contents<'_, T> {
             let [p, p_d] = on_sphere(p, p_d);
             let mut rho = add(hinge, scale(l[0], p));
             let mut rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
-            let on_surface = if mounted.curved { mounted.on_surface(n, l, [p, p_d]) } else { None };
+            let on_surface = if mounted.curved {
+                let changing = place.and_then(|place| curves.surface(n, place));
+                mounted.on_surface(n, l, [p, p_d], changing.map(|pair| pair.map(follow)))
+            } else {
+                None
+            };
             if let Some((_, lift)) = &on_surface {
                 (rho, rho_d) = (add(rho, scale(lift.z, e)), add(rho_d, scale(lift.z_d, e)));
             }
@@ -502,7 +520,7 @@ impl<T: Number> Contents<'_, T> {
                 centring_d = l[0] * l[1] * dot(p_perp, p_perp) * k;
                 if let Some((_, lift)) = &on_surface {
                     (b, b_d) = (b + lift.z, b_d + lift.z_d);
-                    end_rate = add(end_rate, scale(lift.z_by_length, e));
+                    end_rate = add(end_rate, scale(lift.z_at_rest, e));
                     centring_d = centring_d + m[0] * lift.energy_d + m[1] * lift.energy;
                 }
                 let lost = scale(m[1] * l[0], p_perp);

@@ -233,12 +233,14 @@ impl Draining {
     }
 
     fn is_beyond(&self, x: &[f64; STATES]) -> bool {
-        self.curved().any(|(i, mounted)| mounted.is_beyond(&x[index::bob(i, 0)..]))
+        self.curved()
+            .any(|(i, mounted)| mounted.is_beyond(&x[index::bob(i, 0)..], x[index::LIQUID + i]))
     }
 
     fn check_surfaces(&self, x: &[f64; STATES]) -> Result<(), StepError> {
-        self.curved()
-            .try_for_each(|(i, mounted)| mounted.check_surfaces(&x[index::bob(i, 0)..], i + 1))
+        self.curved().try_for_each(|(i, mounted)| {
+            mounted.check_surfaces(&x[index::bob(i, 0)..], x[index::LIQUID + i], i + 1)
+        })
     }
 
     /// Applies a change of the flows to `flow`. Where a flow jumps, the momentum of the flow within the tank jumps by

@@ -10,8 +10,17 @@ impl Tank {
     /// if the mode is not in use. `field` is its name in the FMUs after `tank.`, `indices` are the element's, from 0.
     pub fn overridden(&self, field: &str, indices: &[usize]) -> Option<String> {
         let n = *indices.first().unwrap_or(&0);
-        let is_of_mode =
-            matches!(field, "mass" | "length" | "hinge" | "wave" | "zeta" | "breaking_steepness");
+        let is_of_mode = matches!(
+            field,
+            "mass"
+                | "length"
+                | "hinge"
+                | "wave"
+                | "zeta"
+                | "breaking_steepness"
+                | "nonlinear_inertia"
+                | "nonlinear_stiffness"
+        );
         if is_of_mode && n >= self.modes {
             return None;
         }
@@ -21,6 +30,9 @@ impl Tank {
             }
             "zeta" if self.fill.has_zeta(n) => {
                 Some(format!("fill.zeta[{},1] to fill.zeta[{0},{}]", n + 1, self.fill.points))
+            }
+            "nonlinear_inertia" | "nonlinear_stiffness" if self.fill.has_surface(n) => {
+                Some(format!("fill.{field}[{},1] to fill.{field}[{0},{}]", n + 1, self.fill.points))
             }
             "m_0" | "H_0" | "I_0" | "mass" | "length" | "hinge" | "wave" if self.diameter > 0.0 => {
                 Some(format!(

@@ -226,7 +226,8 @@ pub struct Tank {
     /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
     /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and the table
-    /// gives m_0, h_0, i_0, i_z, mass, length and hinge, and zeta of modes for which it is not 0.
+    /// gives m_0, h_0, i_0, i_z, mass, length and hinge. It gives zeta of modes for which it is not 0, and s and kappa of
+    /// modes for which they are not 1.
     pub fill: FillTable,
     /// Mass of liquid at the start, kg, in a tank that can drain.
     pub liquid_0: f64,
@@ -267,6 +268,9 @@ impl Tank {
                 tank.m_0 -= tank.mass[n];
                 if let Some(zeta) = curves.zeta(n, at) {
                     tank.zeta[n] = zeta;
+                }
+                if let Some([[s, ..], [kappa, ..]]) = curves.surface(n, at) {
+                    (tank.nonlinear_inertia[n], tank.nonlinear_stiffness[n]) = (s, kappa);
                 }
             }
             [tank.h_0, tank.i_0, tank.i_z] = curves.rigid(at).map(|jet| jet[0]);
@@ -328,9 +332,14 @@ impl Tank {
         self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
-    /// Returns the surface of mode n (from 0), `None` for a pendulum.
+    /// Returns the surface of mode n (from 0), `None` for a pendulum. A mode that is a pendulum at some fills of its table
+    /// only has a surface at every fill.
     pub(crate) fn surface(&self, n: usize) -> Option<Surface> {
-        let surface = Surface::new(self.nonlinear_inertia[n], self.nonlinear_stiffness[n]);
+        let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
+        let surface = match self.fill.has_surface(n) {
+            true => Some(Surface::of([s, kappa])),
+            false => Surface::new(s, kappa),
+        };
         surface.filter(|_| n < self.modes)
     }
 
@@ -341,7 +350,12 @@ impl Tank {
 
     /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface; `name` is that of the tank.
     pub(crate) fn beyond(&self, n: usize, name: &str) -> String {
-        surface::beyond([self.nonlinear_inertia[n], self.nonlinear_stiffness[n]], n, name)
+        let text =
+            surface::beyond([self.nonlinear_inertia[n], self.nonlinear_stiffness[n]], n, name);
+        match self.fill.has_surface(n) {
+            true => format!("{text}; {name}.fill gives them at {:?} kg", self.liquid_0),
+            false => text,
+        }
     }
 
     /// Returns true if mode n (from 0) is planar, or its bob is not a pendulum.
@@ -425,10 +439,15 @@ impl Tank {
         if self.ball.travel > 0.0 {
             return Rigid { mass: 0.0, moment: [0.0; 3], inertia: self.own_inertia() };
         }
-        if self.fill.points > 0 {
-            return Tank { liquid_0: self.fill.liquid[0], ..*self }.resolve().rigid();
+        self.at_point(0).rigid()
+    }
+
+    /// Returns the tank at a point of its table (from 0), itself where the table has no such point.
+    fn at_point(&self, point: usize) -> Tank {
+        match self.fill.masses().get(point) {
+            Some(&liquid_0) => Tank { liquid_0, ..*self }.resolve(),
+            None => *self,
         }
-        self.rigid()
     }
 
     /// Returns the inertia that craft and rigid liquid must have for bobs with s < 1 within 45 degrees, as a body of
@@ -563,6 +582,8 @@ const CYLINDER: FillTable = FillTable {
         [-0.222781, -0.148021, -0.0520051, 0.0473908, 0.1473, 0.247286, 0.347284, 0.447284, 0.547284, 0.647284, 0.747284, 0.847284],
     ]),
     zeta: [[0.0; POINTS]; MODES],
+    nonlinear_inertia: [[1.0; POINTS]; MODES],
+    nonlinear_stiffness: [[1.0; POINTS]; MODES],
 };
 
 impl Default for Tank {
@@ -760,6 +781,12 @@ impl Tank {
                 problems.number(&name_of("length"), length, SHORTEST, FARTHEST, "m");
                 problems.number(&name_of("hinge"), table.hinge[n][i], -FARTHEST, FARTHEST, "m");
                 problems.number(&name_of("zeta"), table.zeta[n][i], 0.0, 10.0, "");
+                for (what, column) in [
+                    ("nonlinear_inertia", &table.nonlinear_inertia),
+                    ("nonlinear_stiffness", &table.nonlinear_stiffness),
+                ] {
+                    problems.number(&name_of(what), column[n][i], -1e3, 1e3, "");
+                }
                 sum += mass;
             }
             if sum > masses[i] {
@@ -1054,8 +1081,15 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     if smallest_pivot(&at_rest) < SINGULAR {
         return Some(String::new());
     }
-    let lent = tanks.iter().fold(body, |sum, tank| sum.and(&tank.rigid()).and(&tank.lent()));
-    if tanks.iter().any(Tank::has_surface) && smallest_pivot(&lent.mass_matrix()) < SINGULAR {
+    // At the start, and at the points of tables.
+    let lends = |point: usize| {
+        let lent = tanks.iter().fold(body, |sum, tank| {
+            let tank = tank.at_point(point);
+            sum.and(&tank.rigid()).and(&tank.lent())
+        });
+        smallest_pivot(&lent.mass_matrix()) < SINGULAR
+    };
+    if tanks.iter().any(Tank::has_surface) && (0..=POINTS).rev().any(lends) {
         let within =
             " at slosh angles up to 45 degrees: a nonlinear_inertia below 1 needs a heavier craft";
         return Some(within.into());

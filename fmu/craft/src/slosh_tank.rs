@@ -393,7 +393,7 @@ fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
 
 impl System<TANK_STATES> for Run<'_> {
     fn rates(&self, t: f64, x: &[f64; TANK_STATES]) -> [f64; TANK_STATES] {
-        if has_diverged(x) || self.mounted.is_curved() && self.mounted.is_beyond(x) {
+        if has_diverged(x) || self.mounted.is_curved() && self.mounted.is_beyond(x, x[LIQUID]) {
             return [0.0; TANK_STATES];
         }
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
@@ -427,7 +427,7 @@ impl Drains<TANK_STATES> for Run<'_> {
     }
 
     fn check_surfaces(&self, x: &[f64; TANK_STATES]) -> Result<(), StepError> {
-        if self.mounted.is_curved() { self.mounted.check_surfaces(x, 0) } else { Ok(()) }
+        if self.mounted.is_curved() { self.mounted.check_surfaces(x, x[LIQUID], 0) } else { Ok(()) }
     }
 }
 
@@ -1241,7 +1241,10 @@ impl SloshTank {
     /// Refuses slosh angles, as integrated by the host, beyond the bound of a mode's surface.
     pub fn check_surfaces(&self) -> Result<(), StepError> {
         match &self.draining {
-            Some(mounted) if mounted.is_curved() => mounted.check_surfaces(&self.motion.state.x, 0),
+            Some(mounted) if mounted.is_curved() => {
+                let x = &self.motion.state.x;
+                mounted.check_surfaces(x, x[LIQUID], 0)
+            }
             _ => Ok(()),
         }
     }

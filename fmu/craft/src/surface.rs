@@ -26,7 +26,8 @@
 //! to p (p'' = y - |p'|^2 p), with the projection Pi:
 //!
 //! ```text
-//! Pi { D^T (G + l D y) + (s - 1)(l sigma' + 2 l' sigma) p_perp } = 0,   sigma' = p_perp.y + |p_perp'|^2 - u |p'|^2
+//! Pi { D^T (G + l D y) + [(s - 1)(l sigma' + 2 l' sigma) + s' l sigma] p_perp } = 0
+//! sigma' = p_perp.y + |p_perp'|^2 - u |p'|^2
 //! G = a + w' x rho + w x (w x rho) + 2 w x rho' + (rho'' without y) + phi/m
 //! ```
 //!
@@ -35,7 +36,7 @@
 //!
 //! ```text
 //! M = Pi (D^T D + (s - 1) p_perp p_perp^T) Pi = Pi + gamma e_t e_t^T,   gamma = (1 - beta eta)^2 - 1 + (s - 1) eta^2
-//! l y = -M^-1 Pi [D^T G + i],   i = (s - 1)(l psi + 2 l' sigma) p_perp,   psi = |p_perp'|^2 - u |p'|^2
+//! l y = -M^-1 Pi [D^T G + i],   i = [(s - 1)(l psi + 2 l' sigma) + s' l sigma] p_perp,   psi = |p_perp'|^2 - u |p'|^2
 //! force on the craft at rho   F = phi - m (G + l D y) = phi - m (N G - D M^-1 Pi i),   N = 1 - D M^-1 Pi D^T
 //! ```
 //!
@@ -44,16 +45,19 @@
 //! A negative s, as in shallow tanks, bounds the angle at which it is positive. The model ends at [`LEAST_INERTIA`].
 //!
 //! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. While the tank drains, the leaving mass
-//! takes its share of E_i with it.
+//! takes its share of E_i with it. s and kappa of its fill table then depend on time, so that z gains the rate kappa' l u^2/8.
 //!
 //! Source: the coefficients are those of `formulas::third_order`. The equations are Lagrange's for these energies.
-//! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint.
+//! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
+//! those of a draining tank against differences of the Lagrangian.
 
 use alloc::format;
 use alloc::string::String;
 
 use taylor::number::Number;
 use taylor::vector::{Vec3, add, dot, scale, sub};
+
+use crate::table::Jet;
 
 /// Smallest inertia along the meridian, relative to a pendulum's, at which the model is used.
 pub(crate) const LEAST_INERTIA: f64 = 0.5;
@@ -63,11 +67,26 @@ const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
 /// The two coefficients of a mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Surface {
+pub(crate) struct Surface<T = f64> {
     /// s - 1
-    inertia: f64,
+    inertia: T,
     /// kappa - 1
-    stiffness: f64,
+    stiffness: T,
+}
+
+impl<T: Number> Surface<T> {
+    /// Returns the surface with s and kappa, also that of a pendulum.
+    pub fn of([s, kappa]: [T; 2]) -> Surface<T> {
+        let one = T::constant(1.0);
+        Surface { inertia: s - one, stiffness: kappa - one }
+    }
+
+    /// Returns the inertia along the meridian, relative to a pendulum's, from eta = p.e and u.
+    pub fn meridian_inertia(&self, eta: T, u: T) -> T {
+        let tilt = T::constant(1.0) - u * eta * (self.stiffness * 0.5);
+        // eta^2 + u = 1
+        eta * eta * (T::constant(1.0) + u * self.inertia) + u * tilt * tilt
+    }
 }
 
 impl Surface {
@@ -106,14 +125,13 @@ impl Surface {
 
     /// Returns the surface of a mode, `None` for a pendulum.
     pub fn new(s: f64, kappa: f64) -> Option<Surface> {
-        (s != 1.0 || kappa != 1.0).then_some(Surface { inertia: s - 1.0, stiffness: kappa - 1.0 })
+        (s != 1.0 || kappa != 1.0).then(|| Surface::of([s, kappa]))
     }
 
-    /// Returns the inertia along the meridian, relative to a pendulum's, from eta = p.e and u.
-    pub fn meridian_inertia<T: Number>(&self, eta: T, u: T) -> T {
-        let tilt = T::constant(1.0) - u * eta * (0.5 * self.stiffness);
-        // eta^2 + u = 1
-        eta * eta * (T::constant(1.0) + u * self.inertia) + u * tilt * tilt
+    /// Returns the surface over a number type.
+    pub fn lift_to<T: Number>(&self) -> Surface<T> {
+        let [inertia, stiffness] = [self.inertia, self.stiffness].map(T::constant);
+        Surface { inertia, stiffness }
     }
 
     /// Returns the largest distance of the bob from its hinge within 45 degrees, over l, or more.
@@ -176,7 +194,7 @@ pub(crate) fn beyond([s, kappa]: [f64; 2], n: usize, name: &str) -> String {
 
 /// The surface at the bob.
 pub(crate) struct Meridian<T> {
-    surface: Surface,
+    surface: Surface<T>,
     p: Vec3<T>,
     e: Vec3<T>,
     pub p_perp: Vec3<T>,
@@ -198,19 +216,24 @@ pub(crate) struct Lift<T> {
     /// i, and E_i/m.
     pub inner: Vec3<T>,
     pub energy: T,
-    /// -(s - 1) l l' sigma^2, the power that E_i/m gains beyond the work of the bob.
+    /// -[(s - 1) l l' + s' l^2/2] sigma^2, the power that E_i/m gains beyond the work of the bob.
     pub energy_d: T,
-    /// (kappa - 1) l' u^2/8, the rate of z of a bob at rest.
-    pub z_by_length: T,
+    /// [(kappa - 1) l]' u^2/8, the rate of z of a bob at rest.
+    pub z_at_rest: T,
 }
 
 impl<T: Number> Meridian<T> {
     /// Creates the surface at the unit vector p; `across` is b of a planar mode.
-    pub fn new(surface: Surface, e: Vec3<T>, p: Vec3<T>, across: Option<Vec3<T>>) -> Meridian<T> {
+    pub fn new(
+        surface: Surface<T>,
+        e: Vec3<T>,
+        p: Vec3<T>,
+        across: Option<Vec3<T>>,
+    ) -> Meridian<T> {
         let eta = dot(e, p);
         let p_perp = sub(p, scale(eta, e));
         let u = dot(p_perp, p_perp);
-        let beta = u * (0.5 * surface.stiffness);
+        let beta = u * (surface.stiffness * 0.5);
         let gamma = beta * (beta * eta - T::constant(2.0)) * eta + eta * eta * surface.inertia;
         let inertia = surface.meridian_inertia(eta, u).at_least(0.5 * LEAST_INERTIA);
         Meridian { surface, p, e, p_perp, u, eta, beta, eased: gamma / inertia, across }
@@ -257,8 +280,14 @@ impl<T: Number> Meridian<T> {
         columns
     }
 
-    /// Returns the bob's height and the terms of E_i at the rate p', with l and its derivatives.
-    pub fn lift(&self, [l, l_d, l_dd]: [T; 3], p_d: Vec3<T>) -> Lift<T> {
+    /// Returns the bob's height and the terms of E_i at the rate p', with l and its derivatives, and those of s and kappa
+    /// if they change.
+    pub fn lift(
+        &self,
+        [l, l_d, l_dd]: Jet<T>,
+        p_d: Vec3<T>,
+        changing: Option<[Jet<T>; 2]>,
+    ) -> Lift<T> {
         let Meridian { u, e, p_perp, surface, .. } = *self;
         let sigma = dot(p_perp, p_d);
         let p_perp_d = sub(p_d, scale(dot(e, p_d), e));
@@ -268,14 +297,24 @@ impl<T: Number> Meridian<T> {
         let rate_d = sigma * sigma + u * psi * 0.5;
         let turning = l * psi + l_d * sigma * 2.0;
         let own = surface.inertia;
-        Lift {
+        let mut lift = Lift {
             z: l * rising * surface.stiffness,
             z_d: (l_d * rising + l * rate) * surface.stiffness,
             z_dd: (l_dd * rising + l_d * rate * 2.0 + l * rate_d) * surface.stiffness,
             inner: scale(turning * own, p_perp),
-            energy: l * l * sigma * sigma * (0.5 * own),
+            energy: l * l * sigma * sigma * (own * 0.5),
             energy_d: -(l * l_d * sigma * sigma * own),
-            z_by_length: l_d * rising * surface.stiffness,
+            z_at_rest: l_d * rising * surface.stiffness,
+        };
+        if let Some([[_, s_d, _], [_, kappa_d, kappa_dd]]) = changing {
+            let by_kappa = kappa_d * l * rising;
+            lift.z_d = lift.z_d + by_kappa;
+            lift.z_at_rest = lift.z_at_rest + by_kappa;
+            lift.z_dd =
+                lift.z_dd + kappa_dd * l * rising + kappa_d * (l_d * rising + l * rate) * 2.0;
+            lift.inner = add(lift.inner, scale(s_d * l * sigma, p_perp));
+            lift.energy_d = lift.energy_d - s_d * l * l * sigma * sigma * 0.5;
         }
+        lift
     }
 }

@@ -2,7 +2,7 @@
 //! derivatives, so that the forces of flowing liquid have no steps.
 //!
 //! ```text
-//! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   zeta_n,   H_0, I_0, I_z
+//! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   zeta_n,   s_n, kappa_n,   H_0, I_0, I_z
 //! ```
 //!
 //! 1/l_n is omega^2/g. Shallow liquid has a long pendulum with a hinge far above it, proportional to 1/depth. Its
@@ -42,6 +42,11 @@ pub struct FillTable {
     pub hinge: [[f64; POINTS]; MODES],
     /// Damping ratio of each mode at `g_ref`; 0 at all points of a mode for `Tank::zeta` at every fill.
     pub zeta: [[f64; POINTS]; MODES],
+    /// Coefficient s of each mode's inertia at finite amplitude (`surface.rs`). If s and kappa of a mode are 1 at all
+    /// points, those of the tank hold at every fill.
+    pub nonlinear_inertia: [[f64; POINTS]; MODES],
+    /// Coefficient kappa of each mode's stiffness at finite amplitude.
+    pub nonlinear_stiffness: [[f64; POINTS]; MODES],
 }
 
 impl FillTable {
@@ -53,6 +58,12 @@ impl FillTable {
     /// Returns true if the table gives the damping ratio of mode `n` (from 0).
     pub(crate) fn has_zeta(&self, n: usize) -> bool {
         self.zeta[n][..self.points].iter().any(|zeta| *zeta > 0.0)
+    }
+
+    /// Returns true if the table gives s and kappa of mode `n` (from 0).
+    pub(crate) fn has_surface(&self, n: usize) -> bool {
+        let columns = [&self.nonlinear_inertia[n], &self.nonlinear_stiffness[n]];
+        columns.iter().any(|column| column.iter().take(self.points).any(|x| *x != 1.0))
     }
 
     /// Returns mass, length and hinge height of mode `n`, from 0, at this mass of liquid, kg.
@@ -76,6 +87,8 @@ impl FillTable {
                 bob: curve(used(&|i| h[i] - l[i])),
                 share: curve(used(&|i| mass[i] / self.liquid[i].max(LIGHTEST))),
                 zeta: (n < modes && self.has_zeta(n)).then(|| curve(self.zeta[n])),
+                surface: (n < modes && self.has_surface(n))
+                    .then(|| [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]].map(curve)),
             }
         };
         FillCurves {
@@ -122,6 +135,7 @@ struct ModeCurves {
     bob: Curve,
     share: Curve,
     zeta: Option<Curve>,
+    surface: Option<[Curve; 2]>,
 }
 
 /// A table with its curves.
@@ -167,6 +181,11 @@ impl FillCurves {
     /// Returns the damping ratio of a mode at `g_ref`, if the table gives it.
     pub fn zeta<T: Number>(&self, n: usize, at: Place<T>) -> Option<T> {
         self.modes[n].zeta.as_ref().map(|curve| curve.at(at)[0])
+    }
+
+    /// Returns s and kappa of a mode, if the table gives them.
+    pub fn surface<T: Number>(&self, n: usize, at: Place<T>) -> Option<[Jet<T>; 2]> {
+        self.modes[n].surface.as_ref().map(|curves| curves.each_ref().map(|curve| curve.at(at)))
     }
 
     /// Returns mass, length and hinge height of a mode.

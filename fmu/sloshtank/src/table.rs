@@ -291,6 +291,10 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(TABLE_OF_MODE),
     V::parameter("tank.fill.zeta", |p, n| &mut p.tank.fill.zeta[n / POINTS][n % POINTS], "1", "Damping ratio of a slosh mode at g_ref at each point of the fill table; 0 at all points of a mode: zeta at every fill")
         .shape(TABLE_OF_MODE).range(0.0, 10.0),
+    V::parameter("tank.fill.nonlinear_inertia", |p, n| &mut p.tank.fill.nonlinear_inertia[n / POINTS][n % POINTS], "1", "Third-order coefficient s (nonlinear_inertia) of a slosh mode at each point of the fill table. If s and kappa of a mode are 1 at all points, nonlinear_inertia and nonlinear_stiffness hold at every fill")
+        .shape(TABLE_OF_MODE).range(-1e3, 1e3),
+    V::parameter("tank.fill.nonlinear_stiffness", |p, n| &mut p.tank.fill.nonlinear_stiffness[n / POINTS][n % POINTS], "1", "Third-order coefficient kappa (nonlinear_stiffness) of a slosh mode at each point of the fill table; see fill.nonlinear_inertia")
+        .shape(TABLE_OF_MODE).range(-1e3, 1e3),
     V::parameter("tank.p_0", |p, n| &mut p.tank.p_0[n / 3][n % 3], "1",
         "Unit vector from hinge to bob at the start, tank axes; the FMU normalises it, for a planar mode within its plane")
         .shape(MODE_VECTOR),

@@ -113,6 +113,10 @@ pub mod tank {
         pub const LENGTH: crate::Array<3> = crate::Array("tank[].fill.length");
         pub const HINGE: crate::Array<3> = crate::Array("tank[].fill.hinge");
         pub const ZETA: crate::Array<3> = crate::Array("tank[].fill.zeta");
+        pub const NONLINEAR_INERTIA: crate::Array<3> =
+            crate::Array("tank[].fill.nonlinear_inertia");
+        pub const NONLINEAR_STIFFNESS: crate::Array<3> =
+            crate::Array("tank[].fill.nonlinear_stiffness");
     }
 }
 

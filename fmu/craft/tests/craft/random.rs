@@ -97,6 +97,13 @@ impl Random {
         }
     }
 
+    /// Gives the bobs of a tank surfaces that change from point to point of its table.
+    pub fn bend_by_fill(&mut self, tank: &mut Tank) {
+        let FillTable { nonlinear_inertia, nonlinear_stiffness, .. } = &mut tank.fill;
+        nonlinear_inertia.as_flattened_mut().fill_with(|| self.between(0.7, 2.5));
+        nonlinear_stiffness.as_flattened_mut().fill_with(|| self.between(0.3, 2.5));
+    }
+
     /// Takes a tank its axial symmetry: two thirds of its modes are planar, with less rigid liquid than their masses.
     pub fn make_planar(&mut self, tank: &mut Tank) {
         let bobs: f64 = tank.mass[..tank.modes].iter().sum();
@@ -194,7 +201,8 @@ pub fn draining_tank(random: &mut Random, modes: usize) -> Tank {
     tank
 }
 
-/// A craft with one to three draining tanks and one that stays; from seed 20 on with surfaces other than spheres.
+/// A craft with one to three draining tanks and one that stays; from seed 20 on with surfaces other than spheres, from
+/// seed 40 on with those of the fill.
 pub fn draining_craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -203,6 +211,9 @@ pub fn draining_craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
     p.tank[p.tanks - 1] = random.tank();
     if seed >= 20 {
         random.bend_all(&mut p);
+    }
+    if seed >= 40 {
+        p.tank.iter_mut().for_each(|tank| random.bend_by_fill(tank));
     }
     let mut u = random.inputs();
     u.force.value[2] += 2.0 * p.craft.mass;

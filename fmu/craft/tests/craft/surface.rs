@@ -5,13 +5,15 @@
 //! their random tanks.
 
 use craft::{
-    Coupling, Inertia, Inputs, MODES, Mount, Parameters, Ramp, STATES, TANK_STATES, Tank,
-    TankInputs, TankParameters,
+    Coupling, FillTable, Inertia, Inputs, Line, MODES, Mount, POINTS, Parameters, Ramp, STATES,
+    TANK_STATES, Tank, TankInputs, TankParameters,
 };
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use taylor::number::{Dual, Number};
 
 use super::component::{SloshTank, Spacecraft};
 use super::exchange::runge_kutta;
-use super::random::Random;
+use super::random::{Random, draining_tank};
 use super::waves::{G, bench, circular, planar};
 
 /// A tank that rests upright under gravity.
@@ -211,4 +213,255 @@ fn a_craft_too_light_for_its_coefficients_is_refused() {
     assert!(said.len() == 1 && said[0].contains("nonlinear_inertia below 1"), "{said:?}");
     p.craft.mass = 3.0 * p.tank[0].mass[0];
     assert_eq!(p.problems(), [""; 0]);
+}
+
+/// One mode of a draining tank as a Lagrangian, per mass:
+///
+/// ```text
+/// L = |rho' + w x rho|^2/2 - a.rho + (s - 1) l^2 (q.q')^2/2 - (k/m) l^2 |q|^2/2
+/// rho = d + h e + l q + [(kappa - 1) l |q|^4/8 - l sqrt(1 - |q|^2)] e
+/// ```
+///
+/// q: x and y of the unit vector from hinge to bob. The table has two points, between which 1/l, h - l, m over the liquid,
+/// s and kappa are straight lines.
+struct Lagrangian<'a> {
+    tank: &'a Tank,
+    n: usize,
+    u: &'a TankInputs,
+}
+
+impl Lagrangian<'_> {
+    /// Returns l, h, m, s and kappa.
+    fn table<T: Number>(&self, t: T) -> [T; 5] {
+        let (FillTable { liquid, mass, length, hinge, .. }, n) = (&self.tank.fill, self.n);
+        let flow = self.u.mass_flow;
+        let left = T::constant(self.tank.liquid_0)
+            - t * (T::constant(flow.value) + t * (flow.slope / 2.0));
+        let share = (left - T::constant(liquid[0])) * (1.0 / (liquid[1] - liquid[0]));
+        let line = |y: [f64; 2]| T::constant(y[0]) + share * (y[1] - y[0]);
+        let ends = |of: &dyn Fn(usize) -> f64| line([of(0), of(1)]);
+        let l = ends(&|i| 1.0 / length[n][i]).recip();
+        let h = ends(&|i| hinge[n][i] - length[n][i]) + l;
+        let m = ends(&|i| mass[n][i] / liquid[i]) * left;
+        let FillTable { nonlinear_inertia, nonlinear_stiffness, .. } = &self.tank.fill;
+        [l, h, m, ends(&|i| nonlinear_inertia[n][i]), ends(&|i| nonlinear_stiffness[n][i])]
+    }
+
+    /// Returns L at q, q' and t.
+    fn at(&self, q: [f64; 2], q_d: [f64; 2], t: f64) -> f64 {
+        let time = Dual::of(t, 1.0);
+        let [l, h, _, _, kappa] = self.table(time);
+        let [x, y] = [0, 1].map(|i| Dual::of(q[i], q_d[i]));
+        let u = x * x + y * y;
+        let one = Dual::constant(1.0);
+        let up = h + (kappa - one) * l * u * u * 0.125 - l * (one - u).sqrt();
+        let in_tank = [l * x, l * y, up];
+        let vector = |of: fn(Dual) -> f64| Vector3::from(in_tank.map(of));
+        let [w, x_q, y_q, z_q] = self.tank.q;
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x_q, y_q, z_q));
+        let rho = Vector3::from(self.tank.position) + turn * vector(Dual::value);
+        let TankInputs { a, omega, omega_dot, .. } = self.u;
+        let moved = |i: usize| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t;
+        let w = Vector3::from([0, 1, 2].map(moved));
+        let speed = turn * vector(Dual::result) + w.cross(&rho);
+        let [l, _, m, s, _] = self.table(t);
+        let sigma = q[0] * q_d[0] + q[1] * q_d[1];
+        let inner = 0.5 * (s - 1.0) * (l * sigma).powi(2);
+        let centring = 0.5 * self.tank.k[self.n] / m * l * l * (q[0] * q[0] + q[1] * q[1]);
+        0.5 * speed.norm_squared() - Vector3::from(a.at(t)).dot(&rho) + inner - centring
+    }
+}
+
+/// Central differences of seventh order at so many steps.
+const DIFFERENCES: [(f64, f64); 6] = [
+    (1.0, 0.75),
+    (2.0, -0.15),
+    (3.0, 1.0 / 60.0),
+    (-1.0, -0.75),
+    (-2.0, 0.15),
+    (-3.0, -1.0 / 60.0),
+];
+
+/// The motion of a draining tank's bobs satisfies Lagrange's equations d(dL/dq')/dt = dL/dq, by differences of L and along the
+/// motion. Liquid flows so fast that s' and kappa' matter.
+#[test]
+fn bobs_of_a_draining_tank_move_by_lagrange_s_equations() {
+    for seed in 0..24 {
+        let mut random = Random::new(seed);
+        let mut tank = draining_tank(&mut random, 1 + seed as usize % 3);
+        random.bend_by_fill(&mut tank);
+        (tank.fill.points, tank.zeta, tank.fill.zeta) = (2, [0.0; MODES], [[0.0; POINTS]; MODES]);
+        tank.liquid_0 = 0.5 * (tank.fill.liquid[0] + tank.fill.liquid[1]);
+        let mut ramp = || Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
+        let (a, omega, omega_dot) = (ramp(), ramp().value, ramp());
+        let mass_flow =
+            Line { value: random.between(-30.0, 30.0), slope: random.between(-50.0, 50.0) };
+        let u = TankInputs { a, omega, omega_dot, mass_flow };
+        let p = TankParameters { tank, ..TankParameters::default() };
+        let start = SloshTank::new(&p, &u, 0.0, 1e-13).unwrap();
+        // Error h^6 times the seventh derivative of a motion with up to 20 rad/s, 1e-13/h.
+        let (h, middle) = (2e-3, 0.05);
+        let at = |t: f64| {
+            let mut tank = start.clone();
+            tank.step(&u, t).unwrap();
+            tank.continuous_states()
+        };
+        let states: Vec<_> = (0..7).map(|k| at(middle + (k as f64 - 3.0) * h)).collect();
+        for n in 0..tank.modes {
+            let law = Lagrangian { tank: &tank, n, u: &u };
+            let q = |x: &[f64; TANK_STATES]| {
+                let bob = &x[6 * n..];
+                [[bob[0], bob[1]], [bob[3], bob[4]]]
+            };
+            let moved = |mut q: [f64; 2], i: usize, by: f64| {
+                q[i] += by;
+                q
+            };
+            // L is quadratic in q'.
+            let momentum = |k: usize, i: usize| {
+                let ([place, rate], t) = (q(&states[k]), middle + (k as f64 - 3.0) * h);
+                let [more, less] = [0.5, -0.5].map(|by| law.at(place, moved(rate, i, by), t));
+                more - less
+            };
+            let [place, rate] = q(&states[3]);
+            for i in 0..2 {
+                let (mut left, mut right) = (0.0, 0.0);
+                for (step, weight) in DIFFERENCES {
+                    left += weight * momentum((3.0 + step) as usize, i) / h;
+                    right += weight * law.at(moved(place, i, 0.01 * step), rate, middle) / 0.01;
+                }
+                let l = law.table(middle)[0];
+                let size = l * (1.0 + l * rate[0].hypot(rate[1]));
+                println!(
+                    "{seed} {n} {i}: {left:.9} {right:.9} {:.1e}",
+                    (left - right).abs() / size
+                );
+                assert!((left - right).abs() < 1e-8 * size, "{seed} {n} {i}: {left} {right}");
+            }
+        }
+    }
+}
+
+/// A table with the same s and kappa at all points is a tank with them.
+#[test]
+fn a_table_with_one_pair_at_every_fill_is_a_tank_with_this_pair() {
+    for seed in 0..6 {
+        let mut random = Random::new(seed);
+        let mut tank = draining_tank(&mut random, 1 + seed as usize % 3);
+        random.bend(&mut tank);
+        let mass_flow = Line { value: 5.0, slope: 0.5 };
+        let a = Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
+        let u = TankInputs { a, omega: random.vector(0.5), mass_flow, ..TankInputs::default() };
+        let mut by_table = tank;
+        for n in 0..tank.modes {
+            by_table.fill.nonlinear_inertia[n] = [tank.nonlinear_inertia[n]; POINTS];
+            by_table.fill.nonlinear_stiffness[n] = [tank.nonlinear_stiffness[n]; POINTS];
+        }
+        by_table.nonlinear_inertia = [1.0; MODES];
+        by_table.nonlinear_stiffness = [1.0; MODES];
+        let [mut one, mut other] = [tank, by_table].map(|tank| {
+            let p = TankParameters { tank, ..TankParameters::default() };
+            let mut tank = SloshTank::new(&p, &u, 0.0, 1e-12).unwrap();
+            tank.step(&u, 2.0).unwrap();
+            tank
+        });
+        let (out, same) = (one.outputs(&u), other.outputs(&u));
+        let all = |tank: &SloshTank, bias: &[f64]| [&tank.continuous_states()[..], bias].concat();
+        for (a, b) in all(&one, &out.bias).iter().zip(all(&other, &same.bias)) {
+            assert!((a - b).abs() < 1e-10 * (1.0 + a.abs()), "{seed}: {a} {b}");
+        }
+    }
+}
+
+/// At a point of its table, without flow, a tank has the rates of one with these coefficients.
+#[test]
+fn a_tank_has_the_coefficients_of_its_fill() {
+    let mut random = Random::new(5);
+    let mut tank = draining_tank(&mut random, 2);
+    random.bend_by_fill(&mut tank);
+    let u = TankInputs { a: Ramp::held([0.3, -0.2, 2.0]), ..TankInputs::default() };
+    for point in [0, 4, POINTS - 1] {
+        let with = Tank { liquid_0: tank.fill.liquid[point], ..tank };
+        let mut constant = with;
+        for n in 0..tank.modes {
+            constant.nonlinear_inertia[n] = tank.fill.nonlinear_inertia[n][point];
+            constant.nonlinear_stiffness[n] = tank.fill.nonlinear_stiffness[n][point];
+        }
+        constant.fill.nonlinear_inertia = [[1.0; POINTS]; MODES];
+        constant.fill.nonlinear_stiffness = [[1.0; POINTS]; MODES];
+        let rates = |tank: Tank| {
+            let p = TankParameters { tank, ..TankParameters::default() };
+            SloshTank::new(&p, &u, 0.0, 1e-9).unwrap().derivatives(&u)
+        };
+        assert_eq!(rates(with), rates(constant), "{point}");
+        constant.nonlinear_stiffness[1] += 0.1;
+        assert_ne!(rates(with), rates(constant), "{point}");
+    }
+}
+
+/// While the liquid falls from a point with s = 1 to one with s = -6, the bound of the angle comes down to a bob on a
+/// circle of 20 degrees.
+#[test]
+fn a_bound_that_reaches_the_bob_while_the_tank_drains_is_refused() {
+    let mut tank = Tank { modes: 1, zeta: [0.0; MODES], ..Tank::default() };
+    tank.fill.points = 2;
+    tank.fill.nonlinear_inertia[0][0] = -6.0;
+    (tank.fill.liquid[0], tank.fill.liquid[1], tank.liquid_0) = (300.0, 400.0, 399.0);
+    tank.fill.length[0][0] = tank.fill.length[0][1];
+    let (sin, cos) = f64::to_radians(20.0).sin_cos();
+    tank.p_0[0] = [sin, 0.0, -cos];
+    let l = tank.fill.mode(0, tank.liquid_0)[1];
+    tank.p_dot_0[0] = [0.0, sin * f64::sqrt(G / l / cos), 0.0];
+    let mass_flow = Line { value: 10.0, slope: 0.0 };
+    let u = TankInputs { a: Ramp::held([0.0, 0.0, G]), mass_flow, ..TankInputs::default() };
+    let p = TankParameters { tank, ..TankParameters::default() };
+    assert_eq!(p.problems(), [""; 0]);
+    let mut slosh = SloshTank::new(&p, &u, 0.0, 1e-8).unwrap();
+    let why = (0..90).find_map(|_| slosh.step(&u, 0.1).err()).unwrap().to_string();
+    assert!(
+        why.contains("slosh angle of mode 1") && why.contains("tank.fill gives them at"),
+        "{why}"
+    );
+    assert!(slosh.continuous_states()[6 * MODES + 1] > 305.0);
+    // Its coefficients at the last point refuse the same start there.
+    let empty = TankParameters { tank: Tank { liquid_0: 300.0, ..tank }, ..p };
+    let said = empty.problems();
+    assert!(said.len() == 1 && said[0].contains("exceeds 16.1 degrees"), "{said:?}");
+}
+
+#[test]
+fn coefficients_of_a_table_are_checked_by_their_names_and_replace_those_of_the_tank() {
+    let mut p = Parameters { tanks: 1, ..Parameters::default() };
+    let tank = &mut p.tank[0];
+    tank.fill.points = 3;
+    tank.fill.nonlinear_inertia[0][1] = f64::NAN;
+    tank.fill.nonlinear_stiffness[0][2] = 2e3;
+    let said = p.problems();
+    assert!(
+        said[0].starts_with("tank[1].fill.nonlinear_inertia[1,2] = NaN (allowed: "),
+        "{said:?}"
+    );
+    assert!(said[1].starts_with("tank[1].fill.nonlinear_stiffness[1,3] = 2000.0 "), "{said:?}");
+    let tank = &mut p.tank[0];
+    tank.liquid_0 = 100.0;
+    (tank.fill.nonlinear_inertia[0][1], tank.fill.nonlinear_stiffness[0][2]) = (1.4, 0.7);
+    assert_eq!(p.problems(), [""; 0]);
+    let why = p.overridden("tank[].nonlinear_inertia", &[0, 0]).unwrap();
+    assert_eq!(why, "tank[1].fill.nonlinear_inertia[1,1] to fill.nonlinear_inertia[1,3]");
+    assert_eq!(p.overridden("tank[].nonlinear_inertia", &[0, 1]), None);
+    // Points and modes that are not in use do not count.
+    p.tank[0].fill.points = 0;
+    p.tank[0].fill.nonlinear_inertia[0][0] = f64::NAN;
+    assert_eq!(p.problems(), [""; 0]);
+    // A craft that is heavy enough at the start, but not where s is 0.
+    let mut p = Parameters { tanks: 1, ..Parameters::default() };
+    let tank = &mut p.tank[0];
+    (tank.fill.points, tank.liquid_0) = (2, 127.0);
+    tank.fill.mass[0][..2].copy_from_slice(&[63.0, 87.0]);
+    p.craft.mass = 15.0;
+    p.craft.j = Inertia { xx: 90.0, yy: 86.0, zz: 64.0, xy: 0.0, xz: 0.0, yz: 0.0 };
+    assert_eq!(p.problems(), [""; 0]);
+    p.tank[0].fill.nonlinear_inertia[0][0] = 0.0;
+    let said = p.problems();
+    assert!(said.len() == 1 && said[0].contains("nonlinear_inertia below 1"), "{said:?}");
 }
