@@ -270,9 +270,9 @@ pub fn table<'py>(
             return Err(format!("The table's ends must ascend: {low} m, then {high} m.").into());
         }
         let placed = fill_table::place(tank, low, high, modes)?;
-        let error = Some(placed.error);
+        let between = Some(&placed.between);
         let target = Target::Spacecraft { tank: 1 };
-        fill_table::parameters(tank, &placed.sweep, error, target, checked(liquid)?)
+        fill_table::parameters(tank, &placed.sweep, between, target, checked(liquid)?)
     })?;
     let set = found.into_iter().next().expect("one question has one answer");
     handed_over(py, set.map_err(|why: Problems| tank.get().error(&why))?)

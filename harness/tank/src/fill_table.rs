@@ -9,9 +9,13 @@ use core::f64::consts::PI;
 use names::sloshtank::tank::MOST_MODES as MODES;
 use names::sloshtank::tank::fill;
 pub use names::sloshtank::tank::fill::MOST_POINTS as POINTS;
-use names::sloshtank::tank::{H_0, HINGE, I_0, I_Z, LENGTH, LIQUID_0, M_0, MASS, OUTLET, ZETA};
+use names::sloshtank::tank::{
+    H_0, HINGE, I_0, I_Z, LENGTH, LIQUID_0, M_0, MASS, NONLINEAR_INERTIA, NONLINEAR_STIFFNESS,
+    OUTLET, ZETA,
+};
 
 use crate::contour::Problems;
+use crate::fill_amplitude::{self, AtFill, Columns};
 use crate::interpolation::Monotone;
 use crate::modal::ModalData;
 use crate::parameters::{Liquid, ParameterSet, Target, Value};
@@ -30,9 +34,18 @@ const LIMIT: f64 = 5e-3;
 pub struct Placed {
     /// The rows of the table.
     pub sweep: Sweep,
+    /// Its errors between them.
+    pub between: Between,
+}
+
+/// Solutions between the points of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Between {
     /// Largest errors between the points for the first mode: frequency and mass relative, hinge over the largest radius
     /// of the surface.
     pub error: [f64; 3],
+    /// A solution near the middle between each two points.
+    pub rows: Vec<ModalData>,
 }
 
 /// A mode at the candidate fills: mass of liquid, omega^2/g, bob, share of mass.
@@ -152,9 +165,14 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
             step /= 2;
         }
     }
-    let error = curves.errors(0, &points);
-    let rows = points.iter().map(|i| dense[*i].clone()).collect();
-    Ok(Placed { sweep: Sweep { rows }, error })
+    let of = |places: &[usize]| places.iter().map(|i| dense[*i].clone()).collect();
+    let middles: Vec<usize> = points
+        .windows(2)
+        .filter(|pair| pair[1] > pair[0] + 1)
+        .map(|pair| (pair[0] + pair[1]) / 2)
+        .collect();
+    let between = Between { error: curves.errors(0, &points), rows: of(&middles) };
+    Ok(Placed { sweep: Sweep { rows: of(&points) }, between })
 }
 
 /// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its table.
@@ -165,7 +183,7 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
 pub fn parameters(
     tank: &Tank,
     sweep: &Sweep,
-    error: Option<[f64; 3]>,
+    between: Option<&Between>,
     target: Target,
     liquid: Liquid,
 ) -> Result<ParameterSet, Problems> {
@@ -190,11 +208,14 @@ pub fn parameters(
     }
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
     let modes = carrying(rows);
-    let with_modes = |row: &ModalData| {
-        let row = ModalData { modes: row.modes[..modes].to_vec(), ..row.clone() };
-        ParameterSet::new(tank, &row, target, liquid)
+    let solved = |rows: &[ModalData], liquid: Liquid| {
+        let with_modes = |row: &ModalData| {
+            let row = ModalData { modes: row.modes[..modes].to_vec(), ..row.clone() };
+            ParameterSet::new(tank, &row, target, liquid)
+        };
+        rows.iter().map(with_modes).collect::<Result<Vec<_>, _>>()
     };
-    let mut sets = rows.iter().map(with_modes).collect::<Result<Vec<_>, _>>()?;
+    let mut sets = solved(rows, liquid)?;
     let value = |set: &ParameterSet, what: &str, n: usize| {
         let name = format!("{prefix}.{what}[{n}]");
         set.values.iter().find_map(|(other, value)| match value {
@@ -205,10 +226,11 @@ pub fn parameters(
     let ratio = |set: &ParameterSet, n: usize| value(set, "zeta", n).unwrap_or(0.0);
     let ratios: Vec<Vec<f64>> =
         sets.iter().map(|set| (1..=modes).map(|n| ratio(set, n)).collect()).collect();
-    let of_mode_1 = |set: Option<&ParameterSet>, what: &str| value(set?, what, 1);
-    let third_order = ["nonlinear_inertia", "nonlinear_stiffness"]
-        .map(|what| (what, of_mode_1(sets.first(), what), of_mode_1(sets.last(), what)));
-    let [low, high] = [sets.first(), sets.last()].map(|set| of_mode_1(set, "k").unwrap_or(0.0));
+    let middle = between.map_or(&[][..], |between| &between.rows);
+    let middle_sets = solved(middle, Liquid { nu: None, ..liquid })?;
+    let third_order = third_order(AtFill::all(rows, &sets), AtFill::all(middle, &middle_sets));
+    let [low, high] = [sets.first(), sets.last()]
+        .map(|set| set.and_then(|set| value(set, "k", 1)).unwrap_or(0.0));
     let mut set = sets.pop().unwrap_or_else(|| unreachable!("there are at least two rows"));
     if low != high {
         let text = format!(
@@ -219,12 +241,19 @@ pub fn parameters(
         set.notes.push(text.clone());
         set.warnings.push(text);
     }
-    for (what, low, high) in third_order {
-        if let Some(high) = high {
-            let low = low.map_or("not known".to_string(), |low| format!("{low:.4}"));
-            set.notes.push(format!(
-                "{what}[1] stays that of the largest fill while the tank drains: {high:.4}; at the least fill it is {low}"
-            ));
+    // The columns replace the coefficients of the largest fill.
+    set.third_order.clear();
+    set.notes
+        .retain(|note| !note.starts_with(fill_amplitude::PREFIX) && !note.starts_with(INERTIA));
+    let mut of_fills = Vec::new();
+    for (n, found) in third_order {
+        match found {
+            Ok(columns) => {
+                set.notes.extend(columns.notes);
+                set.warnings.extend(columns.warnings);
+                of_fills.push((n, columns.values));
+            }
+            Err(note) => set.notes.push(note),
         }
     }
     if liquid.nu.is_some() {
@@ -237,7 +266,7 @@ pub fn parameters(
         short(first.fill),
         short(last.fill)
     ));
-    if let Some([frequency, mass, hinge]) = error {
+    if let Some(Between { error: [frequency, mass, hinge], .. }) = between {
         set.notes.push(format!(
             "between the points, of mode 1: frequency within {:.2} %, mass {:.2} %, hinge {:.2} % of the surface's \
              largest radius",
@@ -245,7 +274,7 @@ pub fn parameters(
             100.0 * mass,
             100.0 * hinge
         ));
-        if frequency.max(mass).max(hinge) > LIMIT {
+        if frequency.max(*mass).max(*hinge) > LIMIT {
             set.warnings.push(format!(
                 "{} points are few for this tank between these fills: more than {} % between them",
                 rows.len(),
@@ -257,6 +286,9 @@ pub fn parameters(
     let of_modes = (1..=modes).flat_map(|n| [MASS, LENGTH, HINGE].map(|array| array.at([n])));
     let ratios_of_modes = (1..=modes).filter(|_| liquid.nu.is_some()).map(|n| ZETA.at([n]));
     let of_modes = of_modes.chain(ratios_of_modes);
+    let coefficients =
+        (1..=modes).flat_map(|n| [NONLINEAR_INERTIA.at([n]), NONLINEAR_STIFFNESS.at([n])]);
+    let of_modes = of_modes.chain(coefficients);
     let replaced = [M_0, H_0, I_0, I_Z].map(String::from).into_iter().chain(of_modes);
     let replaced: Vec<String> = replaced.map(|name| target.name(&name)).collect();
     set.values.retain(|(name, _)| !replaced.contains(name));
@@ -282,6 +314,23 @@ pub fn parameters(
             }
         }
     }
+    for (n, [s, kappa]) in of_fills {
+        for (i, (s, kappa)) in s.into_iter().zip(kappa).enumerate() {
+            real(&fill::NONLINEAR_INERTIA.at([n, i + 1]), s);
+            real(&fill::NONLINEAR_STIFFNESS.at([n, i + 1]), kappa);
+        }
+    }
     set.values.push((target.name(fill::POINTS), Value::Integer(rows.len() as i64)));
     Ok(set)
+}
+
+/// Beginning of the note about the coefficients of one fill.
+const INERTIA: &str = "nonlinear_inertia[";
+
+/// Returns the numbers of modes with their third-order columns; see [`fill_amplitude::columns`].
+fn third_order(points: Vec<AtFill>, between: Vec<AtFill>) -> Vec<(usize, Result<Columns, String>)> {
+    let numbers = points.iter().flat_map(|at| at.set.third_order.iter().map(|(n, _)| *n));
+    // Mode 1 also where it is known nowhere, for the reason.
+    let most = numbers.max().unwrap_or(1);
+    (1..=most).map(|n| (n, fill_amplitude::columns(n, &points, &between))).collect()
 }

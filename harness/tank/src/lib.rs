@@ -19,6 +19,7 @@ pub mod contour;
 mod contour_waves;
 pub mod curve;
 pub mod damping;
+mod fill_amplitude;
 pub mod fill_table;
 pub mod finite_amplitude;
 mod gauss;

@@ -95,6 +95,8 @@ pub struct ParameterSet {
     pub unknown: Vec<String>,
     /// Names and values.
     pub values: Vec<(String, Value)>,
+    /// Numbers of modes, from 1, with the third-order coefficients that stand in `values`.
+    pub third_order: Vec<(usize, Coefficients)>,
 }
 
 /// Adds capillarity to the modes: that of a flat surface and, for the first mode of an upright cylinder, that of the
@@ -381,14 +383,14 @@ impl ParameterSet {
             .iter()
             .enumerate()
             .filter(|(_, (_, of_axis))| *of_axis == 0 && !is_linear)
-            .filter_map(|(n, (axis, _))| Some((n, [found.mode, found.mode_y][*axis]?)))
+            .filter_map(|(n, (axis, _))| Some((n + 1, [found.mode, found.mode_y][*axis]?)))
             .filter(|(_, known)| known.angle_limit >= finite_amplitude::LEAST_ANGLE)
             .collect();
         for (n, known) in &third_order {
             notes.push(format!(
                 "nonlinear_inertia[{0}] = {1}, nonlinear_stiffness[{0}] = {2}: third order of potential flow, error {3:.0e}, for \
                  slosh angles up to {4:.0} degrees",
-                n + 1,
+                n,
                 significant(known.nonlinear_inertia),
                 significant(known.nonlinear_stiffness),
                 known.error,
@@ -419,7 +421,7 @@ impl ParameterSet {
                     ("nonlinear_inertia", known.nonlinear_inertia),
                     ("nonlinear_stiffness", known.nonlinear_stiffness),
                 ] {
-                    values.push((format!("{prefix}.{what}[{}]", n + 1), Value::Real(value)));
+                    values.push((format!("{prefix}.{what}[{n}]"), Value::Real(value)));
                 }
             }
         };
@@ -512,7 +514,7 @@ impl ParameterSet {
             warnings.push("mode 1 carries hardly any mass: its hinge has no meaning".to_string());
         }
         warnings.dedup();
-        Ok(ParameterSet { notes, warnings, unknown, values })
+        Ok(ParameterSet { notes, warnings, unknown, values, third_order })
     }
 
     /// Returns notes and warnings as comments for the head of a file.

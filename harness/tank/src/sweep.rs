@@ -3,6 +3,7 @@
 use core::fmt::Write as _;
 
 use crate::contour::Problems;
+use crate::finite_amplitude;
 use crate::interpolation::Monotone;
 use crate::modal::{ModalData, Mode, Rest, rest};
 use crate::parameters::{Liquid, damping_of};
@@ -52,12 +53,20 @@ impl Sweep {
         Ok(())
     }
 
+    /// Computes the third-order coefficients of every row that has modes, see [`finite_amplitude::of_tank`].
+    pub fn add_third_order(&mut self, tank: &Tank) {
+        for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
+            row.finite_amplitude = Some(finite_amplitude::of_tank(tank, row));
+        }
+    }
+
     /// Returns comma-separated values with a heading; columns of modes that a row lacks are empty. Units SI;
-    /// H and hinge from the contour's own zero. Damping ratios with the ends of their intervals have columns if any row
-    /// has them.
+    /// H and hinge from the contour's own zero. Damping ratios with the ends of their intervals, and the third-order
+    /// coefficients of mode 1 with their error, have columns if any row has them; they are empty where they are not known.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
         let is_damped = self.rows.iter().any(|row| row.damping.is_some());
+        let has_third_order = self.rows.iter().any(|row| row.finite_amplitude.is_some());
         let mut text =
             "fill,m_liq,z_cg,I_frozen_cg,I_frozen_axis,I_eff_cg,m_0,H_0,I_0,error".to_string();
         for n in 1..=modes {
@@ -67,6 +76,9 @@ impl Sweep {
             if is_damped {
                 let _ = write!(text, ",zeta_{n},zeta_low_{n},zeta_high_{n}");
             }
+        }
+        if has_third_order {
+            text.push_str(",nonlinear_inertia_1,nonlinear_stiffness_1,finite_amplitude_error_1");
         }
         text.push('\n');
         for row in &self.rows {
@@ -107,6 +119,14 @@ impl Sweep {
                         None => Default::default(),
                     });
                 }
+            }
+            if has_third_order {
+                let found = row.finite_amplitude.as_ref().and_then(|found| found.mode);
+                cells.extend(match found {
+                    Some(mode) => [mode.nonlinear_inertia, mode.nonlinear_stiffness, mode.error]
+                        .map(|v| v.to_string()),
+                    None => Default::default(),
+                });
             }
             text.push_str(&cells.join(","));
             text.push('\n');

@@ -141,16 +141,17 @@ impl TankArgs {
                 let fills: Result<Vec<f64>, _> =
                     self.sweep.iter().map(|fill| tank.height_of(*fill)).collect();
                 let fills = fills.with_context(read)?;
-                let (mut swept, error) = match fills[..] {
+                let (mut swept, between) = match fills[..] {
                     [low, high] if self.parameters.is_some() && low < high => {
                         let placed = fill_table::place(&tank, low, high, self.modes);
                         let placed = placed.with_context(read)?;
-                        (placed.sweep, Some(placed.error))
+                        (placed.sweep, Some(placed.between))
                     }
                     _ => (sweep::sweep(&tank, &fills, self.modes).with_context(read)?, None),
                 };
+                swept.add_third_order(&tank);
                 set = self.set_file(|target, liquid| {
-                    fill_table::parameters(&tank, &swept, error, target, liquid)
+                    fill_table::parameters(&tank, &swept, between.as_ref(), target, liquid)
                 })?;
                 if let Some(nu) = self.nu {
                     swept.damp(&tank, nu, self.liquid()).with_context(read)?;

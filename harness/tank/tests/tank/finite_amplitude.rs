@@ -3,6 +3,7 @@
 use hubslosh_tank::coefficients::{Coefficients, FiniteAmplitude};
 use hubslosh_tank::fill_table;
 use hubslosh_tank::finite_amplitude::of_tank;
+use hubslosh_tank::interpolation::Monotone;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value};
 use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::{Tank, table};
@@ -209,14 +210,116 @@ fn files_without_coefficients_say_why() {
     }
 }
 
-/// A draining tank keeps the coefficients of its largest fill and notes those of the least.
+/// Returns the columns s and kappa of mode 1.
+fn columns(set: &ParameterSet) -> [Vec<f64>; 2] {
+    let all = third_order_of(set);
+    ["inertia", "stiffness"].map(|what| {
+        let name = format!("tank.fill.nonlinear_{what}[1,");
+        all.iter().filter(|(other, _)| other.starts_with(&name)).map(|(_, x)| *x).collect()
+    })
+}
+
+/// The pair of each fill stands at its point with its error in the notes, and no single pair for all.
 #[test]
-fn a_draining_tank_has_the_coefficients_of_its_largest_fill() {
+fn a_draining_tank_has_the_coefficients_of_every_fill() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let table = sweep(&sphere, &[0.1, 0.2, 0.4], 1).unwrap();
     let set = fill_table::parameters(&sphere, &table, None, Target::SloshTank, WATER).unwrap();
-    let [least, most] = [0, 2].map(|row: usize| of_tank(&sphere, &table.rows[row]).mode.unwrap());
-    assert_eq!(third_order_of(&set)[0].1, most.nonlinear_inertia);
-    let words = format!("at the least fill it is {:.4}", least.nonlinear_inertia);
-    assert!(set.notes.iter().any(|note| note.contains(&words)), "{:?}", set.notes);
+    let [s, kappa] = columns(&set);
+    for (i, row) in table.rows.iter().enumerate() {
+        let known = of_tank(&sphere, row).mode.unwrap();
+        assert_eq!((s[i], kappa[i]), (known.nonlinear_inertia, known.nonlinear_stiffness));
+        let words = format!("fill {} m: s = {:.4}", row.fill, known.nonlinear_inertia);
+        assert!(
+            set.notes.iter().any(|note| note.starts_with(&words[..words.len() - 1])),
+            "{words}"
+        );
+    }
+    assert_eq!((s.len(), third_order_of(&set).len()), (3, 6));
+    assert_eq!(set.warnings, [""; 0]);
+}
+
+/// A sphere has poles from 0.556 to 0.63 m, and its coefficients are not known above 0.85 m. Between the known fills the
+/// values stay between those of the neighbours, and beyond the last known fill they keep its value.
+#[test]
+fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills() {
+    let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
+    let fills = [0.5, 0.56, 0.6, 0.7, 0.8, 0.88, 0.9];
+    let table = sweep(&sphere, &fills, 1).unwrap();
+    let set = fill_table::parameters(&sphere, &table, None, Target::SloshTank, WATER).unwrap();
+    let pair = |i: usize| {
+        let known = of_tank(&sphere, &table.rows[i]).mode;
+        known.map(|known| [known.nonlinear_inertia, known.nonlinear_stiffness])
+    };
+    let columns = columns(&set);
+    for (i, unknown) in [false, true, true, false, false, true, true].into_iter().enumerate() {
+        assert_eq!(pair(i).is_none(), unknown, "{}", fills[i]);
+        for (k, column) in columns.iter().enumerate() {
+            let value = column[i];
+            match i {
+                1 | 2 => {
+                    let [a, b] = [0, 3].map(|i| pair(i).unwrap()[k]);
+                    assert!((a.min(b)..a.max(b)).contains(&value), "{value} {a} {b}");
+                }
+                5 | 6 => assert!((value - column[4]).abs() < 1e-12, "{value} {}", column[4]),
+                _ => assert_eq!(value, pair(i).unwrap()[k]),
+            }
+        }
+    }
+    let words = "s and kappa of mode 1 are not known at the fills 0.56, 0.6, 0.88, 0.9 m";
+    assert!(set.warnings.len() == 1 && set.warnings[0].contains(words), "{:?}", set.warnings);
+    assert!(set.warnings[0].ends_with("where s and kappa have a pole"), "{:?}", set.warnings);
+    let unknown = |note: &&String| note.contains("error not known, bounded by the neighbours: ");
+    assert_eq!(set.notes.iter().filter(unknown).count(), 4);
+}
+
+/// A torus has no coefficients at all, and a cylinder with one known fill none to interpolate.
+#[test]
+fn a_table_without_two_known_fills_has_pendulums_and_says_why() {
+    for (shape, fills, why) in [
+        ("torus = { ring_radius = 1.0, tube_radius = 0.3 }", [0.2, 0.3], "ring of liquid"),
+        ("cylinder = { radius = 0.1, height = 2.0 }", [0.08314, 0.2], "mode (2,2)"),
+    ] {
+        let tank = tank(&format!("density = 1000.0\nshape = {{ {shape} }}"));
+        let table = sweep(&tank, &fills, 1).unwrap();
+        let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, WATER).unwrap();
+        assert!(third_order_of(&set).is_empty() && set.third_order.is_empty(), "{shape}");
+        let said = |note: &String| note.contains("takes a pendulum") && note.contains(why);
+        assert!(set.notes.iter().any(said), "{shape} {:?}", set.notes);
+    }
+}
+
+/// The errors between the points of placed tables are those at further fills.
+#[test]
+fn a_placed_table_states_the_error_of_the_coefficients_between_its_points() {
+    for (shape, low, high) in [
+        ("cone = { half_angle = 30, height = 1.0 }", 0.3, 0.9),
+        ("cylinder = { radius = 0.5, height = 1.5 }", 0.7, 1.4),
+        ("sphere = { radius = 0.5 }", 0.1, 0.5),
+    ] {
+        let tank = tank(&format!("density = 1000.0\nshape = {{ {shape} }}"));
+        let placed = fill_table::place(&tank, low, high, 1).unwrap();
+        let between = Some(&placed.between);
+        let set = fill_table::parameters(&tank, &placed.sweep, between, Target::SloshTank, WATER);
+        let set = set.unwrap();
+        let x: Vec<f64> = placed.sweep.rows.iter().map(|row| row.m_liq).collect();
+        let curves = columns(&set).map(|y| Monotone::within(&x, &y));
+        let mut worst = 0.0_f64;
+        for share in [0.13, 0.29, 0.51, 0.77, 0.94] {
+            let row = tank.solve(low + share * (high - low), 1).unwrap();
+            let known = of_tank(&tank, &row).mode.unwrap();
+            for (curve, exact) in
+                curves.iter().zip([known.nonlinear_inertia, known.nonlinear_stiffness])
+            {
+                let off = (curve.at(row.m_liq) - exact).abs() / (1.0 + exact.abs());
+                worst = worst.max(off);
+            }
+        }
+        let note = set.notes.iter().find(|note| note.starts_with("between the points s")).unwrap();
+        let stated: f64 =
+            note.split(" within ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        println!("{shape}: {worst:.1e}, stated {stated:.1e}");
+        // The largest error lies between the middles.
+        assert!(worst < 3.0 * stated + 1e-6 && stated < 0.01, "{shape}: {worst:e} {stated:e}");
+    }
 }

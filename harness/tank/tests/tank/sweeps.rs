@@ -1,6 +1,7 @@
 //! Tables over the fill.
 
 use crate::common::tank;
+use hubslosh_tank::fill_table::Between;
 use hubslosh_tank::interpolation::Monotone;
 use hubslosh_tank::parameters::{Liquid, Target, Value, damping_of};
 use hubslosh_tank::sweep::{Depletion, sweep};
@@ -130,6 +131,24 @@ fn empty_and_full_tanks_have_no_modes() {
     assert!(!csv.contains("NaN") && csv.lines().all(|l| l.split(',').count() == 24), "{csv}");
 }
 
+/// Behind all other columns: the pair of mode 1 with its error, empty where it is not known.
+#[test]
+fn a_sweep_has_the_third_order_of_every_fill() {
+    let tank = tank("density = 1000.0\nshape = { cylinder = { radius = 0.1, height = 2.0 } }");
+    let mut table = sweep(&tank, &[0.0, 0.08314, 0.2], 2).unwrap();
+    assert!(!table.to_csv().contains("nonlinear"));
+    table.add_third_order(&tank);
+    let csv = table.to_csv();
+    let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    let at = lines[0].len() - 3;
+    let names = ["nonlinear_inertia_1", "nonlinear_stiffness_1", "finite_amplitude_error_1"];
+    assert_eq!(lines[0][at..], names);
+    assert!(lines[1][at..] == ["", "", ""] && lines[2][at..] == ["", "", ""], "{csv}");
+    let known = table.rows[2].finite_amplitude.as_ref().unwrap().mode.unwrap();
+    let cells: Vec<f64> = lines[3][at..].iter().map(|cell| cell.parse().unwrap()).collect();
+    assert_eq!(cells, [known.nonlinear_inertia, known.nonlinear_stiffness, known.error]);
+}
+
 /// Ratio and interval of each mode at each fill, behind the mode's other columns; none without a viscosity, empty cells
 /// for an empty tank.
 #[test]
@@ -230,7 +249,7 @@ fn a_placed_table_states_the_errors_between_its_points() {
         ];
         found = std::array::from_fn(|k| found[k].max(off[k].abs()));
     }
-    for (found, stated) in found.into_iter().zip(placed.error) {
+    for (found, stated) in found.into_iter().zip(placed.between.error) {
         // Sought at some hundred fills, the largest lies between two of them.
         assert!((0.95..1.1).contains(&(found / stated)), "{found:e} {stated:e}");
         assert!(stated < 5e-3);
@@ -245,7 +264,7 @@ fn a_placed_table_states_the_errors_between_its_points() {
         ((stiffness.at(exact.m_liq) * exact.modes[0].l).sqrt() - 1.0).abs()
     };
     let worst = fills(0.03, 1.47, 1000).into_iter().map(off).fold(0.0, f64::max);
-    let placed = placed.error.into_iter().fold(0.0, f64::max);
+    let placed = placed.between.error.into_iter().fold(0.0, f64::max);
     assert!(worst > 10.0 * placed, "{worst:e} {placed:e}");
 }
 
@@ -341,8 +360,9 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
         ([0.001, 0.006, 0.003], true),
         ([0.001, 0.002, 0.006], true),
     ] {
+        let between = Some(&Between { error, rows: Vec::new() });
         let set =
-            fill_table::parameters(&tank, &table, Some(error), Target::SloshTank, liquid).unwrap();
+            fill_table::parameters(&tank, &table, between, Target::SloshTank, liquid).unwrap();
         let [frequency, mass, hinge] = error.map(|x| format!("{:.2} %", 100.0 * x));
         let words = format!("frequency within {frequency}, mass {mass}, hinge {hinge}");
         assert!(set.notes.iter().any(|note| note.contains(&words)), "{:?}", set.notes);

@@ -1,0 +1,149 @@
+//! Third-order coefficients over the fill of a tank that drains: columns for the FMUs' fill tables.
+//!
+//! At some fills s and kappa are not known: near poles, in a nearly full tank, in shallow liquid. A table needs a value at
+//! every point. There it gets bounded values: the FMUs' interpolation between the known fills, and beyond them the nearest
+//! known value.
+
+use crate::coefficients::Coefficients;
+use crate::interpolation::Monotone;
+use crate::modal::ModalData;
+use crate::parameters::ParameterSet;
+use crate::table::{short, significant};
+
+/// Largest error between two points, over 1 + |s| or 1 + |kappa|, without a warning.
+const LARGEST: f64 = 0.05;
+
+/// A fill with the parameters of the tank there.
+pub(crate) struct AtFill<'a> {
+    /// Height of the surface above the lowest point, m.
+    pub fill: f64,
+    /// Mass of the liquid, kg.
+    pub liquid: f64,
+    pub set: &'a ParameterSet,
+}
+
+impl<'a> AtFill<'a> {
+    /// Returns the fills of solutions with their parameters.
+    pub fn all(rows: &[ModalData], sets: &'a [ParameterSet]) -> Vec<AtFill<'a>> {
+        let of = |(row, set): (&ModalData, &'a ParameterSet)| {
+            let (fill, liquid) = (row.fill, row.m_liq);
+            AtFill { fill, liquid, set }
+        };
+        rows.iter().zip(sets).map(of).collect()
+    }
+
+    fn known(&self, n: usize) -> Option<Coefficients> {
+        self.set.third_order.iter().find(|(mode, _)| *mode == n).map(|(_, known)| *known)
+    }
+
+    /// Returns why the coefficients are not known.
+    fn reason(&self) -> &str {
+        let mut reasons = self.set.notes.iter().rev().filter_map(|note| note.strip_prefix(PREFIX));
+        let reason = reasons.next().unwrap_or("no formula is known for this mode");
+        reason.split(", so they are left out").next().unwrap_or(reason)
+    }
+}
+
+/// Beginning of the notes about finite amplitude in the parameters of one fill.
+pub(crate) const PREFIX: &str = "finite amplitude: ";
+
+/// Columns of a mode, s and kappa at the points of a table.
+pub(crate) struct Columns {
+    pub values: [Vec<f64>; 2],
+    /// Source, errors and gaps.
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+fn coefficients(known: &Coefficients) -> [f64; 2] {
+    [known.nonlinear_inertia, known.nonlinear_stiffness]
+}
+
+/// Returns fills in words.
+fn fills(of: &[&AtFill]) -> String {
+    let all: Vec<String> = of.iter().map(|at| short(at.fill)).collect();
+    all.join(", ")
+}
+
+/// Returns the columns of mode `n` (from 1) at ascending fills, and `Err` with a note if they are known at fewer than two
+/// fills. `between` are further fills, which show the errors between the points.
+pub(crate) fn columns(n: usize, points: &[AtFill], between: &[AtFill]) -> Result<Columns, String> {
+    let mut known: Vec<(f64, [f64; 2])> = points
+        .iter()
+        .chain(between)
+        .filter_map(|at| Some((at.liquid, coefficients(&at.known(n)?))))
+        .collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (missing, found): (Vec<&AtFill>, Vec<&AtFill>) =
+        points.iter().partition(|at| at.known(n).is_none());
+    if found.len() < 2 {
+        let why = missing.first().map_or("", |at| at.reason());
+        return Err(format!(
+            "{PREFIX}s and kappa of mode {n} are known at {} of {} fills, so the table leaves them out, and the FMU takes a \
+             pendulum: {why}",
+            found.len(),
+            points.len()
+        ));
+    }
+    let masses: Vec<f64> = known.iter().map(|(liquid, _)| *liquid).collect();
+    let curves = [0, 1].map(|i| {
+        let y: Vec<f64> = known.iter().map(|(_, pair)| pair[i]).collect();
+        Monotone::within(&masses, &y)
+    });
+    let pair_at = |at: &AtFill| match at.known(n) {
+        Some(known) => coefficients(&known),
+        None => curves.each_ref().map(|curve| curve.at(at.liquid)),
+    };
+    let pairs: Vec<[f64; 2]> = points.iter().map(pair_at).collect();
+    let values = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).collect::<Vec<f64>>());
+
+    let mut notes = vec![format!(
+        "fill.nonlinear_inertia and fill.nonlinear_stiffness of mode {n}: third order of potential flow; errors are relative to \
+         1 + |s| and 1 + |kappa|"
+    )];
+    for (at, [s, kappa]) in points.iter().zip(&pairs) {
+        let from = match at.known(n) {
+            Some(known) => format!(
+                "error {:.0e}, for slosh angles up to {:.0} degrees",
+                known.error,
+                known.angle_limit.to_degrees()
+            ),
+            None => format!("error not known, bounded by the neighbours: {}", at.reason()),
+        };
+        notes.push(format!(
+            "fill {} m: s = {}, kappa = {}, {from}",
+            short(at.fill),
+            significant(*s),
+            significant(*kappa)
+        ));
+    }
+    let mut warnings = Vec::new();
+    if !missing.is_empty() {
+        warnings.push(format!(
+            "{PREFIX}s and kappa of mode {n} are not known at the fills {} m, where the table has values bounded by its other \
+             fills: {}",
+            fills(&missing),
+            missing[0].reason()
+        ));
+    }
+    let masses: Vec<f64> = points.iter().map(|at| at.liquid).collect();
+    let table = values.each_ref().map(|y| Monotone::within(&masses, y));
+    let off = |at: &AtFill| {
+        let exact = coefficients(&at.known(n)?);
+        let off = |i: usize| (table[i].at(at.liquid) - exact[i]).abs() / (1.0 + exact[i].abs());
+        Some((off(0).max(off(1)), at.fill))
+    };
+    let worst = between.iter().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((worst, fill)) = worst {
+        let text = format!(
+            "between the points s and kappa of mode {n} are within {worst:.0e} of 1 + |s| and 1 + |kappa|, the largest error at \
+             a fill of {} m",
+            short(fill)
+        );
+        if worst > LARGEST {
+            warnings.push(format!("{PREFIX}{text}: {} points are few there", points.len()));
+        }
+        notes.push(text);
+    }
+    Ok(Columns { values, notes, warnings })
+}
