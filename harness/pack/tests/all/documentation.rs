@@ -8,7 +8,7 @@ use pack::documentation::live::{self, Module};
 use pack::documentation::page::{Gathered, Layout, Page};
 
 /// Paths of all Markdown files of the project, from its root.
-fn markdown() -> Vec<String> {
+pub fn markdown() -> Vec<String> {
     fn below(folder: &Path, all: &mut Vec<PathBuf>) {
         for entry in folder.read_dir().unwrap().flatten() {
             let (path, name) = (entry.path(), entry.file_name());

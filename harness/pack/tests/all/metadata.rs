@@ -3,6 +3,8 @@
 use pack::metadata::{self, REPOSITORY, VERSION};
 use pack::root;
 
+use super::documentation::markdown;
+
 fn read(name: &str) -> String {
     std::fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
@@ -20,8 +22,8 @@ fn address_and_version_are_those_of_cargo_toml() {
     let citation = read("CITATION.cff");
     assert!(citation.lines().any(|line| line == format!("version: {VERSION}")), "CITATION.cff");
     assert!(!citation.contains(REPOSITORY), "the address has one place, Cargo.toml");
-    for page in ["README.md", "book/start.md", "book/index.md"] {
-        for line in read(page).lines() {
+    for page in markdown() {
+        for line in read(&page).lines() {
             let clone = line.trim_start().strip_prefix("git clone ");
             assert!(clone.is_none_or(|rest| rest.starts_with(REPOSITORY)), "{page}: {line}");
             // `pip install --find-links dist "hubslosh[plot]==1.2.3"`
