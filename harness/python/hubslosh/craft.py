@@ -361,11 +361,15 @@ class Craft:
         try:
             found = iter(self._solve(asked))
         finally:
-            said, self._said[:] = self._said[:], []
-            for text in dict.fromkeys(said):
-                warnings.warn(text, FmuWarning, stacklevel=4)
+            self._warn()
         tanks = [{name: next(found) for name in of} for of in every]
         return [{name: tank for name, tank in of.items() if tank is not None} for of in tanks]
+
+    def _warn(self) -> None:
+        """Issue the warnings of tanks that were solved."""
+        said, self._said[:] = self._said[:], []
+        for text in dict.fromkeys(said):
+            warnings.warn(text, FmuWarning, stacklevel=5)
 
     def mass_properties(self, fill: Fill, liquid: Liquid = "effective") -> MassProperties:
         """Return mass, centre of mass and inertia at a fill, every surface at rest.
@@ -459,6 +463,7 @@ class Craft:
                 except FmuError as error:
                     raise FmuError(f"tank {name}: {error}") from None
                 self._said.extend(f"tank {name}: {text}" for text in said)
+                self._warn()
             table: dict[str, Quantity] = {
                 f"tank[{number}]{key.removeprefix('tank[1]')}": value
                 for key, value in self._known[key].items()
@@ -474,7 +479,9 @@ class Craft:
 
         * ``mass_flow``: Outflow of each tank, kg/s; one value, or one for each tank as in `fills`.
           A tank with outflow gets a fill table with the ends ``between``, which takes some 5 s of
-          CPU time and is kept. The FMU stops where liquid leaves the table.
+          CPU time and is kept. The FMU stops where liquid leaves the table. The table has damping
+          ratios and third-order coefficients at every fill; a warning names fills at which the
+          coefficients are not known and are bounded by those of other fills.
         """
         return self.parameters(fill, mass_flow=mass_flow, between=between)
 
