@@ -118,6 +118,30 @@ def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         hubslosh.campaign("thesis", program="elsewhere")
 
 
+def with_binary(fmu: Path, binary: bytes, path: Path) -> Path:
+    """Write an FMU that has another binary."""
+    with zipfile.ZipFile(fmu) as packed, zipfile.ZipFile(path, "w") as new:
+        for name in packed.namelist():
+            new.writestr(name, binary if "binaries/" in name else packed.read(name))
+    return path
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no compiler that is always there")
+def test_an_fmu_that_crashes_ends_no_python(fmu: Path, tmp_path: Path, request) -> None:
+    """Its library aborts while it is loaded: an error of identify, and a finding of check."""
+    program, library = option(request, "--hubslosh"), tmp_path / "library"
+    (source := tmp_path / "crash.c").write_text(
+        "#include <stdlib.h>\n__attribute__((constructor)) static void crash(void) { abort(); }\n"
+    )
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
+    crashing = with_binary(fmu, library.read_bytes(), tmp_path / "crashing.fmu")
+    table = pd.DataFrame({"time": [0.0, 1.0, 2.0], "tau_cmd": 0.0, "omega": 0.0})
+    with pytest.raises(FmuError, match="hubslosh identify: the FMU has ended the process"):
+        hubslosh.identify(table, fmu=crashing, program=program)
+    checked = hubslosh.check(crashing, only=["load.opens"], program=program)
+    assert checked.errors == 1 and "the process ended" in checked.findings[0].text
+
+
 def test_a_check_gives_typed_findings(fmu: Path, tmp_path: Path, request) -> None:
     """An FMU whose binaries are no libraries breaks a rule; the FMU as it is breaks none."""
     program, seen = option(request, "--hubslosh"), []
@@ -125,10 +149,8 @@ def test_a_check_gives_typed_findings(fmu: Path, tmp_path: Path, request) -> Non
     assert (checked.errors, checked.warnings, checked.findings) == (0, 0, ())
     assert len(checked.rules) > 3 and all(rule.skipped is None for rule in checked.rules)
     assert any("rules of calls" in line for line in seen)
-    broken, sarif = tmp_path / "broken.fmu", tmp_path / "broken.sarif"
-    with zipfile.ZipFile(fmu) as packed, zipfile.ZipFile(broken, "w") as new:
-        for name in packed.namelist():
-            new.writestr(name, b"text" if "binaries/" in name else packed.read(name))
+    sarif = tmp_path / "broken.sarif"
+    broken = with_binary(fmu, b"text", tmp_path / "broken.fmu")
     checked = hubslosh.check(
         broken, "--sarif", str(sarif), only=["load"], progress=False, program=program
     )
