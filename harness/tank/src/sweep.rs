@@ -62,7 +62,8 @@ impl Sweep {
 
     /// Returns comma-separated values with a heading; columns of modes that a row lacks are empty. Units SI;
     /// H and hinge from the contour's own zero. Damping ratios with the ends of their intervals, and the third-order
-    /// coefficients of mode 1 with their error, have columns if any row has them; they are empty where they are not known.
+    /// coefficients of mode 1 with their error and the largest angle of their validity, rad, have columns if any row has
+    /// them. The columns are empty where they are not known.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
         let is_damped = self.rows.iter().any(|row| row.damping.is_some());
@@ -78,7 +79,9 @@ impl Sweep {
             }
         }
         if has_third_order {
-            text.push_str(",nonlinear_inertia_1,nonlinear_stiffness_1,finite_amplitude_error_1");
+            text.push_str(
+                ",nonlinear_inertia_1,nonlinear_stiffness_1,finite_amplitude_error_1,angle_limit_1",
+            );
         }
         text.push('\n');
         for row in &self.rows {
@@ -123,8 +126,13 @@ impl Sweep {
             if has_third_order {
                 let found = row.finite_amplitude.as_ref().and_then(|found| found.mode);
                 cells.extend(match found {
-                    Some(mode) => [mode.nonlinear_inertia, mode.nonlinear_stiffness, mode.error]
-                        .map(|v| v.to_string()),
+                    Some(mode) => [
+                        mode.nonlinear_inertia,
+                        mode.nonlinear_stiffness,
+                        mode.error,
+                        mode.angle_limit,
+                    ]
+                    .map(|v| v.to_string()),
                     None => Default::default(),
                 });
             }

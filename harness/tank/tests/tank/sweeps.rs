@@ -140,13 +140,14 @@ fn a_sweep_has_the_third_order_of_every_fill() {
     table.add_third_order(&tank);
     let csv = table.to_csv();
     let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
-    let at = lines[0].len() - 3;
+    let at = lines[0].len() - 4;
     let names = ["nonlinear_inertia_1", "nonlinear_stiffness_1", "finite_amplitude_error_1"];
-    assert_eq!(lines[0][at..], names);
-    assert!(lines[1][at..] == ["", "", ""] && lines[2][at..] == ["", "", ""], "{csv}");
+    assert_eq!((&lines[0][at..at + 3], lines[0][at + 3]), (&names[..], "angle_limit_1"));
+    assert!(lines[1][at..] == [""; 4] && lines[2][at..] == [""; 4], "{csv}");
     let known = table.rows[2].finite_amplitude.as_ref().unwrap().mode.unwrap();
     let cells: Vec<f64> = lines[3][at..].iter().map(|cell| cell.parse().unwrap()).collect();
-    assert_eq!(cells, [known.nonlinear_inertia, known.nonlinear_stiffness, known.error]);
+    let [s, kappa] = [known.nonlinear_inertia, known.nonlinear_stiffness];
+    assert_eq!(cells, [s, kappa, known.error, known.angle_limit]);
 }
 
 /// Ratio and interval of each mode at each fill, behind the mode's other columns; none without a viscosity, empty cells
