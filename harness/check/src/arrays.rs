@@ -4,9 +4,7 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::description::Variable;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest};
-use host::causality::Causality;
 use host::description::Type;
 use host::fmi2::guarded::Lists;
 
@@ -28,8 +26,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
         serializes: fmu.can(interface, "canSerializeFMUstate"),
         ..Lists::default()
     };
-    let is_input = |v: &&Variable| v.causality == Causality::Input && v.is_continuous();
-    for v in fmu.variables().iter().filter(is_input) {
+    for v in &fmu.inputs {
         if let Reading::Real(x) = session.get(v)? {
             lists.inputs.push((v.reference, x));
         }
@@ -53,10 +50,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
         Interface::CoSimulation => {
             let order = d.co_simulation.as_ref().and_then(|i| i.number("maxOutputDerivativeOrder"));
             if order.is_some_and(|order| order >= 1.0) {
-                let outputs = fmu.variables().iter();
-                let outputs =
-                    outputs.filter(|v| v.causality == Causality::Output && v.is_continuous());
-                lists.outputs = outputs.map(|v| v.reference).collect();
+                lists.outputs = fmu.outputs.iter().map(|v| v.reference).collect();
             }
         }
         Interface::ModelExchange => {

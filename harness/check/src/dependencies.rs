@@ -337,11 +337,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         .collect();
     let references: Vec<u32> = unknowns.iter().map(|v| v.reference).collect();
     let states = fmu.states();
-    let inputs: Vec<_> = fmu
-        .variables()
-        .iter()
-        .filter(|v| v.causality == Causality::Input && v.is_continuous())
-        .collect();
+    let inputs = &fmu.inputs;
     let mut session = fmu.running(Interface::ModelExchange)?;
     session.advance(3)?;
     let mut x = vec![0.0; states.len()];

@@ -83,24 +83,17 @@ fn put(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
     Ok(session.set(known, &Reading::Real(x)).is_ok())
 }
 
-fn real(session: &mut Session, v: &Variable) -> Result<f64> {
-    match session.read(v)? {
-        Reading::Real(x) => Ok(x),
-        _ => Ok(f64::NAN),
-    }
-}
-
 /// The factors of a pair where the session stands, by differences of `share` of the known's size.
 fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Factor>> {
-    let here = real(session, pair.known)?;
-    let before = real(session, pair.unknown)?;
+    let here = session.real(pair.known)?;
+    let before = session.real(pair.unknown)?;
     let (min, max) = pair.known.bounds();
     let step = share * here.abs().max(0.1 * pair.known.nominal());
     let there = if here + step <= max { here + step } else { here - step };
     if there < min || there == here || !put(session, pair.known, there)? {
         return Ok(None);
     }
-    let after = real(session, pair.unknown)?;
+    let after = session.real(pair.unknown)?;
     put(session, pair.known, here)?;
     let dx = there - here;
     let size = before.abs().max(after.abs());

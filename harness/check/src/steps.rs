@@ -229,13 +229,8 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // The same inputs, held over each of the long steps.
     let run = |parts: usize| -> Result<(Vec<f64>, Vec<f64>)> {
         let mut session = fmu.running(Interface::CoSimulation)?;
-        let outputs: Vec<_> = fmu
-            .variables()
-            .iter()
-            .filter(|v| v.causality == Causality::Output && v.is_continuous())
-            .collect();
-        let mut scale = vec![0.0f64; outputs.len()];
-        let mut last = vec![0.0; outputs.len()];
+        let mut scale = vec![0.0f64; fmu.outputs.len()];
+        let mut last = vec![0.0; fmu.outputs.len()];
         let start = session.time;
         for step in 0..STEPS {
             session.count = step;
@@ -245,11 +240,9 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 session.go(end - session.time)?;
                 session.time = end;
             }
-            for (n, v) in outputs.iter().enumerate() {
-                if let Reading::Real(x) = session.read(v)? {
-                    scale[n] = scale[n].max(x.abs());
-                    last[n] = x;
-                }
+            for (n, v) in fmu.outputs.iter().enumerate() {
+                last[n] = session.real(v)?;
+                scale[n] = scale[n].max(last[n].abs());
             }
         }
         Ok((last, scale))
@@ -257,11 +250,7 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (whole, scale) = run(1)?;
     for parts in [2, 5] {
         let (cut, _) = run(parts)?;
-        let outputs = fmu
-            .variables()
-            .iter()
-            .filter(|v| v.causality == Causality::Output && v.is_continuous());
-        for (n, v) in outputs.enumerate() {
+        for (n, v) in fmu.outputs.iter().enumerate() {
             let allowed = SLACK * tolerance * scale[n].max(1e-3 * v.nominal());
             let off = (whole[n] - cut[n]).abs();
             if off > allowed {
@@ -311,11 +300,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 break;
             }
             session.time = end;
-            let read = |v: &&Variable| match session.read(v)? {
-                Reading::Real(x) => Ok(x),
-                _ => Ok(f64::NAN),
-            };
-            all.push(watched.iter().map(read).collect::<Result<_>>()?);
+            all.push(watched.iter().map(|v| session.real(v)).collect::<Result<_>>()?);
         }
         Ok(all)
     };
@@ -405,14 +390,12 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         findings.skip("canInterpolateInputs is not declared");
         return Ok(());
     }
-    let inputs =
-        fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_continuous());
     let computed = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let computed: Vec<&Variable> = fmu.variables().iter().filter(computed).collect();
     let mut any = false;
     // one input may be the derivative of another, which needs no slope then: one that acts is enough
     let (mut acts, mut ignored) = (false, Vec::new());
-    for input in inputs {
+    for &input in &fmu.inputs {
         let running = || -> Result<(Session, Reading)> {
             let mut session = fmu.running(Interface::CoSimulation)?;
             session.advance(3)?;
@@ -436,11 +419,7 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
                 session.instance.set_real_input_derivatives(&reference, &[1], &[slope])?;
             }
             session.go(session.step)?;
-            let read = |v: &&Variable| match session.read(v)? {
-                Reading::Real(x) => Ok(x),
-                _ => Ok(f64::NAN),
-            };
-            computed.iter().chain([&input]).map(read).collect()
+            computed.iter().chain([&input]).map(|v| session.real(v)).collect()
         };
         let step = fmu.session(Interface::CoSimulation)?.step;
         let held = end(*here, None)?;
@@ -489,11 +468,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
         findings.skip("maxOutputDerivativeOrder is 0");
         return Ok(());
     }
-    let outputs: Vec<_> = fmu
-        .variables()
-        .iter()
-        .filter(|v| v.causality == Causality::Output && v.is_continuous())
-        .collect();
+    let outputs = &fmu.outputs;
     let references: Vec<u32> = outputs.iter().map(|v| v.reference).collect();
     session.advance(STEPS)?;
     let mut declared = vec![f64::NAN; outputs.len()];
@@ -564,11 +539,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.advance(3)?;
         session.stimulate()?;
         let read = |session: &mut Session| -> Result<Vec<f64>> {
-            let value = |v: &&Variable| match session.read(v)? {
-                Reading::Real(x) => Ok(x),
-                _ => Ok(f64::NAN),
-            };
-            all.iter().map(value).collect()
+            all.iter().map(|v| session.real(v)).collect()
         };
         let before = read(&mut session)?;
         let start = session.time;
@@ -638,13 +609,9 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
         findings.skip("maxOutputDerivativeOrder is 0");
         return Ok(());
     }
-    let outputs: Vec<_> = fmu
-        .variables()
-        .iter()
-        .filter(|v| v.causality == Causality::Output && v.is_continuous())
-        .collect();
+    let outputs = &fmu.outputs;
     for order in 1..=most.min(10.0) as i32 {
-        for v in &outputs {
+        for v in outputs {
             // after an error an FMU may refuse everything: a new instance each time
             let mut session = fmu.running(Interface::CoSimulation)?;
             session.advance(3)?;

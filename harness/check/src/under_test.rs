@@ -37,8 +37,10 @@ const UNKNOWN_NOMINAL: f64 = 1e-3;
 pub struct FmuUnderTest {
     loaded: Loaded<Fmi2>,
     description: &'static Description,
-    /// Places of the continuous inputs among the variables.
-    inputs: Vec<usize>,
+    /// The continuous inputs.
+    pub inputs: Vec<&'static Variable>,
+    /// The continuous outputs.
+    pub outputs: Vec<&'static Variable>,
     directory: PathBuf,
     path: PathBuf,
     /// State of the process before the binary was loaded.
@@ -123,15 +125,15 @@ impl FmuUnderTest {
         };
         loaded
             .retain(|of, binary| of == Interface::CoSimulation || binary.has_exchange(), is_there);
+        let continuous = |causality| {
+            let all = description.variables.iter();
+            all.filter(|v| v.causality == causality && v.is_continuous()).collect()
+        };
         Ok(FmuUnderTest {
             loaded,
             description,
-            inputs: (0..description.variables.len())
-                .filter(|k| {
-                    let v = &description.variables[*k];
-                    v.causality == Causality::Input && v.is_continuous()
-                })
-                .collect(),
+            inputs: continuous(Causality::Input),
+            outputs: continuous(Causality::Output),
             directory: directory.to_path_buf(),
             path: path.to_path_buf(),
             before: Vec::new(),
@@ -551,7 +553,7 @@ impl<'f> Session<'f> {
     /// Sets all Real inputs to values that change from step to step.
     pub fn stimulate(&mut self) -> Called {
         let fmu = self.fmu;
-        for (n, v) in fmu.inputs.iter().map(|k| &fmu.variables()[*k]).enumerate() {
+        for (n, v) in fmu.inputs.iter().enumerate() {
             let x = stimulus(v, self.count, n);
             self.set(v, &Reading::Real(x))?;
         }
@@ -652,6 +654,11 @@ impl<'f> Session<'f> {
             Reading::Boolean(b) => self.instance.set_boolean(&reference, &[*b]),
             Reading::Text(text) => self.instance.set_string(&reference, &[text]),
         }
+    }
+
+    /// The value of a Real in an ordinary run.
+    pub fn real(&mut self, v: &Variable) -> Result<f64> {
+        Ok(if let Reading::Real(x) = self.read(v)? { x } else { f64::NAN })
     }
 
     /// One value of an ordinary run; that it cannot be read is a rule of its own.

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::Subject;
-use super::subject::{STEPS, Use, start_values};
+use super::subject::{STEPS, Session, Use, start_values};
 use crate::loaded::{Life as _, UnderTest as _};
 use crate::{Findings, life, states};
 use host::c_abi::{CallError, Status, foreign_environments};
@@ -376,14 +376,19 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- Model Exchange
 
-/// `exchange.counts`
-pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
+/// An instance for Model Exchange, or the reason why there is none.
+fn exchanging<'s>(subject: &'s Subject, findings: &mut Findings) -> Result<Option<Session<'s>>> {
     if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip("it offers no Model Exchange");
-        return Ok(());
+        return Ok(None);
     }
+    subject.running(Use::EXCHANGE).map(Some)
+}
+
+/// `exchange.counts`
+pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
-    let mut session = subject.running(Use::EXCHANGE)?;
+    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
     let length = |r: u32| d.at(r).map_or(0, super::Variable::length);
     let states: usize = d.states().into_iter().map(length).sum();
     let indicators = d.unknowns("EventIndicator").filter_map(|u| u.reference);
@@ -412,12 +417,8 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
 
 /// `exchange.vectors`
 pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_err() {
-        findings.skip("it offers no Model Exchange");
-        return Ok(());
-    }
     let d = &subject.description;
-    let mut session = subject.running(Use::EXCHANGE)?;
+    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
     session.advance(3)?;
     let derivatives: Vec<u32> =
         d.unknowns("ContinuousStateDerivative").filter_map(|u| u.reference).collect();
@@ -454,11 +455,7 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
 
 /// `exchange.states_set`
 pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_err() {
-        findings.skip("it offers no Model Exchange");
-        return Ok(());
-    }
-    let mut session = subject.running(Use::EXCHANGE)?;
+    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
     let n = session.instance.number_of_states()?;
     if n == 0 {
         findings.skip("it has no continuous states");
@@ -481,11 +478,7 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 /// `exchange.indicators`
 pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_err() {
-        findings.skip("it offers no Model Exchange");
-        return Ok(());
-    }
-    let mut session = subject.running(Use::EXCHANGE)?;
+    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
     let nz = session.instance.number_of_indicators()?;
     if nz == 0 {
         findings.skip("it has no event indicators");
