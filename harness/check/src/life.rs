@@ -422,7 +422,10 @@ pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         session.instance().terminate()?;
         fmu.doing(format!("reading values after {call}"));
         let after = session.readings()?;
-        if let Some(text) = session.difference(&after, &before) {
+        // FMI 3.0: values can be read; those of Dymola's FMUs move a little in fmi3Terminate
+        if F::NUMBER == "2.0"
+            && let Some(text) = session.difference(&after, &before)
+        {
             findings.add(format!("after {call} ({})", F::name(using)), text);
         }
     }
