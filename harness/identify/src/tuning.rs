@@ -152,9 +152,12 @@ pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
 pub const COARSEST: f64 = 0.2;
 
 // Runs of the bench: `model/bench/simulate.rs`.
-// Tests: `a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates`.
+// Tests: `a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates`, `a_run_that_would_not_end_is_refused`.
 /// Instants closer than this are the same, s.
 pub const SAME_INSTANT: f64 = 1e-9;
+/// Most internal steps of our FMUs in a communication step: so many, and so many a second. A fit's runs take some 100 a second. A
+/// search may try values that take millions: it cannot judge them, and tries others.
+pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
 
 // The valley of tank and hub: `model/bench/tank.rs`.
 // Tests: `a_long_step_along_the_valley_stays_in_it`, `a_step_to_where_there_is_no_tank_ends_before`.

@@ -10,9 +10,11 @@ use host::causality::Causality;
 use host::description::{ModelDescription, Type};
 use host::exchange;
 use host::fmu::{Fmu, Instance, Interface};
+use names::hubslosh::solver::MAX_STEPS;
 
 use crate::input::question::{Question, Setting, Solver, real};
 use crate::input::record::Record;
+use crate::model::bench::simulate::most_steps;
 use crate::tuning::{
     COMPARED_FACTOR, COMPARED_STEPS, COMPARED_TOLERANCE, FINEST_TOLERANCE, HELD_STEPS, SLOPE_PROBES,
 };
@@ -317,6 +319,10 @@ impl Setup {
         let own = |setting: &&Setting| setting.recording.is_none_or(|of| of == number);
         for setting in self.settings.iter().filter(own) {
             instance.set(&setting.name, &setting.value)?;
+        }
+        let set = self.settings.iter().filter(own).map(|setting| setting.name.as_str());
+        if let Some(most) = most_steps(fmu.description(), set, &record.time) {
+            instance.set(MAX_STEPS, &most.to_string())?;
         }
         for (reference, value) in values {
             instance.set_real(&[*reference], &[*value])?;

@@ -599,6 +599,38 @@ fn after_its_noise_is_renewed_a_minimum_is_of_that_noise() {
     assert!(!problem.renew_noise(&mut found).unwrap(), "nothing has changed");
 }
 
+/// A search tried a delay of −5,889 s, and the FMU ran for minutes after the recording's end; another one friction so stiff that a row took
+/// millions of internal steps.
+#[test]
+fn a_run_that_would_not_end_is_refused() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recording = sweep(&fmu, "lin-sweep:amplitude=0.1,duration=20,f0=2,f1=3", &[]);
+    let run = |settings: &[(&str, &str)], delay: f64| {
+        let settings = settings.iter().map(|(name, value)| ((*name).into(), (*value).into()));
+        let setup =
+            Setup { settings: settings.collect(), intersample: Intersample::FirstOrderHold };
+        setup.run(&fmu, &[], &recording, delay)
+    };
+    let says = |settings: &[(&str, &str)], delay: f64| {
+        format!("{:#}", run(settings, delay).expect_err("it is refused"))
+    };
+    let lugre = ("friction.model", "lugre");
+    for delay in [-5889.0, 5889.0] {
+        let said = says(&[], delay);
+        assert!(said.contains("longer than the recording (allowed: up to 20"), "{said}");
+    }
+    assert!(run(&[], -0.1).is_ok());
+    let stiff = [lugre, ("friction.sigma0", "1e9"), ("init.omega", "100")];
+    let said = says(&stiff, 0.0);
+    assert!(said.contains("solver.max_steps = 600 internal steps"), "{said}");
+    // the user's own bound stays
+    let own = [&stiff[..], &[("solver.max_steps", "50")]].concat();
+    let said = says(&own, 0.0);
+    assert!(said.contains("solver.max_steps = 50 internal steps"), "{said}");
+    // the stiffest bristles that a fit reaches
+    assert!(run(&[lugre, ("friction.sigma0", "1000")], 0.0).is_ok());
+}
+
 #[test]
 fn no_model_fits_a_torque_that_is_clipped() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -13,7 +13,7 @@ use crate::fit::bench::problem::{Answer, Polished, Problem, Rough};
 use crate::model::bench::simulate::Intersample;
 use crate::model::bench::stribeck::Indices;
 use crate::news::Since;
-use crate::tuning::{BENCH_WINDOWS, LEADS, NEARLY_NOISE, ROUNDS};
+use crate::tuning::{BENCH_WINDOWS, LEADS, NEARLY_NOISE, ROUNDS, STRIBECK_GRID};
 use analysis::innovations::Tests;
 use names::hubslosh::{SloshModel, hub};
 
@@ -331,6 +331,15 @@ impl<'a> Search<'a, '_> {
             return Ok(near);
         };
         let points = friction::grid(&self.problem, &near, indices);
+        let refused = STRIBECK_GRID.len() - points.len();
+        if refused > 0 {
+            let which = if points.is_empty() { "no" } else { "not every" };
+            self.say(format!(
+                "{}: {which} other friction.omega_s can be judged: the FMU refuses the runs at {refused} of {}, or they show nothing",
+                self.model,
+                STRIBECK_GRID.len()
+            ));
+        }
         for tried in &points {
             let (speed, more) = (tried.speed, tried.more);
             let adds = match tried.x {

@@ -1,21 +1,39 @@
 //! The FMU's answer to a recording's torque, at the recording's instants.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use experiments::rest;
+use host::description::ModelDescription;
 use host::drive::Inputs;
 use host::fmu::Fmu;
-use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA, friction};
+use names::hubslosh::{
+    G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA, friction, solver,
+};
 
 use crate::input::clocks;
 use crate::input::recording::Recording;
 use crate::model::bench::effect::{self, Effects};
-use crate::tuning::SAME_INSTANT;
+use crate::tuning::{MOST_INTERNAL_STEPS, SAME_INSTANT};
 
 /// The FMU's input for a torque on the hub besides the actuator's.
 pub const TORQUE_BESIDES: &str = TAU_EXT;
 
 /// The FMU's parameters that friction is proportional to.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
+
+/// Returns the bound for `solver.max_steps` in runs over these instants, s; `None` where the FMU has no such parameter, the
+/// settings set it, or its default is less.
+pub fn most_steps<'n>(
+    description: &ModelDescription,
+    mut set: impl Iterator<Item = &'n str>,
+    time: &[f64],
+) -> Option<i32> {
+    let variable = description.variable(solver::MAX_STEPS).ok()?;
+    let longest = time.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    let most =
+        (MOST_INTERNAL_STEPS.0 + MOST_INTERNAL_STEPS.1 * longest).min(f64::from(i32::MAX)) as i32;
+    let default: Option<i32> = variable.attributes().start.as_ref()?.parse().ok();
+    (!set.any(|name| name == solver::MAX_STEPS) && Some(most) < default).then_some(most)
+}
 
 /// Motion of the hub at the rows of a recording.
 #[derive(Clone, Debug, Default)]
@@ -139,6 +157,9 @@ pub struct Setup {
 impl Setup {
     /// Runs the FMU with these real parameters, by name, through a recording. `delay` (s) lies
     /// between the recorded torque and the recorded rate: row k sees the FMU at t_k − delay.
+    ///
+    /// # Errors
+    /// If the delay is longer than the recording, a step takes more than [`most_steps`], or the FMU refuses a call.
     pub fn run(
         &self,
         fmu: &Fmu,
@@ -160,11 +181,21 @@ impl Setup {
         effects: &Effects,
         read: Read,
     ) -> Result<Motion> {
+        let time = &recording.time;
+        let span = time[time.len() - 1] - time[0];
+        ensure!(
+            delay.abs() <= span,
+            "a delay of {delay} s is longer than the recording (allowed: up to {span} s)"
+        );
         let reference =
             |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
         let mut instance = rest::instantiate(fmu, "identify")?;
         for (name, value) in &self.settings {
             instance.set(name, value)?;
+        }
+        let set = self.settings.iter().map(|(name, _)| name.as_str());
+        if let Some(most) = most_steps(fmu.description(), set, time) {
+            instance.set(solver::MAX_STEPS, &most.to_string())?;
         }
         for (name, value) in values {
             instance.set_real(&[reference(name)?], &[*value])?;
@@ -190,7 +221,6 @@ impl Setup {
         driven.extend(besides.as_ref().map(|torque| (TORQUE_BESIDES, torque.as_slice())));
         let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let inputs = Inputs::new(fmu.description(), &names, held)?;
-        let time = &recording.time;
         let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
         inputs.initialise(&mut instance, None, time[0], None, &first)?;
         let drifting = match effects.friction_drift == 0.0 {
@@ -199,7 +229,6 @@ impl Setup {
         };
         let mut friction = vec![0.0; drifting.len()];
         instance.get_real(&drifting, &mut friction)?;
-        let span = time[time.len() - 1] - time[0];
 
         let outputs =
             [reference(THETA)?, reference(OMEGA)?, reference(OMEGA_DOT)?, reference(SLOSH_ANGLE)?];
