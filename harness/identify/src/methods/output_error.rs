@@ -309,7 +309,8 @@ fn finish(
         }
         None => of_models,
     };
-    say("the last steps", &problem);
+    let end = polished.decrement;
+    say(&format!("the last steps, to {end:.4} standard deviations from the minimum"), &problem);
     let others = others.as_ref().filter(|_| way.is_none());
     let between_rows = torque_between_rows(&mut problem, &mut polished, others, options)?;
     say("other torques between rows", &problem);
@@ -339,9 +340,13 @@ fn finish(
     let fits = findings.fits(&fit);
     if !fits {
         let law = fit.friction.clone();
-        findings.cause = cause::find(&problem, &polished.x, (&model, &law), &mut |line| {
+        let found = cause::find(&problem, &polished.x, (&model, &law), &mut |line| {
             say(line, &problem);
-        })?;
+        });
+        findings.cause = found.unwrap_or_else(|error| {
+            say(&format!("the cause of the misfit cannot be sought: {error:#}"), &problem);
+            None
+        });
     }
     let profile = friction::profile(&problem, &polished, &speeds)?;
     say("profile of the friction's curve", &problem);

@@ -2,7 +2,8 @@
 //!
 //! Each candidate is added to the model that fits best. One run shows the direction in which it moves the residual. Of the part that
 //! the unknowns cannot take, the candidate explains a share of the sum of squares at first order. The [`REFITTED`] candidates with
-//! the largest shares are fitted with all unknowns. The one with the least deviance is the cause if the gain is far beyond chance.
+//! the largest shares are fitted with all unknowns. The one with the least deviance is the cause if the gain is far beyond chance, and
+//! if it explains [`CAUSE_EXPLAINS`] of the misfit: the sum of squares above the number of residuals, or all that is more than noise.
 //! All of this starts from the recording's own noise: the noise of the misfit would hide what it is made of.
 
 use anyhow::Result;
@@ -15,7 +16,9 @@ use crate::estimate::prose;
 use crate::fit::bench::goodness::tests;
 use crate::fit::bench::problem::{Problem, Rough};
 use crate::model::bench::unknown::{Quantity, Unknown};
-use crate::tuning::{ACTUATOR_LIMIT, BIC_DECIDES, CAUSE_LEAST, CAUSE_PART, REFITTED};
+use crate::tuning::{
+    ACTUATOR_LIMIT, BIC_DECIDES, CAUSE_EXPLAINS, CAUSE_LEAST, CAUSE_PART, REFITTED,
+};
 use analysis::innovations::Tests;
 use analysis::statistics::peak;
 
@@ -218,6 +221,10 @@ pub fn find(
         }
     }
     let Some((gain, candidate, mut other, found)) = best else { return Ok(None) };
+    let cost = |found: &Rough| found.answer.1.norm_squared();
+    let misfit = cost(&base) - e.len() as f64;
+    let explained = (cost(&base) - cost(&found)) / misfit;
+    tell(&format!("{} explains {:.0} % of the misfit", candidate.effect, 100.0 * explained));
     // the noise of the last search is the recording's; the tests need the noise that is left
     other.estimate_noise(&found.answer.0);
     let found = other.search(&found.x, CAUSE_PART.1)?;
@@ -226,11 +233,7 @@ pub fn find(
         let value = unknown.value(found.x[found.x.len() - 1]);
         (unknown.quantity.name(), value, unknown.unit.clone())
     });
-    Ok(Some(Cause {
-        effect: candidate.effect.into(),
-        flags: candidate.flags,
-        size,
-        gain,
-        fits: tests(&other, &found.answer.0).iter().all(Tests::passed),
-    }))
+    let fits = tests(&other, &found.answer.0).iter().all(Tests::passed);
+    let (effect, flags) = (candidate.effect.into(), candidate.flags);
+    Ok((fits || explained > CAUSE_EXPLAINS).then_some(Cause { effect, flags, size, gain, fits }))
 }
