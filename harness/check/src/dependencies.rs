@@ -8,7 +8,6 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::{Unknown, Variable};
-use super::life::first;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest, start_value};
 use super::values::items;
 use host::causality::Causality;
@@ -215,7 +214,7 @@ fn watch(
         return Ok(None);
     }
     let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
-    let interface = if exchange { Interface::ModelExchange } else { first(fmu)? };
+    let interface = if exchange { Interface::ModelExchange } else { fmu.first()? };
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == Causality::Input).collect();
     let states = fmu.states();
@@ -289,7 +288,7 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         return Ok(());
     }
     let knowns: Vec<_> = fmu.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
-    let interface = first(fmu)?;
+    let interface = fmu.first()?;
     let mut seen = Seen::nothing();
     for attempt in 0..AT_LEAST {
         let mut session = moved(fmu, interface, attempt)?;

@@ -11,7 +11,6 @@ use anyhow::Result;
 use super::Findings;
 use super::dependencies::moved;
 use super::description::{Unknown, Variable};
-use super::life::first;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
 
 /// Starts at which factors are measured: the first as declared, then with other parameters.
@@ -171,7 +170,7 @@ pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         look(fmu, findings, &running, interface, false)?;
     }
     if !initial.is_empty() {
-        look(fmu, findings, &initial, first(fmu)?, true)?;
+        look(fmu, findings, &initial, fmu.first()?, true)?;
     }
     Ok(())
 }

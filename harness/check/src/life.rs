@@ -70,7 +70,7 @@ pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let folder = tempfile::tempdir()?;
         fmu.doing(format!("loading copy {copy} of the binary"));
         let copied = fmu.copy(folder.path())?;
-        let interface = first(&copied)?;
+        let interface = copied.first()?;
         let mut session = copied.running(interface)?;
         session.advance(STEPS)?;
         runs.push(session.readings()?);
@@ -78,26 +78,17 @@ pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.doing(format!("unloading copy {copy} of the binary"));
     }
     for run in &runs[1..] {
-        if let Some(text) = fmu.session(first(fmu)?)?.difference(run, &runs[0]) {
-            is_deterministic(fmu, first(fmu)?)?;
+        if let Some(text) = fmu.session(fmu.first()?)?.difference(run, &runs[0]) {
+            is_deterministic(fmu, fmu.first()?)?;
             findings.add("loading it again", text);
         }
     }
     Ok(())
 }
 
-/// The interface most rules use.
-pub fn first(fmu: &FmuUnderTest) -> Result<Interface> {
-    let why = || Unusable {
-        rule: "load.instance",
-        why: "it offers no interface that can be called".into(),
-    };
-    Ok(*fmu.interfaces().first().ok_or_else(why)?)
-}
-
 /// `instantiate.guid`
 pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = first(fmu)?;
+    let interface = fmu.first()?;
     let wrong = format!("{}x", fmu.binary(interface)?.description().guid);
     let with = Instantiation { guid: Some(&wrong), ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with another GUID";
@@ -119,7 +110,7 @@ fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, Ca
 
 /// `instantiate.arguments`
 pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = first(fmu)?;
+    let interface = fmu.first()?;
     // the standard asks for a URI: only a FMU that needs no resources can do without
     let place = "fmi2Instantiate with the resource location NULL";
     let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
@@ -149,7 +140,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.skip("it has no resources");
         return Ok(());
     }
-    let interface = first(fmu)?;
+    let interface = fmu.first()?;
     let run = |location: Option<&str>| -> Result<Vec<Reading>> {
         let mut session = match location {
             None => fmu.session(interface)?,
@@ -208,7 +199,7 @@ fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
 
 /// `instantiate.callbacks`
 pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = first(fmu)?;
+    let interface = fmu.first()?;
     if !fmu.can(interface, "canNotUseMemoryManagementFunctions") {
         findings.skip("canNotUseMemoryManagementFunctions is not declared");
         return Ok(());
@@ -250,7 +241,7 @@ fn live(fmu: &FmuUnderTest, mut instance: Instance) -> Result<()> {
 
 /// `instantiate.copies`
 pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = first(fmu)?;
+    let interface = fmu.first()?;
     let logs = refuse_as_usual(fmu, interface)?;
     fmu.doing("fmi2Instantiate with callbacks that are wiped afterwards");
     let with = Instantiation { callbacks: Callbacks::Fleeting, ..fmu.arguments(interface)? };

@@ -3,44 +3,13 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::life::first;
-use super::under_test::{FmuUnderTest, Interface, Life, STEPS, UnderTest, Unusable};
+use super::under_test::{FmuUnderTest, Interface, Life, STEPS, UnderTest};
 use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
 
-/// Messages of an FMU about several mistakes, and how many of its ordinary instance have the category NULL.
-pub fn complaints(fmu: &FmuUnderTest) -> Result<(Vec<Message>, usize)> {
-    let interface = first(fmu)?;
-    let mut all = Vec::new();
-    fmu.doing("fmi2Instantiate with another GUID");
-    let with = Instantiation { guid: Some("another"), ..fmu.arguments(interface)? };
-    if let Err(error) = fmu.instantiate(interface, &with)? {
-        all.extend(error.messages);
-    }
-    let mut session = fmu.session(interface)?;
-    fmu.doing("fmi2SetDebugLogging");
-    session
-        .instance
-        .set_debug_logging(true, &[])
-        .map_err(|error| Unusable { rule: "log.switch", why: error.to_string() })?;
-    fmu.told_by("life.order", || {
-        fmu.doing("fmi2ExitInitializationMode in state \"instantiated\"");
-        let _ = session.instance.exit_initialization_mode();
-    });
-    if session.initialise().is_ok() {
-        fmu.told_by("values.unknown", || {
-            fmu.doing("fmi2GetReal of an unknown value reference");
-            let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
-        });
-        let _ = session.advance(STEPS); // after an error an FMU may refuse all calls
-    }
-    all.extend(session.instance.take_messages());
-    Ok((all, session.instance.uncategorised()))
-}
-
 /// `log.percent`
 pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = first(fmu)?;
+    let interface = fmu.first()?;
     // If the text becomes the format, %d prints some number and %% one sign; neither can crash.
     const TEXT: &str = "{a%db%%c}";
     let mut told = Vec::new();
@@ -101,7 +70,7 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
 
 /// `log.text`
 pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let (messages, _) = complaints(fmu)?;
+    let (messages, _) = fmu.complaints()?;
     if messages.is_empty() {
         findings.skip("it logs nothing");
     }
@@ -157,7 +126,7 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `log.environment`
 pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let complaints = complaints(fmu);
+    let complaints = fmu.complaints();
     let runs = fmu.interfaces().into_iter().map(|interface| ordinary(fmu, interface, true));
     let runs: Result<Vec<_>> = runs.collect();
     match foreign_environments() {
@@ -178,7 +147,7 @@ pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `log.switch`
 pub fn switch(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = fmu.session(first(fmu)?)?;
+    let mut session = fmu.session(fmu.first()?)?;
     let root = &fmu.description().root;
     let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
     let sets = declared.iter().map(std::slice::from_ref).chain([&[][..], &declared[..]]);

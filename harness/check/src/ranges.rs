@@ -7,7 +7,6 @@ use anyhow::Result;
 use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
-use super::life::first;
 use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use super::values::{items, mentions};
 use host::description::Type;
@@ -62,7 +61,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Sets a parameter or input before initialisation and initialises; why that was refused, if it was
 /// and no other variable is blamed for it.
 fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(), String>> {
-    let mut session = fmu.session(first(fmu)?)?;
+    let mut session = fmu.session(fmu.first()?)?;
     fmu.doing(format!("setting {} to {value} and initialising", v.name));
     if let Err(error) = session.set(v, value) {
         return Ok(Err(error.to_string()));
@@ -189,7 +188,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     };
     // Runs with other parameters, and starts with one parameter far from where it is.
     for attempt in 0..STEPS as u64 {
-        let mut session = moved(fmu, first(fmu)?, attempt)?;
+        let mut session = moved(fmu, fmu.first()?, attempt)?;
         fmu.doing(format!("initialising with other parameters, try {attempt}"));
         if session.initialise().is_err() {
             continue;
@@ -203,7 +202,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
         for x in far_values(v) {
-            let mut session = fmu.session(first(fmu)?)?;
+            let mut session = fmu.session(fmu.first()?)?;
             fmu.doing(format!("initialising with {} = {x:?}", v.name));
             if session.set(v, &Reading::Real(x)).is_ok() && session.initialise().is_ok() {
                 look(&mut session);

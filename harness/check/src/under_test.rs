@@ -106,6 +106,15 @@ pub struct Experiment {
 }
 
 impl FmuUnderTest {
+    /// The interface most rules use.
+    pub fn first(&self) -> Result<Interface> {
+        let why = || Unusable {
+            rule: "load.instance",
+            why: "it offers no interface that can be called".into(),
+        };
+        Ok(*self.interfaces().first().ok_or_else(why)?)
+    }
+
     /// Loads the FMU that is unpacked in `directory` and has this model description, which lives as long as the process
     /// of the rule. Makes no instances after `deadline`.
     pub fn open(
@@ -301,7 +310,32 @@ impl UnderTest for FmuUnderTest {
     }
 
     fn complaints(&self) -> Result<(Vec<Message>, usize)> {
-        super::log::complaints(self)
+        let interface = self.first()?;
+        let mut all = Vec::new();
+        self.doing("fmi2Instantiate with another GUID");
+        let with = Instantiation { guid: Some("another"), ..self.arguments(interface)? };
+        if let Err(error) = self.instantiate(interface, &with)? {
+            all.extend(error.messages);
+        }
+        let mut session = self.session(interface)?;
+        self.doing("fmi2SetDebugLogging");
+        session
+            .instance
+            .set_debug_logging(true, &[])
+            .map_err(|error| Unusable { rule: "log.switch", why: error.to_string() })?;
+        self.told_by("life.order", || {
+            self.doing("fmi2ExitInitializationMode in state \"instantiated\"");
+            let _ = session.instance.exit_initialization_mode();
+        });
+        if session.initialise().is_ok() {
+            self.told_by("values.unknown", || {
+                self.doing("fmi2GetReal of an unknown value reference");
+                let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
+            });
+            let _ = session.advance(STEPS); // after an error an FMU may refuse all calls
+        }
+        all.extend(session.instance.take_messages());
+        Ok((all, session.instance.uncategorised()))
     }
 }
 

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::life::{expect_refusal, first};
+use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use host::causality::{Causality, Variability};
 use host::description::Type;
@@ -20,8 +20,8 @@ fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
 
 fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
     // if it does not initialise, another rule tells
-    fmu.running(first(fmu)?)?;
-    let mut session = fmu.session(first(fmu)?)?;
+    fmu.running(fmu.first()?)?;
+    let mut session = fmu.session(fmu.first()?)?;
     session.instance.setup_experiment(None, session.time, None)?;
     session.instance.enter_initialization_mode()?;
     Ok(session)
@@ -127,7 +127,7 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// `values.round_trip`
 pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
-    let mut fresh = fmu.session(first(fmu)?)?;
+    let mut fresh = fmu.session(fmu.first()?)?;
     for (v, start) in settable(fmu) {
         fmu.doing(format!("setting {} to {start}", v.name));
         // as hosts do that set every start value before they set up
@@ -236,7 +236,7 @@ fn refused(
     reference: u32,
     what: &str,
 ) -> Result<()> {
-    let mut session = fmu.running(first(fmu)?)?;
+    let mut session = fmu.running(fmu.first()?)?;
     let place = format!("{name} of {what}");
     fmu.doing(&place);
     let answer = call(&mut session.instance, reference);
@@ -288,7 +288,7 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (mut refused, mut accepted) = (None, Vec::new());
     for (v, start) in fixed {
         any = true;
-        let mut session = fmu.running(first(fmu)?)?;
+        let mut session = fmu.running(fmu.first()?)?;
         session.advance(1)?;
         let place = format!("setting the fixed parameter {} after initialisation", v.name);
         fmu.doing(&place);
@@ -334,7 +334,7 @@ pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         });
         let Some(v) = v else { continue };
         any = true;
-        let mut session = fmu.running(first(fmu)?)?;
+        let mut session = fmu.running(fmu.first()?)?;
         let value = session.get(v)?;
         let place = format!("setting the {causality} {} after initialisation", v.name);
         fmu.doing(&place);
@@ -362,7 +362,7 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 _ => bound + outwards,
             };
             let try_at = |x: f64| -> Result<Option<String>> {
-                let mut session = fmu.session(first(fmu)?)?;
+                let mut session = fmu.session(fmu.first()?)?;
                 fmu.doing(format!("setting {} to {x:?} and initialising", v.name));
                 let value = match v.kind {
                     Type::Real => Reading::Real(x),
@@ -415,7 +415,7 @@ pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != Causality::Input);
     for (v, _) in reals {
         for x in [f64::NAN, f64::INFINITY] {
-            let mut session = fmu.session(first(fmu)?)?;
+            let mut session = fmu.session(fmu.first()?)?;
             let place = format!("{} = {x}, then a step", v.name);
             let refused = fmu.left_open(&place, findings, || {
                 session.set(v, &Reading::Real(x)).is_err()
