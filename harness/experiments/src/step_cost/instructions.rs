@@ -2,11 +2,9 @@
 //! lets it make one instruction after the other in between. Every Linux has that, unlike counters of the hardware; it
 //! takes microseconds per instruction, so that only some steps are counted: the slowest, and some from the middle.
 
-use anyhow::Result;
-use host::fmu::Fmu;
-
-use super::{Course, Spread};
-use crate::run::Run;
+use super::Spread;
+#[cfg(target_os = "linux")]
+use {super::Course, crate::run::Run, anyhow::Result, host::fmu::Fmu};
 
 /// Steps that are counted around the median.
 const MIDDLE: usize = 9;
