@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use analysis::statistics::{about_mean, noise_level};
+use analysis::statistics::{about_mean, mean, noise_level};
 use anyhow::{Context, Result, bail, ensure};
 use files::budget;
 
@@ -158,6 +158,12 @@ impl Recording {
     /// Values of the rows with a value of the encoder.
     pub fn of_fresh_angle(&self, values: &[f64]) -> Vec<f64> {
         masked(values, self.angle_fresh.as_deref())
+    }
+
+    /// What the gyro reads at the beginning, rad/s: the mean of its first two values.
+    pub fn first_rate(&self) -> f64 {
+        let first: Vec<f64> = self.of_fresh(&self.rate).into_iter().take(2).collect();
+        mean(&first)
     }
 
     /// Standard deviation of the gyro's white noise, rad/s.
