@@ -568,11 +568,12 @@ fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>
     if dry.iter().flatten().next().is_none() {
         return Ok(None);
     }
-    // vague priors do not count
+    // vague priors of parameters do not count; that of the rate at the start stays, which nothing else may show
     let rows: usize = found.answer.residual.iter().map(Vec::len).sum();
     let priors = problem.unknowns.iter().filter(|unknown| unknown.prior.is_some());
     let mut jacobian = found.jacobian.clone();
-    for (k, _) in priors.enumerate().filter(|(_, unknown)| unknown.vague) {
+    let is_vague = |unknown: &Unknown| unknown.vague && unknown.quantity.parameter().is_some();
+    for (k, _) in priors.enumerate().filter(|(_, unknown)| is_vague(unknown)) {
         jacobian.row_mut(rows + k).fill(0.0);
     }
     let unknown = &problem.unknowns[place];

@@ -1,5 +1,7 @@
 //! Recordings of the FMU itself, with its gyro's noise, identified without priors and starts.
 
+use analysis::random::Random;
+use analysis::statistics::deviation;
 use experiments::profile::{Profile, Torque};
 use host::fmu::Fmu;
 use identify::estimate::Estimated;
@@ -597,6 +599,34 @@ fn after_its_noise_is_renewed_a_minimum_is_of_that_noise() {
         assert!((now / then / factor - 1.0).abs() < 1e-9, "{now} {then} {factor}");
     }
     assert!(!problem.renew_noise(&mut found).unwrap(), "nothing has changed");
+}
+
+/// Friction stops the hub before the first row that is fitted: no row shows the rate at the start, and the search tried ±1,000 rad/s.
+#[test]
+fn the_first_readings_bound_a_rate_that_friction_stops_at_once() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.1,duration=120,f0=2,f1=2.8";
+    let all = sweep(&fmu, torque, &[]);
+    // two seconds without torque before it
+    let (step, noise) = (all.step(), all.rate_noise());
+    let rest = (2.0 / step).round() as usize;
+    let mut random = Random::new(1, 0);
+    let torque = [vec![0.0; rest], all.torque].concat();
+    let at_rest: Vec<f64> = (0..rest).map(|_| noise * random.normal()).collect();
+    let rate = [at_rest, all.rate].concat();
+    let time: Vec<f64> = (0..rate.len()).map(|k| step * k as f64).collect();
+    let fresh = Some(time.iter().map(|t| *t >= 0.1).collect());
+    let spread = deviation(&rate);
+    let recording = Recording::of("a.csv", time, torque, rate);
+    let recording = Recording { from_rest: false, fresh, ..recording };
+    let options = Options { sensor_errors: true, ..options() };
+    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    let first = &found.measurement["init.omega[1]"];
+    assert!(first.interval[0] < 0.0 && first.interval[1] > 0.0, "{first:?}");
+    assert!(first.value.abs() < spread && first.std < 2.0 * spread, "{first:?}");
+    // nor is the asymmetry given up for it
+    assert!(found.parameters["friction.asymmetry"].std < 0.1);
 }
 
 /// A search tried a delay of −5,889 s, and the FMU ran for minutes after the recording's end; another one friction so stiff that a row took

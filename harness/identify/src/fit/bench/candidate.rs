@@ -18,6 +18,7 @@ use crate::model::bench::simulate::{Intersample, Setup};
 use crate::model::bench::unknown::{Scale, Unknown};
 use crate::news::{News, Since};
 use analysis::innovations::Tests;
+use analysis::statistics::deviation;
 
 /// One model's fit.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -264,8 +265,11 @@ fn unknowns(
             list.push(Unknown::angle_offset(i, angle[0]));
         }
     }
-    for (i, _) in recordings.iter().enumerate().filter(|(_, r)| !r.from_rest) {
-        list.push(Unknown::initial(i, init::OMEGA, "rad/s", 1e-2));
+    for (i, recording) in recordings.iter().enumerate().filter(|(_, r)| !r.from_rest) {
+        // friction may stop the hub before the first row that is fitted; what the gyro reads then bounds the search
+        let rate = Unknown::initial(i, init::OMEGA, "rad/s", 1e-2);
+        let (first, spread) = (recording.first_rate(), deviation(&recording.rate));
+        list.push(Unknown { vague: true, ..rate.known(first, spread) });
         if !frozen {
             list.push(Unknown::initial(i, init::SLOSH_ANGLE, "rad", 0.1));
             list.push(Unknown::initial(i, init::SLOSH_RATE, "rad/s", 1.0));
