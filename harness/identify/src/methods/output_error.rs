@@ -469,6 +469,7 @@ fn finish(
     let mut verdict =
         verdict::words(question, &findings, &fit, &combinations, &parameters, &error_budget);
     verdict.extend(shares);
+    verdict.extend(budget::first_order(&changes));
     verdict.extend(start_study::words(&starts));
     let slosh_angle = if fit.model == Frozen.name() { 0.0 } else { largest_angle(&answer) };
     verdict.extend(regime(&fit.model, slosh_angle));

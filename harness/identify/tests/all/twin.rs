@@ -753,6 +753,7 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
         let found = problem.polish(&problem.start(), None, ROUNDS).unwrap();
         let tolerances = Tolerances { torque: 0.01, ..Tolerances::NONE };
         let slopes = budget::slopes(&problem, &found, &tolerances).unwrap();
+        assert_eq!(budget::first_order(&slopes), None);
         let there: Vec<f64> =
             found.x.iter().zip(slopes[0].moved.iter()).map(|(x, by)| x + by).collect();
         let (before, after) = (problem.values(&found.x), problem.values(&there));
@@ -767,6 +768,10 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
         }
         assert!(of("delay").1.abs() < 1e-8, "{model}: {:?}", of("delay"));
         assert!(of("friction.asymmetry").1.abs() < 1e-5, "{model}: {:?}", of("friction.asymmetry"));
+        // an error with which the FMU does not run is not silent
+        let far = Tolerances { gravity: 1e9, ..Tolerances::NONE };
+        let words = budget::first_order(&budget::slopes(&problem, &found, &far).unwrap());
+        assert_eq!(words.is_some_and(|w| w.contains("g_axial (")), model == "linear");
         // and it is what a fit of the recording with 1.01 times the torque finds
         let mut scaled = recordings.clone();
         scaled[0].torque.iter_mut().for_each(|torque| *torque *= 1.01);

@@ -48,6 +48,8 @@ pub struct Slope {
     pub change: DVector<f64>,
     /// Change of the variables x at the minimum by the same error.
     pub moved: DVector<f64>,
+    /// Reason why both are of first order at the minimum only; `None`: the fit was repeated with the error.
+    refused: Option<String>,
 }
 
 /// Returns the effects of all tolerances that count, at a minimum.
@@ -65,10 +67,21 @@ pub fn slopes(problem: &Problem, found: &Polished, tolerances: &Tolerances) -> R
             continue;
         }
         let at = (&found.x[..], &found.answer, &found.jacobian);
-        let (change, moved) = refit(problem, at, name, tolerance)?;
-        slopes.push(Slope { name, tolerance, change, moved });
+        slopes.push(refit(problem, at, name, tolerance)?);
     }
     Ok(slopes)
+}
+
+/// Returns a sentence on the tolerances whose effect is of first order only, if there are any.
+pub fn first_order(slopes: &[Slope]) -> Option<String> {
+    let word = |s: &Slope| s.refused.as_ref().map(|why| format!("{} ({why})", s.name));
+    let all: Vec<String> = slopes.iter().filter_map(word).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "The fit could not be repeated with errors of {}. Their effect is of first order, and intervals may be too narrow.",
+            all.join(", ")
+        )
+    })
 }
 
 /// Returns the derivative of the stacked innovations by the logarithm of `torque`, `clock` or a parameter of the FMU that is not
@@ -79,9 +92,9 @@ pub fn slopes(problem: &Problem, found: &Polished, tolerances: &Tolerances) -> R
 pub fn relative_slope(
     problem: &Problem,
     at: (&[f64], &Answer, &DMatrix<f64>),
-    name: &str,
+    name: &'static str,
 ) -> Result<DVector<f64>> {
-    Ok(refit(problem, at, name, BUDGET_SIZE)?.0 / BUDGET_SIZE)
+    Ok(refit(problem, at, name, BUDGET_SIZE)?.change / BUDGET_SIZE)
 }
 
 /// The same problem with an error of this relative size in what is not estimated.
@@ -111,27 +124,30 @@ fn with_error(
 /// The minimum is sought anew with the error, by Gauss and Newton's steps with the sensitivities that there are. It begins at the bench that has the
 /// same motion under the error ([`same_motion`]). A difference at fixed x would be wrong: if dry friction makes the hub stick,
 /// the instants of sticking jump with the torque. The sensitivities to b, c, d and the asymmetry could compensate that jump, but
-/// not in such a difference. Where the steps do not settle, the first order at x is taken.
+/// not in such a difference. Where the steps do not settle, the first order at x is taken, and the verdict names it.
 fn refit(
     problem: &Problem,
     (x, answer, jacobian): (&[f64], &Answer, &DMatrix<f64>),
-    name: &str,
+    name: &'static str,
     size: f64,
-) -> Result<(DVector<f64>, DVector<f64>)> {
+) -> Result<Slope> {
+    let slope = |(change, moved), refused| Slope { name, tolerance: size, change, moved, refused };
     let covariance = problem.covariance(jacobian)?;
     let base = problem.stacked(answer, x);
     let refitted = with_error(problem, name, size, |other| {
         let there = same_motion(problem, x, name, 1.0 + size).unwrap_or_else(|| x.to_vec());
         settled(other, (x, &base), (jacobian, &covariance), there)
     });
-    if refitted.is_ok() {
-        return refitted;
-    }
-    with_error(problem, name, BUDGET_STEP, |other| {
+    let refused = match refitted {
+        Ok(found) => return Ok(slope(found, None)),
+        Err(error) => format!("{error:#}"),
+    };
+    let found = with_error(problem, name, BUDGET_STEP, |other| {
         let change = (other.stacked(&other.answer(x)?, x) - &base) * (size / BUDGET_STEP);
         let moved = -(&covariance.x * jacobian.tr_mul(&change));
         Ok((change, moved))
-    })
+    })?;
+    Ok(slope(found, Some(refused)))
 }
 
 /// Seeks the minimum of another problem from `there` by Gauss–Newton steps with the sensitivities of the problem at x, where the
