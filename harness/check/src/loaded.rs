@@ -223,7 +223,7 @@ pub fn declared(root: &Element) -> Vec<(Interface, String)> {
 
 /// An FMU under test.
 pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
-    /// Its version of FMI.
+    /// The version of FMI that it has.
     type Version: Version;
     /// Use of an instance: an interface, and in FMI 3.0 what the host allows.
     type Use: Copy;
@@ -270,13 +270,13 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
 pub trait Life<'f, V: Version + 'f> {
     /// A variable's values as they were read.
     type Reading;
-    /// Where the host is in the simulation, which a saved state does not contain.
+    /// The host's place in the simulation, which a saved state does not contain.
     type Mark;
 
     /// The instance.
     fn instance(&mut self) -> &mut Instance<'f, V>;
 
-    /// From instantiation up to the first step.
+    /// Takes a new instance up to its first step.
     fn initialise(&mut self) -> Result<()>;
 
     /// Makes steps of the usual size, inputs changing, until the FMU asks for the end.
@@ -291,13 +291,13 @@ pub trait Life<'f, V: Version + 'f> {
     /// The first variable whose value is not the same to the last bit, as a sentence.
     fn difference(&self, ours: &[Self::Reading], theirs: &[Self::Reading]) -> Option<String>;
 
-    /// Where the host is.
+    /// Returns the host's place in the simulation.
     fn mark(&self) -> Self::Mark;
 
-    /// Back to where the host was.
+    /// Takes the host back to an earlier place.
     fn go_back(&mut self, to: &Self::Mark);
 
-    /// Another life than usual, before a reset.
+    /// Leads the instance another way than usual, before a reset.
     fn stray(&mut self) -> Result<()>;
 
     /// Takes the host back to the start, where the FMU is after a reset.
@@ -307,5 +307,5 @@ pub trait Life<'f, V: Version + 'f> {
 type Of<'f, F> = <F as UnderTest>::Session<'f>;
 /// All values of an FMU's variables.
 pub type Readings<'f, F> = Vec<<Of<'f, F> as Life<'f, <F as UnderTest>::Version>>::Reading>;
-/// Where the host of an FMU is.
+/// Place of the host in the simulation of an FMU.
 pub type Mark<'f, F> = <Of<'f, F> as Life<'f, <F as UnderTest>::Version>>::Mark;

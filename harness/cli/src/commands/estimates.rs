@@ -27,7 +27,7 @@ impl Out<'_> {
     /// Shows the progress of a search.
     ///
     /// # Errors
-    /// Those of the search.
+    /// If the search fails.
     pub fn search<T>(&self, search: impl FnOnce(&mut dyn FnMut(&News)) -> Result<T>) -> Result<T> {
         let spinner = progress::of_search()?;
         let found = search(&mut |news| match news {

@@ -160,7 +160,7 @@ impl Recording {
         masked(values, self.angle_fresh.as_deref())
     }
 
-    /// What the gyro reads at the beginning, rad/s: the mean of its first two values.
+    /// Returns the gyro's first reading, rad/s: the mean of its first two values.
     pub fn first_rate(&self) -> f64 {
         let first: Vec<f64> = self.of_fresh(&self.rate).into_iter().take(2).collect();
         mean(&first)

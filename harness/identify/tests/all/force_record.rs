@@ -456,7 +456,7 @@ fn known(name: &str, value: &str) -> Setting {
     Setting { name: format!("tank.{name}"), recording: None, value: value.into() }
 }
 
-/// Whether the damping by breaking is stated, with the truth in 4 standard deviations.
+/// Asserts that the damping by breaking is stated, with the truth in 4 standard deviations.
 fn holds_the_breaking(result: &ForceRecord) {
     let stated = compared(&BREAKS, result);
     let of = |name: &str| stated.iter().find(|(other, ..)| other == name).unwrap();
