@@ -1,15 +1,18 @@
-"""Compares what fmpy and fmutool report of FMUs 2.0 with one fault each.
+"""Compares what fmpy, fmutool and VDMCheck2 report of FMUs 2.0 with one fault each.
 
     HUBSLOSH_KEEP_MUTANTS=target/mutants cargo test --release -p check --test all
     python3 harness/python/environment.py target/python/importers .ci/requirements-importers.txt
     target/python/importers/bin/python .ci/other_tools.py target/mutants
 
+VDMCheck2 is tried if VDMCHECK2 names its script (`VDMCheck2.sh` of a release of FMI-VDM-Model).
+
 Prints a table in Markdown. The tests of `check` write the FMUs and expect `check` to find each
-fault by the intended rule. A fault counts as reported if a tool reports anything: neither reports
+fault by the intended rule. A fault counts as reported if a tool reports anything: no tool reports
 anything on the faultless FMUs. A fault is in the archive (`zip`), the description (`xml`), the
 binaries as files (`bin`), or in the behaviour of the binary.
 """
 
+import os
 import subprocess
 import sys
 from collections import Counter
@@ -44,7 +47,17 @@ def of_fmutool(fmu: Path) -> bool:
     return bool(others) or done.returncode != 0 or not all(words in done.stdout for words in WELL)
 
 
+def of_vdmcheck(fmu: Path) -> bool:
+    """Return True if VDMCheck2 does not end with "No errors found."."""
+    done = subprocess.run(
+        [os.environ["VDMCHECK2"], fmu.resolve()], capture_output=True, text=True, check=False
+    )
+    return "No errors found." not in done.stdout.splitlines()
+
+
 TOOLS = {"`fmpy validate`": of_fmpy, "`fmutool -check`": of_fmutool}
+if "VDMCHECK2" in os.environ:
+    TOOLS["VDMCheck2"] = of_vdmcheck
 
 
 def main() -> None:
