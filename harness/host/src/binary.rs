@@ -426,6 +426,14 @@ pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     Ok(body)
 }
 
+/// Returns the part of a universal binary for an architecture, `x86_64` or `arm64`; any other file as it is.
+pub fn part<'a>(bytes: &'a [u8], architecture: &str) -> &'a [u8] {
+    let Ok(whole) = MachOFatFile32::parse(bytes) else { return bytes };
+    let wanted =
+        whole.arches().iter().find(|p| self::architecture(p.architecture()) == architecture);
+    wanted.and_then(|part| part.data(bytes).ok()).unwrap_or(bytes)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -524,5 +532,22 @@ mod tests {
             assert!(Binary::read(bytes).is_err());
         }
         assert!(join(&[b"no Mach-O".to_vec()]).is_err());
+    }
+
+    #[test]
+    fn the_parts_of_a_universal_binary_are_the_files_that_were_joined() {
+        let thin = |processor: u32, length: usize| {
+            let mut bytes = vec![7u8; length];
+            for (i, number) in [macho::MH_MAGIC_64, processor, 3].into_iter().enumerate() {
+                bytes[4 * i..][..4].copy_from_slice(&number.to_le_bytes());
+            }
+            bytes
+        };
+        let parts = [thin(macho::CPU_TYPE_X86_64, 20_000), thin(macho::CPU_TYPE_ARM64, 100)];
+        let whole = join(&parts).unwrap();
+        assert_eq!(part(&whole, "x86_64"), parts[0]);
+        assert_eq!(part(&whole, "arm64"), parts[1]);
+        assert_eq!(part(&whole, "riscv64"), whole);
+        assert_eq!(part(&parts[1], "arm64"), parts[1]);
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use files::output;
+use host::binary;
 use host::fmi2::PLATFORM;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
@@ -37,10 +38,17 @@ impl Packed {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
     }
 
-    /// Returns the names in the FMU of a version of FMI.
-    pub fn names(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = String> {
-        let folders = fmi.folders(self.folder).iter();
-        folders.map(move |folder| format!("binaries/{folder}/{identifier}{}", self.ending))
+    /// Returns names and contents in the FMU of a version of FMI. A folder that is for one processor gets only its part of a
+    /// universal binary.
+    pub fn files(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = (String, &[u8])> {
+        fmi.folders(self.folder).iter().map(move |folder| {
+            let bytes = match folder.strip_suffix("-darwin") {
+                Some("aarch64") => binary::part(&self.bytes, "arm64"),
+                Some(processor) => binary::part(&self.bytes, processor),
+                None => &self.bytes,
+            };
+            (format!("binaries/{folder}/{identifier}{}", self.ending), bytes)
+        })
     }
 }
 

@@ -372,8 +372,7 @@ pub fn sbom(
 ) -> String {
     let identifier = model.identifier();
     let files = binaries.iter().flat_map(|binary| {
-        let hash = sha256(&binary.bytes);
-        binary.names(&identifier, fmi).map(move |name| (name, hash.clone()))
+        binary.files(&identifier, fmi).map(|(name, bytes)| (name, sha256(bytes)))
     });
     let product = Product {
         kind: "library",

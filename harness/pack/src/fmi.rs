@@ -20,8 +20,8 @@ impl Fmi {
     /// Versions of FMI in releases and wheels.
     pub const RELEASED: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
-    /// Folders under `binaries/` for a platform that is known by its folder in FMI 2.0. A universal binary for macOS
-    /// lies in two of FMI 3.0.
+    /// Folders under `binaries/` for a platform that is known by its folder in FMI 2.0. The two parts of a universal binary
+    /// for macOS lie in two of FMI 3.0.
     pub fn folders(self, platform: &'static str) -> &'static [&'static str] {
         match (self, platform) {
             (Fmi::V3 | Fmi::V3Arrays, "linux64") => &["x86_64-linux"],

@@ -131,10 +131,10 @@ fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
     let description = ModelDescription::from_xml(&String::from_utf8_lossy(&first))?;
     let icon = read(&root().join("modelDescription/icon/icon.png"))?;
     let mut files = vec![("modelDescription.xml".into(), xml), (fmi.icon().into(), icon)];
+    let identifier = model.identifier();
     for binary in binaries {
-        for name in binary.names(&model.identifier(), fmi) {
-            files.push((name, binary.bytes.clone()));
-        }
+        let placed = binary.files(&identifier, fmi);
+        files.extend(placed.map(|(name, bytes)| (name, bytes.to_vec())));
     }
 
     let title = format!("{} {}", description.model_name, description.version);

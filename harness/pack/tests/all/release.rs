@@ -200,7 +200,7 @@ fn release_is_small_and_for_all_platforms() {
     for (Model { name, .. }, fmi, fmu) in released() {
         let mut processors = 0;
         for Platform { folder, ending, .. } in &PLATFORMS {
-            // both of macOS are in each of its two folders of FMI 3.0
+            // FMI 2.0 has one folder for both processors of macOS
             for folder in fmi.folders(folder) {
                 let binary = format!("binaries/{folder}/{name}{ending}");
                 let binary = Binary::read(&release::read(&fmu, &binary).unwrap()).unwrap();
