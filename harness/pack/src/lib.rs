@@ -64,7 +64,7 @@ fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> 
         .iter()
         .map(|b| Packed { folder: b.folder, ending: b.ending, bytes: b.bytes.clone() })
         .collect();
-    archive::write(&files(model, fmi, &binaries)?, out)
+    archive::write_small(&files(model, fmi, &binaries)?, out)
 }
 
 /// The packed HubSlosh for tests: [`packed_model_for_tests`].

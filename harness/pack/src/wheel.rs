@@ -48,7 +48,7 @@ struct Binaries {
 /// If something cannot be built, read or written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     check_folder(folder)?;
-    write_one(folder, native()?)
+    write_one(folder, native()?, archive::write)
 }
 
 /// The same for other platforms, a wheel for each processor.
@@ -57,7 +57,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 /// As [`write`]; if a binary would not run on every machine of its platform, nothing is written.
 pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>> {
     check_folder(folder)?;
-    cross(platforms)?.into_iter().map(|binaries| write_one(folder, binaries)).collect()
+    let write = |binaries| write_one(folder, binaries, archive::write_small);
+    cross(platforms)?.into_iter().map(write).collect()
 }
 
 fn check_folder(folder: &Path) -> Result<()> {
@@ -83,7 +84,8 @@ pub fn for_tests(fmus: &[&Path]) -> PathBuf {
         let read = vec![Binary::read(&library)?];
         let native = (native_name(std::env::consts::DLL_SUFFIX), library);
         let binaries = Binaries { folder: PLATFORM, fmus: fmus_in, native, command: None, read };
-        write_one(fmus[0].parent().context("the FMU is in no folder")?, binaries)
+        let folder = fmus[0].parent().context("the FMU is in no folder")?;
+        write_one(folder, binaries, archive::write)
     };
     make().unwrap_or_else(|error| panic!("the wheel for the tests could not be packed: {error:#}"))
 }
@@ -156,7 +158,7 @@ fn cross_one(
         let binary = [Packed { folder: platform.folder, ending: platform.ending, bytes }];
         for fmi in Fmi::RELEASED {
             let fmu = fmi.path(made.path(), &model.identifier());
-            archive::write(&files_of_fmu(&model, fmi, &binary)?, &fmu)?;
+            archive::write_small(&files_of_fmu(&model, fmi, &binary)?, &fmu)?;
             fmus.push((file_name(&fmu), archive::read(&fmu)?));
         }
     }
@@ -177,10 +179,14 @@ fn native_name(ending: &str) -> &'static str {
     if ending == ".dll" { "_native.pyd" } else { "_native.abi3.so" }
 }
 
-fn write_one(folder: &Path, binaries: Binaries) -> Result<PathBuf> {
+fn write_one(
+    folder: &Path,
+    binaries: Binaries,
+    write: fn(&Files, &Path) -> Result<()>,
+) -> Result<PathBuf> {
     let tags = tags(&binaries.read)?;
     let out = folder.join(format!("{PACKAGE}-{VERSION}-{ABI}-{}.whl", tags.join(".")));
-    archive::write(&files(binaries, &tags)?, &out)?;
+    write(&files(binaries, &tags)?, &out)?;
     Ok(out)
 }
 
