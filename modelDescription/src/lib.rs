@@ -3,12 +3,13 @@
 //! This crate knows no single variable: the table describes them. The XML is committed so that a
 //! change of the interface shows in a diff.
 
+mod element;
 pub mod fmi3;
 pub mod icon;
 pub mod names;
-pub mod schema;
 pub mod variables;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use runtime::Model;
@@ -17,8 +18,10 @@ use runtime::log::categories;
 use runtime::table::Scalar;
 use runtime::unit::Unit;
 use runtime::v2::Fmi2;
-use runtime::variable::{Access, Causality, Enumeration, Kind, Value};
+use runtime::variable::{Access, Causality, Enumeration, Kind, Value, Variable};
 use runtime::version::Version;
+
+use crate::element::Element;
 
 /// The folder of a model's XML, documentation and pictures.
 pub fn folder<M: Model>() -> PathBuf {
@@ -39,122 +42,121 @@ const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 
 /// The file's text.
-pub fn xml<M: Model>() -> Result<String, serde_xml_rs::Error> {
-    write(&description::<M>())
+pub fn xml<M: Model>() -> Result<String, xml::writer::Error> {
+    description::<M>().document()
 }
 
-fn write(description: &impl serde::Serialize) -> Result<String, serde_xml_rs::Error> {
-    let layout = xml::EmitterConfig::new().perform_indent(true).indent_string("  ");
-    let mut text = serde_xml_rs::SerdeXml::new().emitter(layout).to_string(description)?;
-    text.push('\n');
-    Ok(text)
-}
-
-fn description<M: Model>() -> schema::ModelDescription {
+fn description<M: Model>() -> Element {
     let table = M::table();
-    schema::ModelDescription {
-        fmi_version: "2.0",
-        model_name: table.about.model,
-        guid: table.guid().into(),
-        description: table.about.description,
-        author: env!("CARGO_PKG_AUTHORS"),
-        version: table.about.version,
-        copyright: format!("(c) 2026 {}", env!("CARGO_PKG_AUTHORS")),
-        license: env!("CARGO_PKG_LICENSE"),
-        generation_tool: format!("{} {}", table.about.model, table.about.version),
-        generation_date_and_time: RELEASED,
-        variable_naming_convention: "structured",
-        number_of_event_indicators: table.about.event_indicators,
-        model_exchange: schema::ModelExchange {
-            model_identifier: table.about.model,
-            needs_execution_tool: false,
-            completed_integrator_step_not_needed: false,
-            can_be_instantiated_only_once_per_process: false,
-            can_not_use_memory_management_functions: true,
-            can_get_and_set_fmu_state: true,
-            can_serialize_fmu_state: true,
-            provides_directional_derivative: true,
-        },
-        co_simulation: schema::CoSimulation {
-            model_identifier: table.about.model,
-            needs_execution_tool: false,
-            can_handle_variable_communication_step_size: true,
-            can_interpolate_inputs: true,
-            max_output_derivative_order: 1,
-            can_run_asynchronuously: false,
-            can_be_instantiated_only_once_per_process: false,
-            can_not_use_memory_management_functions: true,
-            can_get_and_set_fmu_state: true,
-            can_serialize_fmu_state: true,
-            provides_directional_derivative: true,
-        },
-        units: schema::Units { all: table.units().map(unit).collect() },
-        types: Some(table.enumerations())
-            .filter(|all| !all.is_empty())
-            .map(|all| schema::Types { all: all.into_iter().map(simple_type).collect() }),
-        log_categories: schema::LogCategories {
-            all: categories::<M, Fmi2>(table)
-                .into_iter()
-                .map(|c| schema::Category { name: c.name, description: c.description })
-                .collect(),
-        },
-        default_experiment: schema::DefaultExperiment {
-            start_time: real(0.0),
-            stop_time: real(STOP_TIME),
-            tolerance: real(DEFAULT_TOLERANCE),
-            step_size: real(STEP_SIZE),
-        },
-        variables: schema::Variables { all: table.scalars.iter().map(variable).collect() },
-        structure: schema::Structure {
-            outputs: unknowns::<M>(is_output, |s| s.depends_on().collect()),
-            derivatives: unknowns::<M>(is_derivative, |s| s.depends_on().collect()),
-            initial_unknowns: unknowns::<M>(
-                |s| {
-                    let calculated = s.variable.causality == Causality::CalculatedParameter;
-                    is_output(s) || calculated || s.variable.state.is_some() || is_derivative(s)
-                },
-                |s| s.initial_depends_on().collect(),
-            ),
-        },
-    }
+    let all_unknowns = |list| unknowns::<M>(list, "Unknown", "index", index);
+    root::<M>("2.0", "guid", table.guid())
+        .with("numberOfEventIndicators", table.about.event_indicators)
+        .holding([
+            Element::new("ModelExchange")
+                .with("modelIdentifier", table.about.model)
+                .with("needsExecutionTool", false)
+                .with("completedIntegratorStepNotNeeded", false)
+                .with("canBeInstantiatedOnlyOncePerProcess", false)
+                .with("canNotUseMemoryManagementFunctions", true)
+                .with("canGetAndSetFMUstate", true)
+                .with("canSerializeFMUstate", true)
+                .with("providesDirectionalDerivative", true),
+            Element::new("CoSimulation")
+                .with("modelIdentifier", table.about.model)
+                .with("needsExecutionTool", false)
+                .with("canHandleVariableCommunicationStepSize", true)
+                .with("canInterpolateInputs", true)
+                .with("maxOutputDerivativeOrder", 1)
+                .with("canRunAsynchronuously", false)
+                .with("canBeInstantiatedOnlyOncePerProcess", false)
+                .with("canNotUseMemoryManagementFunctions", true)
+                .with("canGetAndSetFMUstate", true)
+                .with("canSerializeFMUstate", true)
+                .with("providesDirectionalDerivative", true),
+            Element::new("UnitDefinitions").holding(table.units().map(unit)),
+        ])
+        .holding(type_definitions::<M>(|of| {
+            Element::new("SimpleType")
+                .with("name", of.name)
+                .with("description", of.description)
+                .holding([Element::new("Enumeration").holding(items(of))])
+        }))
+        .holding([
+            log_categories::<M, Fmi2>(),
+            default_experiment(),
+            Element::new("ModelVariables").holding(table.scalars.iter().map(variable)),
+            Element::new("ModelStructure").holding([
+                Element::new("Outputs").holding(all_unknowns(List::Outputs)),
+                Element::new("Derivatives").holding(all_unknowns(List::Derivatives)),
+                Element::new("InitialUnknowns").holding(all_unknowns(List::Initial)),
+            ]),
+        ])
 }
 
-fn unit(unit: &Unit) -> schema::Unit {
-    let exponent = |n: i32| (n != 0).then_some(n);
-    schema::Unit {
-        name: unit.name,
-        base: unit.base.map(|[kg, m, s, rad]| schema::BaseUnit {
-            kg: exponent(kg),
-            m: exponent(m),
-            s: exponent(s),
-            rad: exponent(rad),
+/// The root element with the attributes of both versions, which name the token differently.
+fn root<M: Model>(version: &str, token_name: &'static str, token: &str) -> Element {
+    let about = &M::table().about;
+    Element::new("fmiModelDescription")
+        .with("fmiVersion", version)
+        .with("modelName", about.model)
+        .with(token_name, token)
+        .with("description", about.description)
+        .with("author", env!("CARGO_PKG_AUTHORS"))
+        .with("version", about.version)
+        .with("copyright", concat!("(c) 2026 ", env!("CARGO_PKG_AUTHORS")))
+        .with("license", env!("CARGO_PKG_LICENSE"))
+        .with("generationTool", format_args!("{} {}", about.model, about.version))
+        .with("generationDateAndTime", RELEASED)
+        .with("variableNamingConvention", "structured")
+}
+
+fn unit(unit: &Unit) -> Element {
+    let exponents = |all: [i32; 4]| {
+        let named = ["kg", "m", "s", "rad"].into_iter().zip(all).filter(|(_, n)| *n != 0);
+        named.fold(Element::new("BaseUnit"), |base, (name, n)| base.with(name, n))
+    };
+    let display_unit = |(name, factor): &(&str, f64)| {
+        Element::new("DisplayUnit").with("name", name).with("factor", real(*factor))
+    };
+    Element::new("Unit")
+        .with("name", unit.name)
+        .holding(unit.base.map(exponents))
+        .holding(unit.display_units.iter().map(display_unit))
+}
+
+/// The enumerations, if there are any.
+fn type_definitions<M: Model>(one: impl Fn(&Enumeration) -> Element) -> Option<Element> {
+    let all = M::table().enumerations();
+    let some = !all.is_empty();
+    some.then(|| Element::new("TypeDefinitions").holding(all.into_iter().map(one)))
+}
+
+fn items(of: &Enumeration) -> impl Iterator<Item = Element> {
+    of.items.iter().zip(1..).map(|(item, value)| {
+        Element::new("Item")
+            .with("name", item.name)
+            .with("value", value)
+            .with("description", item.description)
+    })
+}
+
+fn log_categories<M: Model, V: Version>() -> Element {
+    Element::new("LogCategories").holding(
+        categories::<M, V>(M::table()).into_iter().map(|c| {
+            Element::new("Category").with("name", c.name).with("description", c.description)
         }),
-        displayed: unit
-            .display_units
-            .iter()
-            .map(|(name, factor)| schema::DisplayUnit { name, factor: real(*factor) })
-            .collect(),
-    }
+    )
 }
 
-fn simple_type(of: &Enumeration) -> schema::SimpleType {
-    let items = of.items.iter().zip(1..);
-    schema::SimpleType {
-        name: of.name,
-        description: of.description,
-        enumeration: schema::Items {
-            all: items
-                .map(|(item, value)| schema::Item {
-                    name: item.name,
-                    value,
-                    description: item.description,
-                })
-                .collect(),
-        },
-    }
+fn default_experiment() -> Element {
+    Element::new("DefaultExperiment")
+        .with("startTime", real(0.0))
+        .with("stopTime", real(STOP_TIME))
+        .with("tolerance", real(DEFAULT_TOLERANCE))
+        .with("stepSize", real(STEP_SIZE))
 }
 
-fn variable<M: Model>(scalar: &Scalar<M>) -> schema::ScalarVariable {
+fn variable<M: Model>(scalar: &Scalar<M>) -> Element {
     let v = scalar.variable;
     let (causality, initial) = match v.causality {
         Causality::Input => ("input", None),
@@ -163,43 +165,64 @@ fn variable<M: Model>(scalar: &Scalar<M>) -> schema::ScalarVariable {
         Causality::Parameter => ("parameter", Some("exact")),
         Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
     };
-    let variability = match (v.causality, v.kind) {
+    let kind = match v.kind {
+        Kind::Real(_) => "Real",
+        Kind::Integer { .. } => "Integer",
+        Kind::Boolean => "Boolean",
+        Kind::Enumeration(_) => "Enumeration",
+    };
+    let derivative = state_of(v, scalar.element).map(index);
+    let own = Own { start: scalar.start().map(text), derivative };
+    Element::new("ScalarVariable")
+        .with("name", scalar.name())
+        .with("valueReference", Fmi2::reference(scalar))
+        .with("description", v.description)
+        .with("causality", causality)
+        .with("variability", variability(v))
+        .with_some("initial", initial)
+        .holding([of_type(Element::new(kind), v, own)])
+}
+
+fn variability<M: Model>(v: &Variable<M>) -> &'static str {
+    match (v.causality, v.kind) {
         (Causality::Parameter, _) if v.tunable => "tunable",
         (Causality::Parameter | Causality::CalculatedParameter, _) => "fixed",
         (_, Kind::Real(_)) => "continuous",
         _ => "discrete",
+    }
+}
+
+/// Attributes of a variable that its entry in the table does not state.
+struct Own {
+    start: Option<String>,
+    /// The index (FMI 2.0) or value reference (FMI 3.0) of the state whose derivative the variable is.
+    derivative: Option<u32>,
+}
+
+/// Adds the attributes that depend on the type.
+fn of_type<M: Model>(element: Element, v: &Variable<M>, own: Own) -> Element {
+    let element = match v.kind {
+        Kind::Real(quantity) => element
+            .with_some("unit", Some(quantity.unit).filter(|unit| !unit.is_empty()))
+            .with_some("displayUnit", quantity.display_unit)
+            .with_some("min", quantity.min.map(real))
+            .with_some("max", quantity.max.map(real))
+            .with_some("nominal", quantity.nominal.map(real)),
+        Kind::Integer { min, max } => element.with_some("min", min).with_some("max", max),
+        Kind::Boolean => element,
+        Kind::Enumeration(of) => element.with("declaredType", of.name),
     };
-    let start = scalar.start().map(|value| match value {
+    element
+        .with_some("start", own.start)
+        .with_some("derivative", own.derivative)
+        .with_some("reinit", v.reinit.then_some(true))
+}
+
+fn text(value: Value) -> String {
+    match value {
         Value::Real(x) => real(x),
         Value::Integer(n) => n.to_string(),
         Value::Boolean(b) => b.to_string(),
-    });
-    let kind = match v.kind {
-        Kind::Real(q) => schema::Kind::Real {
-            unit: Some(q.unit).filter(|unit| !unit.is_empty()),
-            display_unit: q.display_unit,
-            min: q.min.map(real),
-            max: q.max.map(real),
-            nominal: q.nominal.map(real),
-            start,
-            derivative: match v.access {
-                Access::Derivative(place) => M::table().state_at(place(scalar.element)).map(index),
-                _ => None,
-            },
-            reinit: v.reinit.then_some(true),
-        },
-        Kind::Integer { min, max } => schema::Kind::Integer { min, max, start },
-        Kind::Boolean => schema::Kind::Boolean { start },
-        Kind::Enumeration(of) => schema::Kind::Enumeration { declared_type: of.name, start },
-    };
-    schema::ScalarVariable {
-        name: scalar.name(),
-        value_reference: Fmi2::reference(scalar),
-        description: v.description,
-        causality,
-        variability,
-        initial,
-        kind,
     }
 }
 
@@ -208,32 +231,72 @@ fn real(x: f64) -> String {
     format!("{x:?}")
 }
 
-fn is_output<M: Model>(scalar: &Scalar<M>) -> bool {
-    scalar.variable.causality == Causality::Output
-}
-
-fn is_derivative<M: Model>(scalar: &Scalar<M>) -> bool {
-    matches!(scalar.access, Access::Derivative(_))
+/// The state whose derivative an element of an entry is.
+fn state_of<M: Model>(v: &Variable<M>, element: usize) -> Option<&'static Scalar<M>> {
+    match v.access {
+        Access::Derivative(place) => M::table().state_at(place(element)),
+        _ => None,
+    }
 }
 
 /// Place among the variables, counted from 1.
-fn index<M: Model>(scalar: &Scalar<M>) -> usize {
-    scalar.index as usize + 1
+fn index<M: Model>(scalar: &Scalar<M>) -> u32 {
+    scalar.index + 1
 }
 
-/// Some of the scalars in the order of their indices, with what they depend on.
-fn unknowns<M: Model>(
-    of_interest: impl Fn(&Scalar<M>) -> bool,
-    dependencies: impl Fn(&Scalar<M>) -> Vec<&'static Scalar<M>>,
-) -> schema::Unknowns {
-    let all = M::table().scalars.iter().filter(|scalar| of_interest(scalar)).map(|scalar| {
-        let text: Vec<_> =
-            dependencies(scalar).into_iter().map(|known| index(known).to_string()).collect();
-        schema::Unknown {
-            index: index(scalar),
-            dependencies: text.join(" "),
-            dependencies_kind: vec!["dependent"; text.len()].join(" "),
+/// A list of ModelStructure.
+#[derive(Clone, Copy, PartialEq)]
+enum List {
+    Outputs,
+    Derivatives,
+    Initial,
+}
+
+impl List {
+    fn holds<M: Model>(self, scalar: &Scalar<M>) -> bool {
+        let v = scalar.variable;
+        let is_output = v.causality == Causality::Output;
+        let is_derivative = matches!(scalar.access, Access::Derivative(_));
+        match self {
+            Self::Outputs => is_output,
+            Self::Derivatives => is_derivative,
+            Self::Initial => {
+                let calculated = v.causality == Causality::CalculatedParameter;
+                is_output || calculated || v.state.is_some() || is_derivative
+            }
         }
-    });
-    schema::Unknowns { all: all.collect() }
+    }
+}
+
+/// The scalars of a list in the order of their numbers, each with the numbers of those it depends on. An array depends on
+/// what any of its elements does. `element` and `attribute` are what the version calls them.
+fn unknowns<M: Model>(
+    list: List,
+    element: &'static str,
+    attribute: &'static str,
+    number: impl Fn(&Scalar<M>) -> u32,
+) -> Vec<Element> {
+    let mut unknowns: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    for scalar in M::table().scalars.iter().filter(|scalar| list.holds(scalar)) {
+        let known: Vec<_> = match list {
+            List::Initial => scalar.initial_depends_on().collect(),
+            List::Outputs | List::Derivatives => scalar.depends_on().collect(),
+        };
+        unknowns.entry(number(scalar)).or_default().extend(known.into_iter().map(&number));
+    }
+    let one = |(n, known): (u32, BTreeSet<u32>)| unknown(element, attribute, n, &known);
+    unknowns.into_iter().map(one).collect()
+}
+
+fn unknown(
+    element: &'static str,
+    attribute: &'static str,
+    number: u32,
+    known: &BTreeSet<u32>,
+) -> Element {
+    let numbers: Vec<_> = known.iter().map(u32::to_string).collect();
+    Element::new(element)
+        .with(attribute, number)
+        .with("dependencies", numbers.join(" "))
+        .with("dependenciesKind", vec!["dependent"; numbers.len()].join(" "))
 }
