@@ -435,97 +435,38 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Reads reals.
-pub unsafe fn fmi2GetReal<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *mut fmi2Real,
-) -> fmi2Status {
-    let as_c = |value| match value {
-        Value::Real(x) => Some(x),
-        _ => None,
-    };
-    unsafe { get::<M, _>(c, &GET_REAL, (vr, nvr, value), as_c) }
+/// Functions that get or set variables of a type by `$access`, with a conversion from or to the C type.
+macro_rules! of_type {
+    ($($(#[$doc:meta])* $name:ident($value:ty): $access:ident, $call:expr, $convert:expr;)*) => {$(
+        $(#[$doc])*
+        pub unsafe fn $name<M: Model>(
+            c: fmi2Component,
+            vr: *const fmi2ValueReference,
+            nvr: usize,
+            value: $value,
+        ) -> fmi2Status {
+            unsafe { $access::<M, _>(c, $call, (vr, nvr, value), $convert) }
+        }
+    )*};
 }
 
-/// Reads integers and enumerations.
-pub unsafe fn fmi2GetInteger<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *mut fmi2Integer,
-) -> fmi2Status {
-    let as_c = |value| match value {
-        Value::Integer(n) => Some(n),
-        _ => None,
-    };
-    unsafe { get::<M, _>(c, &GET_INTEGER, (vr, nvr, value), as_c) }
-}
-
-/// Reads Booleans: 0 or 1.
-pub unsafe fn fmi2GetBoolean<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *mut fmi2Boolean,
-) -> fmi2Status {
-    let as_c = |value| match value {
-        Value::Boolean(b) => Some(fmi2Boolean::from(b)),
-        _ => None,
-    };
-    unsafe { get::<M, _>(c, &GET_BOOLEAN, (vr, nvr, value), as_c) }
-}
-
-/// There are no strings.
-pub unsafe fn fmi2GetString<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *mut fmi2String,
-) -> fmi2Status {
-    unsafe { get::<M, _>(c, &GET_STRING, (vr, nvr, value), |_| None) }
-}
-
-/// Sets reals.
-pub unsafe fn fmi2SetReal<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *const fmi2Real,
-) -> fmi2Status {
-    unsafe { set::<M, _>(c, &SET_REAL, (vr, nvr, value), Value::Real) }
-}
-
-/// Sets integers and enumerations.
-pub unsafe fn fmi2SetInteger<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *const fmi2Integer,
-) -> fmi2Status {
-    unsafe { set::<M, _>(c, &SET_INTEGER, (vr, nvr, value), Value::Integer) }
-}
-
-/// Sets Booleans: everything but 0 is true.
-pub unsafe fn fmi2SetBoolean<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *const fmi2Boolean,
-) -> fmi2Status {
-    unsafe { set::<M, _>(c, &SET_BOOLEAN, (vr, nvr, value), |b| Value::Boolean(b != 0)) }
-}
-
-/// There are no strings.
-pub unsafe fn fmi2SetString<M: Model>(
-    c: fmi2Component,
-    vr: *const fmi2ValueReference,
-    nvr: usize,
-    value: *const fmi2String,
-) -> fmi2Status {
-    // No variable is a string, so the value is never looked at.
-    unsafe { set::<M, _>(c, &SET_STRING, (vr, nvr, value), |_| Value::Boolean(false)) }
+of_type! {
+    /// Reads reals.
+    fmi2GetReal(*mut fmi2Real): get, &GET_REAL, Value::real;
+    /// Reads integers and enumerations.
+    fmi2GetInteger(*mut fmi2Integer): get, &GET_INTEGER, Value::integer;
+    /// Reads Booleans: 0 or 1.
+    fmi2GetBoolean(*mut fmi2Boolean): get, &GET_BOOLEAN, |value| value.boolean().map(i32::from);
+    /// There are no strings.
+    fmi2GetString(*mut fmi2String): get, &GET_STRING, |_| None;
+    /// Sets reals.
+    fmi2SetReal(*const fmi2Real): set, &SET_REAL, Value::Real;
+    /// Sets integers and enumerations.
+    fmi2SetInteger(*const fmi2Integer): set, &SET_INTEGER, Value::Integer;
+    /// Sets Booleans: everything but 0 is true.
+    fmi2SetBoolean(*const fmi2Boolean): set, &SET_BOOLEAN, |b| Value::Boolean(b != 0);
+    /// There are no strings: the value is never looked at.
+    fmi2SetString(*const fmi2String): set, &SET_STRING, |_| Value::Boolean(false);
 }
 
 // ---- Saved states ----

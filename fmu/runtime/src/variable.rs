@@ -15,6 +15,35 @@ pub enum Value {
     Boolean(bool),
 }
 
+impl Value {
+    /// The real number, if it is one.
+    #[inline]
+    pub fn real(self) -> Option<f64> {
+        match self {
+            Self::Real(x) => Some(x),
+            _ => None,
+        }
+    }
+
+    /// The integer, if it is one.
+    #[inline]
+    pub fn integer(self) -> Option<i32> {
+        match self {
+            Self::Integer(n) => Some(n),
+            _ => None,
+        }
+    }
+
+    /// The Boolean, if it is one.
+    #[inline]
+    pub fn boolean(self) -> Option<bool> {
+        match self {
+            Self::Boolean(b) => Some(b),
+            _ => None,
+        }
+    }
+}
+
 /// The role of a variable, as FMI names it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Causality {

@@ -204,118 +204,40 @@ fn set_ends<M: Model>(
     Ok(())
 }
 
-/// Reads reals.
-pub unsafe fn fmi3GetFloat64<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *mut fmi3Float64,
-    nValues: usize,
-) -> fmi3Status {
-    let as_c = |value| match value {
-        Value::Real(x) => Some(x),
-        _ => None,
-    };
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { get::<M, _>(instance, &GET_FLOAT64, references, values, as_c) }
+/// Functions that get or set variables of a type by `$access`, with a conversion from or to the C type.
+macro_rules! of_type {
+    ($($(#[$doc:meta])* $name:ident($values:ty): $access:ident, $call:expr, $convert:expr;)*) => {$(
+        $(#[$doc])*
+        pub unsafe fn $name<M: Model>(
+            instance: fmi3Instance,
+            valueReferences: *const fmi3ValueReference,
+            nValueReferences: usize,
+            values: $values,
+            nValues: usize,
+        ) -> fmi3Status {
+            let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+            unsafe { $access::<M, _>(instance, $call, references, values, $convert) }
+        }
+    )*};
 }
 
-/// Reads integers.
-pub unsafe fn fmi3GetInt32<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *mut fmi3Int32,
-    nValues: usize,
-) -> fmi3Status {
-    let as_c = |value| match value {
-        Value::Integer(n) => Some(n),
-        _ => None,
-    };
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { get::<M, _>(instance, &GET_INT32, references, values, as_c) }
-}
-
-/// Reads enumerations.
-pub unsafe fn fmi3GetInt64<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *mut fmi3Int64,
-    nValues: usize,
-) -> fmi3Status {
-    let as_c = |value| match value {
-        Value::Integer(n) => Some(n.into()),
-        _ => None,
-    };
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { get::<M, _>(instance, &GET_INT64, references, values, as_c) }
-}
-
-/// Reads Booleans: 0 or 1.
-pub unsafe fn fmi3GetBoolean<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *mut fmi3Boolean,
-    nValues: usize,
-) -> fmi3Status {
-    let as_c = |value| match value {
-        Value::Boolean(b) => Some(b.into()),
-        _ => None,
-    };
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { get::<M, _>(instance, &GET_BOOLEAN, references, values, as_c) }
-}
-
-/// Sets reals.
-pub unsafe fn fmi3SetFloat64<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *const fmi3Float64,
-    nValues: usize,
-) -> fmi3Status {
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { set::<M, _>(instance, &SET_FLOAT64, references, values, Value::Real) }
-}
-
-/// Sets integers.
-pub unsafe fn fmi3SetInt32<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *const fmi3Int32,
-    nValues: usize,
-) -> fmi3Status {
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { set::<M, _>(instance, &SET_INT32, references, values, Value::Integer) }
-}
-
-/// Sets enumerations.
-pub unsafe fn fmi3SetInt64<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *const fmi3Int64,
-    nValues: usize,
-) -> fmi3Status {
-    // 0 is not an item of any enumeration.
-    let from_c = |n| Value::Integer(i32::try_from(n).unwrap_or(0));
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { set::<M, _>(instance, &SET_INT64, references, values, from_c) }
-}
-
-/// Sets Booleans: everything but 0 is true.
-pub unsafe fn fmi3SetBoolean<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *const fmi3Boolean,
-    nValues: usize,
-) -> fmi3Status {
-    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-    unsafe { set::<M, _>(instance, &SET_BOOLEAN, references, values, |b| Value::Boolean(b != 0)) }
+of_type! {
+    /// Reads reals.
+    fmi3GetFloat64(*mut fmi3Float64): get, &GET_FLOAT64, Value::real;
+    /// Reads integers.
+    fmi3GetInt32(*mut fmi3Int32): get, &GET_INT32, Value::integer;
+    /// Reads enumerations.
+    fmi3GetInt64(*mut fmi3Int64): get, &GET_INT64, |value| value.integer().map(i64::from);
+    /// Reads Booleans: 0 or 1.
+    fmi3GetBoolean(*mut fmi3Boolean): get, &GET_BOOLEAN, |value| value.boolean().map(u8::from);
+    /// Sets reals.
+    fmi3SetFloat64(*const fmi3Float64): set, &SET_FLOAT64, Value::Real;
+    /// Sets integers.
+    fmi3SetInt32(*const fmi3Int32): set, &SET_INT32, Value::Integer;
+    /// Sets enumerations. 0 is not an item of any.
+    fmi3SetInt64(*const fmi3Int64): set, &SET_INT64, |n| Value::Integer(i32::try_from(n).unwrap_or(0));
+    /// Sets Booleans: everything but 0 is true.
+    fmi3SetBoolean(*const fmi3Boolean): set, &SET_BOOLEAN, |b| Value::Boolean(b != 0);
 }
 
 /// Gets or sets variables of a type that no variable has: fine when there are none.
