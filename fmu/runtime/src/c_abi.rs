@@ -17,6 +17,7 @@ use crate::call::{Call, Fault, Severity};
 use crate::instance::Instance;
 use crate::log::{Filter, Topic, category};
 use crate::model::Model;
+use crate::snapshot;
 use crate::version::Version;
 
 // ---- Status and logger ----
@@ -279,6 +280,20 @@ pub unsafe fn on<M: Model, V: Version>(
     status(fault.severity)
 }
 
+/// [`on`] for the calls that look at their arguments only in an instance state that allows the call.
+#[inline]
+pub unsafe fn on_allowed<M: Model, V: Version>(
+    handle: *mut c_void,
+    call: &'static Call,
+    body: impl FnOnce(&mut Component<M, V>) -> Result<(), Fault>,
+) -> Status {
+    let if_allowed = |component: &mut Component<M, V>| {
+        component.instance.check(call)?;
+        body(component)
+    };
+    unsafe { on(handle, call, if_allowed) }
+}
+
 /// [`on`] for the calls with which the motion can begin: they log warnings about the initial parameters and
 /// inputs.
 pub unsafe fn on_start<M: Model, V: Version>(
@@ -345,6 +360,61 @@ pub unsafe fn saved_state<'a, M: Model, V: Version>(
         return Err(call.error(format_args!("argument {name} is not a saved state of this FMU")));
     }
     Ok(unsafe { &mut (*handle.cast::<SavedState<M, V>>()).instance })
+}
+
+/// Saves an instance, into the handle that is there or into a new one.
+pub unsafe fn save_state<M: Model, V: Version>(
+    call: &Call,
+    name: &str,
+    handle: *mut *mut c_void,
+    instance: &Instance<M, V>,
+) -> Result<(), Fault> {
+    unsafe {
+        let handle = place(call, name, handle)?;
+        if handle.is_null() {
+            *handle = new_state(instance.clone());
+        } else {
+            saved_state(call, name, *handle)?.clone_from(instance);
+        }
+    }
+    Ok(())
+}
+
+/// Writes a saved state to `size` bytes of the host.
+pub unsafe fn serialize<M: Model, V: Version>(
+    call: &Call,
+    saved: &Instance<M, V>,
+    bytes: *mut u8,
+    size: usize,
+) -> Result<(), Fault> {
+    let saved = snapshot::to_bytes(saved);
+    if size < saved.len() {
+        return Err(
+            call.error(format_args!("size is {size}; a saved state takes {} bytes", saved.len()))
+        );
+    }
+    let room = unsafe { array_mut(call, "serializedState", bytes, size)? };
+    room[..saved.len()].copy_from_slice(&saved);
+    Ok(())
+}
+
+/// Makes a saved state like those of `like` from bytes. The handle is written, never read: the host need not have set it.
+pub unsafe fn deserialize<M: Model, V: Version>(
+    call: &Call,
+    like: &Instance<M, V>,
+    (bytes, size): (*const u8, usize),
+    (name, handle): (&str, *mut *mut c_void),
+) -> Result<(), Fault> {
+    if handle.is_null() {
+        return Err(null(call, name));
+    }
+    unsafe {
+        let bytes = array(call, "serializedState", bytes, size)?;
+        let saved = snapshot::from_bytes::<M, V>(bytes).map_err(|why| call.error(why))?;
+        like.check_layout(call, &saved)?;
+        ptr::write(handle, new_state(saved));
+    }
+    Ok(())
 }
 
 /// Frees a saved state and clears the handle; NULL is allowed. fmusim (0.0.39) passes the state itself in place of the handle's

@@ -17,8 +17,8 @@ use std::panic::catch_unwind;
 use std::ptr;
 
 use crate::c_abi::{
-    self, Log, Logger, array, array_mut, c_string, free_component, free_state, new_component,
-    new_state, null, on, on_start, place, saved_state, text,
+    self, Log, Logger, array, array_mut, c_string, deserialize, free_component, free_state,
+    new_component, null, on, on_allowed, on_start, place, save_state, saved_state, serialize, text,
 };
 use crate::call::states::*;
 use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity};
@@ -261,8 +261,7 @@ pub unsafe fn fmi2SetDebugLogging<M: Model>(
 ) -> fmi2Status {
     let call = &SET_DEBUG_LOGGING;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             if loggingOn == 0 {
                 component.log.filter = Filter::NONE;
                 return Ok(());
@@ -404,8 +403,7 @@ unsafe fn get<M: Model, T>(
     as_c: impl Fn(Value) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             let references = array(call, "vr", vr, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
             for (reference, place) in references.iter().zip(places) {
@@ -426,8 +424,7 @@ unsafe fn set<M: Model, T: Copy>(
     from_c: impl Fn(T) -> Value,
 ) -> fmi2Status {
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             let references = array(call, "vr", vr, nvr)?;
             let values = array(call, "value", value, nvr)?;
             component.instance.set(call, references, |n| from_c(values[n]))
@@ -478,15 +475,8 @@ pub unsafe fn fmi2GetFMUstate<M: Model>(
 ) -> fmi2Status {
     let call = &GET_STATE;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
-            let handle = place(call, "FMUstate", FMUstate)?;
-            if handle.is_null() {
-                *handle = new_state(component.instance.clone());
-            } else {
-                saved_state(call, "FMUstate", *handle)?.clone_from(&component.instance);
-            }
-            Ok(())
+        on_allowed::<M, Fmi2>(c, call, |component| {
+            save_state(call, "FMUstate", FMUstate, &component.instance)
         })
     }
 }
@@ -495,8 +485,7 @@ pub unsafe fn fmi2GetFMUstate<M: Model>(
 pub unsafe fn fmi2SetFMUstate<M: Model>(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
     let call = Fmi2::SET_STATE;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             component.instance.restore(saved_state(call, "FMUstate", FMUstate)?)
         })
     }
@@ -519,8 +508,7 @@ pub unsafe fn fmi2SerializedFMUstateSize<M: Model>(
 ) -> fmi2Status {
     let call = &SERIALIZED_SIZE;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |_| {
             saved_state::<M, Fmi2>(call, "FMUstate", FMUstate)?;
             *place(call, "size", size)? = snapshot::size::<M>();
             Ok(())
@@ -537,25 +525,14 @@ pub unsafe fn fmi2SerializeFMUstate<M: Model>(
 ) -> fmi2Status {
     let call = &SERIALIZE;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |_| {
             let saved = saved_state::<M, Fmi2>(call, "FMUstate", FMUstate)?;
-            let bytes = snapshot::to_bytes(saved);
-            if size < bytes.len() {
-                return Err(call.error(format_args!(
-                    "size is {size}; a saved state takes {} bytes",
-                    bytes.len()
-                )));
-            }
-            let room = array_mut(call, "serializedState", serializedState.cast::<u8>(), size)?;
-            room[..bytes.len()].copy_from_slice(&bytes);
-            Ok(())
+            serialize(call, saved, serializedState.cast(), size)
         })
     }
 }
 
-/// Makes a saved state from bytes. The handle is written, never read: the host
-/// need not have set it.
+/// Makes a saved state from bytes.
 pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
     c: fmi2Component,
     serializedState: *const fmi2Byte,
@@ -563,16 +540,10 @@ pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
     FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
     let call = &DESERIALIZE;
+    let bytes = (serializedState.cast(), size);
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
-            if FMUstate.is_null() {
-                return Err(null(call, "FMUstate"));
-            }
-            let bytes = array(call, "serializedState", serializedState.cast::<u8>(), size)?;
-            let instance = snapshot::from_bytes::<M, Fmi2>(bytes);
-            ptr::write(FMUstate, new_state(instance.map_err(|why| call.error(why))?));
-            Ok(())
+        on_allowed::<M, Fmi2>(c, call, |component| {
+            deserialize(call, &component.instance, bytes, ("FMUstate", FMUstate))
         })
     }
 }
@@ -589,8 +560,7 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
 ) -> fmi2Status {
     let call = Fmi2::DIRECTIONAL_DERIVATIVE;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             let unknowns = array(call, "vUnknown_ref", vUnknown_ref, nUnknown)?;
             let knowns = array(call, "vKnown_ref", vKnown_ref, nKnown)?;
             let direction = array(call, "dvKnown", dvKnown, nKnown)?;
@@ -665,8 +635,7 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
 ) -> fmi2Status {
     let call = Fmi2::COMPLETED_STEP;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             let enter = place(call, "enterEventMode", enterEventMode)?;
             let terminate = place(call, "terminateSimulation", terminateSimulation)?;
             *enter = component.instance.completed_integrator_step()?.into();
@@ -705,8 +674,7 @@ unsafe fn fill<M: Model>(
     body: impl FnOnce(&mut Instance<M, Fmi2>, &mut [fmi2Real]) -> Result<(), Fault>,
 ) -> fmi2Status {
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             body(&mut component.instance, array_mut(call, name, pointer, length)?)
         })
     }
@@ -763,8 +731,7 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Model>(
 ) -> fmi2Status {
     let call = Fmi2::SET_INPUT_DERIVATIVES;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             let references = array(call, "vr", vr, nvr)?;
             let orders = array(call, "order", order, nvr)?;
             let values = array(call, "value", value, nvr)?;
@@ -783,8 +750,7 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Model>(
 ) -> fmi2Status {
     let call = Fmi2::GET_OUTPUT_DERIVATIVES;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             let references = array(call, "vr", vr, nvr)?;
             let orders = array(call, "order", order, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
@@ -816,8 +782,7 @@ pub unsafe fn fmi2DoStep<M: Model>(
 pub unsafe fn fmi2CancelStep<M: Model>(c: fmi2Component) -> fmi2Status {
     let call = &CANCEL_STEP;
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |_| {
             Err(call.error("no step is running: fmi2DoStep returns when the step is done"))
         })
     }
@@ -832,8 +797,7 @@ unsafe fn answer<M: Model, T>(
     known: impl FnOnce(&Instance<M, Fmi2>) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on::<M, Fmi2>(c, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi2>(c, call, |component| {
             let place = place(call, "value", value)?;
             let value = known(&component.instance);
             *place = value

@@ -6,7 +6,7 @@ use super::calls::*;
 use super::elements::wrong_variable;
 use super::references::wrong_reference;
 use super::types::*;
-use crate::c_abi::{Component, array_mut, on, place};
+use crate::c_abi::{Component, array_mut, on_allowed, place};
 use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::Causality;
@@ -66,8 +66,7 @@ pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
 ) -> fmi3Status {
     let call = &NUMBER_OF_DEPENDENCIES;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let count = place(call, "nDependencies", nDependencies)?;
             *count = dependencies(component, call, valueReference)?.len();
             Ok(())
@@ -87,8 +86,7 @@ pub unsafe fn fmi3GetVariableDependencies<M: Model>(
 ) -> fmi3Status {
     let call = &DEPENDENCIES;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let all = dependencies(component, call, dependent)?;
             if all.len() != nDependencies {
                 return Err(call.error(format_args!(

@@ -6,7 +6,7 @@ use super::calls::*;
 use super::elements::{check_numbers, scalars_of};
 use super::references::time_reference;
 use super::types::*;
-use crate::c_abi::{array, array_mut, on};
+use crate::c_abi::{array, array_mut, on_allowed};
 use crate::model::Model;
 use crate::variable::{is_finite, text as number};
 use crate::version::Version;
@@ -25,8 +25,7 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
 ) -> fmi3Status {
     let call = Fmi3::DIRECTIONAL_DERIVATIVE;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
             let unknowns = scalars_of(component, call, unknowns)?;
             let knowns = array(call, "knowns", knowns, nKnowns)?;
@@ -63,8 +62,7 @@ pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
 ) -> fmi3Status {
     let call = &ADJOINT_DERIVATIVE;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
             let unknowns = scalars_of(component, call, unknowns)?;
             let knowns = array(call, "knowns", knowns, nKnowns)?;

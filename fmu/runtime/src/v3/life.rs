@@ -12,8 +12,8 @@ use super::host::Host;
 use super::references::has_intermediate_update;
 use super::types::*;
 use crate::c_abi::{
-    self, Log, Logger, array, c_string, free_component, new_component, null, on, on_start, place,
-    text,
+    self, Log, Logger, array, c_string, free_component, new_component, null, on, on_allowed,
+    on_start, place, text,
 };
 use crate::call::{CType, Events, Fault, InstanceState, Interface, Severity};
 use crate::instance::Instance;
@@ -36,8 +36,7 @@ pub unsafe fn fmi3SetDebugLogging<M: Model>(
 ) -> fmi3Status {
     let call = &SET_DEBUG_LOGGING;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let mut names = Vec::new();
             for category in array(call, "categories", categories, nCategories)? {
                 names.push(text(*category).ok_or_else(|| null(call, "categories[]"))?);
@@ -312,8 +311,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
 ) -> fmi3Status {
     let call = Fmi3::NEW_DISCRETE_STATES;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let need_update = place(call, "discreteStatesNeedUpdate", discreteStatesNeedUpdate)?;
             let terminate = place(call, "terminateSimulation", terminateSimulation)?;
             let nominals_changed = place(

@@ -6,7 +6,7 @@ use super::calls::*;
 use super::elements::check_numbers;
 use super::host::Host;
 use super::types::*;
-use crate::c_abi::{Component, array, array_mut, on, place};
+use crate::c_abi::{Component, array, array_mut, on, on_allowed, place};
 use crate::call::{Call, Fault};
 use crate::instance::Instance;
 use crate::model::Model;
@@ -31,8 +31,7 @@ pub unsafe fn fmi3CompletedIntegratorStep<M: Model>(
 ) -> fmi3Status {
     let call = Fmi3::COMPLETED_STEP;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let enter = place(call, "enterEventMode", enterEventMode)?;
             let terminate = place(call, "terminateSimulation", terminateSimulation)?;
             *enter = component.instance.completed_integrator_step()?.into();
@@ -58,8 +57,7 @@ pub unsafe fn fmi3SetContinuousStates<M: Model>(
 ) -> fmi3Status {
     let call = Fmi3::SET_CONTINUOUS_STATES;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let states = array(call, "continuousStates", continuousStates, nContinuousStates)?;
             let Component { instance, host, .. } = component;
             let Some(arrays) = &host.arrays else { return instance.set_continuous_states(states) };
@@ -82,8 +80,7 @@ unsafe fn fill_states<M: Model>(
     body: impl FnOnce(&mut Instance<M, Fmi3>, &mut [fmi3Float64]) -> Result<(), Fault>,
 ) -> fmi3Status {
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let room = array_mut(call, name, pointer, length)?;
             let Component { instance, host, .. } = component;
             let Some(arrays) = &host.arrays else { return body(instance, room) };
@@ -106,8 +103,7 @@ unsafe fn fill<M: Model>(
     body: impl FnOnce(&mut Instance<M, Fmi3>, &mut [fmi3Float64]) -> Result<(), Fault>,
 ) -> fmi3Status {
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             body(&mut component.instance, array_mut(call, name, pointer, length)?)
         })
     }
@@ -164,8 +160,7 @@ unsafe fn tell<M: Model>(
     count: impl FnOnce(&Host<M>) -> usize,
 ) -> fmi3Status {
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             *place(call, name, pointer)? = count(&component.host);
             Ok(())
         })

@@ -2,12 +2,12 @@
 
 #![allow(unsafe_code)]
 
-use std::ptr;
-
 use super::calls::*;
 use super::elements::resize;
 use super::types::*;
-use crate::c_abi::{array, array_mut, free_state, new_state, null, on, place, saved_state};
+use crate::c_abi::{
+    deserialize, free_state, on, on_allowed, place, save_state, saved_state, serialize,
+};
 use crate::model::Model;
 use crate::snapshot;
 use crate::version::Version;
@@ -19,15 +19,8 @@ pub unsafe fn fmi3GetFMUState<M: Model>(
 ) -> fmi3Status {
     let call = &GET_STATE;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
-            let handle = place(call, "FMUState", FMUState)?;
-            if handle.is_null() {
-                *handle = new_state(component.instance.clone());
-            } else {
-                saved_state(call, "FMUState", *handle)?.clone_from(&component.instance);
-            }
-            Ok(())
+        on_allowed::<M, Fmi3>(instance, call, |component| {
+            save_state(call, "FMUState", FMUState, &component.instance)
         })
     }
 }
@@ -39,8 +32,7 @@ pub unsafe fn fmi3SetFMUState<M: Model>(
 ) -> fmi3Status {
     let call = Fmi3::SET_STATE;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             component.instance.restore(saved_state(call, "FMUState", FMUState)?)?;
             resize(component);
             Ok(())
@@ -65,8 +57,7 @@ pub unsafe fn fmi3SerializedFMUStateSize<M: Model>(
 ) -> fmi3Status {
     let call = &SERIALIZED_SIZE;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |_| {
             saved_state::<M, Fmi3>(call, "FMUState", FMUState)?;
             *place(call, "size", size)? = snapshot::size::<M>();
             Ok(())
@@ -83,23 +74,14 @@ pub unsafe fn fmi3SerializeFMUState<M: Model>(
 ) -> fmi3Status {
     let call = &SERIALIZE;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
-            let bytes = snapshot::to_bytes(saved_state::<M, Fmi3>(call, "FMUState", FMUState)?);
-            if size < bytes.len() {
-                return Err(call.error(format_args!(
-                    "size is {size}; a saved state takes {} bytes",
-                    bytes.len()
-                )));
-            }
-            let room = array_mut(call, "serializedState", serializedState, size)?;
-            room[..bytes.len()].copy_from_slice(&bytes);
-            Ok(())
+        on_allowed::<M, Fmi3>(instance, call, |_| {
+            let saved = saved_state::<M, Fmi3>(call, "FMUState", FMUState)?;
+            serialize(call, saved, serializedState, size)
         })
     }
 }
 
-/// Makes a saved state from bytes. The handle is written, never read: the host need not have set it.
+/// Makes a saved state from bytes.
 pub unsafe fn fmi3DeserializeFMUState<M: Model>(
     instance: fmi3Instance,
     serializedState: *const fmi3Byte,
@@ -107,17 +89,10 @@ pub unsafe fn fmi3DeserializeFMUState<M: Model>(
     FMUState: *mut fmi3FMUState,
 ) -> fmi3Status {
     let call = &DESERIALIZE;
+    let bytes = (serializedState, size);
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
-            if FMUState.is_null() {
-                return Err(null(call, "FMUState"));
-            }
-            let bytes = array(call, "serializedState", serializedState, size)?;
-            let saved = snapshot::from_bytes::<M, Fmi3>(bytes).map_err(|why| call.error(why))?;
-            component.instance.check_layout(call, &saved)?;
-            ptr::write(FMUState, new_state(saved));
-            Ok(())
+        on_allowed::<M, Fmi3>(instance, call, |component| {
+            deserialize(call, &component.instance, bytes, ("FMUState", FMUState))
         })
     }
 }

@@ -7,7 +7,7 @@ use super::elements::{check_count, check_elements, scalars_of, start_resized, wr
 use super::host::Phase;
 use super::references::{Extra, extra, wrong_reference};
 use super::types::*;
-use crate::c_abi::{Component, array, array_mut, on};
+use crate::c_abi::{Component, array, array_mut, on_allowed};
 use crate::call::states::*;
 use crate::call::{CType, Call, Fault, InstanceState};
 use crate::model::Model;
@@ -25,8 +25,7 @@ unsafe fn get<M: Model, T>(
     as_c: impl Fn(Value) -> Option<T>,
 ) -> fmi3Status {
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_some() {
                 let found = array_values(component, call, references, value_count)?;
@@ -131,8 +130,7 @@ unsafe fn set<M: Model, T: Copy>(
     from_c: impl Fn(T) -> Value,
 ) -> fmi3Status {
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_some() {
                 let values = array(call, "values", values, value_count)?;
@@ -267,8 +265,7 @@ unsafe fn call_of_no_variable<M: Model>(
     value_count: usize,
 ) -> fmi3Status {
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             of_no_variable(component, call, references, value_count)
         })
@@ -285,8 +282,7 @@ pub unsafe fn fmi3GetUInt64<M: Model>(
 ) -> fmi3Status {
     let call = &GET_UINT64;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
             if component.host.arrays.is_none() {
                 return of_no_variable(component, call, references, nValues);
@@ -314,8 +310,7 @@ pub unsafe fn fmi3SetUInt64<M: Model>(
 ) -> fmi3Status {
     let call = &SET_UINT64;
     unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            component.instance.check(call)?;
+        on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
             if component.host.arrays.is_none() {
                 return of_no_variable(component, call, references, nValues);
@@ -433,8 +428,7 @@ pub unsafe fn fmi3ActivateModelPartition<M: Model>(
 ) -> fmi3Status {
     static CALL: Call = both("fmi3ActivateModelPartition", ANY);
     unsafe {
-        on::<M, Fmi3>(instance, &CALL, |component| {
-            component.instance.check(&CALL)?;
+        on_allowed::<M, Fmi3>(instance, &CALL, |_| {
             Err(CALL.error("this FMU has no Scheduled Execution"))
         })
     }
