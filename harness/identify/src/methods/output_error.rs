@@ -351,7 +351,8 @@ fn finish(
     let profile = friction::profile(&problem, &polished, &speeds)?;
     say("profile of the friction's curve", &problem);
     let Polished { jacobian, covariance, answer, .. } = polished;
-    let error_budget = budget::of(&problem, (&x, &answer), &jacobian, &covariance, &changes);
+    let (error_budget, modes_unknown) =
+        budget::of(&problem, (&x, &answer), &jacobian, &covariance, &changes);
     say("higher slosh modes", &problem);
     let starts = start_study(&problem, &x, e.norm_squared(), options.start_study);
     say("other starts", &problem);
@@ -470,6 +471,7 @@ fn finish(
         verdict::words(question, &findings, &fit, &combinations, &parameters, &error_budget);
     verdict.extend(shares);
     verdict.extend(budget::first_order(&changes));
+    verdict.extend(modes_unknown);
     verdict.extend(start_study::words(&starts));
     let slosh_angle = if fit.model == Frozen.name() { 0.0 } else { largest_angle(&answer) };
     verdict.extend(regime(&fit.model, slosh_angle));

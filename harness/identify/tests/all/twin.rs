@@ -772,6 +772,13 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
         let far = Tolerances { gravity: 1e9, ..Tolerances::NONE };
         let words = budget::first_order(&budget::slopes(&problem, &found, &far).unwrap());
         assert_eq!(words.is_some_and(|w| w.contains("g_axial (")), model == "linear");
+        // nor are higher modes, with which the steps do not settle here
+        let at = (&found.x[..], &found.answer);
+        let (effects, words) =
+            budget::of(&problem, at, &found.jacobian, &found.covariance, &slopes);
+        assert_eq!(effects.len(), slopes.len(), "{model}");
+        let is_told = words.is_some_and(|w| w.contains("modes 2 to 4") && w.contains("settle"));
+        assert_eq!(is_told, model == "linear");
         // and it is what a fit of the recording with 1.01 times the torque finds
         let mut scaled = recordings.clone();
         scaled[0].torque.iter_mut().for_each(|torque| *torque *= 1.01);

@@ -260,14 +260,15 @@ fn same_motion(problem: &Problem, x: &[f64], name: &str, factor: f64) -> Option<
     Some(there)
 }
 
-/// Returns the effects of possible errors at the minimum x, the tolerances first.
+/// Returns the effects of possible errors at the minimum x, the tolerances first, and a sentence if that of higher slosh modes is
+/// not known.
 pub fn of(
     problem: &Problem,
     (x, answer): (&[f64], &Answer),
     jacobian: &DMatrix<f64>,
     covariance: &Covariance,
     slopes: &[Slope],
-) -> Vec<Effect> {
+) -> (Vec<Effect>, Option<String>) {
     let effect = |source: String, change: DVector<f64>, tolerance: bool| {
         let there: Vec<f64> = x.iter().zip(change.iter()).map(|(x, change)| x + change).collect();
         let values = problem.values(x).into_iter().zip(problem.values(&there));
@@ -280,11 +281,18 @@ pub fn of(
         effect(source, slope.moved.clone(), true)
     };
     let mut effects: Vec<Effect> = slopes.iter().map(of_slope).collect();
-    let sloshes = problem.index(slosh::ZETA).is_some();
-    if let Some(change) = modes(problem, (x, answer), jacobian, covariance).filter(|_| sloshes) {
-        effects.push(effect("slosh modes 2 to 4, left out".into(), change, false));
-    }
-    effects
+    let unknown = match modes(problem, (x, answer), jacobian, covariance) {
+        Ok(change) => {
+            let source = "slosh modes 2 to 4, left out".to_string();
+            effects.extend(change.map(|change| effect(source, change, false)));
+            None
+        }
+        Err(error) => Some(format!(
+            "The effect of slosh modes 2 to 4, which are left out, is not known: the fit could not be repeated with them ({error:#}). \
+             A second fit with --set slosh.modes=4 shows it."
+        )),
+    };
+    (effects, unknown)
 }
 
 /// A share in percent.
@@ -293,23 +301,27 @@ pub fn percent(part: f64) -> String {
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// Returns the change of x when the model is fitted anew with four modes. `None` if the steps do not settle.
-/// One step would not do: what of the innovations' change is of second order looks like a large error in weak directions,
+/// Returns the change of x when the model is fitted anew with four modes; `None` if the liquid does not slosh or `slosh.modes` is
+/// set. One step would not do: what of the innovations' change is of second order looks like a large error in weak directions,
 /// friction's.
+///
+/// # Errors
+/// If the steps do not settle, or the FMU refuses to run.
 fn modes(
     problem: &Problem,
     (x, answer): (&[f64], &Answer),
     jacobian: &DMatrix<f64>,
     covariance: &Covariance,
-) -> Option<DVector<f64>> {
-    if problem.setup.settings.iter().any(|(name, _)| name == slosh::MODES) {
-        return None;
+) -> Result<Option<DVector<f64>>> {
+    let is_set = problem.setup.settings.iter().any(|(name, _)| name == slosh::MODES);
+    if is_set || problem.index(slosh::ZETA).is_none() {
+        return Ok(None);
     }
     let base = problem.stacked(answer, x);
     let mut other = problem.clone();
     other.setup.settings.push((slosh::MODES.into(), "4".into()));
-    let found = settled(&other, (x, &base), (jacobian, covariance), x.to_vec());
-    found.ok().map(|(_, moved)| moved)
+    let (_, moved) = settled(&other, (x, &base), (jacobian, covariance), x.to_vec())?;
+    Ok(Some(moved))
 }
 
 /// Contribution of tolerances to the covariance of x.
