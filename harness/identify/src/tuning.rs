@@ -359,9 +359,11 @@ pub const OUTPUT_ROUNDING: f64 = 1e-12;
 pub const DIRECTION_PART: f64 = 1e-2;
 
 // Sources of uncertainty: `uncertainty/bench/sources.rs`.
-// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum`.
+// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum`.
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.3;
+/// Part of a hub's path against its main direction above which it turns both ways.
+pub const BOTH_WAYS: f64 = 0.1;
 /// Correlation above which two unknowns count as determined only if each is precise by itself.
 pub const COMBINED_CORRELATION: f64 = 0.99;
 /// Relative standard deviation beyond which a correlated unknown is not known by itself.

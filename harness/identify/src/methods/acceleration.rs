@@ -50,7 +50,7 @@ use crate::tuning::{
     MOVING_SPEED, ONE_WAY, ROUGH_ROWS, SCORE_WINDOW, SHORT_CHANGE, STICKING_ROUNDS, TOLD_SHARE,
     VAGUE_STRIBECK,
 };
-use crate::uncertainty::bench::sources::{Combination, Sources, one_way};
+use crate::uncertainty::bench::sources::{self, Combination, Sources, one_way};
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::Sections;
 use crate::words::start_study::{self, Trial};
@@ -718,13 +718,14 @@ impl Problem {
         sum
     }
 
-    /// 1 if the hub turns forwards for most of the way, else −1.
-    fn way(&self, x: &[f64]) -> f64 {
-        let p = self.values(x);
-        let turned = self.rows.iter().zip(self.biases(&p)).map(|(rows, bias)| {
-            rows.inner().map(|k| rows.weight[k - 1] * (rows.rate[k] - bias)).sum::<f64>()
-        });
-        if turned.sum::<f64>() < 0.0 { -1.0 } else { 1.0 }
+    /// Rates in the rows that count, less the bias, in any unit.
+    fn turned(&self, x: &[f64]) -> Vec<f64> {
+        let biases = self.biases(&self.values(x)).to_vec();
+        let of = |(rows, bias): (&Rows, f64)| {
+            let one = |k: usize| rows.weight[k - 1] * (rows.rate[k] - bias);
+            rows.inner().map(one).collect::<Vec<f64>>()
+        };
+        self.rows.iter().zip(biases).flat_map(of).collect()
     }
 
     /// Minima at the Stribeck speeds of the grid, and the 95 % intervals of b, c, d and ω_s over them.
@@ -969,13 +970,16 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     minimum = problem.solve(&[off_the_bounds(&minimum.x)], &[]);
     let mut held = Vec::new();
     let mut known = problem.known(&minimum, &held)?;
-    let way = problem.way(&minimum.x);
+    let turned = problem.turned(&minimum.x);
+    let way = if turned.iter().sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
     let is_vague = |known: &Option<Known>, place: usize, part: f64| {
         known.as_ref().is_none_or(|known| {
             !known.shown.contains(&place) || known.of_values[(place, place)].sqrt() > part
         })
     };
-    if !problem.one_way && is_vague(&known, ASYMMETRY, ONE_WAY) {
+    // if the friction of a hub that turns both ways is small, its asymmetry is vague, too
+    let turns_one_way = || known.is_none() || sources::way(turned.into_iter()).is_some();
+    if !problem.one_way && is_vague(&known, ASYMMETRY, ONE_WAY) && turns_one_way() {
         // the dry friction of one direction alone is seen: that of both is as large
         let mut x = off_the_bounds(&minimum.x);
         let factor = 1.0 + way * problem.values(&x)[ASYMMETRY];

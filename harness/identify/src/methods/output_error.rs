@@ -25,7 +25,7 @@ use crate::fit::bench::goodness::{fit_pct, is_poor, tests};
 use crate::fit::bench::options::Options;
 use crate::fit::bench::problem::{self, Answer, Differences, Polished, Problem};
 use crate::fit::bench::start::{self, Response};
-use crate::fit::covariance::{self, Covariance};
+use crate::fit::covariance::{self, Covariance, directions};
 use crate::fit::evidence;
 use crate::input::plausible;
 use crate::input::recording::Recording;
@@ -563,7 +563,8 @@ struct OneWay {
 }
 
 /// If the hub turns one way alone, only c (1 ± asymmetry) and d (1 ± asymmetry) act, and only vague priors separate the asymmetry
-/// from c and d. The asymmetry is then not an unknown: the search fixes it at 0.
+/// from c and d. The asymmetry is then not an unknown: the search fixes it at 0. A hub that turns both ways keeps it as an unknown,
+/// however vague: there it says that dry friction is small, not that the friction of one direction is unknown.
 fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>> {
     const NAME: &str = hubslosh::friction::ASYMMETRY;
     let Some(place) = problem.index(NAME) else { return Ok(None) };
@@ -581,13 +582,13 @@ fn one_way(problem: &mut Problem, found: &mut Polished) -> Result<Option<OneWay>
     }
     let unknown = &problem.unknowns[place];
     let slope = unknown.scale.slope(found.x[place]).abs();
-    let std =
-        Covariance::of(&jacobian, &problem.names())?.map(|c| c.x[(place, place)].sqrt() * slope);
-    if std.is_some_and(|std| std < ONE_WAY) || unknown.prior.is_some() {
+    // unknowns without influence, or others that are inseparable, do not widen it
+    let std = directions(&jacobian, &problem.names())?.0.row(place).norm() * slope;
+    if std < ONE_WAY || unknown.prior.is_some() {
         return Ok(None);
     }
-    let turned: f64 = found.answer.motion.iter().flat_map(|motion| &motion.rate).sum();
-    let way = if turned < 0.0 { -1.0 } else { 1.0 };
+    let rates = found.answer.motion.iter().flat_map(|motion| motion.rate.iter().copied());
+    let Some(way) = sources::way(rates) else { return Ok(None) };
     let range = unknown.range;
     let factor = 1.0 + way * unknown.value(found.x[place]);
     let mut x = found.x.clone();

@@ -866,3 +866,26 @@ fn a_delay_of_half_a_row_is_no_finding_where_the_torque_between_rows_is_found() 
     // held is refuted; smooth or linear is the same 10 ms
     assert!(says("linear between rows") && !says("half a row"), "{:?}", found.verdict);
 }
+
+/// A rigid liquid and almost no dry friction, so the asymmetry is not known.
+#[test]
+fn a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let settings = [("slosh.model", "frozen"), ("friction.c", "1e-6"), ("friction.d", "1e-6")];
+    let mut recording =
+        sweep(&fmu, "lin-sweep:amplitude=0.02,f0=0.1,f1=0.5,duration=60", &settings);
+    let mut random = Random::new(1, 9);
+    recording.rate.iter_mut().for_each(|rate| *rate += 4e-3 * random.normal());
+    let options = Options { models: vec!["frozen".into()], sensor_errors: true, ..options() };
+    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    let asymmetry = &found.parameters["friction.asymmetry"];
+    assert!(asymmetry.std > 0.3, "{asymmetry:?}");
+    for name in ["friction.c", "friction.d"] {
+        // friction in each direction is bounded, and so is this
+        assert!(found.parameters[name].interval[1] < 0.1, "{:?}", found.parameters[name]);
+        let combination = format!("{name} (1");
+        let of = found.details.combinations.iter().find(|c| c.name.starts_with(&combination));
+        assert!(of.is_none(), "{of:?}");
+    }
+}

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::estimate::{Estimated, prose};
 use crate::model::bench::unknown::Unknown;
-use crate::tuning::{COMBINED_CORRELATION, VAGUE_ALONE};
+use crate::tuning::{BOTH_WAYS, COMBINED_CORRELATION, VAGUE_ALONE};
 use names::hubslosh::friction;
 
 /// Sources of uncertainty, as covariances of the variables x.
@@ -101,6 +101,16 @@ impl Combination {
     }
 }
 
+/// Returns the direction of a hub that turns one way alone (1: counter-clockwise, −1: clockwise), from its rates. `None` if it rests,
+/// or if more than [`BOTH_WAYS`] of its path leads the other way.
+pub fn way(rates: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut forwards, mut backwards) = (0.0, 0.0);
+    rates.for_each(|rate| *if rate < 0.0 { &mut backwards } else { &mut forwards } += rate.abs());
+    let (way, along, against) =
+        if backwards > forwards { (-1.0, backwards, forwards) } else { (1.0, forwards, backwards) };
+    (along > 0.0 && against <= BOTH_WAYS * along).then_some(way)
+}
+
 /// Replaces the estimates of dry friction if the hub turned one `way` alone (1: counter-clockwise, −1: clockwise). A fit with
 /// asymmetry 0 gives only the friction of that direction, c (1 ± asymmetry) and d (1 ± asymmetry). The asymmetry is then anywhere
 /// within its `bounds`, and c and d are at least half of that friction.
@@ -165,6 +175,16 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
+
+    #[test]
+    fn a_hub_turns_one_way_if_nearly_all_of_its_path_does() {
+        let of = |rates: &[f64]| way(rates.iter().copied());
+        assert_eq!((of(&[0.0, 2.0, 0.1]), of(&[0.0, -2.0, -0.1])), (Some(1.0), Some(-1.0)));
+        // liquid that swings back turns the hub back a little
+        assert_eq!((of(&[2.0, -0.1]), of(&[-2.0, 0.1])), (Some(1.0), Some(-1.0)));
+        assert_eq!((of(&[2.0, -0.3]), of(&[-2.0, 0.3])), (None, None));
+        assert_eq!((of(&[0.0, 0.0]), of(&[])), (None, None));
+    }
 
     /// Two variables and the gyro's scale.
     #[test]
