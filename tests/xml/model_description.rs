@@ -192,11 +192,35 @@ fn enumerations_name_the_physics_own_items_in_their_order() {
         let Kind::Enumeration(of) = variable.kind else { panic!("{} is none", variable.name) };
         let items: Vec<String> = of.items.iter().map(|item| item.name.replace('_', "")).collect();
         let own: Vec<String> = all.iter().map(|item| format!("{item:?}").to_lowercase()).collect();
-        assert_eq!(items, own, "{}", variable.name);
+        assert_eq!(
+            items, own,
+            "{}: the items in fmu/hubslosh/src/table.rs (left) must be those of ALL in fmu/plant/src/parameters.rs (right), in its \
+             order",
+            variable.name
+        );
     }
     compare("slosh.model", &SloshModel::ALL);
     compare("slosh.source", &SloshSource::ALL);
     compare("friction.model", &FrictionModel::ALL);
+}
+
+#[test]
+fn every_slosh_model_and_friction_law_is_in_the_documentation() {
+    let has = |page: &str, text: String| {
+        let all = std::fs::read_to_string(pack::root().join(page)).unwrap();
+        assert!(all.contains(&text), "{page} does not contain: {text}");
+    };
+    for name in ["slosh.model", "friction.model"] {
+        let variable = TABLE.variables.iter().find(|v| v.name == name).unwrap();
+        let Kind::Enumeration(of) = variable.kind else { panic!("{name} is none") };
+        let mut numbered = Vec::new();
+        for (item, number) in of.items.iter().zip(1..) {
+            has("modelDescription/HubSlosh/documentation/model.md", format!("`{}`", item.name));
+            has("book/choosing.md", format!("`{}`", item.name));
+            numbered.push(format!("{number} {}", item.name));
+        }
+        has("book/host_setup.md", format!("`{name}`: {}", numbered.join(", ")));
+    }
 }
 
 #[test]

@@ -240,9 +240,19 @@ fn documentation_lists_the_rules() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../book/check.md");
     let page = std::fs::read_to_string(page).unwrap();
     for rules in [RULES, check::rules::fmi3::RULES] {
+        let table = check::table(rules);
+        let missing: Vec<&str> = table.lines().filter(|line| !page.contains(line)).collect();
         assert!(
-            page.contains(&check::table(rules)),
-            "check.md is out of date: put what `hubslosh check --rules` prints under \"The rules\""
+            page.contains(&table),
+            "book/check.md is out of date: put what `hubslosh check --rules` prints under \"The rules\". Missing lines, each \
+             behind the rule before it in the table:\n{}",
+            missing.join("\n")
         );
     }
+    let first = concat!(env!("CARGO_MANIFEST_DIR"), "/../../book/first_check.md");
+    let count = format!("{} rules looked at, 2 skipped", RULES.len() - 2);
+    assert!(
+        std::fs::read_to_string(first).unwrap().contains(&count),
+        "book/first_check.md does not contain: {count}"
+    );
 }
