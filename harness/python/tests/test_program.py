@@ -2,11 +2,13 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -16,6 +18,7 @@ from conftest import option
 import hubslosh
 from hubslosh import FmuError
 from hubslosh.fmu import Fmu
+from hubslosh.program import Method
 
 PLAN = """
 title = "Two pulses"
@@ -218,6 +221,22 @@ def test_every_method_gives_the_same_kind_of_answer(
     found = hubslosh.identify(run, method="black-box", fmu=fmu, program=program)
     assert not found.parameters and found.fits is None and found.model is None
     assert len(found.all["models"]) > 2 and found.verdict
+
+
+def test_every_method_of_identification_is_in_the_package_and_in_the_book(
+    request: pytest.FixtureRequest,
+) -> None:
+    """`Method` and the docstring of `identify` have the program's methods."""
+    command = [option(request, "--hubslosh"), "identify", "--help"]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    methods = re.search(r"\[possible values: (output-error[^\]]*)\]", text)[1].split(", ")
+    assert list(get_args(Method)) == methods, "Method in hubslosh/program.py"
+    pages = (Path(__file__).parents[3] / "book").glob("*.md")
+    book = "".join(page.read_text("utf-8") for page in pages)
+    for method in methods:
+        assert f'"{method}"' in hubslosh.identify.__doc__, f"docstring of identify: {method}"
+    for method in methods[1:]:  # the first is the default
+        assert f"--method {method}" in book, f"book/other_methods.md: {method}"
 
 
 def test_identification_gives_typed_estimates(
