@@ -4,11 +4,11 @@ Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/bro
 """
 
 import argparse
-import shutil
-import sys
 from pathlib import Path
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
+
+from pages import chromium
 
 ALIKE = (
     ("linearise", "linearize", "linearisation", "linearized"),
@@ -37,11 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("book", type=Path, help="the folder with index.html")
     arguments = parser.parse_args()
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        sys.exit("no chromium: .ci/browser installs it")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with chromium() as browser:
         page = browser.new_page()
         page.goto((arguments.book / "index.html").absolute().as_uri())
         for words in ALIKE:
@@ -57,7 +53,6 @@ def main() -> None:
             assert not titles(page, nonsense)
             assert f"No page has “{nonsense}”" in page.inner_text("#found")
             assert not page.locator("#found button").count()
-        browser.close()
     print(f"{arguments.book}: spellings, endings, mistakes")
 
 

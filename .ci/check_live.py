@@ -10,14 +10,14 @@ import argparse
 import csv
 import gzip
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 import contrast
+from pages import chromium
 
 SHARED = ("three.js", "scene.js", "fmu.js", "live.js")
 PAGES = {
@@ -377,22 +377,14 @@ def main() -> None:
     parser.add_argument("axe", type=Path, help="axe.min.js of npm's axe-core")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of the pages")
     arguments = parser.parse_args()
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        sys.exit("no chromium: .ci/browser installs it")
     address = {name: (arguments.book / f"{name}.html").absolute().as_uri() for name in PAGES}
     native = arguments.native
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=chromium,
-            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-        )
+    with chromium() as browser:
         swirl(browser, address["swirl"], native / "HubSlosh.csv")
         slew(browser, address["slew"], native / "Spacecraft.csv", native / "margins.json")
         your_tank(browser, address["your_tank"], arguments.program, native, arguments.axe)
         for name in PAGES:
             looks(browser, address[name], name, arguments.axe, arguments.pictures)
-        browser.close()
     # other pages load nothing of this
     for other in arguments.book.glob("*.html"):
         assert ('src="live.js"' in other.read_text()) == (other.stem in PAGES), other

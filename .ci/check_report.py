@@ -6,28 +6,12 @@ Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/bro
 import argparse
 import csv
 import re
-import shutil
-import sys
 import tempfile
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
-
-def opened(browser: Browser, report: Path, width: int, scheme: str = "light") -> Page:
-    """Open the report and wait until every figure is drawn; anything fetched is an error."""
-    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
-    faults: list[str] = []
-    page.on("pageerror", lambda error: faults.append(str(error)))
-    page.on(
-        "request",
-        lambda r: None if r.url.startswith(("file:", "data:", "blob:")) else faults.append(r.url),
-    )
-    page.goto(report.absolute().as_uri())
-    page.wait_for_function("document.documentElement.dataset.drawn === 'yes'", timeout=180_000)
-    assert not faults, f"faults or fetched: {faults[:3]}"
-    return page
-
+from pages import chromium, opened
 
 RANGE = "document.querySelector('.plot').layout.xaxis.range.map(Number)"
 
@@ -138,12 +122,7 @@ def main() -> None:
     parser.add_argument("report", type=Path)
     parser.add_argument("--pages", type=int, help="most pages of paper")
     arguments = parser.parse_args()
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        sys.exit("no chromium: .ci/browser installs it")
-    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as directory:
-        flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-        browser = playwright.chromium.launch(executable_path=chromium, args=flags)
+    with chromium() as browser, tempfile.TemporaryDirectory() as directory:
         has_view = (arguments.report.parent / "view.html").exists()
         shown = view(browser, arguments.report) if has_view else "nothing"
         page = opened(browser, arguments.report, 1400)
@@ -174,7 +153,6 @@ def main() -> None:
         width = phone.evaluate("document.documentElement.scrollWidth")
         assert width <= 400, f"text {width} px wide on a phone of 400 px"
         assert not (faults := phone.evaluate(FAULTS)), f"on a phone: {faults[:5]}"
-        browser.close()
     print(
         f"{arguments.report}: hover, legend, zoom, reset, contents, dark, phone; {pages} pages; "
         f"{shown} in 3-D"

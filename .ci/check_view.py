@@ -18,18 +18,17 @@ import itertools
 import json
 import math
 import re
-import shutil
 import subprocess
-import sys
 import tomllib
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 import contrast
+from pages import chromium, opened
 
 Row = dict[str, float]
 Vector = Sequence[float]
@@ -346,24 +345,6 @@ def record(case: Case, binary: Path, fmus: Path, folder: Path) -> tuple[Path, Pa
     return run.with_suffix(".csv"), page
 
 
-def opened(browser: Browser, page: Path, width: int, scheme: str) -> Page:
-    """Open a page and wait until it is drawn; anything fetched is an error."""
-    found = browser.new_page(
-        viewport={"width": width, "height": 900}, color_scheme=scheme, reduced_motion="reduce"
-    )
-    faults: list[str] = []
-    found.on("pageerror", lambda error: faults.append(str(error)))
-    found.on(
-        "request",
-        lambda r: None if r.url.startswith(("file:", "data:", "blob:")) else faults.append(r.url),
-    )
-    found.goto(page.absolute().as_uri())
-    found.wait_for_function("document.documentElement.dataset.drawn === 'yes'", timeout=180_000)
-    assert not faults, f"faults or fetched: {faults[:3]}"
-    assert not found.evaluate("hubsloshView.playing"), "it plays by itself"
-    return found
-
-
 def first_moment(section: list[list[float]], radius: float) -> float:
     """Return the integral of elevation times x over the surface at rest, m4, by Simpson's rule.
 
@@ -480,7 +461,7 @@ def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str
     drive = ["--profile", "sine:duration=10", "--columns", "theta,omega,slosh_angle"]
     subprocess.run([binary, "run", *drive, *of, run], check=True)
     subprocess.run([binary, "view", run, *of, file], check=True)
-    page = opened(browser, file, *VIEWS[0])
+    page = opened(browser, file, *VIEWS[0], reduced_motion="reduce")
     shown = page.evaluate("document.body.innerText")
     page.close()
     assert unit in shown, f"the page does not show the unit {unit}"
@@ -495,13 +476,8 @@ def main() -> None:
     parser.add_argument("axe", type=Path, help="axe.min.js of npm's axe-core")
     parser.add_argument("out", type=Path, help="a folder for runs, pages and screenshots")
     arguments = parser.parse_args()
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        sys.exit("no chromium: .ci/browser installs it")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=flags)
+    with chromium() as browser:
         for case in (*CASES, in_sphere(arguments.binary, arguments.out)):
             table, file = record(case, arguments.binary, arguments.fmus, arguments.out)
             data = rows(table)
@@ -512,7 +488,8 @@ def main() -> None:
             reach = json.loads(found[1])["scene"]["geometry"]["reach"]
             worst = (0.0, 0.0)
             for instant, (width, scheme) in zip(case.instants, VIEWS, strict=True):
-                page = opened(browser, file, width, scheme)
+                page = opened(browser, file, width, scheme, reduced_motion="reduce")
+                assert not page.evaluate("hubsloshView.playing"), "it plays by itself"
                 row = min(data, key=lambda row: abs(row["time"] - instant))
                 worst = tuple(map(max, worst, compare(page, case, row, reach)))
                 assert page.evaluate("document.documentElement.scrollWidth") <= width
@@ -534,7 +511,6 @@ def main() -> None:
             )
         hub = arguments.fmus / "HubSlosh.fmu"
         print(hostile_unit(browser, arguments.binary, hub, arguments.out))
-        browser.close()
     sweep = arguments.out / "sweep.parquet"
     print(film(arguments.binary, sweep, hub, arguments.out / "film.mp4"))
 

@@ -50,7 +50,7 @@ def fmpy_findings(fmu: Path) -> list[str]:
     return findings
 
 
-def fmutool_findings(fmu: Path) -> list[str]:
+def fmutool_findings(fmu: Path, version: int) -> list[str]:
     """Return what ``fmutool -check`` (PyPI's fmu-manipulation-toolbox) says but for "all well"."""
     program = Path(sys.executable).with_name("fmutool")
     done = subprocess.run(
@@ -58,7 +58,6 @@ def fmutool_findings(fmu: Path) -> list[str]:
     )
     said = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
     # Each check ends with one sentence of its own when it has found nothing.
-    version = version_of(fmu)
     well = (
         f"seems to be compliant with FMI-{version}.0",
         f"No semantic error against the FMI-{version} standard",
@@ -143,7 +142,7 @@ def main() -> None:
     asked = {
         f"XML schema of FMI {version}.0": schema_findings,
         f"fmpy {fmpy.__version__}": fmpy_findings,
-        "fmutool": fmutool_findings,
+        "fmutool": lambda fmu: fmutool_findings(fmu, version),
     }
     if version == 2:
         asked["FMI Library"] = fmi_library_findings

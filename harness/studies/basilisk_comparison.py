@@ -15,7 +15,7 @@ freedom goes to zero as 1/M, and the page shows it.
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -48,6 +48,7 @@ FILLS = {"10 cm": 0.10, "5 cm": 0.05}
 SIGNALS = ("theta", "omega", "slosh_angle", "slosh_angle_radial")
 
 Signals = dict[str, np.ndarray]
+Vector = Sequence[float] | np.ndarray
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,19 @@ def ours(fmu: Path, given: Case, tolerance: float = TOLERANCE) -> Signals:
     return dict(zip(SIGNALS, np.array(rows).T, strict=True))
 
 
+def bob(craft: spacecraft.Spacecraft, pendulum: sphericalPendulum.SphericalPendulum) -> np.ndarray:
+    """Return the bob's direction from the hinge, in the body's frame.
+
+    Basilisk turns the pendulum's frame while it runs, to stay away from its singularity.
+    """
+    state = craft.dynManager.getStateObject
+    phi = state(pendulum.nameOfPhiState).getState()[0][0]
+    theta = state(pendulum.nameOfThetaState).getState()[0][0]
+    frame = np.hstack([pendulum.pHat_01, pendulum.pHat_02, pendulum.pHat_03])
+    c = np.cos(theta)
+    return frame @ [np.cos(phi) * c, np.sin(phi) * c, -np.sin(theta)]
+
+
 def basilisk(given: Case, mass: float, integrator: str = "RKF78", step: float = 1e-3) -> Signals:
     """Return Basilisk's signals every 20 ms.
 
@@ -165,19 +179,9 @@ def basilisk(given: Case, mass: float, integrator: str = "RKF78", step: float = 
     every = macros.sec2nano(EVERY)
     hub = craft.scStateOutMsg.recorder(every)
 
-    def bob() -> np.ndarray:
-        """Return the bob's direction from the hinge, in the body's frame.
-
-        Basilisk turns the pendulum's frame while it runs, to stay away from its singularity.
-        """
-        state = craft.dynManager.getStateObject
-        phi = state(pendulum.nameOfPhiState).getState()[0][0]
-        theta = state(pendulum.nameOfThetaState).getState()[0][0]
-        frame = np.hstack([pendulum.pHat_01, pendulum.pHat_02, pendulum.pHat_03])
-        c = np.cos(theta)
-        return frame @ [np.cos(phi) * c, np.sin(phi) * c, -np.sin(theta)]
-
-    liquid = pythonVariableLogger.PythonVariableLogger({"bob": lambda _: bob()}, every)
+    liquid = pythonVariableLogger.PythonVariableLogger(
+        {"bob": lambda _: bob(craft, pendulum)}, every
+    )
     for model in (craft, thrust, hub, liquid):
         simulation.AddModelToTask("task", model)
 
@@ -215,17 +219,23 @@ def pendulum_of(given: Case) -> sphericalPendulum.SphericalPendulum:
     third = np.array([1.0, 0.0, 0.0]) - bob[0] * bob
     third /= np.linalg.norm(third)
     second = np.cross(third, bob)
+    place, drag = (LEVER, 0, 0), given.damping
+    return pendulum_at(given.m, given.length, place, drag, (bob, second, third), velocity)
 
+
+def pendulum_at(
+    mass: float, length: float, place: Vector, drag: float, axes: Sequence[Vector], rate: Vector
+) -> sphericalPendulum.SphericalPendulum:
+    """Return a pendulum hinged at a place; its first axis points to where the bob starts."""
+    _, second, third = axes
     pendulum = sphericalPendulum.SphericalPendulum()
-    pendulum.massInit = given.m
-    pendulum.pendulumRadius = given.length
-    pendulum.d = column(LEVER, 0, 0)
-    pendulum.D = (given.damping * np.eye(3)).tolist()
-    pendulum.pHat_01 = column(*bob)
-    pendulum.pHat_02 = column(*second)
-    pendulum.pHat_03 = column(*third)
-    pendulum.phiDotInit = float(velocity @ second)
-    pendulum.thetaDotInit = float(-velocity @ third)
+    pendulum.massInit = mass
+    pendulum.pendulumRadius = length
+    pendulum.d = column(*place)
+    pendulum.D = (drag * np.eye(3)).tolist()
+    pendulum.pHat_01, pendulum.pHat_02, pendulum.pHat_03 = (column(*axis) for axis in axes)
+    pendulum.phiDotInit = float(rate @ second)
+    pendulum.thetaDotInit = float(-rate @ third)
     return pendulum
 
 
@@ -236,7 +246,7 @@ def column(x: float, y: float, z: float) -> list[list[float]]:
 
 def differences(a: Signals, b: Signals) -> list[float]:
     """Return each signal's largest difference, relative to its maximum in ``b``."""
-    return [np.abs(a[name] - b[name]).max() / np.abs(b[name]).max() for name in SIGNALS]
+    return [np.abs(a[name] - b[name]).max() / np.abs(b[name]).max() for name in b]
 
 
 def timed(signals: Callable[[], Signals]) -> tuple[Signals, float]:
@@ -401,6 +411,18 @@ def page(
     ])  # fmt: skip
 
 
+def write(out: Path, text: str, worst: float) -> None:
+    """Write the page, unless the largest difference is more than allowed."""
+    if worst > ALLOWED:
+        sys.exit(
+            f"{text}\nerror: {worst:.1e} is more than the {ALLOWED:.0e} allowed; nothing written"
+        )
+    half_written = out.with_suffix(".tmp")
+    half_written.write_text(text, encoding="utf-8")
+    half_written.replace(out)
+    print(f"largest difference {worst:.1e}; wrote {out}")
+
+
 def main() -> None:
     """Compare and write the page."""
     parser = argparse.ArgumentParser(description="Compares the spherical model with Basilisk's.")
@@ -415,15 +437,7 @@ def main() -> None:
         ulp, looser = rounding(args.fmu)
     except FmuError as error:
         sys.exit(f"error: {error}")
-    text = page(cases, masses, integrators, worst, ulp, looser)
-    if worst > ALLOWED:
-        sys.exit(
-            f"{text}\nerror: {worst:.1e} is more than the {ALLOWED:.0e} allowed; nothing written"
-        )
-    half_written = args.out.with_suffix(".tmp")
-    half_written.write_text(text, encoding="utf-8")
-    half_written.replace(args.out)
-    print(f"largest difference {worst:.1e}; wrote {args.out}")
+    write(args.out, page(cases, masses, integrators, worst, ulp, looser), worst)
 
 
 if __name__ == "__main__":

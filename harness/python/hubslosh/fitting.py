@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arguments import check_table
 from .fmu import FmuError
+from .linearization import control_package
 
 ITERATIONS = 30
 """Iterations of Sanathanan and Koerner's method, which converges within ten."""
@@ -42,11 +43,7 @@ class TransferFunction:
 
     def to_control(self) -> Any:
         """Return a ``control.TransferFunction``; needs the package control."""
-        try:
-            import control
-        except ModuleNotFoundError:
-            raise FmuError("to_control needs the package control: pip install control") from None
-        return control.TransferFunction(self.numerator, self.denominator)
+        return control_package().TransferFunction(self.numerator, self.denominator)
 
 
 def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunction:

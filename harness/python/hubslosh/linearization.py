@@ -204,17 +204,22 @@ class LinearModel:
 
     def to_control(self) -> Any:
         """Return it as ``control.StateSpace``, with names; needs the package control."""
-        try:
-            import control
-        except ModuleNotFoundError:
-            raise FmuError("to_control needs the package control: pip install control") from None
-        return control.StateSpace(
+        return control_package().StateSpace(
             *self,
             0 if self.period is None else self.period,
             states=list(self.states),
             inputs=list(self.inputs),
             outputs=list(self.outputs),
         )
+
+
+def control_package() -> Any:
+    """Return python-control, or raise FmuError."""
+    try:
+        import control
+    except ModuleNotFoundError:
+        raise FmuError("to_control needs the package control: pip install control") from None
+    return control
 
 
 def mode_table(rows: list[tuple[float, float, tuple[str, ...]]]) -> "pd.DataFrame":

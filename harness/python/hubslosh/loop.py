@@ -24,6 +24,7 @@ from .simulation import (
     histories_of,
     outputs_of,
     parameters_of,
+    table_of,
     too_many_rows,
 )
 
@@ -264,19 +265,9 @@ class Loop:
             )
         commands = feedback.commands
         commands[-1] = commands[-2]
-        table = Run(
-            {"time": points}
-            | dict(zip(command, commands.T, strict=True))
-            | {name: values for name, (values, _) in given.items()}
-            | recorded,
-            copy=False,
-        )
-        if wanted is not None:
-            table = table[wanted].reset_index(drop=True)
-        units = {name: fmu.unit(name) for name in table.columns if name != "time"}
-        table.attrs["units"] = {"time": "s"} | units
-        table.attrs |= {"model": str(self.model), "parameters": dict(every)}
-        return table
+        rows = {"time": points} | dict(zip(command, commands.T, strict=True))
+        rows |= {name: values for name, (values, _) in given.items()} | recorded
+        return table_of(fmu, rows, wanted, self.model, every)
 
     def _controller(
         self,

@@ -140,7 +140,18 @@ def simulate(
         inputs={name: value[0] for name, value in given.items()},
     ) as plant:
         recorded = plant.run(points, given, slopes, asked)
-    table = Run({"time": points} | given | recorded, copy=False)
+    return table_of(fmu, {"time": points} | given | recorded, wanted, model, parameters)
+
+
+def table_of(
+    fmu: Fmu,
+    columns: dict[str, Real],
+    wanted: NDArray[np.bool_] | None,
+    model: str | Path,
+    parameters: Mapping[str, Quantity],
+) -> Run:
+    """Return the wanted rows of a run (None: all) as its table."""
+    table = Run(columns, copy=False)
     if wanted is not None:
         table = table[wanted].reset_index(drop=True)
     units = {name: fmu.unit(name) for name in table.columns if name != "time"}

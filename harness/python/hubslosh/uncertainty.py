@@ -634,14 +634,19 @@ class UncertainModel:
             }  # fmt: skip
         return new
 
+    def _controller(self, loop: Loop) -> LinearModel:
+        """Return the controller of a loop around this model, or raise FmuError."""
+        K = loop._must_be_linear()
+        if loop.names != (list(self.M.outputs[self.order :]), list(self.M.inputs[self.order :])):
+            raise FmuError("the loop must measure the model's outputs and command its inputs")
+        return K
+
     def closed(self, loop: Loop, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return what Δ sees of the closed loop at frequencies in Hz: frequencies × Δ × Δ.
 
         The hold's images around the sampling rate are left out.
         """
-        K = loop._must_be_linear()
-        if loop.names != (list(self.M.outputs[self.order :]), list(self.M.inputs[self.order :])):
-            raise FmuError("the loop must measure the model's outputs and command its inputs")
+        K = self._controller(loop)
         w = TURN * np.atleast_1d(np.asarray(frequency, float))
         late = loop.delay + loop.latency * loop.period
         hold = np.sinc(w * loop.period / TURN) * np.exp(-1j * w * (loop.period / 2 + late))
@@ -669,9 +674,7 @@ class UncertainModel:
         Damping ratios stay at 0 or above. Any Δ found is a lower bound of µ; one that is not found
         is no proof.
         """
-        K = loop._must_be_linear()
-        if loop.names != (list(self.M.outputs[self.order :]), list(self.M.inputs[self.order :])):
-            raise FmuError("the loop must measure the model's outputs and command its inputs")
+        K = self._controller(loop)
 
         def poles(delta: Matrix) -> NDArray[np.complex128]:
             return _closed(loop._gain(self.at(delta), K))
