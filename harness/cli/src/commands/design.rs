@@ -41,10 +41,10 @@ pub struct DesignArgs {
     #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
     snr: Option<f64>,
     /// Period of the multisine, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 100.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 100.0, conflicts_with = "profile")]
     period: f64,
-    /// Length of the multisine, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    /// Length of the multisine, s; that of a profile is its `duration=…`.
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, conflicts_with = "profile")]
     duration: f64,
     /// Band of the multisine, or of --snr, Hz.
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
@@ -257,8 +257,7 @@ impl<'f> Bench<'f> {
         if asked.sensor_errors {
             unknowns.extend([Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)]);
         }
-        let (arw, rate) = (real(imu::ARW)?, real(imu::RATE)?);
-        let white = arw * rate.sqrt();
+        let white = white_noise(real)?;
         // Gauss–Markov bias of IEEE Std 952: its standard deviation is the instability over 0.664
         let drift = real(imu::BIAS_INSTABILITY)? / 0.664 / white;
         let noise = Noise { white, drift, time: real(imu::BIAS_TIME)? };
@@ -279,12 +278,19 @@ impl<'f> Bench<'f> {
         let unknowns = self.unknowns.clone();
         ensure!(
             time.len() > unknowns.len(),
-            "the plan has {} rows at {STEP} s for {} unknowns (allowed: more rows than unknowns; --duration makes it longer)",
+            "the plan has {} rows at {STEP} s for {} unknowns (allowed: more rows than unknowns); a longer duration has more",
             time.len(),
             unknowns.len()
         );
         design::cramer_rao(self.fmu, self.fitted.clone(), rows, unknowns, self.noise)
     }
+}
+
+/// White noise of a row of the gyro, rad/s.
+fn white_noise(real: &mut dyn FnMut(&str) -> Result<f64>) -> Result<f64> {
+    let white = real(imu::ARW)? * real(imu::RATE)?.sqrt();
+    ensure!(white > 0.0, "imu.arw = 0 leaves no noise to compare with (allowed: above 0)");
+    Ok(white)
 }
 
 /// Name, expected value and standard deviation of every unknown.
@@ -418,8 +424,7 @@ impl DesignArgs {
         ensure!(0.0 < f0 && f0 < f1 && f1.is_finite(), "--band = {f0},{f1} (allowed: 0 < f0 < f1)");
         ensure!(snr.abs() <= 200.0, "--snr = {snr} (allowed: -200 to 200 dB)");
         // Per sample: the sine's power Ω²/2 over arw² times the sampling rate.
-        let sigma = real(imu::ARW)? * real(imu::RATE)?.sqrt();
-        ensure!(sigma > 0.0, "imu.arw = 0 leaves no noise to compare with (allowed: above 0)");
+        let sigma = white_noise(real)?;
         let rate = sigma * std::f64::consts::SQRT_2 * 10f64.powf(snr / 20.0);
         let dry = real(friction::C)? + real(friction::D)?;
         // Its describing function at that rate.

@@ -252,6 +252,25 @@ fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
 }
 
 #[test]
+fn a_plan_that_nothing_can_be_learnt_from_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let fmu = packed_for_tests().to_str().unwrap();
+    for (plan, words) in [
+        (&["zero"][..], &["up to 0.00e0 N·m, does not turn the hub"][..]),
+        (&["sine:amplitude=5e-3"], &["friction.c + friction.d = 5.92e-3 N·m", "a larger torque"]),
+        (&["sine", "--set", "imu.arw=0"], &["imu.arw = 0 leaves no noise", "above 0"]),
+        (&["zero:duration=0.02"], &["2 rows", "8 unknowns", "longer duration"]),
+    ] {
+        let arguments = [&["design", "--fmu", fmu, "--profile"], plan].concat();
+        refuses(directory.path(), || hubslosh(directory.path(), &arguments), words);
+    }
+    // a flag of the multisine
+    let done = hubslosh(directory.path(), &["design", "--profile", "sine", "--duration", "0.02"]);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(said.contains("cannot be used with '--duration"), "{said}");
+}
+
+#[test]
 fn what_the_fmu_warns_of_is_told() {
     let directory = tempfile::tempdir().unwrap();
     let said = |arguments: &[&str]| {

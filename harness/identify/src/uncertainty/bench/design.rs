@@ -16,6 +16,7 @@ use crate::model::bench::simulate::Setup;
 use crate::model::bench::unknown::Unknown;
 use crate::tuning::{ANGLE_ENOUGH, ANGLE_ROUNDS, LINE_GROUP, SPREAD_POWER};
 use analysis::gauss_markov::Noise;
+use names::hubslosh::friction;
 
 /// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification,
 /// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`LINE_GROUP`] left out at random.
@@ -259,6 +260,9 @@ pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
 
 /// Standard deviation that no unbiased estimate can beat, for each unknown at its start, from a torque
 /// and a gyro's noise.
+///
+/// # Errors
+/// If the hub does not turn, some combination of the unknowns has no influence on its rate, or the FMU refuses to run.
 pub fn cramer_rao(
     fmu: &Fmu,
     setup: Setup,
@@ -267,10 +271,19 @@ pub fn cramer_rao(
     noise: Noise,
 ) -> Result<Vec<(String, f64, f64)>> {
     let rate = vec![0.0; time.len()];
+    let largest = peak(&torque);
     let recording = [Recording::of("plan", time, torque, rate)];
     let mut problem = Problem::new(fmu, setup, &recording, unknowns);
     problem.channels[0].noise = noise;
     let x = problem.start();
+    let values = problem.values(&x);
+    let of = |name: &str| problem.index(name).map_or(0.0, |place| values[place]);
+    ensure!(
+        problem.setup.run(fmu, &[], &recording[0], 0.0)?.rate.iter().any(|rate| *rate != 0.0),
+        "the planned torque, up to {largest:.2e} N·m, does not turn the hub: nothing can be estimated. Dry friction holds up to \
+         friction.c + friction.d = {:.2e} N·m (allowed: a larger torque).",
+        of(friction::C) + of(friction::D)
+    );
     let (covariance, _) = problem.information(&x)?;
     let deviation = |i: usize| covariance.x[(i, i)].sqrt();
     Ok(problem
