@@ -79,7 +79,7 @@ pub const ON_CLOCK: f64 = 0.98;
 pub const SLOWEST_GYRO: usize = 100;
 
 // Sensor faults: `input/sensor_faults.rs`.
-// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`.
+// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`, `a_range_that_one_end_shows_is_that_of_the_other`.
 /// Fewest values at an end of the range that are clipped, and how many times as many they are as equal values just inside it.
 pub const CLIPPED: (usize, f64) = (20, 4.0);
 /// Width of that inside, in units of the noise.

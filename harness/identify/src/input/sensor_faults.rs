@@ -53,11 +53,20 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let at = |k: usize| format!("{:.2} s", time[k]);
     let ends = [("upper", 1.0), ("lower", -1.0)];
     let resolution = resolution(values);
-    let held = ends.map(|(_, sign)| held(values, sign, (noise, resolution)));
+    // the ends of a gyro's range are opposite; those of a motion from rest are not
+    let sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+    let opposite = match rest {
+        Rest::Rate(_) if is_opposite(values) => held(&sizes, 1.0, (noise, resolution)),
+        _ => Vec::new(),
+    };
+    let held = ends.map(|(_, sign)| match opposite.is_empty() {
+        true => held(values, sign, (noise, resolution)),
+        false => opposite.iter().copied().filter(|k| sign * values[*k] > 0.0).collect(),
+    });
     let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
+    let steps = |jump: &Option<f64>| jump.is_some_and(|jump| jump > FAULT_STEPS * resolution);
     // a hub rests at one end of its rates at most
-    let both = rest != Rest::Angle
-        && jumps.iter().all(|jump| jump.is_some_and(|jump| jump > FAULT_STEPS * resolution));
+    let both = rest != Rest::Angle && jumps.iter().all(steps);
     for (((end, _), rows), jump) in ends.into_iter().zip(held).zip(jumps) {
         if !both && jump.is_none_or(|jump| jump <= FAULT_LEAVES * noise) {
             continue;
@@ -97,6 +106,14 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     repeats.into_iter().for_each(|k| out[k] = true);
     found.rows = (0..values.len()).filter(|k| out[*k]).collect();
     found
+}
+
+/// Returns true if the largest and the least value are opposite: those of a range are.
+fn is_opposite(values: &[f64]) -> bool {
+    let ends = values
+        .iter()
+        .fold((f64::NEG_INFINITY, f64::INFINITY), |(high, low), v| (high.max(*v), low.min(*v)));
+    (ends.0 + ends.1).abs() <= SENSOR_ROUNDING * peak(values)
 }
 
 /// Rows at an end of the range, if they are many and stand together: the sensor clips there, or the hub rests.
@@ -260,6 +277,24 @@ mod tests {
             found.words.iter().any(|line| line.contains("clipped"))
         };
         assert!(!is_clipped(Some(rate[0])));
+    }
+
+    /// A gyro with a bias reaches one end of its range in each cycle, and the other one in few. It comes back from each by less than
+    /// five standard deviations of its noise.
+    #[test]
+    fn a_range_that_one_end_shows_is_that_of_the_other() {
+        let mut random = Random::new(5, 0);
+        let time: Vec<f64> = (0..10_000).map(|k| 0.02 * f64::from(k)).collect();
+        let mut gyro = |bias: f64| -> Vec<f64> {
+            let motion = |t: &f64| bias + 0.02 * (std::f64::consts::TAU * 2.03 * t).sin();
+            let mut read = |t| ((motion(t) + 4e-4 * random.normal()) / LEAST).round() * LEAST;
+            time.iter().map(|t| read(t).clamp(-0.0195, 0.0195)).collect()
+        };
+        let values = gyro(1.3e-3);
+        let lower = values.iter().filter(|w| **w == -0.0195).count();
+        assert!((1..CLIPPED.0).contains(&lower), "{lower}");
+        let (_, said) = words(&time, &values);
+        assert!(said.contains("the upper end") && said.contains("the lower end"), "{said}");
     }
 
     #[test]
