@@ -37,7 +37,7 @@ use crate::tuning::{
     BEGINNINGS, BIC_ALIKE, BIC_DECIDES, CONVERGED, GOES_ON, LONG_RECORDING, ONE_WAY, ROUNDS,
     SANDWICH_WINDOW, STUDY_REACH,
 };
-use crate::uncertainty::bench::budget::{self, Effect};
+use crate::uncertainty::bench::budget::{self, Effect, Slope};
 use crate::uncertainty::bench::cause;
 use crate::uncertainty::bench::deep_tank;
 use crate::uncertainty::bench::missing;
@@ -275,7 +275,7 @@ fn finish(
     options: &Options,
     tell: &mut dyn FnMut(News),
 ) -> Result<Identification> {
-    let Fitted { mut problem, polished, mut fit, speeds, others } = best;
+    let Fitted { mut problem, polished, mut fit, mut speeds, others } = best;
     let (mut since, model) = (Since::default(), fit.model.clone());
     let mut say = |what: &str, problem: &Problem| {
         tell(News::Detail(since.line(format!("{model}: {what}"), problem.simulations())));
@@ -312,31 +312,38 @@ fn finish(
     let end = polished.decrement;
     say(&format!("the last steps, to {end:.4} standard deviations from the minimum"), &problem);
     let others = others.as_ref().filter(|_| way.is_none());
-    let between_rows = torque_between_rows(&mut problem, &mut polished, others, options)?;
+    let mut between_rows = torque_between_rows(&mut problem, &mut polished, others, options)?;
     say("other torques between rows", &problem);
-    fit.fit_pct = fit_pct(&problem, &polished.answer);
-    fit.tests = tests(&problem, &polished.answer);
-    fit.poor = is_poor(&problem, &polished.answer);
-    fit.noise_white = problem.channels[0].noise.white;
-    fit.converged = polished.decrement < CONVERGED;
-    fit.newton_decrement = polished.decrement;
+    let (mut changes, mut findings) =
+        judge(&problem, &polished, (&between_rows, question), options, &mut fit)?;
+    say("tolerances, and torques that may be missing", &problem);
+    let mut shown = if findings.fits(&fit) {
+        Vec::new()
+    } else {
+        budget::shown(&problem, &polished, &changes)?
+    };
+    if !shown.is_empty() {
+        let names: Vec<String> = shown.iter().map(|unknown| unknown.quantity.name()).collect();
+        let names = names.join(", ");
+        match with_unknowns(&problem, &polished, &shown, question, options, &fit) {
+            Ok(other) if other.findings.fits(&other.fit) && other.fit.converged => {
+                say(&format!("{names} within its tolerance explains the misfit"), &other.problem);
+                Judged { problem, polished, between_rows, fit, changes, findings } = other;
+                // they were found without these unknowns
+                speeds.clear();
+            }
+            Ok(other) => {
+                say(&format!("{names} does not explain the misfit"), &other.problem);
+                shown.clear();
+            }
+            Err(error) => {
+                say(&format!("{names} cannot be estimated: {error:#}"), &problem);
+                shown.clear();
+            }
+        }
+    }
     x.clone_from(&polished.x);
     let e = problem.stacked(&polished.answer, &x);
-    let changes = budget::slopes(&problem, &polished, &options.tolerances)?;
-    say("tolerances", &problem);
-    let mut findings = Findings {
-        cause: None,
-        torque: between_rows.words,
-        missing: missing::torques(&problem, &polished, &e, &changes)?,
-        doubts: question
-            .doubts
-            .iter()
-            .cloned()
-            .chain(acausal(&problem, &polished, options))
-            .chain(at_end(&problem, &polished.x))
-            .collect(),
-    };
-    say("torques that may be missing", &problem);
     let fits = findings.fits(&fit);
     if !fits {
         let law = fit.friction.clone();
@@ -469,6 +476,10 @@ fn finish(
     let names = problem.unknowns.iter().map(|u| u.quantity.name()).collect();
     let mut verdict =
         verdict::words(question, &findings, &fit, &combinations, &parameters, &error_budget);
+    verdict.extend(shown.iter().filter_map(|unknown| {
+        let name = unknown.quantity.name();
+        Some(budget::shown_words(&name, parameters.get(&name)?))
+    }));
     verdict.extend(shares);
     verdict.extend(budget::first_order(&changes));
     verdict.extend(modes_unknown);
@@ -499,6 +510,71 @@ fn finish(
         residuals: residuals(&problem, &answer),
         ..Identified::new(details)
     })
+}
+
+/// Judges a minimum: the tests of its residual, the effects of tolerances, and what the model lacks.
+fn judge(
+    problem: &Problem,
+    found: &Polished,
+    (between_rows, question): (&BetweenRows, &verdict::Question),
+    options: &Options,
+    fit: &mut ModelFit,
+) -> Result<(Vec<Slope>, Findings)> {
+    fit.fit_pct = fit_pct(problem, &found.answer);
+    fit.tests = tests(problem, &found.answer);
+    fit.poor = is_poor(problem, &found.answer);
+    fit.noise_white = problem.channels[0].noise.white;
+    fit.converged = found.decrement < CONVERGED;
+    fit.newton_decrement = found.decrement;
+    let changes = budget::slopes(problem, found, &options.tolerances)?;
+    let e = problem.stacked(&found.answer, &found.x);
+    let findings = Findings {
+        cause: None,
+        torque: between_rows.words.clone(),
+        missing: missing::torques(problem, found, &e, &changes)?,
+        doubts: question
+            .doubts
+            .iter()
+            .cloned()
+            .chain(acausal(problem, found, options))
+            .chain(at_end(problem, &found.x))
+            .collect(),
+    };
+    Ok((changes, findings))
+}
+
+/// A minimum of a problem, and what [`judge`] finds there.
+struct Judged<'a> {
+    problem: Problem<'a>,
+    polished: Polished,
+    between_rows: BetweenRows,
+    fit: ModelFit,
+    changes: Vec<Slope>,
+    findings: Findings,
+}
+
+/// The problem with more unknowns, at its minimum.
+fn with_unknowns<'a>(
+    problem: &Problem<'a>,
+    found: &Polished,
+    more: &[Unknown],
+    question: &verdict::Question,
+    options: &Options,
+    fit: &ModelFit,
+) -> Result<Judged<'a>> {
+    let (mut problem, mut fit, mut x) = (problem.clone(), fit.clone(), found.x.clone());
+    x.extend(more.iter().map(|unknown| unknown.scale.variable(unknown.start)));
+    problem.unknowns.extend(more.iter().cloned());
+    let mut polished = problem.polish_from((&x, found.answer.clone()), None, ROUNDS)?;
+    if problem.renew_noise(&mut polished)? {
+        polished = problem.polish_on(&polished, ROUNDS)?;
+    }
+    polished = problem.polish_at_kink(polished, ROUNDS)?;
+    polished = on_to_the_end(&problem, polished)?;
+    let between_rows = torque_between_rows(&mut problem, &mut polished, None, options)?;
+    let (changes, findings) =
+        judge(&problem, &polished, (&between_rows, question), options, &mut fit)?;
+    Ok(Judged { problem, polished, between_rows, fit, changes, findings })
 }
 
 /// Goes on with a search whose sets of sensitivities ran out before the minimum, as long as that lessens the sum of squares: two bent

@@ -12,16 +12,20 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail, ensure};
+use host::causality::Causality;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use crate::estimate::{Estimated, prose};
 use crate::fit::bench::problem::{Answer, Polished, Problem};
 use crate::fit::covariance::Covariance;
 use crate::input::tolerance::{NAMES, Tolerances};
 use crate::model::bench::nominal::{self, Bench};
 use crate::model::bench::tank;
-use crate::model::bench::unknown::Quantity;
-use crate::tuning::{BUDGET_LEAVES, BUDGET_ROUNDS, BUDGET_SETTLED, BUDGET_SIZE, BUDGET_STEP};
+use crate::model::bench::unknown::{Quantity, Unknown};
+use crate::tuning::{
+    BUDGET_LEAVES, BUDGET_ROUNDS, BUDGET_SETTLED, BUDGET_SIZE, BUDGET_STEP, SHOWN_TOLERANCE,
+};
 use names::hubslosh::{self, G_AXIAL, fluid, friction, hub, slosh};
 
 /// Effect of an error of something that is not estimated.
@@ -82,6 +86,44 @@ pub fn first_order(slopes: &[Slope]) -> Option<String> {
             all.join(", ")
         )
     })
+}
+
+/// Returns the parameters of the FMU whose tolerances the recordings show, as unknowns with priors. An error of one standard deviation
+/// then moves the innovations by more than [`SHOWN_TOLERANCE`], and no unknown can take that. For linear slosh there are none.
+/// Nonlinear slosh shows its angle, and so the arm.
+///
+/// # Errors
+/// If the FMU refuses its settings.
+pub fn shown(problem: &Problem, found: &Polished, slopes: &[Slope]) -> Result<Vec<Unknown>> {
+    let Polished { jacobian, covariance, .. } = found;
+    let is_shown = |slope: &&Slope| {
+        let taken = jacobian * (&covariance.x * jacobian.tr_mul(&slope.change));
+        (&slope.change - taken).norm() > SHOWN_TOLERANCE
+    };
+    let description = problem.fmu.description();
+    let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
+    let mut unknowns = Vec::new();
+    for slope in slopes.iter().filter(is_shown) {
+        let variable = description.variable(slope.name).ok();
+        let Some(variable) = variable.filter(|v| v.causality == Causality::Parameter) else {
+            continue;
+        };
+        let (value, unit) = (instance.real(slope.name)?, variable.attributes().unit.clone());
+        let unknown = Unknown::positive(slope.name, &unit.unwrap_or_default(), value);
+        let known = unknown.known(value, slope.tolerance * value);
+        unknowns.push(known.within_range_of(description));
+    }
+    Ok(unknowns)
+}
+
+/// Returns a sentence on a parameter that is estimated because its tolerance leaves more than noise in the residual.
+pub fn shown_words(name: &str, found: &Estimated) -> String {
+    format!(
+        "{name} is estimated within its tolerance, because its nominal value leaves more than noise: {:.4e} ± {:.1e} {}.",
+        found.value,
+        found.std,
+        prose(&found.unit)
+    )
 }
 
 /// Returns the derivative of the stacked innovations by the logarithm of `torque`, `clock` or a parameter of the FMU that is not
