@@ -386,7 +386,7 @@ pub const BUDGET_LEAVES: f64 = 0.3;
 pub const BUDGET_SETTLED: f64 = 0.1;
 
 // Causes: `uncertainty/bench/cause.rs`.
-// Tests: `the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it`.
+// Tests: `the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it`, `a_misfit_that_no_candidate_explains_has_no_cause`.
 /// Part of the sum of squares that is left to gain when a search ends: of the candidates, which differ by much more, and of the best.
 pub const CAUSE_PART: (f64, f64) = (1e-2, 1e-3);
 /// Candidates that are fitted.

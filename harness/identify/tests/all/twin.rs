@@ -190,6 +190,29 @@ fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
     assert!((inertia.value - 0.322414).abs() < 4.0 * inertia.std, "{inertia:?}");
 }
 
+/// The hub rocks at 4.1 Hz, and the gyro sees some of it: no candidate has that. The one that explains most explains less than half.
+#[test]
+fn a_misfit_that_no_candidate_explains_has_no_cause() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque: Profile = "lin-sweep:amplitude=0.4,duration=120,f0=1.5,f1=3.6".parse().unwrap();
+    let settings = vec![("slosh.zeta_from_correlation".to_string(), "false".to_string())];
+    let twin =
+        Twin { settings, unmodelled: vec![Unmodelled::Nutation], rate: 25.0, ..Twin::default() };
+    let recordings = [twin.record(&fmu, &Torque::Profile(torque), Some(4)).unwrap()];
+    let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
+    let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
+    assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
+    // one of them is far beyond chance, and would be named if that were enough
+    let explains = found.done.iter().any(|line| line.contains("% of the misfit"));
+    assert!(
+        explains && found.details.cause.is_none(),
+        "{:?} {:?}",
+        found.details.cause,
+        found.done
+    );
+    assert!(!found.verdict.iter().any(|line| line.contains("likeliest cause")));
+}
+
 /// The arm is 2 % longer than its nominal value. Slosh of a third of a radian shows that, and nothing else takes it.
 #[test]
 fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
