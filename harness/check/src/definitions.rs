@@ -67,7 +67,15 @@ pub fn interfaces(d: &Description, findings: &mut Findings) {
 
 /// `xml.model_identifier`
 pub fn model_identifier(d: &Description, findings: &mut Findings) {
-    for interface in d.interfaces() {
+    identifiers(d.interfaces(), findings);
+}
+
+/// Reports model identifiers that cannot be part of a C name.
+pub(crate) fn identifiers<'d>(
+    interfaces: impl Iterator<Item = &'d Element>,
+    findings: &mut Findings,
+) {
+    for interface in interfaces {
         let name = interface.get("modelIdentifier").unwrap_or_default();
         let first = name.chars().next();
         let is_identifier = first.is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
@@ -127,40 +135,53 @@ pub fn state_capability(d: &Description, findings: &mut Findings) {
 
 /// `xml.default_experiment`
 pub fn default_experiment(d: &Description, findings: &mut Findings) {
-    let Some(experiment) = d.root.child("DefaultExperiment") else {
-        return findings.skip("there is no DefaultExperiment");
-    };
-    let place = format!("line {}, DefaultExperiment", experiment.line);
+    let Some(experiment) = experiment_numbers(&d.root, findings) else { return };
     let number = |name| experiment.number(name);
+    let start = number("startTime").unwrap_or(0.0);
+    let Some(stop) = number("stopTime").filter(|stop| *stop >= start) else { return };
+    let place = format!("line {}, DefaultExperiment", experiment.line);
+    if stop == start {
+        findings.add(place, format!("stopTime={stop} (allowed: above startTime {start})"));
+    } else if let Some(step) = number("stepSize").filter(|step| *step > stop - start) {
+        findings.add(
+            place,
+            format!("stepSize={step} (allowed: at most stopTime - startTime = {})", stop - start),
+        );
+    }
+}
+
+/// Reports numbers that no experiment can have. Returns the element, if it is there.
+pub(crate) fn experiment_numbers<'d>(
+    root: &'d Element,
+    findings: &mut Findings,
+) -> Option<&'d Element> {
+    let Some(experiment) = root.child("DefaultExperiment") else {
+        findings.skip("there is no DefaultExperiment");
+        return None;
+    };
     for name in ["startTime", "stopTime", "tolerance", "stepSize"] {
-        if let Some(x) = number(name)
+        if let Some(x) = experiment.number(name)
             && !(x.is_finite() && (x > 0.0 || name.ends_with("Time")))
         {
-            findings
-                .add(&place, format!("{name}={x} (allowed: finite, steps and tolerances above 0)"));
-        }
-    }
-    let start = number("startTime").unwrap_or(0.0);
-    if let Some(stop) = number("stopTime").filter(|stop| *stop >= start) {
-        if stop == start {
-            findings.add(&place, format!("stopTime={stop} (allowed: above startTime {start})"));
-        } else if let Some(step) = number("stepSize").filter(|step| *step > stop - start) {
             findings.add(
-                &place,
-                format!(
-                    "stepSize={step} (allowed: at most stopTime - startTime = {})",
-                    stop - start
-                ),
+                format!("line {}, DefaultExperiment", experiment.line),
+                format!("{name}={x} (allowed: finite, steps and tolerances above 0)"),
             );
         }
     }
+    Some(experiment)
 }
 
 /// `xml.stop_time`
 pub fn stop_time(d: &Description, findings: &mut Findings) {
-    let Some(experiment) = d.root.child("DefaultExperiment") else {
-        return findings.skip("there is no DefaultExperiment");
-    };
+    match d.root.child("DefaultExperiment") {
+        None => findings.skip("there is no DefaultExperiment"),
+        Some(experiment) => stop_before_start(experiment, findings),
+    }
+}
+
+/// Reports an experiment that ends before it starts.
+pub(crate) fn stop_before_start(experiment: &Element, findings: &mut Findings) {
     let start = experiment.number("startTime").unwrap_or(0.0);
     if let Some(stop) = experiment.number("stopTime").filter(|stop| *stop < start) {
         findings.add(
@@ -172,6 +193,16 @@ pub fn stop_time(d: &Description, findings: &mut Findings) {
 
 /// `xml.unique`
 pub fn unique(d: &Description, findings: &mut Findings) {
+    unique_names(&d.root, "SimpleType", |simple| simple.list("Enumeration").collect(), findings);
+}
+
+/// Reports definitions of one name, and items of one name or value, which `items` finds in a type.
+pub(crate) fn unique_names(
+    root: &Element,
+    of_type: &str,
+    items: impl Fn(&Element) -> Vec<&Element>,
+    findings: &mut Findings,
+) {
     let mut one = |what: &str, elements: &mut dyn Iterator<Item = &Element>, attribute: &str| {
         let mut seen = BTreeSet::new();
         for element in elements {
@@ -185,15 +216,15 @@ pub fn unique(d: &Description, findings: &mut Findings) {
             }
         }
     };
-    one("Unit", &mut d.root.list("UnitDefinitions"), "name");
-    one("SimpleType", &mut d.root.list("TypeDefinitions"), "name");
-    one("Category", &mut d.root.list("LogCategories"), "name");
-    for unit in d.root.list("UnitDefinitions") {
+    one("Unit", &mut root.list("UnitDefinitions"), "name");
+    one(of_type, &mut root.list("TypeDefinitions"), "name");
+    one("Category", &mut root.list("LogCategories"), "name");
+    for unit in root.list("UnitDefinitions") {
         one("DisplayUnit", &mut unit.children.iter().filter(|c| c.name == "DisplayUnit"), "name");
     }
-    for simple in d.root.list("TypeDefinitions") {
+    for simple in root.list("TypeDefinitions") {
         for attribute in ["name", "value"] {
-            one("Item", &mut simple.list("Enumeration"), attribute);
+            one("Item", &mut items(simple).into_iter(), attribute);
         }
     }
 }

@@ -1,6 +1,8 @@
 //! modelDescription.xml (FMI 2.0.5, section 2.2): what it says, read without judging.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Deref;
+use std::str::FromStr;
 
 use super::Findings;
 use host::causality::{Causality, Variability};
@@ -30,6 +32,20 @@ pub struct Description {
 pub struct Variable {
     /// Place among the variables, counted from 1, as ModelStructure counts.
     pub index: usize,
+    read: Common,
+}
+
+impl Deref for Variable {
+    type Target = Common;
+
+    fn deref(&self) -> &Common {
+        &self.read
+    }
+}
+
+/// A variable as far as FMI 2.0 and 3.0 agree. In `typed` the attributes of the declared type are filled in.
+#[derive(Clone, Debug)]
+pub struct Common {
     /// Line of the file.
     pub line: u64,
     /// Name.
@@ -38,17 +54,21 @@ pub struct Variable {
     pub reference: u32,
     /// Causality as written, or the default "local".
     pub causality: Causality,
-    /// Variability as written, or the default: "continuous" of a Real, else "discrete".
+    /// Variability as written, or the default for causality and type.
     pub variability: Variability,
     /// Attribute `initial` as written, or the default for causality and variability, if there is one.
     pub initial: Option<String>,
     /// Type.
     pub kind: Type,
-    /// The element of its type, attributes of the declared type filled in.
+    /// The element of its type: in FMI 2.0 that within the ScalarVariable, in FMI 3.0 the variable's own.
     pub typed: Element,
-    /// Attributes of the ScalarVariable itself.
+    /// The element of the variable as written.
     pub(crate) written: Element,
 }
+
+/// Allowed values of `initial`, the default first (FMI 2.0.5, section 2.2.7; FMI 3.0.2, section 2.4.7.5). `None`: causality and
+/// variability do not go together. An empty list: `initial` must not be written.
+pub(crate) type Initials = fn(&Causality, &Variability) -> Option<&'static [&'static str]>;
 
 /// An Unknown of ModelStructure.
 #[derive(Clone, Debug)]
@@ -64,30 +84,64 @@ pub struct Unknown {
 }
 
 impl Variable {
-    /// Position in the file, for findings.
-    pub fn place(&self) -> String {
-        format!("line {}, {}", self.line, self.name)
-    }
-
-    /// True for a Real that may change at any time.
-    pub fn is_continuous(&self) -> bool {
-        self.kind == Type::Real && self.variability == Variability::Continuous
-    }
-
     /// Index of the state whose derivative it is.
     pub fn derivative_of(&self) -> Option<usize> {
         self.typed.get("derivative")?.trim().parse().ok()
-    }
-
-    /// True if its type is Real.
-    pub fn is_real(&self) -> bool {
-        self.kind == Type::Real
     }
 
     /// True for a parameter or an input, which a host sets.
     pub fn is_set_by_hosts(&self) -> bool {
         self.causality == Causality::Input
             || (self.causality == Causality::Parameter && self.variability != Variability::Constant)
+    }
+}
+
+impl Common {
+    /// Reads the variable of an element. `default` is the variability of a parameter and of others without one.
+    pub(crate) fn read(
+        element: &Element,
+        (kind, mut typed): (Type, Element),
+        types: &BTreeMap<&str, &Element>,
+        default: &str,
+        initials: Initials,
+    ) -> Common {
+        let declared = typed.get("declaredType").and_then(|name| types.get(name)).copied();
+        for (name, value) in declared.iter().flat_map(|declared| &declared.attributes) {
+            if typed.get(name).is_none() {
+                typed.attributes.push((name.clone(), value.clone()));
+            }
+        }
+        let text =
+            |name: &str, default: &str| element.get(name).unwrap_or(default).trim().to_string();
+        let causality = Causality::from(&*text("causality", "local"));
+        let variability = Variability::from(&*text("variability", default));
+        let default = initials(&causality, &variability).and_then(|all| all.first());
+        Common {
+            line: element.line,
+            name: text("name", ""),
+            reference: number(element, "valueReference").unwrap_or(0),
+            initial: element.get("initial").or(default.copied()).map(str::to_string),
+            causality,
+            variability,
+            kind,
+            typed,
+            written: element.clone(),
+        }
+    }
+
+    /// Position in the file, for findings.
+    pub fn place(&self) -> String {
+        format!("line {}, {}", self.line, self.name)
+    }
+
+    /// True for a floating-point number.
+    pub fn is_real(&self) -> bool {
+        self.kind == Type::Real
+    }
+
+    /// True for a floating-point number that may change at any time.
+    pub fn is_continuous(&self) -> bool {
+        self.is_real() && self.variability == Variability::Continuous
     }
 
     /// Returns the order of magnitude.
@@ -103,8 +157,30 @@ impl Variable {
     }
 }
 
-/// Returns the default and the allowed values of `initial` (table in section 2.2.7). `None`: the combination is not allowed. An
-/// empty list: `initial` must not be written.
+/// A whole number of an attribute.
+pub(crate) fn number<T: FromStr>(element: &Element, attribute: &str) -> Option<T> {
+    element.get(attribute)?.trim().parse().ok()
+}
+
+/// The words of an attribute.
+pub(crate) fn words(element: &Element, attribute: &str) -> Option<Vec<String>> {
+    Some(element.get(attribute)?.split_whitespace().map(str::to_string).collect())
+}
+
+/// Adds a finding for each variable that breaks something, as `wrong` tells.
+pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
+    variables: impl IntoIterator<Item = &'v V>,
+    findings: &mut Findings,
+    wrong: impl Fn(&'v V) -> Option<String>,
+) {
+    for variable in variables {
+        if let Some(text) = wrong(variable) {
+            findings.add(variable.place(), text);
+        }
+    }
+}
+
+/// See [`Initials`].
 pub(crate) fn initials(
     causality: &Causality,
     variability: &Variability,
@@ -193,17 +269,13 @@ impl Description {
         listed.filter_map(Variable::derivative_of).collect()
     }
 
-    /// Each variable that breaks something, as `wrong` tells.
-    pub(crate) fn each(
-        &self,
+    /// Adds a finding for each variable that breaks something, as `wrong` tells.
+    pub(crate) fn each<'d>(
+        &'d self,
         findings: &mut Findings,
-        wrong: impl Fn(&Variable) -> Option<String>,
+        wrong: impl Fn(&'d Variable) -> Option<String>,
     ) {
-        for variable in &self.variables {
-            if let Some(text) = wrong(variable) {
-                findings.add(variable.place(), text);
-            }
-        }
+        each(&self.variables, findings, wrong);
     }
 
     pub(crate) fn name_of(&self, index: usize) -> String {
@@ -223,43 +295,20 @@ fn variable(element: &Element, index: usize, types: &BTreeMap<&str, &Element>) -
         let (_, kind) = kinds.iter().find(|(name, _)| *name == child.name)?;
         Some((*kind, child.clone()))
     });
-    let (kind, mut typed) = typed.unwrap_or((Type::Real, Element::default()));
-    let declared = typed.get("declaredType").and_then(|name| types.get(name)).copied();
-    for (name, value) in declared.iter().flat_map(|declared| &declared.attributes) {
-        if typed.get(name).is_none() {
-            typed.attributes.push((name.clone(), value.clone()));
-        }
-    }
-    let text = |name: &str, default: &str| element.get(name).unwrap_or(default).trim().to_string();
-    let causality = Causality::from(&*text("causality", "local"));
+    let (kind, typed) = typed.unwrap_or((Type::Real, Element::default()));
     let default = if kind == Type::Real { "continuous" } else { "discrete" };
-    let variability = Variability::from(&*text("variability", default));
-    let default = initials(&causality, &variability).and_then(|all| all.first());
-    Variable {
-        index,
-        line: element.line,
-        name: text("name", ""),
-        reference: element.get("valueReference").and_then(|r| r.trim().parse().ok()).unwrap_or(0),
-        initial: element.get("initial").or(default.copied()).map(str::to_string),
-        causality,
-        variability,
-        kind,
-        typed,
-        written: element.alone(),
-    }
+    let mut read = Common::read(element, (kind, typed), types, default, initials);
+    read.written = element.alone();
+    Variable { index, read }
 }
 
 fn unknown(element: &Element) -> Unknown {
-    let words = |name: &str| {
-        let words = element.get(name)?.split_whitespace();
-        Some(words.map(str::to_string).collect::<Vec<_>>())
-    };
     Unknown {
         line: element.line,
-        index: element.get("index").and_then(|i| i.trim().parse().ok()).unwrap_or(0),
-        dependencies: words("dependencies")
+        index: number(element, "index").unwrap_or(0),
+        dependencies: words(element, "dependencies")
             .map(|words| words.iter().map(|word| word.parse().unwrap_or(0)).collect()),
-        kinds: words("dependenciesKind"),
+        kinds: words(element, "dependenciesKind"),
     }
 }
 

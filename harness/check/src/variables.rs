@@ -1,12 +1,13 @@
 //! Variables of modelDescription.xml (FMI 2.0.5, section 2.2): names, causality, start values, ranges.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Deref;
 
 use super::Findings;
-use super::description::{Description, Variable, initials};
+use super::description::{Common, Description, Initials, Variable, each, initials};
 use host::causality::{Causality, Variability};
 use host::description::Type;
-use host::xml::double;
+use host::xml::{Element, double};
 
 /// `xml.names`
 pub fn names(d: &Description, findings: &mut Findings) {
@@ -22,17 +23,26 @@ pub fn names(d: &Description, findings: &mut Findings) {
 
 /// `xml.structured_names`
 pub fn structured_names(d: &Description, findings: &mut Findings) {
-    if d.root.get("variableNamingConvention") != Some("structured") {
+    unstructured(&d.root, &d.variables, findings);
+}
+
+/// Reports names that are not structured as declared.
+pub(crate) fn unstructured<'d, V: Deref<Target = Common> + 'd>(
+    root: &Element,
+    variables: impl IntoIterator<Item = &'d V>,
+    findings: &mut Findings,
+) {
+    if root.get("variableNamingConvention") != Some("structured") {
         return findings.skip("names are not declared as structured");
     }
-    d.each(findings, |v| {
+    each(variables, findings, |v| {
         (!is_structured(&v.name))
             .then(|| "the name is not a path like a.b[1].c, der(a.b) or a.'b c'".to_string())
     });
 }
 
 /// The grammar of section 2.2.9.
-pub(crate) fn is_structured(name: &str) -> bool {
+fn is_structured(name: &str) -> bool {
     if let Some(inner) = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')) {
         // A comma after the last index is the order's, one between brackets the indices'.
         return match inner.rsplit_once(',') {
@@ -145,20 +155,23 @@ fn is_whole(indices: &[Vec<u32>]) -> bool {
 
 /// `xml.causality`
 pub fn causality(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        let (causality, variability) = (&v.causality, &v.variability);
-        if initials(causality, variability).is_none() {
-            let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
-            let allowed: Vec<_> =
-                all.into_iter().filter(|v| initials(causality, &(*v).into()).is_some()).collect();
-            let allowed = allowed.join(", ");
-            return Some(format!(
-                "causality {causality} with variability {variability} (allowed: {allowed})"
-            ));
-        }
-        (v.variability == Variability::Continuous && v.kind != Type::Real)
-            .then(|| format!("a continuous {} (allowed: Real alone)", v.typed.name))
-    });
+    d.each(findings, |v| wrong_causality(v, initials, "Real"));
+}
+
+/// Returns what is wrong with causality and variability, which are those of `reals` alone if a variable is continuous.
+pub(crate) fn wrong_causality(v: &Common, initials: Initials, reals: &str) -> Option<String> {
+    let (causality, variability) = (&v.causality, &v.variability);
+    if initials(causality, variability).is_none() {
+        let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
+        let allowed: Vec<_> =
+            all.into_iter().filter(|v| initials(causality, &(*v).into()).is_some()).collect();
+        let allowed = allowed.join(", ");
+        return Some(format!(
+            "causality {causality} with variability {variability} (allowed: {allowed})"
+        ));
+    }
+    (v.variability == Variability::Continuous && !v.is_real())
+        .then(|| format!("a continuous {} (allowed: {reals} alone)", v.typed.name))
 }
 
 /// `xml.variability`
@@ -172,86 +185,93 @@ pub fn variability(d: &Description, findings: &mut Findings) {
 
 /// `xml.initial`
 pub fn initial(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        let written = v.written.get("initial")?;
-        // A combination that is not allowed is another rule's business.
-        let allowed = initials(&v.causality, &v.variability)?;
-        let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
-        (!allowed.contains(&written)).then(|| {
-            format!(
-                "initial={written} with causality {} and variability {} (allowed: {how})",
-                v.causality, v.variability
-            )
-        })
-    });
+    d.each(findings, |v| wrong_initial(v, initials));
+}
+
+/// Returns what is wrong with the attribute `initial`.
+pub(crate) fn wrong_initial(v: &Common, initials: Initials) -> Option<String> {
+    let written = v.written.get("initial")?;
+    // A combination that is not allowed is another rule's business.
+    let allowed = initials(&v.causality, &v.variability)?;
+    let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
+    (!allowed.contains(&written)).then(|| {
+        format!(
+            "initial={written} with causality {} and variability {} (allowed: {how})",
+            v.causality, v.variability
+        )
+    })
 }
 
 /// `xml.start`
 pub fn start(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
-        let start = v.typed.get("start").is_some();
-        let initial = v.initial.as_deref();
-        if v.causality == Causality::Independent || initial == Some("calculated") {
-            return start.then(|| {
-                let why = initial.map_or("independent".into(), |i| format!("initial={i}"));
-                format!("a start value with {why} (allowed: none)")
-            });
-        }
-        let needed = v.causality == Causality::Input
-            || v.variability == Variability::Constant
-            || matches!(initial, Some("exact" | "approx"));
-        (needed && !start).then(|| {
-            let why = initial.map_or(v.causality.to_string(), |i| format!("initial={i}"));
-            format!("no start value with {why}")
-        })
+        wrong_start(v, v.typed.get("start").is_some(), v.causality == Causality::Input)
     });
+}
+
+/// Returns what is wrong with a start value that is there or not, and that the causality may require.
+pub(crate) fn wrong_start(v: &Common, is_there: bool, is_required: bool) -> Option<String> {
+    let initial = v.initial.as_deref();
+    let why = |other: String| format!("with {}", initial.map_or(other, |i| format!("initial={i}")));
+    if v.causality == Causality::Independent || initial == Some("calculated") {
+        return is_there
+            .then(|| format!("a start value {} (allowed: none)", why("independent".into())));
+    }
+    let needed = is_required
+        || v.variability == Variability::Constant
+        || matches!(initial, Some("exact" | "approx"));
+    (needed && !is_there).then(|| format!("no start value {}", why(v.causality.to_string())))
 }
 
 /// `xml.finite`
 pub fn finite(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        let wrong = ["start", "min", "max", "nominal"].into_iter().find_map(|name| {
-            let x = v.typed.number(name).filter(|_| v.kind == Type::Real)?;
-            let fits = x.is_finite() && (name != "nominal" || x > 0.0);
-            (!fits).then_some((name, x))
-        });
-        wrong.map(|(name, x)| match name {
-            "nominal" => format!("nominal={x} (allowed: finite, above 0)"),
-            _ => format!("{name}={x} (allowed: finite numbers)"),
-        })
-    });
+    d.each(findings, |v| not_finite(v, v.typed.number("start")));
+}
+
+/// Returns which number of a Real is not finite.
+pub(crate) fn not_finite(v: &Common, starts: impl IntoIterator<Item = f64>) -> Option<String> {
+    let starts = starts.into_iter().map(|start| ("start", start));
+    let others = ["min", "max", "nominal"].into_iter();
+    let others = others.filter_map(|name| Some((name, v.typed.number(name)?)));
+    let fits = |name: &str, x: f64| x.is_finite() && (name != "nominal" || x > 0.0);
+    let (name, x) = starts.chain(others).find(|(name, x)| v.is_real() && !fits(name, *x))?;
+    Some(match name {
+        "nominal" => format!("nominal={x} (allowed: finite, above 0)"),
+        _ => format!("{name}={x} (allowed: finite numbers)"),
+    })
 }
 
 /// `xml.range`
 pub fn range(d: &Description, findings: &mut Findings) {
-    let items = |name: &str| -> Vec<f64> {
-        let simple = d.root.list("TypeDefinitions").find(|t| t.get("name") == Some(name));
-        simple
-            .into_iter()
-            .flat_map(|t| t.list("Enumeration"))
-            .filter_map(|item| item.number("value"))
-            .collect()
-    };
     d.each(findings, |v| {
-        let (min, max) = v.bounds();
-        if min > max {
-            return Some(format!("min={min} is above max={max}"));
-        }
-        let start = v.typed.get("start").and_then(double)?;
-        if matches!(v.kind, Type::Boolean | Type::String) {
-            return None;
-        }
-        if start < min || start > max {
-            return Some(format!("start={start} (allowed: {min} to {max})"));
-        }
-        if v.kind == Type::Enumeration {
-            let items = v.typed.get("declaredType").map(items).unwrap_or_default();
-            let list: Vec<_> = items.iter().map(f64::to_string).collect();
-            return (!items.is_empty() && !items.contains(&start))
-                .then(|| format!("start={start} is not an item (allowed: {})", list.join(", ")));
-        }
-        None
+        let start = v.typed.get("start").and_then(double);
+        out_of_range(v, start.as_slice(), &d.root, |of| of.list("Enumeration").collect())
     });
+}
+
+/// Returns which bound or start value is out of range; `items` finds the items of an enumeration in its type.
+pub(crate) fn out_of_range<'d>(
+    v: &Common,
+    starts: &[f64],
+    root: &'d Element,
+    items: impl Fn(&'d Element) -> Vec<&'d Element>,
+) -> Option<String> {
+    let (min, max) = v.bounds();
+    if min > max {
+        return Some(format!("min={min} is above max={max}"));
+    }
+    if !matches!(v.kind, Type::Real | Type::Integer | Type::Enumeration) {
+        return None;
+    }
+    if let Some(start) = starts.iter().find(|x| **x < min || **x > max) {
+        return Some(format!("start={start} (allowed: {min} to {max})"));
+    }
+    let declared = v.typed.get("declaredType").filter(|_| v.kind == Type::Enumeration)?;
+    let of = root.list("TypeDefinitions").find(|t| t.get("name") == Some(declared))?;
+    let items: Vec<f64> = items(of).iter().filter_map(|item| item.number("value")).collect();
+    let odd = starts.iter().find(|x| !items.is_empty() && !items.contains(x))?;
+    let list: Vec<_> = items.iter().map(f64::to_string).collect();
+    Some(format!("start={odd} is not an item (allowed: {})", list.join(", ")))
 }
 
 /// `xml.aliases`

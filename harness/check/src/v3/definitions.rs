@@ -1,9 +1,10 @@
 //! Head and definitions of modelDescription.xml (FMI 3.0.2, section 2.4): interfaces, capabilities, units, types.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::description::Description;
 use crate::Findings;
+use crate::definitions::{experiment_numbers, identifiers, stop_before_start, unique_names};
 use host::description::Type;
 use host::xml::Element;
 
@@ -34,21 +35,7 @@ pub fn interfaces(d: &Description, findings: &mut Findings) {
 
 /// `xml.model_identifier`
 pub fn model_identifier(d: &Description, findings: &mut Findings) {
-    for interface in d.interfaces() {
-        let name = interface.get("modelIdentifier").unwrap_or_default();
-        let first = name.chars().next();
-        let is_identifier = first.is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
-            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-        if !is_identifier {
-            findings.add(
-                format!("line {}, {}", interface.line, interface.name),
-                format!(
-                    "modelIdentifier=\"{name}\" (allowed: letters, digits and _, no digit first: \
-                     it becomes part of a C name)"
-                ),
-            );
-        }
-    }
+    identifiers(d.interfaces(), findings);
 }
 
 /// `xml.capabilities`
@@ -96,52 +83,19 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
 
 /// `xml.default_experiment`
 pub fn default_experiment(d: &Description, findings: &mut Findings) {
-    let Some(experiment) = d.root.child("DefaultExperiment") else {
-        return findings.skip("there is no DefaultExperiment");
-    };
-    let place = format!("line {}, DefaultExperiment", experiment.line);
-    let number = |name| experiment.number(name);
-    for name in ["startTime", "stopTime", "tolerance", "stepSize"] {
-        if let Some(x) = number(name)
-            && !(x.is_finite() && (x > 0.0 || name.ends_with("Time")))
-        {
-            findings
-                .add(&place, format!("{name}={x} (allowed: finite, steps and tolerances above 0)"));
-        }
+    if let Some(experiment) = experiment_numbers(&d.root, findings) {
+        stop_before_start(experiment, findings);
     }
-    let start = number("startTime").unwrap_or(0.0);
-    if let Some(stop) = number("stopTime").filter(|stop| *stop < start) {
-        findings
-            .add(place, format!("stopTime={stop} is before startTime={start} (allowed: after it)"));
-    }
+}
+
+/// The items of a type.
+pub(super) fn items(of: &Element) -> Vec<&Element> {
+    of.children.iter().filter(|c| c.name == "Item").collect()
 }
 
 /// `xml.unique`
 pub fn unique(d: &Description, findings: &mut Findings) {
-    let mut one = |what: &str, elements: &mut dyn Iterator<Item = &Element>, attribute: &str| {
-        let mut seen = BTreeSet::new();
-        for element in elements {
-            if let Some(value) = element.get(attribute)
-                && !seen.insert(value)
-            {
-                findings.add(
-                    format!("line {}, {what}", element.line),
-                    format!("the {attribute} \"{value}\" is there already"),
-                );
-            }
-        }
-    };
-    one("Unit", &mut d.root.list("UnitDefinitions"), "name");
-    one("TypeDefinitions", &mut d.root.list("TypeDefinitions"), "name");
-    one("Category", &mut d.root.list("LogCategories"), "name");
-    for unit in d.root.list("UnitDefinitions") {
-        one("DisplayUnit", &mut unit.children.iter().filter(|c| c.name == "DisplayUnit"), "name");
-    }
-    for of in d.root.list("TypeDefinitions") {
-        for attribute in ["name", "value"] {
-            one("Item", &mut of.children.iter().filter(|c| c.name == "Item"), attribute);
-        }
-    }
+    unique_names(&d.root, "TypeDefinitions", items, findings);
 }
 
 /// `xml.units`
@@ -149,9 +103,9 @@ pub fn units(d: &Description, findings: &mut Findings) {
     let units: BTreeMap<&str, &Element> =
         d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
     d.each(findings, |v| {
-        let unit = v.element.get("unit");
-        let aliases = v.element.children.iter().filter(|c| c.name == "Alias");
-        let shown = v.element.get("displayUnit").into_iter();
+        let unit = v.typed.get("unit");
+        let aliases = v.typed.children.iter().filter(|c| c.name == "Alias");
+        let shown = v.typed.get("displayUnit").into_iter();
         let shown = shown.chain(aliases.filter_map(|alias| alias.get("displayUnit")));
         if let Some(unit) = unit.filter(|unit| !units.contains_key(unit)) {
             return Some(format!("the unit \"{unit}\" is not among UnitDefinitions"));

@@ -1,8 +1,10 @@
 //! modelDescription.xml of FMI 3.0.2 (section 2.4): what it says, read without judging.
 
 use std::collections::BTreeMap;
+use std::ops::Deref;
 
 use crate::Findings;
+use crate::description::{Common, each, number, words};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 use host::xml::Element;
@@ -20,30 +22,21 @@ pub struct Description {
 /// A variable.
 #[derive(Clone, Debug)]
 pub struct Variable {
-    /// Line of the file.
-    pub line: u64,
-    /// Name.
-    pub name: String,
-    /// Value reference; 0 if that cannot be read.
-    pub reference: u32,
-    /// Value in the file, or the default "local".
-    pub causality: Causality,
-    /// Value in the file, or the default for causality and type.
-    pub variability: Variability,
-    /// Value in the file, or the default for causality and variability, if there is one.
-    pub initial: Option<String>,
+    read: Common,
     /// Type in which calls exchange the variable.
     pub c_type: CType,
-    /// Type for display.
-    pub kind: Type,
     /// Start values, as written.
     pub starts: Vec<String>,
     /// Sizes with the start values of structural parameters; empty for a scalar.
     pub dimensions: Vec<usize>,
-    /// The element, attributes of the declared type filled in.
-    pub element: Element,
-    /// The element as written.
-    pub written: Element,
+}
+
+impl Deref for Variable {
+    type Target = Common;
+
+    fn deref(&self) -> &Common {
+        &self.read
+    }
 }
 
 /// An element of ModelStructure.
@@ -62,24 +55,9 @@ pub struct Unknown {
 }
 
 impl Variable {
-    /// Position for findings.
-    pub fn place(&self) -> String {
-        format!("line {}, {}", self.line, self.name)
-    }
-
-    /// Returns true for a floating-point number.
-    pub fn is_float(&self) -> bool {
-        self.kind == Type::Real
-    }
-
-    /// Returns true for a continuous variable.
-    pub fn is_continuous(&self) -> bool {
-        self.is_float() && self.variability == Variability::Continuous
-    }
-
     /// Value reference of what it is the derivative of.
     pub fn derivative_of(&self) -> Option<u32> {
-        self.element.get("derivative")?.trim().parse().ok()
+        self.typed.get("derivative")?.trim().parse().ok()
     }
 
     /// Number of values.
@@ -94,24 +72,11 @@ impl Variable {
 
     /// Returns true if the rules' calls exchange values of the variable.
     pub fn is_exchanged(&self) -> bool {
-        !matches!(self.kind, Type::Binary | Type::Clock) && self.element.get("clocks").is_none()
-    }
-
-    /// Returns the bounds; infinite where there are none.
-    pub fn bounds(&self) -> (f64, f64) {
-        let bound = |name, none| self.element.number(name).filter(|x| !x.is_nan()).unwrap_or(none);
-        (bound("min", f64::NEG_INFINITY), bound("max", f64::INFINITY))
-    }
-
-    /// Returns the order of magnitude.
-    pub fn nominal(&self) -> f64 {
-        let nominal = self.element.number("nominal").filter(|n| n.is_finite() && *n > 0.0);
-        nominal.unwrap_or(1.0)
+        !matches!(self.kind, Type::Binary | Type::Clock) && self.typed.get("clocks").is_none()
     }
 }
 
-/// The default of `initial` and what is allowed (2.4.7.5); `None` where causality and variability do not go
-/// together, an empty list where `initial` must not be written.
+/// Allowed values of `initial` in FMI 3.0; see the type in [`crate::description`].
 pub(crate) fn initials(
     causality: &Causality,
     variability: &Variability,
@@ -180,16 +145,12 @@ impl Description {
         derivatives.filter_map(|u| self.at(u.reference?)?.derivative_of()).collect()
     }
 
-    pub(crate) fn each(
-        &self,
+    pub(crate) fn each<'d>(
+        &'d self,
         findings: &mut Findings,
-        wrong: impl Fn(&Variable) -> Option<String>,
+        wrong: impl Fn(&'d Variable) -> Option<String>,
     ) {
-        for variable in &self.variables {
-            if let Some(text) = wrong(variable) {
-                findings.add(variable.place(), text);
-            }
-        }
+        each(&self.variables, findings, wrong);
     }
 
     pub(crate) fn name_of(&self, reference: Option<u32>) -> String {
@@ -207,23 +168,13 @@ fn variable(
     sizes: &BTreeMap<&str, usize>,
 ) -> Option<Variable> {
     let (c_type, kind) = CType::of_element(&element.name)?;
-    let mut whole = element.clone();
-    let declared = element.get("declaredType").and_then(|name| types.get(name)).copied();
-    for (name, value) in declared.iter().flat_map(|declared| &declared.attributes) {
-        if whole.get(name).is_none() {
-            whole.attributes.push((name.clone(), value.clone()));
-        }
-    }
-    let text = |name: &str, default: &str| element.get(name).unwrap_or(default).trim().to_string();
-    let causality = text("causality", "local");
+    let causality = element.get("causality").unwrap_or("local").trim();
     let default = match kind {
         _ if causality.to_lowercase().ends_with("parameter") => "fixed",
         Type::Real => "continuous",
         _ => "discrete",
     };
-    let causality = Causality::from(&*causality);
-    let variability = Variability::from(&*text("variability", default));
-    let default = initials(&causality, &variability).and_then(|all| all.first());
+    let read = Common::read(element, (kind, element.clone()), types, default, initials);
     let starts = match kind {
         Type::String | Type::Binary => {
             let starts = element.children.iter().filter(|child| child.name == "Start");
@@ -238,33 +189,16 @@ fn variable(
         let start = d.get("start").and_then(|start| start.trim().parse().ok());
         start.or_else(|| sizes.get(d.get("valueReference")?.trim()).copied()).unwrap_or(1)
     });
-    Some(Variable {
-        line: element.line,
-        name: text("name", ""),
-        reference: element.get("valueReference").and_then(|r| r.trim().parse().ok()).unwrap_or(0),
-        initial: element.get("initial").or(default.copied()).map(str::to_string),
-        causality,
-        variability,
-        c_type,
-        kind,
-        starts,
-        dimensions: dimensions.collect(),
-        element: whole,
-        written: element.clone(),
-    })
+    Some(Variable { read, c_type, starts, dimensions: dimensions.collect() })
 }
 
 fn unknown(element: &Element) -> Unknown {
-    let words = |name: &str| {
-        let words = element.get(name)?.split_whitespace();
-        Some(words.map(str::to_string).collect::<Vec<_>>())
-    };
     Unknown {
         list: element.name.to_string(),
         line: element.line,
-        reference: element.get("valueReference").and_then(|r| r.trim().parse().ok()),
-        dependencies: words("dependencies")
+        reference: number(element, "valueReference"),
+        dependencies: words(element, "dependencies")
             .map(|words| words.iter().filter_map(|word| word.parse().ok()).collect()),
-        kinds: words("dependenciesKind"),
+        kinds: words(element, "dependenciesKind"),
     }
 }

@@ -95,7 +95,7 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
 /// `xml.event_indicators`
 pub fn event_indicators(d: &Description, findings: &mut Findings) {
     let why = "continuous Float32 and Float64, each once";
-    compare(d, findings, "EventIndicator", &BTreeSet::new(), Variable::is_continuous, why);
+    compare(d, findings, "EventIndicator", &BTreeSet::new(), |v| v.is_continuous(), why);
 }
 
 /// `xml.structure_references`
@@ -128,7 +128,7 @@ pub fn dependencies(d: &Description, findings: &mut Findings) {
             let (kinds, all) = (kinds.len(), listed.len());
             findings.add(&place, format!("{all} dependencies, but {kinds} kinds of them"));
         }
-        let is_float = unknown.reference.and_then(|r| d.at(r)).is_none_or(Variable::is_float);
+        let is_float = unknown.reference.and_then(|r| d.at(r)).is_none_or(|v| v.is_real());
         for kind in kinds {
             let fits = match kind.as_str() {
                 "dependent" => true,

@@ -2,8 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::definitions::items;
 use super::description::{Description, Variable, initials};
 use crate::Findings;
+use crate::variables::{
+    not_finite, out_of_range, unstructured, wrong_causality, wrong_initial, wrong_start,
+};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 use host::xml::double;
@@ -29,13 +33,7 @@ pub fn names(d: &Description, findings: &mut Findings) {
 
 /// `xml.structured_names`
 pub fn structured_names(d: &Description, findings: &mut Findings) {
-    if d.root.get("variableNamingConvention") != Some("structured") {
-        return findings.skip("names are not declared as structured");
-    }
-    d.each(findings, |v| {
-        (!crate::variables::is_structured(&v.name))
-            .then(|| "the name is not a path like a.b[1].c, der(a.b) or a.'b c'".to_string())
-    });
+    unstructured(&d.root, &d.variables, findings);
 }
 
 /// `xml.references`
@@ -57,113 +55,44 @@ pub fn references(d: &Description, findings: &mut Findings) {
 
 /// `xml.causality`
 pub fn causality(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        let (causality, variability) = (&v.causality, &v.variability);
-        if initials(causality, variability).is_none() {
-            let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
-            let allowed: Vec<_> =
-                all.into_iter().filter(|v| initials(causality, &(*v).into()).is_some()).collect();
-            return Some(format!(
-                "causality {causality} with variability {variability} (allowed: {})",
-                allowed.join(", ")
-            ));
-        }
-        (v.variability == Variability::Continuous && !v.is_float())
-            .then(|| format!("a continuous {} (allowed: Float32, Float64 alone)", v.written.name))
-    });
+    d.each(findings, |v| wrong_causality(v, initials, "Float32, Float64"));
 }
 
 /// `xml.initial`
 pub fn initial(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        let written = v.written.get("initial")?;
-        let allowed = initials(&v.causality, &v.variability)?;
-        let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
-        (!allowed.contains(&written)).then(|| {
-            format!(
-                "initial={written} with causality {} and variability {} (allowed: {how})",
-                v.causality, v.variability
-            )
-        })
-    });
+    d.each(findings, |v| wrong_initial(v, initials));
 }
 
 /// `xml.start`
 pub fn start(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
-        if v.kind == Type::Clock {
+        let (count, length) = (v.starts.len(), v.length());
+        // an array of no elements has no values
+        if v.kind == Type::Clock || (count == 0 && length == 0) {
             return None;
         }
-        let start = !v.starts.is_empty();
-        let initial = v.initial.as_deref();
-        if v.causality == Causality::Independent || initial == Some("calculated") {
-            return start.then(|| {
-                let why = initial.map_or("independent".into(), |i| format!("initial={i}"));
-                format!("a start value with {why} (allowed: none)")
-            });
-        }
-        let needed = matches!(
+        let is_required = matches!(
             v.causality,
             Causality::Input | Causality::Parameter | Causality::StructuralParameter
-        ) || v.variability == Variability::Constant
-            || matches!(initial, Some("exact" | "approx"));
-        // an array of no elements has no values
-        if needed && !start && v.length() > 0 {
-            let why = initial.map_or(v.causality.to_string(), |i| format!("initial={i}"));
-            return Some(format!("no start value with {why}"));
-        }
-        let (count, length) = (v.starts.len(), v.length());
-        (count > 1 && count != length).then(|| {
-            format!("{count} start values (allowed: one, or {length}, one for each element)")
+        );
+        wrong_start(v, count > 0, is_required).or_else(|| {
+            (count > 1 && count != length).then(|| {
+                format!("{count} start values (allowed: one, or {length}, one for each element)")
+            })
         })
     });
 }
 
 /// `xml.finite`
 pub fn finite(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        if !v.is_float() {
-            return None;
-        }
-        let starts = v.starts.iter().filter_map(|s| Some(("start", double(s)?)));
-        let others = ["min", "max", "nominal"].into_iter();
-        let others = others.filter_map(|name| Some((name, v.element.number(name)?)));
-        let mut all = starts.chain(others);
-        let fits = |name: &str, x: f64| x.is_finite() && (name != "nominal" || x > 0.0);
-        let (name, x) = all.find(|(name, x)| !fits(name, *x))?;
-        Some(match name {
-            "nominal" => format!("nominal={x} (allowed: finite, above 0)"),
-            _ => format!("{name}={x} (allowed: finite numbers)"),
-        })
-    });
+    d.each(findings, |v| not_finite(v, v.starts.iter().filter_map(|s| double(s))));
 }
 
 /// `xml.range`
 pub fn range(d: &Description, findings: &mut Findings) {
-    let items = |name: &str| -> Vec<f64> {
-        let of = d.root.list("TypeDefinitions").find(|t| t.get("name") == Some(name));
-        let items = of.into_iter().flat_map(|t| &t.children).filter(|c| c.name == "Item");
-        items.filter_map(|item| item.number("value")).collect()
-    };
     d.each(findings, |v| {
-        let (min, max) = v.bounds();
-        if min > max {
-            return Some(format!("min={min} is above max={max}"));
-        }
-        if !matches!(v.kind, Type::Real | Type::Integer | Type::Enumeration) {
-            return None;
-        }
         let starts: Vec<f64> = v.starts.iter().filter_map(|s| double(s)).collect();
-        if let Some(start) = starts.iter().find(|x| **x < min || **x > max) {
-            return Some(format!("start={start} (allowed: {min} to {max})"));
-        }
-        if v.kind == Type::Enumeration {
-            let items = v.element.get("declaredType").map(items).unwrap_or_default();
-            let list: Vec<_> = items.iter().map(f64::to_string).collect();
-            let odd = starts.iter().find(|x| !items.is_empty() && !items.contains(x))?;
-            return Some(format!("start={odd} is not an item (allowed: {})", list.join(", ")));
-        }
-        None
+        out_of_range(v, &starts, &d.root, items)
     });
 }
 
@@ -176,7 +105,7 @@ pub fn independent(d: &Description, findings: &mut Findings) {
             .add("ModelVariables", format!("{} independent variables (allowed: one)", all.len()));
     }
     for v in all {
-        if !v.is_float() {
+        if !v.is_real() {
             findings.add(v.place(), "the independent variable is not a Float64 or Float32");
         }
         for attribute in ["initial", "start", "min", "max"] {
