@@ -20,14 +20,10 @@ pub enum Written {
     Double,
     /// as xs:dateTime.
     Time,
-    /// Whole numbers with spaces between.
-    Indices,
-    /// Whole numbers of 64 bits with spaces between.
-    Longs,
-    /// Numbers with spaces between.
-    Doubles,
-    /// Words true, false, 1, 0 with spaces between.
-    Booleans,
+    /// 64 bits.
+    Long,
+    /// Any number of these with spaces between.
+    List(&'static Written),
     /// One of these.
     OneOf(&'static [&'static str]),
     /// Words from a list with spaces between.
@@ -39,10 +35,15 @@ use Written::*;
 /// An element: `parent/name`, or `name` if it is the same wherever it stands.
 pub struct Kind {
     name: &'static str,
-    needed: &'static [(&'static str, Written)],
-    optional: &'static [(&'static str, Written)],
+    needed: Attributes,
+    optional: Attributes,
+    /// Optional ones that other elements have too.
+    shared: Attributes,
     children: Children,
 }
+
+/// Attributes with their formats.
+pub type Attributes = &'static [(&'static str, Written)];
 
 /// Children of an element.
 pub enum Children {
@@ -53,9 +54,7 @@ pub enum Children {
     /// Any number of each, in this order.
     Ordered(&'static [&'static str]),
     /// One or more of these, in any order.
-    ManyOf(&'static [&'static str]),
-    /// One or more of this.
-    Many(&'static str),
+    Many(&'static [&'static str]),
     /// One of these, then what else there may be.
     Choice(&'static [&'static str], &'static [&'static str]),
 }
@@ -64,19 +63,32 @@ use Children::*;
 
 const CAUSALITY: Written =
     OneOf(&["parameter", "calculatedParameter", "input", "output", "local", "independent"]);
-const VARIABILITY: Written = OneOf(&["constant", "fixed", "tunable", "discrete", "continuous"]);
-const INITIAL: Written = OneOf(&["exact", "approx", "calculated"]);
-const DEPENDENCY: Written = Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
+pub(crate) const VARIABILITY: Written =
+    OneOf(&["constant", "fixed", "tunable", "discrete", "continuous"]);
+pub(crate) const INITIAL: Written = OneOf(&["exact", "approx", "calculated"]);
+pub(crate) const DEPENDENCY: Written =
+    Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
 const TYPES: &[&str] = &["Real", "Integer", "Boolean", "String", "Enumeration"];
 
 /// An element of a table.
 pub const fn kind(
     name: &'static str,
-    needed: &'static [(&'static str, Written)],
-    optional: &'static [(&'static str, Written)],
+    needed: Attributes,
+    optional: Attributes,
     children: Children,
 ) -> Kind {
-    Kind { name, needed, optional, children }
+    Kind { name, needed, optional, shared: &[], children }
+}
+
+impl Kind {
+    /// Adds attributes that other elements have too.
+    pub const fn and(self, shared: Attributes) -> Kind {
+        Kind { shared, ..self }
+    }
+
+    fn attributes(&self) -> impl Iterator<Item = &'static (&'static str, Written)> {
+        self.needed.iter().chain(self.shared).chain(self.optional)
+    }
 }
 
 #[rustfmt::skip]
@@ -104,16 +116,16 @@ static KINDS: &[Kind] = &[
           ("canNotUseMemoryManagementFunctions", Boolean), ("canGetAndSetFMUstate", Boolean),
           ("canSerializeFMUstate", Boolean), ("providesDirectionalDerivative", Boolean)],
         Sequence(&["SourceFiles"])),
-    kind("SourceFiles", &[], &[], Many("File")),
+    kind("SourceFiles", &[], &[], Many(&["File"])),
     kind("File", &[("name", Text)], &[], Sequence(&[])),
-    kind("UnitDefinitions", &[], &[], Many("Unit")),
+    kind("UnitDefinitions", &[], &[], Many(&["Unit"])),
     kind("Unit", &[("name", Text)], &[], Choice(&[], &["BaseUnit", "DisplayUnit"])),
     kind("BaseUnit", &[],
         &[("kg", Int), ("m", Int), ("s", Int), ("A", Int), ("K", Int), ("mol", Int), ("cd", Int),
           ("rad", Int), ("factor", Double), ("offset", Double)],
         Sequence(&[])),
     kind("DisplayUnit", &[("name", Text)], &[("factor", Double), ("offset", Double)], Sequence(&[])),
-    kind("TypeDefinitions", &[], &[], Many("SimpleType")),
+    kind("TypeDefinitions", &[], &[], Many(&["SimpleType"])),
     kind("SimpleType", &[("name", Text)], &[("description", Text)], Choice(TYPES, &[])),
     kind("SimpleType/Real", &[],
         &[("quantity", Text), ("unit", Text), ("displayUnit", Text), ("relativeQuantity", Boolean),
@@ -122,17 +134,17 @@ static KINDS: &[Kind] = &[
     kind("SimpleType/Integer", &[], &[("quantity", Text), ("min", Int), ("max", Int)], Sequence(&[])),
     kind("SimpleType/Boolean", &[], &[], Sequence(&[])),
     kind("SimpleType/String", &[], &[], Sequence(&[])),
-    kind("SimpleType/Enumeration", &[], &[("quantity", Text)], Many("Item")),
+    kind("SimpleType/Enumeration", &[], &[("quantity", Text)], Many(&["Item"])),
     kind("Item", &[("name", Text), ("value", Int)], &[("description", Text)], Sequence(&[])),
-    kind("LogCategories", &[], &[], Many("Category")),
+    kind("LogCategories", &[], &[], Many(&["Category"])),
     kind("Category", &[("name", Text)], &[("description", Text)], Sequence(&[])),
     kind("DefaultExperiment", &[],
         &[("startTime", Double), ("stopTime", Double), ("tolerance", Double), ("stepSize", Double)],
         Sequence(&[])),
-    kind("VendorAnnotations", &[], &[], Many("Tool")),
-    kind("Annotations", &[], &[], Many("Tool")),
+    kind("VendorAnnotations", &[], &[], Many(&["Tool"])),
+    kind("Annotations", &[], &[], Many(&["Tool"])),
     kind("Tool", &[("name", Text)], &[], Any),
-    kind("ModelVariables", &[], &[], Many("ScalarVariable")),
+    kind("ModelVariables", &[], &[], Many(&["ScalarVariable"])),
     kind("ScalarVariable", &[("name", Text), ("valueReference", Unsigned)],
         &[("description", Text), ("causality", CAUSALITY), ("variability", VARIABILITY),
           ("initial", INITIAL), ("canHandleMultipleSetPerTimeInstant", Boolean)],
@@ -151,11 +163,11 @@ static KINDS: &[Kind] = &[
         &[("quantity", Text), ("min", Int), ("max", Int), ("start", Int)],
         Sequence(&[])),
     kind("ModelStructure", &[], &[], Sequence(&["Outputs", "Derivatives", "InitialUnknowns"])),
-    kind("Outputs", &[], &[], Many("Unknown")),
-    kind("Derivatives", &[], &[], Many("Unknown")),
-    kind("InitialUnknowns", &[], &[], Many("Unknown")),
+    kind("Outputs", &[], &[], Many(&["Unknown"])),
+    kind("Derivatives", &[], &[], Many(&["Unknown"])),
+    kind("InitialUnknowns", &[], &[], Many(&["Unknown"])),
     kind("Unknown", &[("index", Unsigned)],
-        &[("dependencies", Indices), ("dependenciesKind", DEPENDENCY)],
+        &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)],
         Sequence(&[])),
 ];
 
@@ -164,46 +176,49 @@ fn find(kinds: &'static [Kind], parent: &str, name: &str) -> Option<&'static Kin
     kinds.iter().find(|k| k.name == full).or_else(|| kinds.iter().find(|k| k.name == name))
 }
 
+/// Value references or indices.
+pub const INDICES: Written = List(&Unsigned);
+/// Whole numbers of 64 bits.
+pub const LONGS: Written = List(&Long);
+/// Numbers.
+pub const DOUBLES: Written = List(&Double);
+/// Truth values.
+pub const BOOLEANS: Written = List(&Boolean);
+
 impl Written {
-    /// Allowed values, if this one is not allowed.
-    fn allowed(self, value: &str) -> Option<String> {
+    fn fits(self, value: &str) -> bool {
         let value = value.trim();
-        let (fits, allowed) = match self {
-            Text => return None,
-            Boolean => {
-                (matches!(value, "true" | "false" | "0" | "1"), "true, false, 1, 0".to_string())
+        match self {
+            Text => true,
+            Boolean => matches!(value, "true" | "false" | "0" | "1"),
+            Int => value.parse::<i32>().is_ok(),
+            Unsigned => value.parse::<u32>().is_ok(),
+            Long => value.parse::<i64>().is_ok() || value.parse::<u64>().is_ok(),
+            Double => double(value).is_some(),
+            Time => is_time(value),
+            List(one) => value.split_whitespace().all(|word| one.fits(word)),
+            OneOf(words) => words.contains(&value),
+            Words(words) => value.split_whitespace().all(|word| words.contains(&word)),
+        }
+    }
+
+    /// Describes the values that are allowed.
+    fn allowed(self) -> String {
+        match self {
+            Text => "any text".into(),
+            Boolean => "true, false, 1, 0".into(),
+            Int => "a whole number of 32 bits".into(),
+            Unsigned => "a whole number from 0 on".into(),
+            Long => "a whole number of 64 bits".into(),
+            Double => "a number with a decimal point, INF, -INF or NaN".into(),
+            Time => "year-month-dayThour:minute:secondZ".into(),
+            List(Unsigned | Long) => "whole numbers with spaces between".into(),
+            List(Double) => {
+                "numbers with a decimal point, INF, -INF or NaN, with spaces between".into()
             }
-            Int => (value.parse::<i32>().is_ok(), "a whole number of 32 bits".to_string()),
-            Unsigned => (value.parse::<u32>().is_ok(), "a whole number from 0 on".to_string()),
-            Double => (
-                double(value).is_some(),
-                "a number with a decimal point, INF, -INF or NaN".to_string(),
-            ),
-            Time => (is_time(value), "year-month-dayThour:minute:secondZ".to_string()),
-            Indices => (
-                value.split_whitespace().all(|word| word.parse::<u32>().is_ok()),
-                "whole numbers with spaces between".to_string(),
-            ),
-            Longs => (
-                value
-                    .split_whitespace()
-                    .all(|w| w.parse::<i64>().is_ok() || w.parse::<u64>().is_ok()),
-                "whole numbers with spaces between".to_string(),
-            ),
-            Doubles => (
-                value.split_whitespace().all(|word| double(word).is_some()),
-                "numbers with a decimal point, INF, -INF or NaN, with spaces between".to_string(),
-            ),
-            Booleans => (
-                value.split_whitespace().all(|w| matches!(w, "true" | "false" | "0" | "1")),
-                "true, false, 1, 0 with spaces between".to_string(),
-            ),
-            OneOf(words) => (words.contains(&value), words.join(", ")),
-            Words(words) => {
-                (value.split_whitespace().all(|word| words.contains(&word)), words.join(", "))
-            }
-        };
-        (!fits).then_some(allowed)
+            List(one) => format!("{} with spaces between", one.allowed()),
+            OneOf(words) | Words(words) => words.join(", "),
+        }
     }
 }
 
@@ -267,15 +282,14 @@ fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &
     let Some(kind) = find(kinds, parent, &element.name) else { return };
     let is_open = !std::ptr::eq(kinds, KINDS) && ANY_ATTRIBUTE.contains(&&*element.name);
     for (attribute, _) in &element.attributes {
-        let known = kind.needed.iter().chain(kind.optional).any(|(name, _)| name == attribute);
+        let known = kind.attributes().any(|(name, _)| name == attribute);
         // xsi:noNamespaceSchemaLocation belongs to XML itself
         if !known
             && !is_open
             && attribute != "noNamespaceSchemaLocation"
             && attribute != "schemaLocation"
         {
-            let all: Vec<_> =
-                kind.needed.iter().chain(kind.optional).map(|(name, _)| *name).collect();
+            let all: Vec<_> = kind.attributes().map(|(name, _)| *name).collect();
             let all = if all.is_empty() { "none".to_string() } else { all.join(", ") };
             findings.add(
                 place(element),
@@ -326,22 +340,13 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                 }
             }
         }
-        ManyOf(names) => {
+        Many(names) => {
             if element.children.is_empty() {
-                findings.add(place(element), "it is empty (allowed: one element or more)");
+                let one = if let [name] = names { name } else { "element" };
+                findings.add(place(element), format!("it is empty (allowed: one {one} or more)"));
             }
-            for child in &element.children {
-                if !names.contains(&&*child.name) {
-                    unknown(child, names, findings);
-                }
-            }
-        }
-        Many(name) => {
-            if element.children.is_empty() {
-                findings.add(place(element), format!("it is empty (allowed: one {name} or more)"));
-            }
-            for child in element.children.iter().filter(|child| child.name != name) {
-                unknown(child, &[name], findings);
+            for child in element.children.iter().filter(|c| !names.contains(&&*c.name)) {
+                unknown(child, names, findings);
             }
         }
         Sequence(names) => {
@@ -415,10 +420,9 @@ pub fn values_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings
 
 fn value(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {
     let Some(kind) = find(kinds, parent, &element.name) else { return };
-    for (name, written) in kind.needed.iter().chain(kind.optional) {
-        if let Some(value) = element.get(name)
-            && let Some(allowed) = written.allowed(value)
-        {
+    for (name, written) in kind.attributes() {
+        if let Some(value) = element.get(name).filter(|value| !written.fits(value)) {
+            let allowed = written.allowed();
             findings.add(place(element), format!("{name}=\"{value}\" (allowed: {allowed})"));
         }
     }
@@ -465,8 +469,7 @@ mod tests {
             for kind in kinds {
                 let names: Vec<&str> = match kind.children {
                     Any => vec![],
-                    Many(name) => vec![name],
-                    Sequence(names) | Ordered(names) | ManyOf(names) => names.to_vec(),
+                    Many(names) | Sequence(names) | Ordered(names) => names.to_vec(),
                     Choice(a, b) => [a, b].concat(),
                 };
                 let parent = kind.name.rsplit('/').next().unwrap();

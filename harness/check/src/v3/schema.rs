@@ -1,10 +1,11 @@
 //! The schema of modelDescription.xml of FMI 3.0.2 (section 2.4) as a table.
 
-use crate::schema::Children::{Any, Choice, Many, ManyOf, Ordered, Sequence};
-use crate::schema::Written::{
-    Boolean, Booleans, Double, Doubles, Indices, Int, Longs, OneOf, Text, Time, Unsigned, Words,
+use crate::schema::Children::{Any, Choice, Many, Ordered, Sequence};
+use crate::schema::Written::{Boolean, Double, Int, OneOf, Text, Time, Unsigned};
+use crate::schema::{
+    self, Attributes, BOOLEANS, DEPENDENCY, DOUBLES, INDICES, INITIAL, Kind, LONGS, VARIABILITY,
+    Written, kind,
 };
-use crate::schema::{self, Kind, Written, kind};
 
 use super::Description;
 use crate::Findings;
@@ -18,9 +19,6 @@ const CAUSALITY: Written = OneOf(&[
     "independent",
     "structuralParameter",
 ]);
-const VARIABILITY: Written = OneOf(&["constant", "fixed", "tunable", "discrete", "continuous"]);
-const INITIAL: Written = OneOf(&["exact", "approx", "calculated"]);
-const DEPENDENCY: Written = Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
 
 /// The elements that stand for a type of variable.
 pub const TYPES: &[&str] = &[
@@ -41,18 +39,19 @@ pub const TYPES: &[&str] = &[
     "Clock",
 ];
 
-type Attributes = &'static [(&'static str, Written)];
-
-const FLOAT: Attributes = &[
+/// Attributes of every variable except clocks.
+const OF_ALL: Attributes = &[
     ("description", Text),
     ("causality", CAUSALITY),
     ("variability", VARIABILITY),
     ("initial", INITIAL),
     ("canHandleMultipleSetPerTimeInstant", Boolean),
-    ("clocks", Indices),
+    ("clocks", INDICES),
     ("intermediateUpdate", Boolean),
     ("previous", Unsigned),
     ("declaredType", Text),
+];
+const FLOAT: Attributes = &[
     ("quantity", Text),
     ("unit", Text),
     ("displayUnit", Text),
@@ -61,50 +60,13 @@ const FLOAT: Attributes = &[
     ("min", Double),
     ("max", Double),
     ("nominal", Double),
-    ("start", Doubles),
+    ("start", DOUBLES),
     ("derivative", Unsigned),
     ("reinit", Boolean),
 ];
-const WHOLE: Attributes = &[
-    ("description", Text),
-    ("causality", CAUSALITY),
-    ("variability", VARIABILITY),
-    ("initial", INITIAL),
-    ("canHandleMultipleSetPerTimeInstant", Boolean),
-    ("clocks", Indices),
-    ("intermediateUpdate", Boolean),
-    ("previous", Unsigned),
-    ("declaredType", Text),
-    ("quantity", Text),
-    ("min", Longs),
-    ("max", Longs),
-    ("start", Longs),
-];
-const TRUTH: Attributes = &[
-    ("description", Text),
-    ("causality", CAUSALITY),
-    ("variability", VARIABILITY),
-    ("initial", INITIAL),
-    ("canHandleMultipleSetPerTimeInstant", Boolean),
-    ("clocks", Indices),
-    ("intermediateUpdate", Boolean),
-    ("previous", Unsigned),
-    ("declaredType", Text),
-    ("start", Booleans),
-];
-const TEXT: Attributes = &[
-    ("description", Text),
-    ("causality", CAUSALITY),
-    ("variability", VARIABILITY),
-    ("initial", INITIAL),
-    ("canHandleMultipleSetPerTimeInstant", Boolean),
-    ("clocks", Indices),
-    ("intermediateUpdate", Boolean),
-    ("previous", Unsigned),
-    ("declaredType", Text),
-    ("mimeType", Text),
-    ("maxSize", Longs),
-];
+const WHOLE: Attributes = &[("quantity", Text), ("min", LONGS), ("max", LONGS), ("start", LONGS)];
+const TRUTH: Attributes = &[("start", BOOLEANS)];
+const TEXT: Attributes = &[("mimeType", Text), ("maxSize", LONGS)];
 const NAMED: Attributes = &[("name", Text), ("valueReference", Unsigned)];
 const ENUMERATION: Attributes =
     &[("name", Text), ("valueReference", Unsigned), ("declaredType", Text)];
@@ -122,7 +84,7 @@ const FLOAT_TYPE: Attributes = &[
     ("nominal", Double),
 ];
 const WHOLE_TYPE: Attributes =
-    &[("description", Text), ("quantity", Text), ("min", Longs), ("max", Longs)];
+    &[("description", Text), ("quantity", Text), ("min", LONGS), ("max", LONGS)];
 const CLOCK_ATTRIBUTES: Attributes = &[
     ("description", Text),
     ("canBeDeactivated", Boolean),
@@ -134,13 +96,13 @@ const CLOCK_ATTRIBUTES: Attributes = &[
     ("intervalDecimal", Double),
     ("shiftDecimal", Double),
     ("supportsFraction", Boolean),
-    ("resolution", Longs),
-    ("intervalCounter", Longs),
-    ("shiftCounter", Longs),
+    ("resolution", LONGS),
+    ("intervalCounter", LONGS),
+    ("shiftCounter", LONGS),
     ("causality", CAUSALITY),
     ("variability", VARIABILITY),
     ("canHandleMultipleSetPerTimeInstant", Boolean),
-    ("clocks", Indices),
+    ("clocks", INDICES),
     ("declaredType", Text),
 ];
 const NOTE: schema::Children = Sequence(&["Annotations"]);
@@ -175,14 +137,14 @@ pub static KINDS: &[Kind] = &[
           ("canGetAndSetFMUState", Boolean), ("canSerializeFMUState", Boolean),
           ("providesDirectionalDerivatives", Boolean), ("providesAdjointDerivatives", Boolean),
           ("providesPerElementDependencies", Boolean)], NOTE),
-    kind("UnitDefinitions", &[], &[], Many("Unit")),
+    kind("UnitDefinitions", &[], &[], Many(&["Unit"])),
     kind("Unit", &[("name", Text)], &[], Ordered(&["Annotations", "BaseUnit", "DisplayUnit"])),
     kind("BaseUnit", &[],
         &[("kg", Int), ("m", Int), ("s", Int), ("A", Int), ("K", Int), ("mol", Int), ("cd", Int), ("rad", Int),
           ("factor", Double), ("offset", Double)], Sequence(&[])),
     kind("DisplayUnit", &[("name", Text)],
         &[("factor", Double), ("offset", Double), ("inverse", Boolean)], NOTE),
-    kind("TypeDefinitions", &[], &[], ManyOf(&["Float32Type", "Float64Type", "Int8Type", "UInt8Type", "Int16Type",
+    kind("TypeDefinitions", &[], &[], Many(&["Float32Type", "Float64Type", "Int8Type", "UInt8Type", "Int16Type",
         "UInt16Type", "Int32Type", "UInt32Type", "Int64Type", "UInt64Type", "BooleanType", "StringType",
         "BinaryType", "EnumerationType", "ClockType"])),
     kind("Float32Type", &[("name", Text)], FLOAT_TYPE, NOTE),
@@ -198,47 +160,47 @@ pub static KINDS: &[Kind] = &[
     kind("BooleanType", &[("name", Text)], &[("description", Text)], NOTE),
     kind("StringType", &[("name", Text)], &[("description", Text)], NOTE),
     kind("BinaryType", &[("name", Text)],
-        &[("description", Text), ("mimeType", Text), ("maxSize", Longs)], NOTE),
+        &[("description", Text), ("mimeType", Text), ("maxSize", LONGS)], NOTE),
     kind("EnumerationType", &[("name", Text)], &[("description", Text), ("quantity", Text)],
         Choice(&[], &["Annotations", "Item"])),
     kind("ClockType", &[("name", Text)], CLOCK_ATTRIBUTES, NOTE),
-    kind("Item", &[("name", Text), ("value", Longs)], &[("description", Text)], NOTE),
-    kind("LogCategories", &[], &[], Many("Category")),
+    kind("Item", &[("name", Text), ("value", LONGS)], &[("description", Text)], NOTE),
+    kind("LogCategories", &[], &[], Many(&["Category"])),
     kind("Category", &[("name", Text)], &[("description", Text)], NOTE),
     kind("DefaultExperiment", &[],
         &[("startTime", Double), ("stopTime", Double), ("tolerance", Double), ("stepSize", Double)], NOTE),
-    kind("ModelVariables", &[], &[], ManyOf(TYPES)),
-    kind("Float32", NAMED, FLOAT, INSIDE),
-    kind("Float64", NAMED, FLOAT, INSIDE),
-    kind("Int8", NAMED, WHOLE, INSIDE),
-    kind("UInt8", NAMED, WHOLE, INSIDE),
-    kind("Int16", NAMED, WHOLE, INSIDE),
-    kind("UInt16", NAMED, WHOLE, INSIDE),
-    kind("Int32", NAMED, WHOLE, INSIDE),
-    kind("UInt32", NAMED, WHOLE, INSIDE),
-    kind("Int64", NAMED, WHOLE, INSIDE),
-    kind("UInt64", NAMED, WHOLE, INSIDE),
-    kind("Boolean", NAMED, TRUTH, INSIDE),
-    kind("String", NAMED, TEXT, INSIDE_TEXT),
-    kind("Binary", NAMED, TEXT, INSIDE_TEXT),
-    kind("Enumeration", ENUMERATION, WHOLE, INSIDE),
+    kind("ModelVariables", &[], &[], Many(TYPES)),
+    kind("Float32", NAMED, FLOAT, INSIDE).and(OF_ALL),
+    kind("Float64", NAMED, FLOAT, INSIDE).and(OF_ALL),
+    kind("Int8", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("UInt8", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("Int16", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("UInt16", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("Int32", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("UInt32", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("Int64", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("UInt64", NAMED, WHOLE, INSIDE).and(OF_ALL),
+    kind("Boolean", NAMED, TRUTH, INSIDE).and(OF_ALL),
+    kind("String", NAMED, TEXT, INSIDE_TEXT).and(OF_ALL),
+    kind("Binary", NAMED, TEXT, INSIDE_TEXT).and(OF_ALL),
+    kind("Enumeration", ENUMERATION, WHOLE, INSIDE).and(OF_ALL),
     kind("Clock", NAMED, CLOCK_ATTRIBUTES, Ordered(&["Annotations", "Alias"])),
-    kind("Dimension", &[], &[("start", Longs), ("valueReference", Unsigned)], Sequence(&[])),
+    kind("Dimension", &[], &[("start", LONGS), ("valueReference", Unsigned)], Sequence(&[])),
     kind("Start", &[("value", Text)], &[], Sequence(&[])),
     kind("Alias", &[("name", Text)], &[("description", Text), ("displayUnit", Text)], NOTE),
     kind("Annotations", &[], &[], Any),
     kind("ModelStructure", &[], &[], Ordered(&["Output", "ContinuousStateDerivative", "ClockedState",
         "InitialUnknown", "EventIndicator"])),
     kind("Output", &[("valueReference", Unsigned)],
-        &[("dependencies", Indices), ("dependenciesKind", DEPENDENCY)], NOTE),
+        &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)], NOTE),
     kind("ContinuousStateDerivative", &[("valueReference", Unsigned)],
-        &[("dependencies", Indices), ("dependenciesKind", DEPENDENCY)], NOTE),
+        &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)], NOTE),
     kind("ClockedState", &[("valueReference", Unsigned)],
-        &[("dependencies", Indices), ("dependenciesKind", DEPENDENCY)], NOTE),
+        &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)], NOTE),
     kind("InitialUnknown", &[("valueReference", Unsigned)],
-        &[("dependencies", Indices), ("dependenciesKind", DEPENDENCY)], NOTE),
+        &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)], NOTE),
     kind("EventIndicator", &[("valueReference", Unsigned)],
-        &[("dependencies", Indices), ("dependenciesKind", DEPENDENCY)], NOTE),
+        &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)], NOTE),
 ];
 
 /// `xml.schema`
