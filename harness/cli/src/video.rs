@@ -90,7 +90,7 @@ pub fn film(page: &str, film: &Film, out: &Path) -> Result<()> {
     );
     ensure!(found == frames as u64, "{browser} drew {found} of {frames} frames: has it no WebGL?");
     let bytes = std::fs::read(&draft).context("the film cannot be read")?;
-    files::output::atomically(out, |file| Ok(file.write_all(&bytes)?))
+    files::output::write(out, &bytes)
 }
 
 /// Starts a browser that draws the frames of a page; its output has them, a line each.

@@ -2,7 +2,7 @@
 //! renamed. And what is in one, as a hash.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -36,6 +36,11 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
     Ok(result)
 }
 
+/// Writes `path` as [`atomically`] does.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    atomically(path, |file| Ok(file.write_all(bytes.as_ref())?))
+}
+
 /// Makes a directory and those above it.
 pub fn directory(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path)
@@ -60,8 +65,6 @@ pub fn sha256_of(mut from: impl Read) -> Result<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write;
-
     use super::*;
 
     #[test]

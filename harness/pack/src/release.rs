@@ -1,7 +1,7 @@
 //! Makes the files of a release. Each FMU is for all platforms, in both versions of FMI, with its SBOM and the report of its
 //! check. The wheels' SBOM and the wheel for Linux follow. [`MANIFEST`] lists the SHA-256 of all files.
 
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -101,10 +101,10 @@ fn record(
     let mut written = Vec::new();
     for (file, bytes) in files {
         let path = folder.join(file);
-        output::atomically(&path, |to| Ok(to.write_all(bytes)?))?;
+        output::write(&path, bytes)?;
         written.push(path);
     }
-    output::atomically(&manifest, |to| Ok(to.write_all((lines.join("\n") + "\n").as_bytes())?))?;
+    output::write(&manifest, (lines.join("\n") + "\n").as_bytes())?;
     for file in old.lines().filter_map(listed).filter(is_own) {
         let path = folder.join(&file);
         if !files.iter().any(|(kept, _)| *kept == file) && path.is_file() {

@@ -1,11 +1,10 @@
 //! Results of `hubslosh identify`, whatever they were identified from.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::Path;
 
 use anyhow::Result;
-use files::output::atomically;
+use files::output;
 use identify::estimate::Estimated;
 use identify::news::News;
 
@@ -47,7 +46,7 @@ impl Out<'_> {
             terminal::message("result", text);
         }
         match self.result {
-            Some(path) => atomically(path, |file| Ok(file.write_all(text.as_bytes())?)),
+            Some(path) => output::write(path, text.as_bytes()),
             None => Ok(()),
         }
     }
@@ -73,7 +72,7 @@ impl Out<'_> {
             terminal::warn("the result cannot be trusted; its verdict says why");
         }
         if let Some(path) = self.report {
-            atomically(path, |file| Ok(file.write_all(page().as_bytes())?))?;
+            output::write(path, page().as_bytes())?;
             done!("{}", path.display());
         }
         if let Some(path) = self.result {

@@ -1,7 +1,6 @@
 //! `hubslosh gyro`.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use analysis::allan::{Estimate, Fit, Term};
@@ -87,9 +86,7 @@ impl GyroArgs {
         output::directory(&self.out)?;
         let [table, picture] = ["allan.csv", "allan.svg"].map(|name| self.out.join(name));
         found.table().write(&table, &BTreeMap::new())?;
-        output::atomically(&picture, |file| {
-            Ok(file.write_all(report::gyro::allan_deviations(&found).as_bytes())?)
-        })?;
+        output::write(&picture, report::gyro::allan_deviations(&found).as_bytes())?;
         match self.json {
             true => terminal::say_json(&found.json())?,
             false => print!("{}", found.text()),
@@ -134,9 +131,7 @@ impl GyroArgs {
             table.write(&self.out.join(name), &BTreeMap::new())?;
         }
         for (name, picture) in report::gyro::rest(&rest) {
-            output::atomically(&self.out.join(name), |file| {
-                Ok(file.write_all(picture.file().as_bytes())?)
-            })?;
+            output::write(&self.out.join(name), picture.file().as_bytes())?;
         }
         let rows = rows(&rest);
         for (name, value) in &rows {
@@ -144,7 +139,7 @@ impl GyroArgs {
         }
         if let Some(path) = &self.report {
             let page = report::gyro::page(&rows, &rest);
-            output::atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
+            output::write(path, page.as_bytes())?;
             done!("{}", path.display());
         }
         done!("{}", self.out.display());

@@ -1,10 +1,9 @@
 //! `hubslosh tank`.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
-use files::output::atomically;
+use files::output;
 use hubslosh_tank::parameters::{self, Liquid, ParameterSet, Target};
 use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
 
@@ -112,14 +111,6 @@ impl TankArgs {
             "--contact-angle {} (allowed: 0 to 180)",
             self.contact_angle
         );
-        let files: Vec<&PathBuf> =
-            [&self.out, &self.parameters, &self.picture].into_iter().flatten().collect();
-        if let Some(i) = (1..files.len()).find(|i| files[..*i].contains(&files[*i])) {
-            bail!(
-                "{} is to be two files at once (--out, --parameters, --picture)",
-                files[i].display()
-            );
-        }
         let read = || self.tank.display().to_string();
         let tank = Tank::read(&self.tank).with_context(read)?;
         let set;
@@ -163,18 +154,18 @@ impl TankArgs {
         };
         match &self.out {
             Some(out) => {
-                atomically(out, |file| Ok(file.write_all(text.as_bytes())?))?;
+                output::write(out, text.as_bytes())?;
                 done!("{}", out.display());
             }
             None if self.json => print!("{json}"),
             None => print!("{as_table}"),
         }
         if let Some((path, text)) = &set {
-            atomically(path, |file| Ok(file.write_all(text.as_bytes())?))?;
+            output::write(path, text.as_bytes())?;
             done!("{}", path.display());
         }
         if let Some(path) = &self.picture {
-            atomically(path, |file| Ok(file.write_all(picture.as_bytes())?))?;
+            output::write(path, picture.as_bytes())?;
             done!("{}", path.display());
         }
         Ok(())

@@ -1,11 +1,10 @@
 //! `hubslosh view`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use files::output::atomically;
+use files::output;
 use host::description::ModelDescription;
 use hubslosh_tank::tank::Geometry;
 use hubslosh_tank::{Fill, Tank};
@@ -139,7 +138,7 @@ impl ViewArgs {
         for warning in page.warnings {
             terminal::warn(warning);
         }
-        atomically(&out, |file| Ok(file.write_all(page.html.as_bytes())?))?;
+        output::write(&out, page.html.as_bytes())?;
         done!("{} ({:.1} MB)", out.display(), page.html.len() as f64 * 1e-6);
         if let Some(video) = &self.video {
             let time = table.column("time").unwrap_or_default();

@@ -155,7 +155,7 @@ impl Folder {
             listed.into_iter().partition(|(name, _)| path.join(name).is_file());
         let text = lines(&found);
         if fs::read(&place).ok().is_none_or(|there| there != text.as_bytes()) {
-            output::atomically(&place, |file| Ok(file.write_all(text.as_bytes())?))?;
+            output::write(&place, text.as_bytes())?;
         }
         let file = File::options().append(true).create(true).open(&place);
         let file = file.with_context(|| format!("{} cannot be written", place.display()))?;
@@ -243,8 +243,7 @@ impl Folder {
         // a full disk is detected before any file is replaced
         let all = files.into_iter().chain([(MANIFEST, text)]);
         let names = all.map(|(name, bytes)| {
-            let wrote =
-                output::atomically(&self.unfinished.join(name), |file| Ok(file.write_all(&bytes)?));
+            let wrote = output::write(&self.unfinished.join(name), &bytes);
             let place = self.path.join(name);
             wrote.with_context(|| format!("{} cannot be published", place.display()))?;
             Ok(name)

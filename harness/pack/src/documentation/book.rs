@@ -31,7 +31,7 @@ struct Part {
 pub fn write(files: &Files, out: &Path) -> Result<()> {
     output::directory(out)?;
     for (name, bytes) in files {
-        output::atomically(&out.join(name), |file| Ok(std::io::Write::write_all(file, bytes)?))?;
+        output::write(&out.join(name), bytes)?;
     }
     Ok(())
 }

@@ -5,7 +5,6 @@
 
 mod chapters;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
@@ -230,9 +229,7 @@ pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> R
     let folder = campaign.take()?;
     if let Some(bearing) = bearing {
         let text = bearing.json()?;
-        output::atomically(&campaign.out.join("friction.json"), |file| {
-            Ok(file.write_all(text.as_bytes())?)
-        })?;
+        output::write(&campaign.out.join("friction.json"), text.as_bytes())?;
     }
     drive(&fmu, &campaign, folder, chapters)?;
     ensure!(
