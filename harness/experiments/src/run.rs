@@ -423,13 +423,7 @@ impl Recorder {
             self.columns[*place].push(*value);
         }
         for (variable, place) in self.others.iter().zip(&self.places[self.reals.len()..]) {
-            let number = match instance.value(variable)? {
-                Value::Real(x) => x,
-                Value::Integer(n) => n as f64,
-                Value::Boolean(yes) => f64::from(u8::from(yes)),
-                Value::String(_) => f64::NAN,
-            };
-            self.columns[*place].push(number);
+            self.columns[*place].push(instance.value(variable)?.number());
         }
         let wrong = self.values.iter().position(|value| !value.is_finite());
         Ok(wrong.map(|i| self.places[i]))

@@ -298,6 +298,16 @@ pub enum Value {
 }
 
 impl Value {
+    /// Returns the value as tables have it: Booleans as 0 and 1, NaN for a text.
+    pub fn number(&self) -> f64 {
+        match self {
+            Value::Real(x) => *x,
+            Value::Integer(n) => *n as f64,
+            Value::Boolean(yes) => f64::from(u8::from(*yes)),
+            Value::String(_) => f64::NAN,
+        }
+    }
+
     /// Returns the value in the form of a description.
     fn text(&self) -> String {
         match self {
@@ -435,23 +445,41 @@ impl Reader {
         if typed.is_none() {
             self.problem(element, "it has no type");
         }
-        let of = |name: &str| typed.and_then(|(_, typed)| typed.get(name)).map(String::from);
+        let (kind, typed) = typed.map_or((Type::Real, None), |(kind, typed)| (kind, Some(typed)));
+        let c_type = match kind {
+            Type::Integer | Type::Enumeration => CType::Int32,
+            Type::Boolean => CType::Boolean,
+            Type::String => CType::String,
+            _ => CType::Float64,
+        };
+        let start = typed.and_then(|typed| typed.get("start")).map(String::from);
+        Variable {
+            variability: element.get("variability").unwrap_or_default().into(),
+            intermediate: false,
+            ..self.common(element, typed, (c_type, kind), start)
+        }
+    }
+
+    /// What both versions have of a variable. `typed` has the attributes that depend on the type.
+    fn common(
+        &mut self,
+        element: &Element,
+        typed: Option<&Element>,
+        (c_type, kind): (CType, Type),
+        start: Option<String>,
+    ) -> Variable {
+        let of = |name: &str| typed.and_then(|typed| typed.get(name)).map(String::from);
         Variable {
             name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
             reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
             causality: element.get("causality").map_or(Causality::Local, Causality::from),
-            variability: element.get("variability").unwrap_or_default().into(),
+            variability: Variability::from(""),
             description: element.get("description").unwrap_or_default().into(),
-            intermediate: false,
-            c_type: match typed.map_or(Type::Real, |(kind, _)| kind) {
-                Type::Integer | Type::Enumeration => CType::Int32,
-                Type::Boolean => CType::Boolean,
-                Type::String => CType::String,
-                _ => CType::Float64,
-            },
-            kind: typed.map_or(Type::Real, |(kind, _)| kind),
+            intermediate: element.flag("intermediateUpdate"),
+            c_type,
+            kind,
             attributes: Attributes {
-                start: of("start"),
+                start,
                 unit: of("unit"),
                 display_unit: of("displayUnit"),
                 min: of("min"),
@@ -538,13 +566,15 @@ impl Reader {
         c_type: CType,
         kind: Type,
     ) -> (Variable, Vec<String>) {
-        let of = |name: &str| element.get(name).map(String::from);
         let starts: Vec<String> = match c_type {
             CType::String | CType::Binary => {
                 let starts = element.children.iter().filter(|child| child.name == "Start");
                 starts.map(|start| start.get("value").unwrap_or_default().into()).collect()
             }
-            _ => of("start").iter().flat_map(|s| s.split_whitespace()).map(String::from).collect(),
+            _ => {
+                let words = element.get("start").into_iter().flat_map(str::split_whitespace);
+                words.map(String::from).collect()
+            }
         };
         let variability = element.get("variability").map(Variability::from);
         let variability = variability.unwrap_or_else(|| {
@@ -555,25 +585,9 @@ impl Reader {
                 (false, _) => Variability::Discrete,
             }
         });
-        let variable = Variable {
-            name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
-            reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
-            causality: element.get("causality").map_or(Causality::Local, Causality::from),
-            variability,
-            description: element.get("description").unwrap_or_default().into(),
-            intermediate: element.flag("intermediateUpdate"),
-            c_type,
-            kind,
-            attributes: Attributes {
-                start: starts.first().cloned(),
-                unit: of("unit"),
-                display_unit: of("displayUnit"),
-                min: of("min"),
-                max: of("max"),
-                declared_type: of("declaredType"),
-            },
-        };
-        (variable, starts)
+        let start = starts.first().cloned();
+        let common = self.common(element, Some(element), (c_type, kind), start);
+        (Variable { variability, ..common }, starts)
     }
 
     /// Sizes of an array, those by structural parameters from `sizes`; none of a scalar.

@@ -12,7 +12,6 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::fmu::{Fmu, FmuError, FmuWarning, error};
-use crate::numbers::number;
 use crate::run::{Run, Stop, Table};
 
 /// An instance, and the FMU that it borrows: dropped in this order.
@@ -145,7 +144,7 @@ impl Instance {
         let fmu = self.fmu.get();
         let all = names.iter().map(|name| fmu.variable(name)).collect::<PyResult<Vec<_>>>()?;
         self.call(py, |held| {
-            all.into_iter().map(|variable| Ok(number(held.instance.value(variable)?))).collect()
+            all.into_iter().map(|variable| Ok(held.instance.value(variable)?.number())).collect()
         })
     }
 

@@ -2,7 +2,6 @@
 #![allow(unsafe_code)]
 
 use host::c_abi::CallError;
-use host::description::Value;
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -24,16 +23,6 @@ impl From<CallError> for Failure {
 impl From<PyErr> for Failure {
     fn from(why: PyErr) -> Failure {
         Failure::Python(why)
-    }
-}
-
-/// A value as a table has it; Booleans as 0 and 1.
-pub fn number(value: Value) -> f64 {
-    match value {
-        Value::Real(x) => x,
-        Value::Integer(n) => n as f64,
-        Value::Boolean(is) => f64::from(u8::from(is)),
-        Value::String(_) => f64::NAN,
     }
 }
 

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::feedback::Feedback;
 use crate::fmu::Fmu;
-use crate::numbers::{Failure, Numbers, number};
+use crate::numbers::{Failure, Numbers};
 
 /// Most rows between two visits of Python, where Ctrl-C is heard and rows are handed over.
 const ROWS: usize = 1024;
@@ -53,7 +53,7 @@ impl<'fmu> Columns<'fmu> {
             self.row[*place] = *real;
         }
         for (variable, place) in &self.others {
-            self.row[*place] = number(from.value(variable)?);
+            self.row[*place] = from.value(variable)?.number();
         }
         Ok(&self.row)
     }

@@ -297,13 +297,9 @@ fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>
     let mut outputs = Vec::new();
     for v in all {
         for value in session.read(&v)? {
-            let number = match value {
-                Value::Real(x) => x,
-                Value::Integer(n) => n as f64,
-                Value::Boolean(yes) => f64::from(u8::from(yes)),
-                Value::String(_) => continue,
-            };
-            outputs.push((v.name.clone(), number));
+            if !matches!(value, Value::String(_)) {
+                outputs.push((v.name.clone(), value.number()));
+            }
         }
     }
     Ok(outputs)

@@ -34,12 +34,8 @@ impl Parameters<'_> {
 
     /// A number in SI units; 0 of what the FMU does not have.
     pub fn number(&self, name: &str) -> f64 {
-        match self.value(name) {
-            Some((Value::Real(x), _)) => x,
-            Some((Value::Integer(n), _)) => n as f64,
-            Some((Value::Boolean(b), _)) => f64::from(u8::from(b)),
-            _ => 0.0,
-        }
+        let number = self.value(name).map(|(value, _)| value.number());
+        number.filter(|number| !number.is_nan()).unwrap_or(0.0)
     }
 
     /// The name of an enumeration's item.
