@@ -1,5 +1,6 @@
 //! Monte Carlo: which of the drawn parameters decide, and the distribution of what they make.
 
+use analysis::statistics;
 use experiments::campaign::Outcome;
 use maud::html;
 
@@ -131,20 +132,19 @@ fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
     ((0..BINS).map(|i| low + (i as f64 + 0.5) * width).collect(), counts)
 }
 
-/// Mean and standard deviation.
+/// Mean and standard deviation; 0 without values.
 pub(super) fn moments(values: &[f64]) -> (f64, f64) {
-    let count = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
-    (mean, variance.sqrt())
+    match values {
+        [] => (0.0, 0.0),
+        _ => (statistics::mean(values), statistics::deviation(values)),
+    }
 }
 
 /// Coefficient of correlation, −1 to 1; 0 where one of the two does not vary.
 fn correlation(points: &[(f64, f64)]) -> f64 {
     let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
-    let ((mx, sx), (my, sy)) = (moments(&x), moments(&y));
-    let mean = points.iter().map(|(x, y)| (x - mx) * (y - my)).sum::<f64>() / points.len() as f64;
-    if sx * sy > 0.0 { mean / (sx * sy) } else { 0.0 }
+    let found = statistics::correlation(&x, &y);
+    if found.is_finite() { found } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use analysis::rest::Rest;
 use anyhow::{Context, Result};
+use experiments::scaling::{OXYGEN, WATER};
 use host::fmu::Fmu;
 use identify::estimate::{Estimated, prose};
 use identify::input::reading::{self, Source};
@@ -28,10 +29,6 @@ const THESIS: [(&str, f64); 5] = [
     (friction::OMEGA_S, 0.08581),
     (hub::I, 0.322414),
 ];
-/// Surface tension of water at 25 °C, N/m, and its density, kg/m³ (thesis 5.1).
-const WATER: (f64, f64) = (0.072, 997.0);
-/// The same of liquid oxygen at −200 °C (thesis 7.2.1).
-const OXYGEN: (f64, f64) = (13.2e-3, 1141.0);
 /// Radius of Centaur's oxygen tank, m (thesis 7.2.1).
 const CENTAUR: f64 = 2.0425;
 /// Standard gravity as in the thesis, m/s².
@@ -177,8 +174,7 @@ fn value(day: &Day, fmu: &Fmu, name: &str) -> Result<f64> {
 /// Bond number against the diameter, and the tank in space with the same one.
 fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
     let radius = value(day, fmu, tank::D)? / 2.0;
-    let (sigma, density) = WATER;
-    let bond = |radius: f64| density * GRAVITY * radius * radius / sigma;
+    let bond = |radius: f64| WATER.bond(GRAVITY, radius);
     let own = bond(radius);
     let diameters = (1..=50).map(|k| f64::from(k) * radius / 20.0);
     let against = chart(
@@ -190,8 +186,7 @@ fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
             series("this tank", Style::Dots, [(2e3 * radius, own)]),
         ],
     );
-    let (sigma, density) = OXYGEN;
-    let acceleration = |radius: f64| own * sigma / (density * radius * radius);
+    let acceleration = |radius: f64| OXYGEN.acceleration(own, radius);
     let radii = || (1..=100).map(|k| 0.05 * f64::from(k));
     let space = chart(
         "Acceleration of an oxygen tank with this tank's Bond number",

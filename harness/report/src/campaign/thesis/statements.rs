@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
+use analysis::statistics::mean;
 use experiments::campaign::Outcome;
+use experiments::scaling::{BENCH, OXYGEN, ROUND_WATER, WATER};
 
 use super::super::page::{Group, torque_of};
 use super::{Judge, Shown, Statement, Who};
@@ -32,10 +34,6 @@ fn from(group: &Group, torque: f64, of: fn(&Outcome) -> Option<f64>) -> Option<V
     let runs = group.runs.iter().filter(|run| torque_of(run) > torque - 1e-9);
     let values: Vec<f64> = runs.map(|run| of(run)).collect::<Option<_>>()?;
     (values.len() > 1).then_some(values)
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 fn spread(values: &[f64]) -> f64 {
@@ -138,19 +136,17 @@ fn number(printed: f64, ours: f64, tolerance: f64) -> Shown {
     (text, (printed / ours - 1.0).abs() < tolerance)
 }
 
-/// The thesis's constants of 7.2: water and oxygen, kg/m³ and N/m; the tank's radius, m.
-const WATER: (f64, f64) = (997.0, 0.072);
-const OXYGEN: (f64, f64) = (1141.0, 13.2e-3);
-const RADIUS: f64 = 0.0815;
+/// The tank's radius, m.
+const RADIUS: f64 = BENCH.0;
 
 /// The rotational Bond number of eq. 7.3 for an acceleration in rad/s².
 fn rotational_bond(acceleration: f64) -> f64 {
-    1000.0 * acceleration * RADIUS.powi(3) / WATER.1
+    ROUND_WATER.rotational_bond(acceleration, RADIUS, RADIUS)
 }
 
 /// Diameter of the flight tank with the same rotational Bond number at 0.005 rad/s², m.
 fn equivalent_diameter(acceleration: f64) -> f64 {
-    2.0 * (rotational_bond(acceleration) * WATER.1 / (1000.0 * 5e-3)).cbrt()
+    2.0 * ROUND_WATER.radius_by_cube(rotational_bond(acceleration), 5e-3)
 }
 
 /// Mean signal-to-noise ratio of a run over the band, the deviation from it, dB, and the frequency of the largest, Hz.
@@ -212,16 +208,7 @@ pub(super) const STATEMENTS: &[Statement] = &[
         who: Who::Bench,
         says: "Resonance and antiresonance vary noticeably with the torque.",
         rule: "each (spa) varies by more than 10 mHz over all torques",
-        judge: Judge::Fill(|group| {
-            let resonance = spread(&from(group, LEAST, |run| run.spa_features().f_res)?);
-            let antiresonance = spread(&from(group, LEAST, |run| run.spa_features().f_dip)?);
-            let text = format!(
-                "antiresonance {:.1}, resonance {:.1} mHz",
-                antiresonance * 1e3,
-                resonance * 1e3
-            );
-            Some((text, antiresonance > 0.01 && resonance > 0.01))
-        }),
+        judge: Judge::Fill(|group| extrema(group, LEAST, |spread| spread > 0.01)),
         why: "The antiresonance is the tank's own frequency, at which slosh is small.",
         ..PLAIN
     },
@@ -243,16 +230,7 @@ pub(super) const STATEMENTS: &[Statement] = &[
         who: Who::Synthetic,
         says: "Resonance and antiresonance hardly depend on the torque; Δf is constant beyond the smallest torques.",
         rule: "both (spa) stay within 4 mHz from 0.05 N·m up",
-        judge: Judge::Fill(|group| {
-            let resonance = spread(&from(group, 0.05, |run| run.spa_features().f_res)?);
-            let antiresonance = spread(&from(group, 0.05, |run| run.spa_features().f_dip)?);
-            let text = format!(
-                "antiresonance {:.1}, resonance {:.1} mHz",
-                antiresonance * 1e3,
-                resonance * 1e3
-            );
-            Some((text, antiresonance < 4e-3 && resonance < 4e-3))
-        }),
+        judge: Judge::Fill(|group| extrema(group, 0.05, |spread| spread < 4e-3)),
         ..PLAIN
     },
     Statement {
@@ -995,7 +973,7 @@ pub(super) const STATEMENTS: &[Statement] = &[
         who: Who::Thesis,
         says: "The tank's Bond number is 902.3.",
         rule: "eq. 7.1 with 997 kg/m³ and 0.072 N/m, to 0.1 %",
-        judge: Judge::Number(|| number(902.3, WATER.0 * 9.81 * RADIUS * RADIUS / WATER.1, 1e-3)),
+        judge: Judge::Number(|| number(902.3, WATER.bond(9.81, RADIUS), 1e-3)),
         ..PLAIN
     },
     Statement {
@@ -1003,9 +981,7 @@ pub(super) const STATEMENTS: &[Statement] = &[
         who: Who::Thesis,
         says: "The Centaur's oxygen tank has this Bond number at 0.002502 m/s².",
         rule: "eq. 7.2 with a radius of 2.0425 m, 1141 kg/m³ and 0.0132 N/m, to 0.1 %",
-        judge: Judge::Number(|| {
-            number(0.002502, 902.3 * OXYGEN.1 / (OXYGEN.0 * 2.0425 * 2.0425), 1e-3)
-        }),
+        judge: Judge::Number(|| number(0.002502, OXYGEN.acceleration(902.3, 2.0425), 1e-3)),
         ..PLAIN
     },
     Statement {
@@ -1092,9 +1068,7 @@ pub(super) const STATEMENTS: &[Statement] = &[
         who: Who::Thesis,
         says: "A Bond number below 30 needs a tank of less than about 5 cm.",
         rule: "eq. 7.1 for a Bond number of 30, to 10 %",
-        judge: Judge::Number(|| {
-            number(0.05, 2.0 * (30.0 * WATER.1 / (WATER.0 * 9.81)).sqrt(), 0.1)
-        }),
+        judge: Judge::Number(|| number(0.05, 2.0 * WATER.radius(30.0, 9.81), 0.1)),
         why: "5 cm is a Bond number of 85.",
         ..PLAIN
     },
@@ -1263,6 +1237,15 @@ pub(super) const STATEMENTS: &[Statement] = &[
         ..PLAIN
     },
 ];
+
+/// Judges the spreads of antiresonance and resonance (spa) from a torque on, Hz.
+fn extrema(group: &Group, torque: f64, is_right: fn(f64) -> bool) -> Option<Shown> {
+    let antiresonance = spread(&from(group, torque, |run| run.spa_features().f_dip)?);
+    let resonance = spread(&from(group, torque, |run| run.spa_features().f_res)?);
+    let text =
+        format!("antiresonance {:.1}, resonance {:.1} mHz", antiresonance * 1e3, resonance * 1e3);
+    Some((text, is_right(antiresonance) && is_right(resonance)))
+}
 
 fn softening(group: &Group) -> Option<Shown> {
     let resonance = |torque| at(group, torque)?.spa_features().f_res;
