@@ -8,7 +8,7 @@ use experiments::sensors::Sensor;
 use identify::any_fmu::{self, Identification};
 use identify::force_record::Task;
 use identify::input::names::list;
-use identify::input::question::{Question, Setting, Solver};
+use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
 use identify::model::simulate::Model;
 use identify::uncertainty::foresee::{Bound, foresee};
@@ -98,19 +98,24 @@ pub struct Told<'a> {
     pub json: bool,
 }
 
-/// Items of a flag; the error lists every item that is wrong.
+/// Items of a flag.
 fn read<T: std::str::FromStr<Err = anyhow::Error>>(
     flags: &[String],
     problems: &mut Vec<String>,
 ) -> Vec<T> {
-    let mut items = Vec::new();
-    for item in flags.iter().flat_map(|flag| list(flag)) {
-        match item.parse() {
-            Ok(item) => items.push(item),
-            Err(error) => problems.push(format!("{error:#}")),
-        }
+    kept(flags.iter().flat_map(|flag| list(flag)).map(str::parse), problems)
+}
+
+/// The items that were read; the error lists every item that is wrong.
+fn kept<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) -> Vec<T> {
+    read.filter_map(|item| item.map_err(|error| problems.push(format!("{error:#}"))).ok()).collect()
+}
+
+impl Told<'_> {
+    /// `--set` as it was written.
+    fn texts(&self) -> Vec<String> {
+        self.settings.iter().map(|(name, value)| format!("{name}={value}")).collect()
     }
-    items
 }
 
 impl AnyFmuArgs {
@@ -125,10 +130,8 @@ impl AnyFmuArgs {
     /// All that is wrong with them.
     pub fn common(&self, told: &Told) -> Result<Task> {
         let mut problems = Vec::new();
-        let settings: Vec<String> =
-            told.settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
         let task = Task {
-            settings: read(&settings, &mut problems),
+            settings: read(&told.texts(), &mut problems),
             priors: read(&self.prior, &mut problems),
             biases: read(&self.bias, &mut problems),
             drift: self.drift,
@@ -152,22 +155,18 @@ impl AnyFmuArgs {
             let twice = (1..names.len()).find(|i| names[..*i].contains(&names[*i]));
             problems.extend(twice.map(|i| format!("--{flag} names {} twice", names[i])));
         }
-        let settings: Vec<String> =
-            told.settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
-        let settings: Vec<Result<Setting>> = settings.iter().map(|text| text.parse()).collect();
-        // its names have commas before the sign of equality
-        let triads: Vec<Result<_>> = self.triad.iter().map(|text| text.parse()).collect();
         let question = Question {
             free: read(&self.free, &mut problems),
             priors: read(&self.prior, &mut problems),
             tolerances: read(&self.tolerances, &mut problems),
-            settings: kept(settings, &mut problems),
+            settings: kept(told.texts().iter().map(|text| text.parse()), &mut problems),
             inputs: names(&self.inputs),
             held: names(&self.held),
             outputs: names(&self.outputs),
             sensors: self.sensors.clone(),
             biases: read(&self.bias, &mut problems),
-            triads: kept(triads, &mut problems),
+            // its names have commas before the sign of equality
+            triads: kept(self.triad.iter().map(|text| text.parse()), &mut problems),
             drift: self.drift,
             solver: self.exchange.map_or(Solver::Own, Solver::Host),
             tolerance: self.solver_tolerance,
@@ -284,17 +283,6 @@ impl AnyFmuArgs {
         }
         Ok(())
     }
-}
-
-fn kept<T>(read: Vec<Result<T>>, problems: &mut Vec<String>) -> Vec<T> {
-    let mut items = Vec::new();
-    for item in read {
-        match item {
-            Ok(item) => items.push(item),
-            Err(error) => problems.push(format!("{error:#}")),
-        }
-    }
-    items
 }
 
 /// Prints tables and verdict.
