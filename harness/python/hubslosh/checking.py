@@ -74,12 +74,13 @@ class Checked:
     def __repr__(self) -> str:
         """Return the first findings and a summary."""
         most = 12
-        lines = [repr(finding) for finding in self.findings]
-        more = [f"and {len(lines) - most} more"] if len(lines) > most else []
+        findings = self.findings
+        lines = [repr(finding) for finding in findings[:most]]
+        more = [f"and {len(findings) - most} more"] if len(findings) > most else []
         skipped = sum(rule.skipped is not None for rule in self.rules)
         counts = f"{self.errors} errors, {self.warnings} warnings"
         rules = f"{len(self.rules) - skipped} rules checked, {skipped} skipped"
-        return "\n".join([*lines[:most], *more, f"{self.fmu}: {counts}; {rules}"])
+        return "\n".join([*lines, *more, f"{self.fmu}: {counts}; {rules}"])
 
 
 def check(
