@@ -106,14 +106,24 @@ fn wrong(set: &Set, seed: u64, harmonics: usize, bias: f64, asymmetry: f64) -> V
     wrong
 }
 
+/// Fits each seed of each set of runs.
+fn all_sets(seeds: std::ops::RangeInclusive<u64>) -> Vec<String> {
+    let of = |set| seeds.clone().flat_map(move |seed| wrong(set, seed, 0, 0.002, ASYMMETRY));
+    SETS.iter().flat_map(of).collect()
+}
+
 /// Seed 2 of the first set failed while the rows at rest did not count: two choices of rows that stick alternated, each by the bias that
 /// the other one gives. `friction.d` was 3.4 standard deviations off and the bias of the ramp 4.9, and the fit was accepted.
 #[test]
 fn friction_of_three_sets_of_runs_ends_in_no_false_minimum() {
-    let all = SETS
-        .iter()
-        .flat_map(|set| (1..=8).flat_map(move |seed| wrong(set, seed, 0, 0.002, ASYMMETRY)));
-    assert_eq!(all.collect::<Vec<_>>(), [""; 0]);
+    assert_eq!(all_sets(1..=2), [""; 0]);
+}
+
+/// The other six seeds of each set.
+#[test]
+#[ignore = "13 s of CPU time: .ci/run --nightly"]
+fn friction_of_eighteen_more_runs_ends_in_no_false_minimum() {
+    assert_eq!(all_sets(3..=8), [""; 0]);
 }
 
 /// The preferential direction came back with the opposite sign and at its bound.

@@ -34,7 +34,7 @@ fn options() -> acceleration::Options {
 fn a_torque_that_is_held_is_averaged_as_it_was() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque =
-        Torque::Profile("lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=300".parse().unwrap());
+        Torque::Profile("lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=100".parse().unwrap());
     let settings = vec![("slosh.model".to_string(), "frozen".to_string())];
     let twin = Twin { settings, intersample: Intersample::ZeroOrderHold, ..Twin::default() };
     let recordings = [twin.record(&fmu, &torque, Some(3)).unwrap()];
@@ -91,7 +91,7 @@ fn the_accelerations_least_squares_find_friction_and_inertia_without_its_biases(
 fn a_gyro_at_a_kilohertz_tells_inertia_and_friction_as_well_as_its_noise_allows() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque =
-        Torque::Profile("lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=60".parse().unwrap());
+        Torque::Profile("lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=20".parse().unwrap());
     let settings = vec![("slosh.model".to_string(), "frozen".to_string())];
     let twin = Twin { settings, rate: 1000.0, ..Twin::default() };
     let (mut off, mut held, mut open) = (0.0, 0, 0);

@@ -38,7 +38,7 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
 #[test]
 fn no_method_hangs_or_panics_on_values_out_of_range() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=60".parse().unwrap());
+    let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=20".parse().unwrap());
     let sound = fmu_twin::record(&fmu, &[], &torque, Some(3), SensorErrors::default()).unwrap();
     let last = sound.time.len() - 1;
     type Change = fn(&mut Recording, usize);
