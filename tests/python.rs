@@ -88,7 +88,7 @@ fn the_studies_compute_the_numbers_of_the_book() {
     pytest(of_the_package().arg(pack::root().join("harness/studies")), "a study failed");
 }
 
-/// 88 sweeps of 45 minutes, whose short form [`the_studies_compute_the_numbers_of_the_book`] has.
+/// Long forms of the studies' tests, such as 88 sweeps of 45 minutes; [`the_studies_compute_the_numbers_of_the_book`] runs the short ones.
 #[test]
 #[ignore = "a minute: cargo test --release --test tests -- --ignored the_whole_ledger"]
 fn the_whole_ledger_of_the_book_is_that_of_the_runs() {
