@@ -384,6 +384,11 @@ impl Toolchain {
             let level = if matches!(product, Product::Fmu(_)) { "s" } else { "z" };
             command.env("CARGO_PROFILE_FMU_OPT_LEVEL", level);
         }
+        if matches!(product, Product::Native | Product::Command) {
+            // optimised as a whole, as an FMU's binary: the command is a quarter smaller
+            command.env("CARGO_PROFILE_RELEASE_LTO", "fat");
+            command.env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1");
+        }
         command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
         command.env("MACOSX_DEPLOYMENT_TARGET", binary::MACOS.to_string());
         command.env("SOURCE_DATE_EPOCH", "0");
