@@ -2,31 +2,31 @@
 //! goes through [`json_in_script`].
 
 /// The part of three.js that [`SCENE`] uses, as the global `THREE` (MIT: [`THREE_LICENSE`] goes with it).
-pub const THREE: &str = include_str!("../three/three.min.js");
+pub static THREE: &str = include_str!("../three/three.min.js");
 
 /// The licence of [`THREE`], which every page that holds it holds too.
-pub const THREE_LICENSE: &str = include_str!("../three/LICENSE");
+pub static THREE_LICENSE: &str = include_str!("../three/LICENSE");
 
 /// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].
-pub const SCENE: &str = include_str!("../scene/scene.js");
+pub static SCENE: &str = include_str!("../scene/scene.js");
 
 /// The global `Live`: controls, plots and the place of a live page of the book.
-pub const LIVE: &str = include_str!("../pages/live.js");
+pub static LIVE: &str = include_str!("../pages/live.js");
 
 /// Style sheet of the live pages, in addition to the book's.
-pub const LIVE_CSS: &str = include_str!("../pages/live.css");
+pub static LIVE_CSS: &str = include_str!("../pages/live.css");
 
 /// The live page "Swirl"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and HubSlosh in the global `FMUS`.
-pub const SWIRL: &str = include_str!("../pages/swirl.js");
+pub static SWIRL: &str = include_str!("../pages/swirl.js");
 
 /// A sampled loop's gain, crossings and margins, as the global `SampledLoop`.
-pub const LOOP: &str = include_str!("../pages/loop.js");
+pub static LOOP: &str = include_str!("../pages/loop.js");
 
 /// The live page "Slew"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`], [`LOOP`] and Spacecraft in the global `FMUS`.
-pub const SLEW: &str = include_str!("../pages/slew.js");
+pub static SLEW: &str = include_str!("../pages/slew.js");
 
 /// The live page "Your tank"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and the solver in the global `MODULES`.
-pub const YOUR_TANK: &str = include_str!("../pages/your_tank.js");
+pub static YOUR_TANK: &str = include_str!("../pages/your_tank.js");
 
 /// Escapes JSON so that it can stand in a script element of any page or in a script: no text in it ends the element
 /// (`</script`), keeps the end from being seen (`<!--<script`: HTML, 13.2.5.20), becomes an entity, or ends a line of

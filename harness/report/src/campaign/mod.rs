@@ -28,10 +28,10 @@ pub(crate) use self::page::printed;
 use self::page::{Group, Page, Varied, axis, best, groups, manoeuvre, runs};
 
 /// plotly.js, as the global `Plotly`.
-pub(crate) const PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
+pub(crate) static PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
 
 /// Licence of Plotly, which every page with Plotly contains.
-pub(crate) const PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
+pub(crate) static PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 
 /// Most groups that get figures of their own; the page states which ones do not.
 const MOST_GROUPS: usize = 24;
