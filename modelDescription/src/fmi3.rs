@@ -90,7 +90,7 @@ fn interface<M: Model>(name: &'static str) -> Element {
 
 /// The unit of the independent variable.
 const TIME_UNIT: &str = "s";
-/// Its name.
+/// The name of the independent variable.
 const TIME: &str = "time";
 
 fn variable<M: Model>(scalar: &Scalar<M>) -> Element {

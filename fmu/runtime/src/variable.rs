@@ -16,7 +16,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// The real number, if it is one.
+    /// Returns the number of a Real, else `None`.
     #[inline]
     pub fn real(self) -> Option<f64> {
         match self {
@@ -25,7 +25,7 @@ impl Value {
         }
     }
 
-    /// The integer, if it is one.
+    /// Returns the number of an Integer or enumeration, else `None`.
     #[inline]
     pub fn integer(self) -> Option<i32> {
         match self {
@@ -34,7 +34,7 @@ impl Value {
         }
     }
 
-    /// The Boolean, if it is one.
+    /// Returns the value of a Boolean, else `None`.
     #[inline]
     pub fn boolean(self) -> Option<bool> {
         match self {

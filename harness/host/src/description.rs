@@ -460,7 +460,7 @@ impl Reader {
         }
     }
 
-    /// What both versions have of a variable. `typed` has the attributes that depend on the type.
+    /// Reads what both versions say of a variable alike. `typed` has the attributes that depend on the type.
     fn common(
         &mut self,
         element: &Element,

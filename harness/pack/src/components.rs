@@ -245,8 +245,8 @@ fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
         let Some((first, rest)) = bytes[place + BEFORE.len()..].split_first() else { continue };
         let of_a_name = |b: &u8| b.is_ascii_alphanumeric() || b"-_.+".contains(b);
         let end = rest.iter().position(|b| !of_a_name(b)).unwrap_or(rest.len());
-        if !separator(first) || !rest.get(end).is_some_and(separator) {
-            continue; // no folder: the text above, where the binary is this program
+        if end == 0 || !separator(first) || !rest.get(end).is_some_and(separator) {
+            continue; // no folder: the texts above, where the binary is this program
         }
         let folder = String::from_utf8_lossy(&rest[..end]);
         let parts = folder.split_once("-").and_then(|_| folder.rsplit_once('-'));
@@ -495,6 +495,7 @@ mod tests {
             "/rust/deps",
             "/rust/deps/",
             "/rust/deps/a b/",
+            "/rust/deps/\\library`cargo metadata`", // the separators, then any other text
         ] {
             assert!(standard_crates(words.as_bytes()).unwrap().is_empty(), "{words}");
         }

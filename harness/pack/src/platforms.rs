@@ -384,9 +384,7 @@ impl Toolchain {
             let level = if matches!(product, Product::Fmu(_)) { "s" } else { "z" };
             command.env("CARGO_PROFILE_FMU_OPT_LEVEL", level);
         }
-        // Not for Windows: its binary then names a part of Rust's standard library that the SBOM cannot read.
-        let is_whole = platform.folder != "win64";
-        if is_whole && matches!(product, Product::Native | Product::Command) {
+        if matches!(product, Product::Native | Product::Command) {
             // optimised as a whole, as an FMU's binary: the command is a quarter smaller
             command.env("CARGO_PROFILE_RELEASE_LTO", "fat");
             command.env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1");
