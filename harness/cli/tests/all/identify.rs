@@ -25,7 +25,7 @@ fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
 
 /// Three minutes of a bench without slosh, its gyro's noise in `omega`.
 fn record(folder: &Path, name: &str, settings: &[&str]) {
-    let torque = "lin-sweep:amplitude=0.05,f0=0.3,f1=3,duration=180";
+    let torque = "lin-sweep:amplitude=0.05,f0=0.3,f1=3,duration=90";
     let mut arguments = vec!["run", "--profile", torque, "--columns", "omega,omega_imu"];
     for setting in ["slosh.model=frozen", "imu.enabled=true"].iter().chain(settings) {
         arguments.extend(["--set", setting]);

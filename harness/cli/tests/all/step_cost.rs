@@ -11,7 +11,7 @@ fn step_cost(fmi: Fmi, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hubslosh"))
         .args(["step-cost", "--fmu"])
         .arg(packed_version_for_tests(HUBSLOSH, fmi))
-        .args(["--step", "1ms", "--steps", "60"])
+        .args(["--step", "1ms", "--steps", "20"])
         .args(arguments)
         .output()
         .unwrap()
