@@ -26,6 +26,7 @@ static const char *const names[VARIABLES] = {
 static Reference variables[VARIABLES];
 
 static size_t states, indicators;
+static int part;
 static Reference reals[1000];
 static size_t count;
 
@@ -80,7 +81,7 @@ static double torque(const struct scene *scene, int step)
 static void stepping(Instance c, const struct scene *scene)
 {
     double slope;
-    for (int n = 0; n < 200; n++) {
+    for (int n = 0; n < (part ? 120 : 200); n++) { /* three or five rounds of steps and rest */
         set(c, 'R', TORQUE, torque(scene, n));
         MUST(do_step(c, 0.02 * n, 0.02));
         read_all(c);
@@ -190,7 +191,7 @@ static void arguments(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-    int runs = 0, refused = 0, ended = 0, part;
+    int runs = 0, refused = 0, ended = 0;
     if (argc < 9) {
         fprintf(stderr, "usage: see the beginning of traps.c\n");
         return 2;

@@ -386,7 +386,8 @@ fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     let settings = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
     let settings = settings.map(|(name, value)| (name.to_string(), value.to_string())).to_vec();
     let twin = Twin { settings, unmodelled: vec![Unmodelled::Drag], ..Twin::default() };
-    let torque = Torque::Profile("lin-sweep:amplitude=0.4,duration=900".parse().unwrap());
+    let torque =
+        Torque::Profile("lin-sweep:amplitude=0.4,duration=500,f0=1.8,f1=3".parse().unwrap());
     let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
     let found = identify(&fmu, &[recording], &options(), &mut |_| {}).unwrap();
     let [drag] = &found.details.missing[..] else { panic!("{:?}", found.details.missing) };
@@ -532,11 +533,11 @@ fn a_bench_of_another_size_is_estimated_if_it_is_said_to_be_one() {
     }
 }
 
-/// Downwards a sweep meets the softening resonance from above; where slosh begins to rotate, windows must grow slowly.
+/// Downwards a sweep meets the softening resonance from above, where slosh begins to rotate.
 #[test]
 fn a_downward_sweep_shows_that_slosh_rotates() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let torque = "lin-sweep:amplitude=0.1,duration=900,f0=3,f1=1.7";
+    let torque = "lin-sweep:amplitude=0.1,duration=400,f0=2.7,f1=2";
     let recording = sweep(&fmu, torque, &[("slosh.model", "spherical")]);
     let models = ["linear", "spherical"].map(String::from).to_vec();
     let found =
