@@ -191,13 +191,13 @@ impl DesignArgs {
             "--band ends at {f1} Hz (allowed: up to {} Hz, half of what rows {STEP} s apart show)",
             0.5 / STEP
         );
+        design::check_rows(self.period, (f0, f1), peak, budget::steps(self.duration, STEP)?)?;
         let mut torque = Multisine::new(self.period, (f0, f1), peak, self.seed)?;
         if self.optimal {
             let plant = expected(real, peak)?;
             let shares = design::d_optimal(&plant, &torque.frequencies());
             torque = torque.shaped(&shares, peak, self.seed);
         }
-        torque.check_rows(budget::steps(self.duration, STEP)?)?;
         let (time, tau) = sampled(self.duration, &|t| torque.at(t))?;
         let factor = wheel.factor(&time, &tau).min(1.0);
         if factor < 1.0 {

@@ -40,27 +40,8 @@ impl Multisine {
     /// Lines between two frequencies (Hz), the largest torque being `peak` (N·m). The phases with the
     /// smallest crest factor of 20 draws are taken.
     pub fn new(period: f64, band: (f64, f64), peak: f64, seed: u64) -> Result<Self> {
-        ensure!(0.0 < band.0 && band.0 < band.1, "a multisine's band must be 0 < f0 < f1");
-        ensure!(
-            peak > 0.0 && period > 0.0 && peak.is_finite() && period.is_finite(),
-            "peak torque and period must be positive numbers"
-        );
-        let lines = (band.1 - band.0) * period / 2.0;
-        ensure!(
-            lines <= budget::LINES as f64 && band.1 * period <= f64::from(u32::MAX),
-            "a band from {} to {} Hz has {lines:.1e} odd lines at a period of {period} s (allowed: at \
-             most {})",
-            band.0,
-            band.1,
-            budget::LINES
-        );
+        let odd = odd_lines(period, band, peak)?;
         let mut random = Random::new(seed, 0);
-        let first = (band.0 * period).ceil() as u32 | 1;
-        let odd: Vec<u32> = (first..=(band.1 * period).floor() as u32).step_by(2).collect();
-        ensure!(
-            odd.len() >= 2 * LINE_GROUP,
-            "period {period} s is too short for the band: too few lines"
-        );
         let (mut lines, mut detection) = (Vec::new(), Vec::new());
         for group in odd.chunks(LINE_GROUP) {
             let left_out = (random.uniform() * LINE_GROUP as f64) as usize;
@@ -103,20 +84,6 @@ impl Multisine {
         Multisine { amplitudes, ..self.clone() }
     }
 
-    /// Fails if it is too much work to compute that many rows.
-    pub fn check_rows(&self, rows: usize) -> Result<()> {
-        let sines = (rows as u64).saturating_mul(self.lines.len() as u64);
-        ensure!(
-            sines <= budget::SINES,
-            "{rows} rows of {} lines are {:.1e} sines (allowed: at most {:.0e}); a shorter record, a \
-             narrower band or a shorter period has fewer",
-            self.lines.len(),
-            sines as f64,
-            budget::SINES as f64
-        );
-        Ok(())
-    }
-
     /// Frequencies of the lines with power, Hz.
     pub fn frequencies(&self) -> Vec<f64> {
         self.lines.iter().map(|&k| f64::from(k) / self.period).collect()
@@ -128,6 +95,49 @@ impl Multisine {
         let tones = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
         tones.map(|((&k, a), phase)| a * (TAU * f64::from(k) * turn + phase).sin()).sum()
     }
+}
+
+/// Checks the work of `rows` values of a multisine, before its phases are drawn, which takes seconds where it has too many lines.
+///
+/// # Errors
+/// If it is too much work, or [`Multisine::new`] refuses the band, the period or the peak.
+pub fn check_rows(period: f64, band: (f64, f64), peak: f64, rows: usize) -> Result<()> {
+    let odd = odd_lines(period, band, peak)?.len();
+    let lines = odd - odd / LINE_GROUP;
+    let sines = (rows as u64).saturating_mul(lines as u64);
+    ensure!(
+        sines <= budget::SINES,
+        "{rows} rows of {lines} lines are {:.1e} sines (allowed: at most {:.0e}); a shorter record, a \
+         narrower band or a shorter period has fewer",
+        sines as f64,
+        budget::SINES as f64
+    );
+    Ok(())
+}
+
+/// Numbers of the odd lines between two frequencies (Hz) at a period (s).
+fn odd_lines(period: f64, band: (f64, f64), peak: f64) -> Result<Vec<u32>> {
+    ensure!(0.0 < band.0 && band.0 < band.1, "a multisine's band must be 0 < f0 < f1");
+    ensure!(
+        peak > 0.0 && period > 0.0 && peak.is_finite() && period.is_finite(),
+        "peak torque and period must be positive numbers"
+    );
+    let lines = (band.1 - band.0) * period / 2.0;
+    ensure!(
+        lines <= budget::LINES as f64 && band.1 * period <= f64::from(u32::MAX),
+        "a band from {} to {} Hz has {lines:.1e} odd lines at a period of {period} s (allowed: at \
+         most {})",
+        band.0,
+        band.1,
+        budget::LINES
+    );
+    let first = (band.0 * period).ceil() as u32 | 1;
+    let odd: Vec<u32> = (first..=(band.1 * period).floor() as u32).step_by(2).collect();
+    ensure!(
+        odd.len() >= 2 * LINE_GROUP,
+        "period {period} s is too short for the band: too few lines"
+    );
+    Ok(odd)
 }
 
 /// Returns the D-optimal power of lines at these frequencies (Hz): it maximises the determinant of the information on a linear
