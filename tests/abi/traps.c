@@ -6,8 +6,8 @@
  *   traps LIBRARY GUID STATES INDICATORS SLOSH_MODELS FRICTION_MODELS all|part NAME=REFERENCE... -- REFERENCE...
  *
  * SLOSH_MODELS and FRICTION_MODELS are how many items the two enumerations have. The names are those of `variables` below;
- * the references after -- are all Reals, which are read. Part: every second one, the others being the other version's of
- * FMI (fmi.h), which handles events itself where it can. */
+ * the references after -- are all Reals, which are read. Part: every second one in fewer steps, the others being the other
+ * version's of FMI (fmi.h), which handles events itself where it can. */
 #define _GNU_SOURCE
 #include "fmi.h"
 #include <signal.h>

@@ -23,7 +23,7 @@ fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     if done.status.success() { Ok(text(&done.stdout)) } else { Err(text(&done.stderr)) }
 }
 
-/// Three minutes of a bench without slosh, its gyro's noise in `omega`.
+/// A minute and a half of a bench without slosh, its gyro's noise in `omega`.
 fn record(folder: &Path, name: &str, settings: &[&str]) {
     let torque = "lin-sweep:amplitude=0.05,f0=0.3,f1=3,duration=90";
     let mut arguments = vec!["run", "--profile", torque, "--columns", "omega,omega_imu"];
