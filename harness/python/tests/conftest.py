@@ -3,7 +3,7 @@ r"""Fixtures: the packed FMU and the harness's binary.
     cargo run --release -- pack
     cargo run --release -- pack --python
     pytest harness/python --fmu dist/HubSlosh.fmu --hubslosh target/release/hubslosh \
-        --wheel dist/hubslosh-0.6.1-cp311-abi3-….whl
+        --wheel dist/hubslosh-0.7.0-cp311-abi3-….whl
 
 ``cargo test --release`` calls it so, with FMU and wheel that it packs itself.
 """
