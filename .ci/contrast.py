@@ -42,12 +42,9 @@ OVER = """() => {
   const words = "h1, p, span, b, label, output, button, summary, li, kbd, select";
   const said = [...document.querySelectorAll(words)].filter((e) => e.textContent.trim() && seen(e));
   const texts = [...document.querySelectorAll("svg text")].filter(seen);
-  const lines = [...document.querySelectorAll(".live svg :is(polyline, circle)")].filter(seen);
-  const drawn = lines.filter((e) => !e.classList.contains("old"));
   return [
     ...said.flatMap((e) => check(e, "color", 4.5)),
     ...texts.flatMap((e) => check(e, "fill", 4.5)),
-    ...drawn.flatMap((e) => check(e, e.matches("circle:not(.point)") ? "fill" : "stroke", 3)),
   ];
 }"""
 

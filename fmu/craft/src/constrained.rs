@@ -312,7 +312,6 @@ impl ConstrainedBob {
     }
 
     /// Returns T and S under Y.
-    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn multipliers(&self, y: Vec3) -> [f64; 2] {
         let [normal, inwards] = self.multipliers;
         let normal = normal + dot(self.n[0], y);
@@ -322,7 +321,6 @@ impl ConstrainedBob {
     }
 
     /// Returns f under Y.
-    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn force(&self, y: Vec3) -> Vec3 {
         let [tension, inner] = self.multipliers(y);
         let mut f = add(self.rest, scale(tension, self.n[0]));

@@ -350,9 +350,7 @@ impl Draining {
     }
 
     /// Solves the equations of motion, and evaluates the tanks' contents.
-    // The WebAssembly module must stay small for web pages, so it has these equations once for rates and outputs.
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[inline(always)]
     fn solve_instant<'a, T: Number>(
         &'a self,
         x: &[T; STATES],

@@ -417,9 +417,7 @@ impl CraftMotion {
     }
 
     /// Computes coefficient N of every quantity and N + 1 of the states.
-    // The WebAssembly module must stay small for web pages, so it has each order only once.
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[inline(always)]
     fn rates_of<const N: usize>(&mut self) {
         // The pivot comes first. Between the sums below it would take registers from every craft, 4 % of a step.
         if self.on_springs {

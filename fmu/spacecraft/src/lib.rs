@@ -17,9 +17,7 @@ pub mod fmi2 {
     runtime::export_fmi2!(crate::Model);
 }
 
-/// The functions of FMI 3.0 that the binary exports. A WebAssembly module leaves them out: its host uses FMI 2.0, and
-/// web pages must load the module.
-#[cfg(not(target_arch = "wasm32"))]
+/// The functions of FMI 3.0 that the binary exports.
 pub mod fmi3 {
     pub use runtime::v3::*;
 

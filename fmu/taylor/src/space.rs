@@ -76,9 +76,7 @@ pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
 }
 
 /// Returns coefficient N of the six different products of components: xx, yy, zz, xy, xz, yz.
-// The WebAssembly module must stay small for web pages, so it has this rule and `cross` only once for each order.
-#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[inline(always)]
 pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     // Terms j and N - j together: 2 a_j b_(N-j) for a square, a_j b_(N-j) + a_(N-j) b_j for the
     // other products.
@@ -152,8 +150,7 @@ pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
 }
 
 /// Returns coefficient N of a x b.
-#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[inline(always)]
 pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
     let mut sum = [EMPTY; 3];
     for j in 0..N + 1 {

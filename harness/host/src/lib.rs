@@ -15,5 +15,4 @@ pub mod fmi3;
 pub mod fmu;
 pub mod guard;
 pub mod symbol;
-pub mod wasm;
 pub mod xml;

@@ -47,11 +47,10 @@ pub struct Component {
 
 /// Crates that Rust's standard library is made from. Panic messages name those whose code is linked
 /// and can panic, with their versions.
-const STANDARD: [(&str, &str); 11] = [
+const STANDARD: [(&str, &str); 10] = [
     ("addr2line", "Apache-2.0 OR MIT"),
     ("adler2", "0BSD OR MIT OR Apache-2.0"),
     ("cfg-if", "MIT OR Apache-2.0"),
-    ("dlmalloc", "MIT OR Apache-2.0"), // the heap of WebAssembly
     ("gimli", "MIT OR Apache-2.0"),
     ("hashbrown", "MIT OR Apache-2.0"),
     ("libc", "MIT OR Apache-2.0"),

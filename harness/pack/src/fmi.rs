@@ -33,7 +33,6 @@ impl Fmi {
             (_, "aarch64-linux") => &["aarch64-linux"],
             (_, "aarch64-windows") => &["aarch64-windows"],
             (_, "aarch64-darwin") => &["aarch64-darwin"],
-            (Fmi::V2, "wasm32") => &["wasm32"], // the module has the functions of FMI 2.0 alone
             _ => &[],
         }
     }

@@ -33,24 +33,6 @@ pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     archive::write(&files(model, fmi, &[binary])?, out)
 }
 
-/// The same with a module for WebAssembly in addition, for web pages and sandboxed hosts; returns the module's size.
-pub fn pack_with_wasm(model: &Model, out: &Path) -> Result<usize> {
-    let native = Packed::native(&build_in(model.package, &model.environment(), false)?)?;
-    let module = wasm(model)?;
-    let size = module.bytes.len();
-    archive::write(&files(model, Fmi::V2, &[native, module])?, out)?;
-    Ok(size)
-}
-
-/// The module of an FMU for WebAssembly.
-///
-/// # Errors
-/// If something is missing for it, or if it does not build.
-pub fn wasm(model: &Model) -> Result<Packed> {
-    let bytes = platforms::build_wasm(model)?;
-    Ok(Packed { folder: platforms::WASM.folder, ending: platforms::WASM.ending, bytes })
-}
-
 /// Builds the binaries of an FMU for all platforms and packs them to `out`.
 pub fn pack_all(model: &Model, fmi: Fmi, out: &Path) -> Result<Vec<Built>> {
     let all = platforms::build(model)?;

@@ -14,7 +14,6 @@ use anyhow::{Context, Result, bail};
 
 use host::binary::{self, Binary};
 use host::fmi2::Fmu;
-use host::wasm::Module;
 
 use crate::models::Model;
 use crate::project;
@@ -124,18 +123,6 @@ pub const PLATFORMS: [Platform; 4] = [
     },
 ];
 
-/// WebAssembly, for pages and for hosts that keep foreign code in a sandbox. The standard's lists have no such platform:
-/// the folder is named by the module's processor, as names of vendors may be. Its host gives callbacks as places in
-/// the module's table of functions, which is exported for that and can grow (`harness/web/fmu/host.js`).
-pub const WASM: Platform = Platform {
-    folder: "wasm32",
-    ending: ".wasm",
-    targets: &[Target { triple: "wasm32-unknown-unknown", suffix: "", architecture: "wasm32" }],
-    tools: &[],
-    cargo: Cargo::Plain,
-    link: &["--export-table", "--growable-table"],
-};
-
 /// The platform of that folder.
 ///
 /// # Errors
@@ -186,33 +173,6 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
     Ok(all)
 }
 
-/// Builds and checks the module of an FMU for WebAssembly.
-///
-/// # Errors
-/// If something is missing for that, if it does not build, or if a page could not use it.
-pub fn build_wasm(model: &Model) -> Result<Vec<u8>> {
-    let toolchain = Toolchain::look()?;
-    toolchain.check(&[&WASM])?;
-    let bytes = toolchain.build(&Product::Fmu(model), &WASM, &WASM.targets[0])?;
-    let wanted = [Fmu::symbols(), Fmu::step_symbols(), Fmu::exchange_symbols()].concat();
-    let faults = Module::read(&bytes)?.faults(&wanted);
-    refuse(&toolchain.faults(&WASM, &bytes, faults))?;
-    Ok(bytes)
-}
-
-/// Builds the tank solver as a module for WebAssembly.
-///
-/// # Errors
-/// If something is missing for it, or if it does not build.
-pub fn build_tank_page() -> Result<Vec<u8>> {
-    let toolchain = Toolchain::look()?;
-    toolchain.check(&[&WASM])?;
-    let product = Product::Library("tank-page", "tank_page");
-    let bytes = toolchain.build(&product, &WASM, &WASM.targets[0])?;
-    refuse(&toolchain.faults(&WASM, &bytes, Vec::new()))?;
-    Ok(bytes)
-}
-
 /// Fails if there are faults, with all of them.
 pub fn refuse(faults: &[String]) -> Result<()> {
     if !faults.is_empty() {
@@ -225,8 +185,6 @@ pub fn refuse(faults: &[String]) -> Result<()> {
 pub enum Product<'a> {
     /// The library of an FMU.
     Fmu(&'a Model),
-    /// The library of another package of this workspace, by its package and its file's name.
-    Library(&'static str, &'static str),
     /// The compiled half of the Python package.
     Native,
     /// The command `hubslosh`.
@@ -374,15 +332,8 @@ impl Toolchain {
         {
             // Building std is an unstable feature of Cargo, which these two names open.
             command.env("RUSTC_BOOTSTRAP", "1").env("__CARGO_TESTS_ONLY_SRC_ROOT", source);
-            // a panic in WebAssembly traps: nothing unwinds
-            let panic = if platform.folder == WASM.folder { "panic_abort" } else { "panic_unwind" };
-            command.arg(format!("-Zbuild-std=std,{panic}"));
+            command.arg("-Zbuild-std=std,panic_unwind");
             flags.push(format!("--remap-path-prefix={}=library", source.display()));
-        }
-        if platform.folder == WASM.folder {
-            // a page has to carry it: an FMU is a fifth smaller than at 2, and a tenth slower
-            let level = if matches!(product, Product::Fmu(_)) { "s" } else { "z" };
-            command.env("CARGO_PROFILE_FMU_OPT_LEVEL", level);
         }
         if matches!(product, Product::Native | Product::Command) {
             // optimised as a whole, as an FMU's binary: the command is a quarter smaller
@@ -399,10 +350,6 @@ impl Toolchain {
                 command.envs(model.environment());
                 project::arguments(&mut command, model.package);
                 Some(model.identifier())
-            }
-            Product::Library(package, name) => {
-                project::arguments(&mut command, package);
-                Some(name.to_string())
             }
             Product::Native => {
                 project::native_arguments(&mut command);
@@ -435,7 +382,7 @@ mod tests {
     /// A platform without a folder would be built and then left out of the archive without a word.
     #[test]
     fn every_platform_has_its_folder_in_an_fmu() {
-        for platform in PLATFORMS.iter().chain([&WASM]) {
+        for platform in &PLATFORMS {
             assert_eq!(Fmi::V2.folders(platform.folder), [platform.folder]);
         }
         for platform in &PLATFORMS {

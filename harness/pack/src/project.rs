@@ -149,9 +149,7 @@ pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> 
         .filter_map(|artifact| {
             let library = artifact.target.kind.contains(&TargetKind::CDyLib);
             let mut files = artifact.filenames.into_iter();
-            let of = |name: &Utf8PathBuf| {
-                matches!(name.extension(), Some("so" | "dll" | "dylib" | "wasm"))
-            };
+            let of = |name: &Utf8PathBuf| matches!(name.extension(), Some("so" | "dll" | "dylib"));
             artifact.executable.or_else(|| files.find(of).filter(|_| library))
         })
         .last()

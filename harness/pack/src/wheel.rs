@@ -224,7 +224,7 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     for (name, bytes) in examples(&root().join("examples"))? {
         files.push((format!("{PACKAGE}/examples/{name}"), bytes));
     }
-    for (name, bytes) in book::render(&root(), &[])? {
+    for (name, bytes) in book::render(&root())? {
         files.push((format!("{PACKAGE}/book/{name}"), bytes));
     }
     for (name, bytes) in binaries.fmus {

@@ -10,24 +10,6 @@ pub static THREE_LICENSE: &str = include_str!("../three/LICENSE");
 /// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].
 pub static SCENE: &str = include_str!("../scene/scene.js");
 
-/// The global `Live`: controls, plots and the place of a live page of the book.
-pub static LIVE: &str = include_str!("../pages/live.js");
-
-/// Style sheet of the live pages, in addition to the book's.
-pub static LIVE_CSS: &str = include_str!("../pages/live.css");
-
-/// The live page "Swirl"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and HubSlosh in the global `FMUS`.
-pub static SWIRL: &str = include_str!("../pages/swirl.js");
-
-/// A sampled loop's gain, crossings and margins, as the global `SampledLoop`.
-pub static LOOP: &str = include_str!("../pages/loop.js");
-
-/// The live page "Slew"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`], [`LOOP`] and Spacecraft in the global `FMUS`.
-pub static SLEW: &str = include_str!("../pages/slew.js");
-
-/// The live page "Your tank"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and the solver in the global `MODULES`.
-pub static YOUR_TANK: &str = include_str!("../pages/your_tank.js");
-
 /// Escapes JSON so that it can stand in a script element of any page or in a script: no text in it ends the element
 /// (`</script`), keeps the end from being seen (`<!--<script`: HTML, 13.2.5.20), becomes an entity, or ends a line of
 /// JavaScript. JSON has these characters in strings alone, so its value stays the same.
@@ -40,23 +22,6 @@ pub fn json_in_script(json: &str) -> String {
         }
     }
     text
-}
-
-/// The host of FMUs compiled to WebAssembly (`fmu/host.js`) as one script without modules, which a page from the disk
-/// can load: the global `FmuHost` with `Fmu`, `FmiError` and `unzip`.
-pub fn fmu_host() -> String {
-    let modules = [
-        include_str!("../fmu/description.js"),
-        include_str!("../fmu/unzip.js"),
-        include_str!("../fmu/host.js"),
-    ];
-    let lines = modules.iter().flat_map(|text| text.lines());
-    let kept: Vec<_> = lines
-        .filter(|line| !line.starts_with("import "))
-        .map(|line| line.strip_prefix("export ").unwrap_or(line))
-        .collect();
-    let text = kept.join("\n");
-    format!("globalThis.FmuHost = (() => {{\n{text}\nreturn {{ Fmu, FmiError, unzip }};\n}})();\n")
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use anyhow::Result;
 use pack::archive;
 use pack::documentation::book;
-use pack::documentation::live;
 
 use crate::{fmu, terminal};
 
@@ -15,7 +14,7 @@ use crate::{fmu, terminal};
 /// book/SUMMARY.md lists.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  hubslosh book\n  hubslosh book --no-open\n  hubslosh book --out site\n  hubslosh book --live"
+    after_help = "Examples:\n  hubslosh book\n  hubslosh book --no-open\n  hubslosh book --out site"
 )]
 pub struct BookArgs {
     /// Writes the book to this directory, and opens no browser [default: the Python package's own book, or dist/book].
@@ -24,16 +23,12 @@ pub struct BookArgs {
     /// Prints the path of the first page and opens no browser.
     #[arg(long)]
     no_open: bool,
-    /// Adds running plants to the live pages: FMUs and tank solver as WebAssembly. Needs the project's source;
-    /// harness/platforms/setup --wasm installs the tools.
-    #[arg(long)]
-    live: bool,
 }
 
 impl BookArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let shipped = fmu::came_with("book").filter(|_| !self.live);
+        let shipped = fmu::came_with("book");
         let folder = match (shipped, &self.out) {
             (Some(shipped), None) => shipped,
             (Some(shipped), Some(out)) => {
@@ -42,9 +37,8 @@ impl BookArgs {
             }
             (None, out) => {
                 pack::needs_source("the book")?;
-                let modules = if self.live { live::build()? } else { Vec::new() };
                 let out = out.clone().unwrap_or_else(|| "dist/book".into());
-                book::write(&book::render(&pack::root(), &modules)?, &out)?;
+                book::write(&book::render(&pack::root())?, &out)?;
                 out
             }
         };

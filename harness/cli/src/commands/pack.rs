@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, bail};
 use pack::platforms::{self, PLATFORMS, Platform};
 use pack::{Fmi, Model, sdist, wheel};
 
 /// Builds the binary of an FMU and packs it, or the Python package with all FMUs and this command inside.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  hubslosh pack --wasm\n  \
+    after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  \
                   hubslosh pack --model Spacecraft --tanks 1 --modes 1\n  \
                   hubslosh pack --fmi 3\n  hubslosh pack --fmi 3 --arrays\n  \
                   hubslosh pack --python\n  hubslosh pack --python --all-platforms\n  hubslosh pack --sdist"
@@ -48,10 +48,6 @@ pub struct PackArgs {
     /// harness/platforms/setup installs the tools.
     #[arg(long)]
     all_platforms: bool,
-    /// Adds binaries/wasm32/NAME.wasm, a WebAssembly module for web pages and Node.js (harness/web/fmu/host.js).
-    /// harness/platforms/setup --wasm installs the tools.
-    #[arg(long, conflicts_with_all = ["python", "sdist", "all_platforms"])]
-    wasm: bool,
 }
 
 impl PackArgs {
@@ -85,15 +81,6 @@ impl PackArgs {
             _ => Fmi::V3Arrays,
         };
         let out = self.out.unwrap_or_else(|| fmi.path("dist".as_ref(), &model.identifier()));
-        if self.wasm {
-            ensure!(
-                fmi == Fmi::V2,
-                "WebAssembly comes with FMI 2.0 (allowed with --wasm: --fmi 2)"
-            );
-            let size = pack::pack_with_wasm(model, &out)?;
-            done!("packed {}, with a module for WebAssembly of {size} bytes", out.display());
-            return Ok(());
-        }
         if !self.all_platforms {
             return native(model, fmi, &out);
         }

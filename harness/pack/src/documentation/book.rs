@@ -12,7 +12,6 @@ use serde_json::json;
 
 use super::Files;
 use super::fmu::one_file;
-use super::live::{self, Module};
 use super::page::{Gathered, Layout, Page};
 
 /// The list of parts and pages, from the project's root.
@@ -36,11 +35,11 @@ pub fn write(files: &Files, out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Renders the book; with `modules`, for its live pages.
+/// Renders the book as the files of a static site.
 ///
 /// # Errors
 /// With every link that leads nowhere, every missing figure and every equation that is not LaTeX.
-pub fn render(root: &Path, modules: &[Module]) -> Result<Files> {
+pub fn render(root: &Path) -> Result<Files> {
     let (parts, pages, titles) = read(root)?;
     let mut all = Gathered::default();
     let mut files = Files::new();
@@ -48,8 +47,7 @@ pub fn render(root: &Path, modules: &[Module]) -> Result<Files> {
         let body = page.html(root, &pages, Layout::Site, &mut all);
         let navigation = navigation(&parts, &pages, &titles, place);
         let neighbours = neighbours(&pages, &titles, place);
-        let head = live::head(page, modules);
-        let html = site_page(&titles[place], &head, &navigation, &body, &neighbours).into_string();
+        let html = site_page(&titles[place], &navigation, &body, &neighbours).into_string();
         files.push((format!("{}.html", page.name), html.into_bytes()));
     }
     let whole = one_file(root, &pages, "HubSlosh: the whole book", &mut all);
@@ -57,7 +55,6 @@ pub fn render(root: &Path, modules: &[Module]) -> Result<Files> {
     files.push(("page.css".into(), super::CSS.into()));
     files.push(("search.js".into(), include_bytes!("search.js").to_vec()));
     files.push(("search-index.js".into(), search_index(&pages, &titles)?.into_bytes()));
-    files.extend(live::files(modules)?);
     files.extend(all.figures()?);
     Ok(files)
 }
@@ -129,13 +126,7 @@ fn neighbours(pages: &[Page], titles: &[String], present: usize) -> Markup {
     html! { (link(present.checked_sub(1), "before")) (link(Some(present + 1), "after")) }
 }
 
-fn site_page(
-    title: &str,
-    head: &Markup,
-    navigation: &Markup,
-    body: &Markup,
-    neighbours: &Markup,
-) -> Markup {
+fn site_page(title: &str, navigation: &Markup, body: &Markup, neighbours: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -144,7 +135,6 @@ fn site_page(
                 meta name="viewport" content="width=device-width";
                 title { (title) " · HubSlosh" }
                 link rel="stylesheet" href="page.css";
-                (head)
             }
             body .site {
                 input type="checkbox" id="menu" aria-label="Contents";

@@ -7,7 +7,6 @@
 
 pub mod book;
 pub mod fmu;
-pub mod live;
 pub mod page;
 
 /// The book before it is written: name and content of each file.

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use pack::documentation::book;
-use pack::documentation::live::{self, Module};
 use pack::documentation::page::{Gathered, Layout, Page};
 
 /// Paths of all Markdown files of the project, from its root.
@@ -65,10 +64,7 @@ fn every_page_of_the_documentation_is_in_the_book() {
 
 #[test]
 fn every_link_and_figure_of_the_book_leads_to_one_of_its_files() {
-    // with a module in each live page: their scripts too
-    let module = |needed| Module { needed, bytes: b"module".to_vec() };
-    let modules: Vec<_> = live::needed().map(module).collect();
-    let files = book::render(&pack::root(), &modules).unwrap();
+    let files = book::render(&pack::root()).unwrap();
     let files: BTreeMap<_, _> = files.into_iter().collect();
     let text = |name: &str| String::from_utf8(files[name].clone()).unwrap();
     let pages: Vec<_> = files.keys().filter(|name| name.ends_with(".html")).collect();
@@ -88,25 +84,9 @@ fn every_link_and_figure_of_the_book_leads_to_one_of_its_files() {
     }
 }
 
-/// They load no slower than in a book without live pages: their bytes are the same, and so are those of all that they load.
-#[test]
-fn live_pages_change_no_byte_of_any_other_page() {
-    let module = |needed| Module { needed, bytes: b"module".to_vec() };
-    let modules: Vec<_> = live::needed().map(module).collect();
-    let live: BTreeMap<_, _> = book::render(&pack::root(), &modules).unwrap().into_iter().collect();
-    let plain = book::render(&pack::root(), &[]).unwrap();
-    let changed: Vec<_> =
-        plain.iter().filter(|(name, bytes)| live[name] != *bytes).map(|(name, _)| name).collect();
-    assert_eq!(changed, ["swirl.html", "slew.html", "your_tank.html"]);
-}
-
 #[test]
 fn every_equation_is_typeset_and_every_place_the_search_finds_exists() {
-    let files: BTreeMap<_, _> = book::render(&pack::root(), &[]).unwrap().into_iter().collect();
-    assert!(
-        !files.keys().any(|name| name.ends_with(".fmu.js") || name.ends_with(".wasm.js")),
-        "no live page was asked for"
-    );
+    let files: BTreeMap<_, _> = book::render(&pack::root()).unwrap().into_iter().collect();
     let text = |name: &str| String::from_utf8(files[name].clone()).unwrap();
     for name in files.keys().filter(|name| name.ends_with(".html")) {
         let page = text(name);
