@@ -87,51 +87,6 @@ def test_rotary_slosh_begins_where_planar_slosh_is_unstable(
     )
 
 
-def ledger_of(plan: str | Path, program: Path, fmu: Path, out: Path) -> str:
-    """Return the ledger of a campaign, whose runs are deleted."""
-    command = [program, "campaign", "--plan", plan, "--fmu", fmu, "--out", out]
-    subprocess.run(command, check=True)
-    ledger = (out / "ledger.md").read_text(encoding="utf-8")
-    shutil.rmtree(out)  # 200 MB a model
-    return ledger
-
-
-def verdicts(page: str, model: str) -> list[tuple[str, str]]:
-    """Return a model's cells in the tables of a ledger, each with the cells before all models."""
-    found = []
-    for row in page.splitlines():
-        cells = [cell.strip() for cell in row.split("|")[1:-1]]
-        if model in cells:
-            before = cells.index("linear")
-            column = cells.index(model)
-        elif row.startswith("| ") and not row.startswith("| ---"):
-            found.append((" | ".join(cells[:before]), cells[column]))
-    return found
-
-
-def test_the_ledger_of_the_book_is_that_of_the_runs(
-    fmu: Path, program: Path, tmp_path: Path
-) -> None:
-    """Every verdict and count of the linear liquid in book/ledger.md, from 22 of its 88 sweeps."""
-    text = (ROOT / "harness" / "campaigns" / "thesis_models.toml").read_text(encoding="utf-8")
-    plan = re.sub(r"slosh.model = \[.*\]", 'slosh.model = ["linear"]', text)
-    path = tmp_path / "linear.toml"
-    path.write_text(plan, encoding="utf-8")
-    found = verdicts(ledger_of(path, program, fmu, tmp_path / "linear"), "linear")
-    book = verdicts((BOOK / "ledger.md").read_text(encoding="utf-8"), "linear")
-    assert len(book) == 92 + 4
-    assert found == book
-
-
-@pytest.mark.whole
-def test_the_whole_ledger_of_the_book_is_that_of_the_runs(
-    fmu: Path, program: Path, tmp_path: Path
-) -> None:
-    """Every verdict and every count of book/ledger.md, from the 88 sweeps of `thesis_models`."""
-    ledger = ledger_of("thesis_models", program, fmu, tmp_path / "models")
-    assert (BOOK / "ledger.md").read_text(encoding="utf-8").endswith(f"\n\n{ledger}")
-
-
 @pytest.mark.parametrize(("study", "model"), [(mode_errors, "HubSlosh"), (reversal, "Spacecraft")])
 def test_a_picture_of_the_book(
     study, model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

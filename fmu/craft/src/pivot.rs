@@ -176,8 +176,7 @@ impl Rubbing {
         }
         let until = |scale: f64, way: f64| {
             let [v1, v2] = [w[1], w[2]].map(|x| (x * scale).abs());
-            let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * way);
-            if speed > 0.0 { 2.0 * way / speed } else { f64::INFINITY }
+            series::time_within(way, v1, v2)
         };
         let v = w[0] * self.inv_eps;
         let sign = until(self.inv_eps, libm::sqrt(v * v + 2.4674) / 2.0);

@@ -109,7 +109,9 @@ pub trait Motion {
     fn rates(&mut self, n: usize);
 
     /// Sets the error scale of a step of length `h` from coefficients 0 and 1, with the relative
-    /// error `allowed`. Returns the time over which the series is valid, at most `h`.
+    /// error `allowed`. Returns the time over which the series is valid, at most `h`, from
+    /// coefficients 0 to 2 of every quantity: a function with a rounded corner has singularities
+    /// near the real axis, which its coefficients may not show before they are passed.
     fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64;
 
     /// Returns the largest of the states' coefficients n relative to its allowed error.
@@ -176,9 +178,12 @@ fn expand_order<M: Motion>(
     progress: &mut Progress,
 ) -> bool {
     motion.rates(n);
-    if n == 1 {
+    if n == 2 {
         progress.h = motion.set_error_scale(progress.h, STEP_SHARE * tolerance);
-        progress.power = progress.h;
+        progress.power = progress.h * progress.h;
+        if motion.convergence() == Convergence::Decay {
+            progress.terms[0] = motion.coefficient_norm(n) * progress.power;
+        }
     }
     progress.power *= progress.h;
     match motion.convergence() {
@@ -194,7 +199,7 @@ fn expand_order<M: Motion>(
             progress.negligible >= count
         }
         Convergence::Decay => {
-            if n + 4 < MIN_ORDER {
+            if n + 3 < MIN_ORDER {
                 return false;
             }
             let [now, one, two, _] = progress.terms;

@@ -130,6 +130,13 @@ pub fn sin_cos(n: usize, a: f64, a_d: &mut Series, s: &Series, c: &Series) -> (f
     if n == 0 { libm::sincos(a) } else { (chain(n, a, a_d, c), -chain(n, a, a_d, s)) }
 }
 
+/// Returns a time, s, over which x_0 + x_1 t + x_2 t^2 stays within `distance` > 0 of x_0, also for complex t; infinity if
+/// it does not change. For a linear x it is the longest such time. `slope` and `bend` are |x_1| and |x_2|.
+pub fn time_within(distance: f64, slope: f64, bend: f64) -> f64 {
+    let speed = slope + libm::sqrt(slope * slope + 4.0 * bend * distance);
+    if speed > 0.0 { 2.0 * distance / speed } else { f64::INFINITY }
+}
+
 /// Evaluates an expression with `$N` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
 #[macro_export]
 macro_rules! for_each_order {

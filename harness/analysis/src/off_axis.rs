@@ -84,14 +84,6 @@ pub fn of_rates(
     (leakage, Some(off_axis))
 }
 
-/// Returns the median CEF of a hub that cannot tilt, from its measured rate and the error of its gyro, rad/s. Two later
-/// stretches of the same white noise stand for the gyros about the other axes.
-pub fn of_noise(rate: &[f64], error: &[f64]) -> f64 {
-    let error = about_mean(error);
-    let off: Vec<f64> = error.windows(3).map(|e| e[1].hypot(e[2])).collect();
-    OffAxis::of(&off, &about_mean(rate), &[]).median
-}
-
 /// Returns the leakage at each frequency, from the radial force's response to the torque (N per N·m) and
 /// the tank's distance from the axis, m.
 pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
@@ -100,21 +92,8 @@ pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{OffAxis, of_noise, of_rates};
+    use super::{OffAxis, of_rates};
     use crate::{Complex64, FrequencyResponse};
-
-    #[test]
-    fn noise_alone_has_three_quarters_of_the_energy_and_a_large_rate_little() {
-        let mut random = crate::random::Random::new(4, 0);
-        let error: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
-        // of three equal normal numbers the median share of two is 3/4
-        assert!((of_noise(&error, &error) - 0.75).abs() < 0.01);
-        let rate: Vec<f64> = error.iter().map(|e| 100.0 + e).collect();
-        let turning: Vec<f64> =
-            rate.iter().zip([1.0, -1.0].iter().cycle()).map(|(r, s)| r * s).collect();
-        // 2 ln 2 is the median of the sum of two squares
-        assert!((of_noise(&turning, &error) / (2.0 * 2f64.ln() / 1e4) - 1.0).abs() < 0.1);
-    }
 
     #[test]
     fn a_rate_of_a_tenth_about_each_other_axis_is_a_cef_of_a_fiftieth() {

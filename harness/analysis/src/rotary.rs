@@ -9,8 +9,6 @@
 //! outwards towards +θ). Under any other torque the same number follows from the angles in windows
 //! of time, by their angular momentum.
 
-use std::f64::consts::TAU;
-
 use crate::{Complex64, FrequencyResponse};
 
 /// Swirl number above which motion counts as rotary: an ellipse with axes 1 : 3.7.
@@ -23,9 +21,6 @@ pub const LEAST: f64 = 0.02;
 /// Length of the windows of time, in slosh periods.
 const PERIODS: f64 = 10.0;
 
-/// Length of the stretches of the pace, s.
-const STRETCH: f64 = 20.0;
-
 /// Rotary motion in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rotary {
@@ -37,8 +32,6 @@ pub struct Rotary {
     pub time: f64,
     /// Swirl number with the largest magnitude in the run.
     pub swirl: f64,
-    /// Largest rate of the crest's rotation over 20 s of a sweep in rotary slosh, over the torque's frequency.
-    pub pace: Option<f64>,
 }
 
 /// Returns the swirl number at each frequency, 0 where the motion is too small.
@@ -64,35 +57,7 @@ impl Rotary {
             to: turning.last().map(|&i| frequency[i]),
             time: turning.iter().fold(0.0, |sum, &i| sum + share(i)),
             swirl: largest(swirl),
-            pace: None,
         }
-    }
-
-    /// Adds the pace, from slosh angles (rad) at times (s) of a sweep with this phase (rad).
-    pub fn with_pace(
-        self,
-        time: &[f64],
-        phase: impl Fn(f64) -> f64,
-        [radial, tangential]: [&[f64]; 2],
-        [from, to]: [f64; 2],
-    ) -> Self {
-        let range = time.partition_point(|t| *t < from)..time.partition_point(|t| *t <= to);
-        let mut pace = None;
-        let mut start = range.start;
-        while start < range.end {
-            let end = time.partition_point(|t| *t < time[start] + STRETCH);
-            if end >= range.end {
-                break;
-            }
-            let angle = |i: usize| tangential[i].atan2(radial[i]);
-            // steps of the angle within half a turn
-            let steps = (start..end).map(|i| angle(i + 1) - angle(i));
-            let turned: f64 = steps.map(|step| step - TAU * (step / TAU).round()).sum();
-            let ratio = turned.abs() / (phase(time[end]) - phase(time[start])).abs();
-            pace = Some(pace.map_or(ratio, |most: f64| most.max(ratio)));
-            start = end;
-        }
-        Rotary { pace, ..self }
     }
 
     /// Evaluates slosh angles (rad) at equal steps (s) of a liquid with this frequency (Hz), without knowledge of the torque.
@@ -171,16 +136,6 @@ mod tests {
         // 2ab/(a² + b²), clockwise
         assert!((flat.swirl + 0.198).abs() < 1e-3, "{flat:?}");
         assert_eq!((flat.time, flat.from), (0.0, None));
-        let angles = |pace: f64| {
-            let time: Vec<f64> = (0..5000).map(|i| step * f64::from(i)).collect();
-            let angle = |t: &f64| 2.0 * PI * 2.3 * pace * t;
-            let radial: Vec<f64> = time.iter().map(|t| angle(t).cos()).collect();
-            let tangential: Vec<f64> = time.iter().map(|t| -angle(t).sin()).collect();
-            let phase = |t: f64| 2.0 * PI * 2.3 * t;
-            let all = [&radial[..], &tangential];
-            Rotary::default().with_pace(&time, phase, all, [10.0, 90.0]).pace
-        };
-        assert!((angles(1.05).unwrap() - 1.05).abs() < 1e-9);
         assert_eq!(run(0.01, 0.01).swirl, 0.0, "too small");
         assert_eq!(run(0.0, 0.1).swirl, 0.0, "in a plane");
     }

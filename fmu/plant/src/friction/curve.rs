@@ -46,8 +46,7 @@ impl StribeckCurve {
             return f64::INFINITY;
         }
         let dv = f64::max(v - FLAT, 2.5 / v);
-        let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * dv);
-        if speed > 0.0 { 2.0 * dv / speed } else { f64::INFINITY }
+        series::time_within(dv, v1, v2)
     }
 
     /// Returns T_C(0), N m.

@@ -81,9 +81,6 @@ impl FrictionLaw for StribeckSmooth {
     fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
         let half = libm::sqrt(v * v + 2.4674) / 2.0;
-        let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * half);
-        // A hub at rest without torque does not move.
-        let sign = if speed > 0.0 { 2.0 * half / speed } else { f64::INFINITY };
-        sign.min(self.curve.convergence_radius(omega))
+        series::time_within(half, v1, v2).min(self.curve.convergence_radius(omega))
     }
 }

@@ -209,10 +209,6 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapt
         "report.html",
         report::campaign::page(campaign, fmu, &results, view, chapters).into_bytes(),
     ));
-    let ledger = report::campaign::ledger(campaign, fmu, &results);
-    if !ledger.is_empty() {
-        files.push(("ledger.md", ledger.into_bytes()));
-    }
     files.extend(shown.map(|page| ("view.html", page.into_bytes())));
     folder.publish(files)?;
     let (all, reused) = results.counts();

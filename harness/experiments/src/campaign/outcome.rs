@@ -481,8 +481,6 @@ pub struct Passing {
     pub off_axis: Option<OffAxis>,
     /// The leakage at the frequencies of `rate`; empty where it is not known.
     pub leakage: Vec<f64>,
-    /// Median cross-axis energy fraction of a hub that cannot tilt, from the gyro's noise alone; `None` without noise.
-    pub noise_fraction: Option<f64>,
 }
 
 impl Record {
@@ -600,17 +598,7 @@ impl Passing {
             let swirl = rotary::swirl(&second, &third, sweep.amplitude.abs());
             let passed = &second.frequency;
             let times: Vec<f64> = passed.iter().filter_map(|f| sweep.time_of(*f)).collect();
-            let rotary = Rotary::of(passed, &times, &swirl);
-            let ends = [rotary.from, rotary.to].map(|f| sweep.time_of(f?));
-            let [Some(first), Some(last)] = ends else { return rotary };
-            let angles = [SLOSH_ANGLE_RADIAL, SLOSH_ANGLE].map(column);
-            let ends = [first.min(last), first.max(last)];
-            rotary.with_pace(column("time"), |t| sweep.phase(t), angles, ends)
-        });
-        let (measured, truth) = (column(OMEGA_IMU), column(OMEGA));
-        let noise_fraction = (!is_recording && measured != truth).then(|| {
-            let error: Vec<f64> = measured.iter().zip(truth).map(|(m, t)| m - t).collect();
-            off_axis::of_noise(about_axis, &error)
+            Rotary::of(passed, &times, &swirl)
         });
         let (leakage, off_axis) = if is_recording {
             let [x, y] = rates.others.each_ref().map(Option::as_deref);
@@ -643,7 +631,7 @@ impl Passing {
         })
         .with(deviation, |f| demodulation::slope(sweep, f));
         rate.resolution = moves(rate.features.f_res.unwrap_or((middle.0 * middle.1).sqrt()));
-        (Passing { rate, off_axis, leakage, noise_fraction }, rotary)
+        (Passing { rate, off_axis, leakage }, rotary)
     }
 }
 

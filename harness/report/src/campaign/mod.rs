@@ -119,12 +119,6 @@ pub fn page(
     page.into_string()
 }
 
-/// Returns the ledger of the thesis's statements as Markdown; empty for a campaign that does not repeat its sweeps.
-pub fn ledger(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
-    let page = data(campaign, fmu, results);
-    if repeats_the_thesis(&page) { thesis::ledger(&page.groups) } else { String::new() }
-}
-
 fn data<'a>(campaign: &'a Campaign, fmu: &Fmu, results: &'a Results) -> Page<'a> {
     let plan = &campaign.plan;
     Page {
@@ -226,7 +220,7 @@ fn bench_sections<'a>(
         ));
     }
     if repeats_the_thesis(page) {
-        sections.push(("Comparison with the thesis", thesis::statements(groups)));
+        sections.push(("Comparison with the thesis", thesis::numbers(groups)));
     }
     sections.push(("Results table", notes::table(page, results)));
     if swept {
