@@ -5,16 +5,15 @@ tanks, a tank that drains, a sphere. At three instants of each page, the drawn b
 and compared with the positions from the table. So is the wave at the wall, also with the FMU's
 wave_height. The surface has to move the liquid's centre of mass as far as the pendulums do.
 Contrast and the rest of WCAG 2 AA are axe-core's to judge. A unit of the FMU that looks like markup
-is shown as text. Leaves fifteen screenshots and a film.
+is shown as text. Leaves fifteen screenshots.
 
-Needs Playwright (``requirements-browser.txt``), Debian's Chromium and ffmpeg; ``.ci/browser`` gets
+Needs Playwright (``requirements-browser.txt``), and Debian's Chromium; ``.ci/browser`` gets
 them.
 """
 
 import argparse
 import csv
 import html
-import itertools
 import json
 import math
 import re
@@ -423,26 +422,6 @@ def keys(page: Page) -> None:
     assert span[1] < span[0] < span[2], "a click on a plot goes nowhere"
 
 
-def film(binary: Path, run: Path, fmu: Path, out: Path) -> str:
-    """Film a second of a run; return what the film is, after a look at its frames."""
-    page = out.with_suffix(".html")
-    part = ["--from", "420", "--to", "421", "--rate", "10"]
-    command = [binary, "view", run, "--fmu", fmu, *part, "--out", page, "--video", out]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    decode = ["ffmpeg", "-v", "error", "-i", out, "-f", "rawvideo", "-pix_fmt", "gray", "-"]
-    pixels = subprocess.run(decode, check=True, capture_output=True).stdout
-    size = 1280 * 720
-    frames = [pixels[k : k + size] for k in range(0, len(pixels), size)]
-    # ten a second, the first and the last included
-    assert [len(frame) for frame in frames] == 11 * [size], len(frames)
-    for frame, other in itertools.pairwise(frames):
-        dark = sum(value < 0x60 for value in frame)
-        assert dark > size // 1000, "there is a picture with letters and lines"
-        moved = sum(abs(a - b) > 0x40 for a, b in zip(frame, other, strict=True))
-        assert moved > size // 1000, "the liquid moves"
-    return f"film: {len(frames)} frames of 1280 x 720, {out.stat().st_size} bytes"
-
-
 def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str:
     """Show a run whose FMU has a unit that opens a comment and a script; the page shows it as text.
 
@@ -511,8 +490,6 @@ def main() -> None:
             )
         hub = arguments.fmus / "HubSlosh.fmu"
         print(hostile_unit(browser, arguments.binary, hub, arguments.out))
-    sweep = arguments.out / "sweep.parquet"
-    print(film(arguments.binary, sweep, hub, arguments.out / "film.mp4"))
 
 
 if __name__ == "__main__":

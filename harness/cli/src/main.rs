@@ -27,7 +27,6 @@ mod outputs;
 mod progress;
 mod set_file;
 mod terminal;
-mod video;
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -10,7 +10,7 @@ use files::input;
 
 /// Options whose values are files or directories that a command writes: command, option, and the endings of files that
 /// it writes there. Every other value that names a file is an input.
-const OUTPUTS: [(&str, &str, &[&str]); 23] = [
+const OUTPUTS: [(&str, &str, &[&str]); 22] = [
     ("analyse", "out", &[]),
     ("book", "out", &[]),
     ("campaign", "out", &[]),
@@ -33,7 +33,6 @@ const OUTPUTS: [(&str, &str, &[&str]); 23] = [
     ("tank", "picture", &["svg"]),
     ("torque", "out", &["csv", "parquet"]),
     ("view", "out", &["html"]),
-    ("view", "video", &["mp4"]),
 ];
 
 /// Endings of files that commands read.

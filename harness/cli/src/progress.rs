@@ -19,11 +19,6 @@ pub fn of_runs() -> Result<ProgressBar> {
     bar("{msg} {bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
 
-/// A bar for the frames of a video.
-pub fn of_frames() -> Result<ProgressBar> {
-    bar("{bar:40} {pos} of {len} frames  {elapsed} elapsed, {eta} left")
-}
-
 /// A bar for the rules of a check.
 pub fn of_rules() -> Result<ProgressBar> {
     bar("{bar:40} {pos} of {len} rules of calls  {elapsed} elapsed, {eta} left")

@@ -590,28 +590,6 @@ globalThis.HubSloshScene = (() => {
       set frame(value) { frame = value; if (state) { apply(); request(); } },
       get frame() { return frame; },
       home() { home(); request(); },
-      // Takes the size of its element now, not when the browser says that it has changed.
-      resize,
-      // Copies the picture with its legend to a 2-D canvas of this size, `text` below on the left.
-      paint(pen, wide, high, text) {
-        const colors = COLORS[dark.matches ? "dark" : "light"], unit = high / 36;
-        pen.fillStyle = colors.paper;
-        pen.fillRect(0, 0, wide, high);
-        draw();
-        pen.drawImage(canvas, 0, 0, wide, high);
-        pen.font = `${0.8 * unit}px system-ui, sans-serif`;
-        pen.textBaseline = "middle";
-        arrows.forEach(({ data }, i) => {
-          const y = unit * (1.2 + 1.15 * i);
-          pen.fillStyle = rows[i].swatch.style.background;
-          pen.fillRect(unit, y - 0.12 * unit, unit, 0.24 * unit);
-          pen.fillStyle = colors.ink;
-          pen.fillText(`${data.label || data.name}: ${rows[i].value.textContent}`, 2.4 * unit, y);
-        });
-        pen.fillStyle = colors.ink;
-        pen.font = `600 ${unit}px system-ui, sans-serif`;
-        pen.fillText(text, unit, high - 1.2 * unit);
-      },
       // What is drawn, read back from its meshes: of each tank and mode hinge and bob in the body's frame, m; the surface above the
       // tank's x axis and y axis from the axis or inner wall outwards, (r, elevation), m, exaggerated as it is drawn, and its ends
       // at the wall.

@@ -13,7 +13,6 @@ use report::view::{self, Drawing, Outline};
 use signals::table::{self, Table};
 
 use super::setting;
-use crate::video::{Film, film};
 use crate::{fmu, set_file, terminal};
 
 /// Makes a page of one run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
@@ -23,7 +22,7 @@ use crate::{fmu, set_file, terminal};
 #[command(after_help = "Examples:\n  \
     hubslosh run --profile exp-sweep:amplitude=0.25 --set slosh.model=spherical --out sweep.parquet\n  \
     hubslosh view sweep.parquet\n  \
-    hubslosh view sweep.parquet --from 300 --to 400 --out swirl.html --video swirl.mp4 --speed 2\n  \
+    hubslosh view sweep.parquet --from 300 --to 400 --out swirl.html\n  \
     hubslosh view drain.csv --fmu SloshTank --parameters draining.toml --tank tank.toml\n  \
     hubslosh view slew.parquet --tank 1:oxidiser.toml --tank 2:fuel.toml")]
 pub struct ViewArgs {
@@ -39,15 +38,6 @@ pub struct ViewArgs {
     /// Last time, s.
     #[arg(long, value_name = "SECONDS")]
     to: Option<f64>,
-    /// Makes a film, too, .mp4: needs Chromium and ffmpeg on PATH.
-    #[arg(long, value_name = "FILE")]
-    video: Option<PathBuf>,
-    /// Run time per time of the film.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "video")]
-    speed: f64,
-    /// Frames of the film a second.
-    #[arg(long, value_name = "NUMBER", default_value_t = 30, requires = "video", value_parser = clap::value_parser!(u32).range(1..=120))]
-    rate: u32,
     /// Draws a tank as this file has it (the format of `hubslosh tank`), the first or that with the number: 2:fuel.toml.
     #[arg(long = "tank", value_name = "[N:]TANK.toml")]
     tanks: Vec<String>,
@@ -71,18 +61,6 @@ impl ViewArgs {
             out.extension().is_some_and(|ending| ending == "html"),
             "--out {}: the name must end in .html",
             out.display()
-        );
-        if let Some(video) = &self.video {
-            ensure!(
-                video.extension().is_some_and(|ending| ending == "mp4"),
-                "--video {}: the name must end in .mp4",
-                video.display()
-            );
-        }
-        ensure!(
-            self.speed > 0.0 && self.speed.is_finite(),
-            "--speed {} (allowed: a number above 0)",
-            self.speed
         );
         let is_parquet = self.run.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let there = table::names(&self.run)?;
@@ -140,12 +118,6 @@ impl ViewArgs {
         }
         output::write(&out, page.html.as_bytes())?;
         done!("{} ({:.1} MB)", out.display(), page.html.len() as f64 * 1e-6);
-        if let Some(video) = &self.video {
-            let time = table.column("time").unwrap_or_default();
-            let duration = time[time.len() - 1] - time[0];
-            film(&page.html, &Film { speed: self.speed, rate: self.rate, duration }, video)?;
-            done!("{}", video.display());
-        }
         Ok(())
     }
 }

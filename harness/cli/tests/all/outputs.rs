@@ -19,12 +19,11 @@ fn refused(directory: &Path, arguments: &[&str]) -> String {
 }
 
 /// Commands with an input IN and an output OUT, one for each option that names an output.
-const CASES: [&str; 16] = [
+const CASES: [&str; 15] = [
     "run --input IN --out OUT",
     "run --profile zero --parameters IN --out OUT",
     "torque --profile file:path=IN --out OUT",
     "view IN --out OUT",
-    "view IN --out page.html --video OUT",
     "check IN --json OUT",
     "check IN --junit OUT",
     "check IN --sarif OUT",

@@ -287,26 +287,6 @@
   setSpeed();
   setWave();
 
-  // `#video=rate,speed,width,height`: instead of the page all frames of a film, one a line, for `hubslosh view --video`.
-  const film = location.hash.match(/^#video=([\d.]+),([\d.eE+-]+),(\d+),(\d+)$/);
-  if (film && scene) {
-    const [rate, times, width, height] = film.slice(1).map(Number);
-    const place = at("scene");
-    Object.assign(place.style, { position: "fixed", inset: "0 auto auto 0", width: `${width}px`, height: `${height}px` });
-    scene.resize();
-    const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), frames = [];
-    [canvas.width, canvas.height] = [width, height];
-    const count_ = Math.ceil(((last - first) / times) * rate) + 1;
-    for (let k = 0; k < count_; k++) {
-      now = Math.min(last, first + (k * times) / rate);
-      scene.show(stateAt(now));
-      scene.paint(pen, width, height, `t = ${now.toFixed(2)} s`);
-      frames.push(`frame ${canvas.toDataURL("image/jpeg", 0.92).slice(23)}`);
-    }
-    document.body.textContent = `\n${frames.join("\n")}\n`;
-    return;
-  }
-
   for (const option of [...at("window").options]) if (Number(option.value) > 0.6 * (last - first)) option.remove();
   show();
   // the picture first
