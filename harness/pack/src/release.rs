@@ -1,5 +1,5 @@
 //! Makes the files of a release. Each FMU is for all platforms, in both versions of FMI, with its SBOM and the report of its
-//! check. The wheels' SBOM and the wheel for Linux follow. [`MANIFEST`] lists the SHA-256 of all files.
+//! check. The wheels' SBOM and the wheel for Linux follow. [`MANIFEST`] lists the SHA-256 of all files, [`PRESENT`] of those in the folder.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -11,9 +11,12 @@ use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};
 use crate::{Fmi, Model, pack_built, platforms, wheel};
 
-/// Name of the list of all files of all releases, with their SHA-256, as `sha256sum --check` reads it. The folder keeps the
-/// files of one version; of the others it keeps the lines of the list.
-pub const MANIFEST: &str = "SHA256SUMS";
+/// Name of the list of the files in the folder, those of one version, with their SHA-256, as `sha256sum --check` reads it.
+pub const PRESENT: &str = "SHA256SUMS";
+
+/// Name of the list of all files of all releases, with their SHA-256: [`PRESENT`], the files of older versions, and the wheels
+/// that the folder does not keep.
+pub const MANIFEST: &str = "SHA256SUMS.all";
 
 /// Bytes up to which the wheel for Linux is in the release, for it lies in the project's history forever. Of 19.0 MB the command
 /// has 6.9, the FMUs 8.6, the book 1.9 and the package's compiled half 1.3. Solving tanks in Python takes 0.6 of these. An FMU 3.0
@@ -112,7 +115,11 @@ fn record(
             std::fs::remove_file(&path).with_context(cannot)?;
         }
     }
-    written.push(manifest);
+    let is_there = |line: &&String| listed(line).is_some_and(|file| folder.join(file).is_file());
+    let present: Vec<&str> = lines.iter().filter(is_there).map(String::as_str).collect();
+    let list = folder.join(PRESENT);
+    output::write(&list, (present.join("\n") + "\n").as_bytes())?;
+    written.extend([manifest, list]);
     Ok(written)
 }
 
@@ -194,5 +201,7 @@ mod tests {
              hubslosh-0.0.1-a.whl\n"
         );
         assert_eq!(list, wanted);
+        let present = std::fs::read_to_string(folder.path().join(PRESENT)).unwrap();
+        assert_eq!(present, format!("{hash}  A-{VERSION}.fmu\n3  AB-0.0.1.fmu\n"));
     }
 }

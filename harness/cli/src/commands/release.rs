@@ -14,7 +14,8 @@ const DEFAULT_RELEASE: &str = "dist/release";
 
 /// Builds and checks the release for all platforms. Each FMU comes in both versions of FMI with its software bill of materials
 /// (SBOM) and the report of its check. The Python package's wheels have SBOMs too; the folder keeps the wheel for Linux.
-/// SHA256SUMS lists them all; files of older versions are removed, their hashes stay.
+/// SHA256SUMS lists the files in the folder, SHA256SUMS.all also the files of older versions, which are removed, and the wheels
+/// that the folder does not keep.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]

@@ -68,7 +68,7 @@ fn release_folder_holds_one_version_and_the_hashes_of_all() {
     let mut wheels = 0;
     for entry in folder.read_dir().unwrap().flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
-        if name == release::MANIFEST {
+        if [release::MANIFEST, release::PRESENT].contains(&name.as_str()) {
             continue;
         }
         let bytes = std::fs::read(entry.path()).unwrap();
@@ -90,6 +90,9 @@ fn release_folder_holds_one_version_and_the_hashes_of_all() {
         |line: &&str| line.contains(&format!("  hubslosh-{version}-")) && line.ends_with(".whl");
     assert_eq!(sums.lines().filter(listed).count(), 5, "Linux, macOS twice each, Windows");
     assert!(sums.contains("  HubSlosh-0.1.0.fmu\n"));
+    let present = std::fs::read_to_string(folder.join(release::PRESENT)).unwrap();
+    let absent = |line: &&str| !folder.join(line.split_once("  ").unwrap().1).is_file();
+    assert_eq!(present.lines().find(absent), None, "sha256sum --check would fail");
 }
 
 /// A source tree of version 1.2.3 with a release of small files, and the wheels that CI has made.
@@ -119,7 +122,7 @@ fn tree_with_a_release(folder: &Path) {
     listed("wheels/hubslosh-1.2.3-py3-none-win_amd64.whl", "hubslosh-1.2.3-py3-none-win_amd64.whl");
     write("wheels/hubslosh-1.2.3.tar.gz", "sdist");
     write("dist/release/notes.txt", "not listed");
-    write("dist/release/SHA256SUMS", &sums);
+    write("dist/release/SHA256SUMS.all", &sums);
 }
 
 /// Names of the gathered files, or what the script says.
@@ -168,7 +171,7 @@ fn release_files_are_those_of_the_manifest_and_a_missing_or_changed_one_fails() 
         (wheel, Some("other"), "has the SHA-256"),
         (other, Some("other"), "lists no hubslosh-1.2.3-py3-none-any.whl"),
         (
-            "dist/release/SHA256SUMS",
+            "dist/release/SHA256SUMS.all",
             Some("0  HubSlosh-1.2.3.fmu\n"),
             "lists no HubSlosh-1.2.3-fmi3.fmu",
         ),
