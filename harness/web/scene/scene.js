@@ -22,7 +22,7 @@ globalThis.HubSloshScene = (() => {
     light: { paper: "#ffffff", ink: "#1b1f24", soft: "#59636e", line: "#c3cad1", glass: "#59636e", liquid: "#2a86d1", surface: "#3f9be6", bob: "#c2410c", body: "#7d8894", hub: "#aeb7c0", metal: "#8d98a3" },
     dark: { paper: "#14181d", ink: "#e6eaee", soft: "#9aa5b1", line: "#3a444f", glass: "#b8c2cc", liquid: "#2f8fe0", surface: "#58adf2", bob: "#ff9d5c", body: "#93a0ad", hub: "#5b6772", metal: "#75828e" },
   };
-  // For arrows without a colour of their own: Okabe and Ito's, each at 3:1 on its background.
+  // For arrows without a colour of their own and for a page's curves: Okabe and Ito's, each at 3:1 on its background.
   const ARROWS = { light: ["#b84a00", "#0072b2", "#00805d", "#a8527f", "#6d4fb3", "#8a6a00"], dark: ["#ff8a4c", "#56b4e9", "#2fd0a3", "#e79ac4", "#b79cf0", "#f0c24b"] };
   const AROUND = 64, RINGS = 16, WALL = 40; // at least so many rings; eight for every mode
 
@@ -432,6 +432,7 @@ globalThis.HubSloshScene = (() => {
     });
     const legend = document.createElement("ul");
     legend.className = "hs-legend";
+    const shownColors = {};
     const rows = arrows.map(({ data }) => {
       const row = document.createElement("li"), swatch = document.createElement("i"), name = document.createElement("span"), value = document.createElement("b");
       name.textContent = data.label || data.name;
@@ -504,6 +505,7 @@ globalThis.HubSloshScene = (() => {
         const color = (data.colors && data.colors[scheme]) || ARROWS[scheme][i % ARROWS[scheme].length];
         drawn.material.color.set(color);
         rows[i].swatch.style.background = color;
+        shownColors[data.name] = color;
       });
       element.style.setProperty("--hs-ink", colors.ink);
       element.style.setProperty("--hs-soft", colors.soft);
@@ -590,6 +592,8 @@ globalThis.HubSloshScene = (() => {
       set frame(value) { frame = value; if (state) { apply(); request(); } },
       get frame() { return frame; },
       home() { home(); request(); },
+      // Colours of the arrows by name, so that a curve of the same quantity can have the same colour.
+      colors: shownColors,
       // What is drawn, read back from its meshes: of each tank and mode hinge and bob in the body's frame, m; the surface above the
       // tank's x axis and y axis from the axis or inner wall outwards, (r, elevation), m, exaggerated as it is drawn, and its ends
       // at the wall.
@@ -623,5 +627,5 @@ globalThis.HubSloshScene = (() => {
     };
   }
 
-  return { create, cylinder, sphere, digits };
+  return { create, cylinder, sphere, digits, ARROWS };
 })();

@@ -86,7 +86,14 @@
 
   // Plots: light or dark colours as the reader has it, envelopes as fine as the width of the plot.
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  const COLORS = { light: ["#0b62a4", "#b84a00", "#00755a", "#a8527f", "#6d4fb3", "#7a5c00"], dark: ["#6cb6ff", "#ff9d5c", "#3ecfa5", "#e79ac4", "#b79cf0", "#f0c24b"] };
+  // A quantity that is an arrow of the picture has the colour of its arrow; other curves take colours that are still free.
+  const arrowOf = new Map(Object.entries(run.scene.arrows).filter(([, source]) => typeof source === "string").map(([arrow, column]) => [column, arrow]));
+  function colorsOf(names) {
+    const fixed = names.map((name) => scene && scene.colors[arrowOf.get(name)]);
+    const all = HubSloshScene.ARROWS[dark.matches ? "dark" : "light"];
+    const free = all.filter((color) => !fixed.includes(color));
+    return fixed.map((color, i) => color || free.shift() || all[i % all.length]);
+  }
   const plots = run.panels.map((panel, i) => {
     const box = document.createElement("div"), head = document.createElement("p"), place = document.createElement("div"), cursor = document.createElement("div");
     box.className = "panel";
@@ -133,10 +140,11 @@
 
   let window_ = [first, last];
   function drawPlots() {
-    const night = dark.matches, ink = night ? "#e6eaee" : "#1b1f24", rule = night ? "#2f3740" : "#dfe4e8", colors = COLORS[night ? "dark" : "light"];
+    const night = dark.matches, ink = night ? "#e6eaee" : "#1b1f24", rule = night ? "#2f3740" : "#dfe4e8";
     for (const plot of plots) {
+      const colors = colorsOf(plot.panel.names);
       const traces = plot.shown.map(({ name, swatch }, i) => {
-        const color = colors[i % colors.length];
+        const color = colors[i];
         swatch.style.background = color;
         const [x, y] = line(plot, i, ...window_);
         return { type: "scatter", mode: "lines", x, y, name, line: { width: 1.2, color } };
