@@ -54,11 +54,13 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// The band around antiresonance and resonance of all runs, at their own distance, Hz.
+/// The band, Hz, around the antiresonance and the resonance of linear theory and of every run that is drawn. A nonlinear
+/// liquid and a bench have their resonance elsewhere than linear theory.
 fn near(group: &Group) -> Option<(f64, f64)> {
     let (from, to) = group.band().unwrap_or(BAND);
-    let bands = group.exact.iter().filter_map(|exact| {
-        let (antiresonance, resonance) = exact.f_dip.zip(exact.f_res)?;
+    let of_runs = group.drawn.iter().filter_map(|run| Some(best(run)?.0.features));
+    let bands = group.exact.iter().copied().chain(of_runs).filter_map(|features| {
+        let (antiresonance, resonance) = features.f_dip.zip(features.f_res)?;
         let delta = resonance - antiresonance;
         Some(((antiresonance - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))
     });
