@@ -25,8 +25,9 @@ mod page;
 mod starts;
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
-use analysis::statistics::{about_mean, noise_level, peak, variance};
+use analysis::statistics::{about_mean, mean, noise_level, peak, variance};
 use anyhow::{Result, bail, ensure};
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
@@ -207,6 +208,8 @@ pub struct Fit {
 pub struct Braking {
     /// `counter-clockwise` (forwards) or `clockwise`.
     pub direction: &'static str,
+    /// Speed to which the fit belongs, rad/s: the mean of both directions. A parabola takes the dependence on the speed.
+    pub speed: f64,
     /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
     pub coefficients: Vec<f64>,
     /// Their standard deviations, rad/s².
@@ -217,12 +220,44 @@ pub struct Braking {
     pub r_squared: f64,
     /// Rows.
     pub rows: usize,
-    /// Angle (rad) and acceleration (rad/s²) of each row.
+    /// Stretches of these rows: parts of one decay within one revolution of the hub.
+    pub stretches: usize,
+    /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
+    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`].
+    #[serde(skip)]
+    covariance: Option<DMatrix<f64>>,
+}
+
+/// Fewest stretches from whose scatter the uncertainty of five coefficients is computed.
+pub const LEAST_STRETCHES: usize = 10;
+
+/// Regressors of [`Braking`] at an angle: 1, then cos hθ and sin hθ of each harmonic.
+fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
+    let each = (1..=harmonics).flat_map(|h| {
+        let (sin, cos) = (angle * h as f64).sin_cos();
+        [cos, sin]
+    });
+    [1.0].into_iter().chain(each).collect()
 }
 
 impl Braking {
+    /// Returns the half-width of the fit's simultaneous 95 % band at an angle, rad/s²: with this probability the whole curve
+    /// lies in the band. The residuals of one stretch count as one value, because deceleration also depends on the rate,
+    /// which changes slowly within a stretch. `None` if there are too few
+    /// stretches. Liang and Zeger, Biometrika 73 (1986) 13,
+    /// with Scheffé's factor.
+    pub fn half_width(&self, angle: f64) -> Option<f64> {
+        /// 95 % quantile of χ² with five degrees of freedom.
+        const CHI_SQUARE: f64 = 11.070;
+        let width = self.coefficients.len();
+        let row = DVector::from_vec(harmonics_at(angle, (width - 1) / 2));
+        let variance = (row.transpose() * self.covariance.as_ref()? * &row)[(0, 0)];
+        let few = (self.stretches - 1) as f64 / (self.stretches - width - 2) as f64;
+        Some((CHI_SQUARE * few * variance).sqrt())
+    }
+
     /// Returns the fitted acceleration at an angle, rad/s².
     pub fn at(&self, angle: f64) -> f64 {
         let [mean, harmonics @ ..] = &self.coefficients[..] else { return 0.0 };
@@ -1105,10 +1140,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let mut uncorrected: BTreeMap<String, f64> =
         problem.names.iter().cloned().zip(uncorrected).collect();
     uncorrected.entry(hub::I.into()).and_modify(|inertia| *inertia -= liquid);
-    let braking: Vec<Braking> = [1.0, -1.0]
-        .into_iter()
-        .filter_map(|way| braking(recordings, problem.biases(&p), way))
-        .collect();
+    let braking = brakings(recordings, problem.biases(&p));
     let starts = problem.start_study(&minimum, options.start_study, rms * rms);
     let rests = problem.rows.iter().any(|rows| rows.resting.iter().any(|weight| *weight > 0.0));
     let share = |j: usize| (of_values[(j, j)] - of_noise[j]) / of_values[(j, j)];
@@ -1189,51 +1221,91 @@ fn windows(problem: &Problem) -> Vec<(usize, usize)> {
     covariance::windows(rows, SCORE_WINDOW)
 }
 
-/// The braking of free decay in one direction against the angle, ordinary least squares (thesis 5.4);
-/// `None` without angle or free decay.
-fn braking(recordings: &[Recording], biases: &[f64], way: f64) -> Option<Braking> {
-    let harmonics = 2;
-    let (mut rows, mut accelerations, mut angles) = (Vec::new(), Vec::new(), Vec::new());
+/// Fits [`Braking`] in both directions; a direction with too few rows is left out.
+fn brakings(recordings: &[Recording], biases: &[f64]) -> Vec<Braking> {
+    let mut free: [Vec<FreeRow>; 2] = Default::default();
+    let mut stretch = 0;
     for (recording, bias) in recordings.iter().zip(biases) {
         let Some(angle) = &recording.angle else { continue };
         let rate: Vec<f64> = recording.rate.iter().map(|w| w - bias).collect();
         let (torque, t) = (&recording.torque, &recording.time);
         let (still, slow) = (FREE_TORQUE * peak(torque), MOVING_SPEED * peak(&rate));
+        let (mut turned, mut last) = (0.0, None);
         for k in 1..t.len() - 1 {
-            let free = (k - 1..=k + 1).all(|i| torque[i].abs() <= still && way * rate[i] > slow);
-            if free {
-                let mut row = vec![1.0];
-                for h in 1..=harmonics {
-                    let (sin, cos) = (angle[k] * h as f64).sin_cos();
-                    row.extend([cos, sin]);
-                }
-                rows.extend(row);
-                angles.push(angle[k]);
-                accelerations.push((rate[k + 1] - rate[k - 1]) / (t[k + 1] - t[k - 1]));
+            let step = angle[k] - angle[k - 1];
+            turned += step - TAU * (step / TAU).round(); // the angle may be wrapped
+            let way = rate[k].signum();
+            if !(k - 1..=k + 1).all(|i| torque[i].abs() <= still && way * rate[i] > slow) {
+                last = None;
+                continue;
             }
+            let revolution = Some((turned / TAU).floor());
+            stretch += usize::from(last != revolution);
+            last = revolution;
+            free[usize::from(way < 0.0)].push(FreeRow {
+                angle: angle[k],
+                speed: rate[k].abs(),
+                acceleration: (rate[k + 1] - rate[k - 1]) / (t[k + 1] - t[k - 1]),
+                stretch,
+            });
         }
     }
-    let (count, width) = (accelerations.len(), 2 * harmonics + 1);
-    if count < 20 * width {
+    let speeds: Vec<f64> = free.iter().flatten().map(|row| row.speed).collect();
+    let speed = mean(&speeds);
+    let [ahead, back] = &free;
+    [("counter-clockwise", ahead), ("clockwise", back)]
+        .into_iter()
+        .filter_map(|(direction, rows)| braking(direction, rows, speed))
+        .collect()
+}
+
+/// A row without torque in which the hub turns.
+struct FreeRow {
+    angle: f64,
+    speed: f64,
+    acceleration: f64,
+    /// Number of the part of a decay within one revolution of the hub.
+    stretch: usize,
+}
+
+/// Fits the rows of one direction by least squares, at this speed, rad/s. A parabola takes the dependence on the speed.
+fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Braking> {
+    let (harmonics, count) = (2, rows.len());
+    let (width, all) = (2 * harmonics + 1, 2 * harmonics + 3);
+    if count < 20 * all {
         return None;
     }
-    let a = DMatrix::from_row_slice(count, width, &rows);
-    let y = DVector::from_vec(accelerations);
+    let regressors = rows.iter().flat_map(|row| {
+        let more = row.speed - speed;
+        [harmonics_at(row.angle, harmonics), vec![more, more * more]].concat()
+    });
+    let a = DMatrix::from_row_iterator(count, all, regressors);
+    let y = DVector::from_iterator(count, rows.iter().map(|row| row.acceleration));
     let inverse = a.tr_mul(&a).try_inverse()?;
     let found = &inverse * a.tr_mul(&y);
     let residual = &y - &a * &found;
-    let points = angles.into_iter().zip(y.iter().copied()).collect();
-    let variance = residual.norm_squared() / (count - width) as f64;
-    let mean = y.mean();
+    let variance = residual.norm_squared() / (count - all) as f64;
+    let at_speed = y - a.columns(width, 2) * found.rows(width, 2);
+    let about = at_speed.add_scalar(-at_speed.mean());
+    let mut sums: BTreeMap<usize, DVector<f64>> = BTreeMap::new();
+    for (i, row) in rows.iter().enumerate() {
+        let sum = sums.entry(row.stretch).or_insert_with(|| DVector::zeros(all));
+        *sum += a.row(i).transpose() * residual[i];
+    }
+    let meat = sums.values().fold(DMatrix::zeros(all, all), |all, s| all + s * s.transpose());
+    let covariance = (&inverse * meat * &inverse).view((0, 0), (width, width)).into_owned();
+    let stretches = sums.len();
     Some(Braking {
-        direction: if way > 0.0 { "counter-clockwise" } else { "clockwise" },
+        direction,
+        speed,
         std: (0..width).map(|j| (variance * inverse[(j, j)]).sqrt()).collect(),
-        coefficients: found.as_slice().to_vec(),
+        coefficients: found.as_slice()[..width].to_vec(),
         rmse: (residual.norm_squared() / count as f64).sqrt(),
-        r_squared: 1.0
-            - residual.norm_squared() / y.iter().map(|v| (v - mean).powi(2)).sum::<f64>(),
+        r_squared: 1.0 - residual.norm_squared() / about.norm_squared(),
         rows: count,
-        points,
+        stretches,
+        points: rows.iter().map(|row| row.angle).zip(at_speed.iter().copied()).collect(),
+        covariance: (stretches >= LEAST_STRETCHES).then_some(covariance),
     })
 }
 
@@ -1336,6 +1408,62 @@ fn words(found: &Found, problem: &Problem, p: &[f64]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Twelve decays in a direction from 6 rad/s, by viscous and dry friction, which depends on the angle by the share
+    /// `cosine`; the gyro has noise.
+    fn decays(random: &mut analysis::random::Random, way: f64, cosine: f64) -> Vec<Recording> {
+        (0..12)
+            .map(|_| {
+                let (h, mut time, mut torque) = (0.02, Vec::new(), Vec::new());
+                let (mut rate, mut angle) = (Vec::new(), Vec::new());
+                let (mut w, mut at) = (6.0, 10.0 * random.normal());
+                while w > 0.5 {
+                    time.push(h * time.len() as f64);
+                    torque.push(if time.len() < 3 { 0.1 } else { 0.0 });
+                    rate.push(way * w + 2e-3 * random.normal());
+                    angle.push(at);
+                    for _ in 0..10 {
+                        w -= 0.1 * h * (0.2 * w + 0.8 * (1.0 + cosine * f64::cos(at)));
+                        at += 0.1 * h * way * w;
+                    }
+                }
+                Recording {
+                    name: String::new(),
+                    time,
+                    torque,
+                    rate,
+                    angle: Some(angle),
+                    gravity: None,
+                    wheel_speed: None,
+                    off_axis: [None, None],
+                    from_rest: false,
+                    fresh: None,
+                    angle_fresh: None,
+                    commanded: None,
+                }
+            })
+            .collect()
+    }
+
+    /// True if the directions' difference is outside its 95 % band somewhere.
+    fn differ(seed: u64, cosine: f64) -> bool {
+        let mut random = analysis::random::Random::new(seed, 0);
+        let all = [decays(&mut random, 1.0, cosine), decays(&mut random, -1.0, 0.0)].concat();
+        let both = brakings(&all, &[0.0; 24]);
+        let [ahead, back] = &both[..] else { panic!("{both:?}") };
+        (0..90).map(|k| TAU * f64::from(k) / 90.0).any(|angle| {
+            let half = ahead.half_width(angle).unwrap().hypot(back.half_width(angle).unwrap());
+            (-ahead.at(angle) - back.at(angle)).abs() > half
+        })
+    }
+
+    #[test]
+    fn scatter_of_decays_is_no_preferential_direction_and_a_tenth_of_friction_is_one() {
+        let of = |cosine: f64| (0..100).filter(|seed| differ(*seed, cosine)).count();
+        // 95 % for the whole curve: 5 of 100 expected, 12 are three standard deviations more
+        assert!(of(0.0) <= 12, "{}", of(0.0));
+        assert!(of(0.1) >= 95, "{}", of(0.1));
+    }
 
     #[test]
     fn the_mean_sign_is_the_integral_and_its_slope_the_derivative() {

@@ -9,7 +9,7 @@ use host::fmu::Fmu;
 use identify::estimate::{Estimated, prose};
 use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
-use identify::methods::acceleration::{self, Braking};
+use identify::methods::acceleration::{self, Braking, LEAST_STRETCHES};
 use identify::model::bench::nominal;
 use identify::words::start_study;
 use names::hubslosh::{fluid, friction, hub, tank};
@@ -314,6 +314,33 @@ fn preferential_direction(
     };
     let differences: Vec<(f64, f64)> =
         fit(ccw).into_iter().zip(fit(cw)).map(|((angle, a), (_, b))| (angle, a - b)).collect();
+    // the directions are independent; the band of the difference is for the whole curve, as those of the fits are
+    let band: Option<Vec<(f64, f64)>> = angles()
+        .map(|angle| {
+            let half = |braking: &Braking| braking.half_width(angle.to_radians());
+            Some((angle, half(ahead)?.hypot(half(back)?)))
+        })
+        .collect();
+    let edges = |sign: f64| -> Vec<(f64, f64)> {
+        let both = band.iter().flatten().zip(&differences);
+        both.map(|((angle, half), (_, difference))| (*angle, difference + sign * half)).collect()
+    };
+    let (lower, upper) = (edges(-1.0), edges(1.0));
+    let beyond = lower.iter().zip(&upper).filter(|(l, u)| l.1 > 0.0 || u.1 < 0.0).count();
+    let shown = match &band {
+        None => format!(
+            "The decays have {} and {} parts of a revolution (needed for an interval: {LEAST_STRETCHES} in each direction), so the figures \
+             cannot tell friction that depends on the angle from scatter.",
+            ahead.stretches, back.stretches
+        ),
+        Some(_) if beyond == 0 => "The difference of the directions is nowhere outside its 95 % interval (dashed): the curves of these \
+             figures show scatter, not friction that depends on the angle or the direction."
+            .to_string(),
+        Some(band) => format!(
+            "The difference of the directions is outside its 95 % interval (dashed) over {:.0} % of the revolution.",
+            100.0 * beyond as f64 / band.len() as f64
+        ),
+    };
     let (x, y) = ("angle / deg", "deceleration / (rad/s²)");
     let scatter = chart(
         "Deceleration in free decay against the angle",
@@ -330,7 +357,11 @@ fn preferential_direction(
         "Directional asymmetry against the angle",
         x,
         "counter-clockwise less clockwise / (rad/s²)",
-        vec![series("difference of the fits", Style::Line, differences)],
+        vec![
+            series("difference of the fits", Style::Line, differences.iter().copied()),
+            series("95 % interval, lower end", Style::Dashed, lower.iter().copied()),
+            series("95 % interval, upper end", Style::Dashed, upper.iter().copied()),
+        ],
     );
     let round = |points: Vec<(f64, f64)>| {
         points.into_iter().map(|(angle, a)| {
@@ -366,9 +397,12 @@ fn preferential_direction(
         title: "Preferential direction (thesis 5.4)".into(),
         text: vec![
             verdict,
-            "The figures show the thesis's fits, deceleration against the angle alone. Deceleration also depends on the rate: the \
-             fits describe the bearing only if the decays pass each angle at many rates."
-                .into(),
+            format!(
+                "The figures show deceleration against the angle at {:.2} rad/s, the mean speed of the decays. A parabola takes its \
+                 dependence on the speed, which the thesis's fits leave in.",
+                ahead.speed
+            ),
+            shown,
         ],
         illustrations: vec![
             illustration(
