@@ -189,6 +189,11 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
 /// Parameters of a recording's noise with their intervals, and whether they describe its Allan deviation: name and value.
 pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
     let stated = |Estimate { value, low, high, .. }: &Estimate, unit: &str| match (*low, *high) {
+        (low, high) if low.is_nan() || high.is_nan() => {
+            format!(
+                "{value:.4e} {unit}, its significance could not be tested: no interval is given"
+            )
+        }
         (0.0, f64::INFINITY) => {
             format!("{value:.4e} {unit}, the recording is too short for an interval")
         }
