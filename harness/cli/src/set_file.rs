@@ -90,7 +90,30 @@ fn from_json(text: &str) -> Result<Vec<(String, String)>> {
         let value = value.with_context(|| format!("parameters: {name} has no number \"value\""))?;
         settings.push((name.clone(), format!("{value:?}")));
     }
-    Ok(settings)
+    Ok(of_one_run(settings))
+}
+
+/// Returns the settings of a run: those of all recordings, and those of the one recording (`NAME@1`) if there is no other. Otherwise
+/// a warning names what belongs to single recordings and is left out.
+fn of_one_run(settings: Vec<(String, String)>) -> Vec<(String, String)> {
+    let recording = |name: &str| -> Option<usize> { name.rsplit_once('@')?.1.parse().ok() };
+    let has_others = settings.iter().any(|(name, _)| recording(name).is_some_and(|n| n > 1));
+    let mut left_out = Vec::new();
+    let mut kept = Vec::new();
+    for (name, value) in settings {
+        match (recording(&name), name.rsplit_once('@')) {
+            (Some(_), _) if has_others => left_out.push(name),
+            (Some(_), Some((plain, _))) => kept.push((plain.to_string(), value)),
+            _ => kept.push((name, value)),
+        }
+    }
+    if !left_out.is_empty() {
+        crate::terminal::warn(format_args!(
+            "{} belong to single recordings and are not set: --set NAME=VALUE sets the one of this run",
+            left_out.join(", ")
+        ));
+    }
+    kept
 }
 
 /// SSP 1.0 and 2.0, "SystemStructureParameterValues": a value with a `unit` is converted by the unit's definition in the file's

@@ -393,8 +393,6 @@ pub const CAUSE_PART: (f64, f64) = (1e-2, 1e-3);
 pub const REFITTED: usize = 3;
 /// Part of the best candidate's share below which another one is not fitted.
 pub const CAUSE_LEAST: f64 = 0.05;
-/// Part of the misfit that a cause explains at least.
-pub const CAUSE_EXPLAINS: f64 = 0.5;
 /// Largest commanded torque over which the actuator's limit starts.
 pub const ACTUATOR_LIMIT: f64 = 0.9;
 

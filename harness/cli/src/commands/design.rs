@@ -330,7 +330,7 @@ impl Plan {
             let one = |(name, value, std): &(String, f64, f64)| {
                 let variable = fmu.description().variable(name);
                 let unit = variable.map(|v| fmu.description().unit(v).to_string()).ok();
-                (name.clone(), json!({ "value": value, "std": std, "unit": unit }))
+                (name.clone(), json!({ "value": value, "std_noise": std, "unit": unit }))
             };
             bounds.iter().map(one).collect::<serde_json::Map<_, _>>()
         };
@@ -380,7 +380,7 @@ impl Plan {
             }
         );
         let head = if self.sweep.is_some() { "sweep %" } else { "" };
-        println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std", "std %");
+        println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std, noise", "std %");
         for (k, (name, value, deviation)) in self.bounds.iter().enumerate() {
             // nothing is a part of what is expected to be 0
             let percent = |std: f64| match *value {
@@ -395,6 +395,11 @@ impl Plan {
                 percent(*deviation)
             );
         }
+        println!(
+            "No interval follows from these bounds: they are of the gyro's noise alone, for a friction curve of known shape. The standard \
+             deviations of identify also hold the tolerances of torque, clock and bench and the Stribeck curve, and are up to a \
+             hundred times larger."
+        );
         if let Some(Sweep { profile, angle, bounds }) = &self.sweep {
             println!(
                 "Mean standard deviation (geometric): multisine {:.4} %, linear sweep {:.4} % (slosh angle up to {angle:.3} rad).",

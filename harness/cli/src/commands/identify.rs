@@ -339,7 +339,13 @@ impl IdentifyArgs {
             }
             MethodName::Frequency => {
                 let intersample = self.intersample().unwrap_or(Intersample::FirstOrderHold);
-                self.answer(Frequency { settings: self.settings.clone(), intersample }, trim)
+                let frequency = Frequency {
+                    settings: self.settings.clone(),
+                    intersample,
+                    tolerances: self.tolerances()?,
+                    gyro_scale: self.gyro_scale,
+                };
+                self.answer(frequency, trim)
             }
             MethodName::Multisine => self.answer(Multisine { period: self.period }, trim),
             MethodName::BlackBox => self.answer(BlackBox, trim),
@@ -444,7 +450,8 @@ impl IdentifyArgs {
             "the recordings are of different signals: {}",
             signals.join(", ")
         );
-        self.find(FreeDecay { signal }, None, &recordings, &[], notes)
+        let clock = self.tolerances()?.clock;
+        self.find(FreeDecay { signal, clock }, None, &recordings, &[], notes)
     }
 
     /// Identifies, writes and prints.

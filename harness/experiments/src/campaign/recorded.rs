@@ -1,9 +1,14 @@
 //! Reads a recording as a run: on an equally spaced grid, from the torque's beginning to its end.
 
-use anyhow::{Context, Result, ensure};
+use std::f64::consts::TAU;
+
+use analysis::Complex64;
+use analysis::sweep::Sweep;
+use anyhow::{Context, Result, bail, ensure};
 use files::budget;
+use nalgebra::{DMatrix, DVector};
 use signals::fourier::{Forward, Inverse};
-use signals::recording::{self, Between, Signal, Wanted, even};
+use signals::recording::{self, Between, Signal, Wanted, even_with_gaps};
 use signals::table::Table;
 
 use crate::plan::{Case, Recorded};
@@ -21,6 +26,17 @@ const SIGNALS: [Signal; 4] = [
 const LEAST_CORRELATION: f64 = 0.9;
 /// Largest part of the run that may be missing at its ends.
 const MISSING: f64 = 0.5;
+/// Largest part of a record in gaps: lines join torque and rate alike, so that their ratio is hardly changed. Where 3 % of the rows are lost
+/// one by one, the gaps are 6 % of the record.
+const GAPS: f64 = 0.15;
+/// Largest relative difference of the recorder's clock from that of the torque.
+const FASTEST_CLOCK: f64 = 2e-3;
+/// Cycles by which such a difference shifts the torque at the end of a record, above which times are corrected.
+const SHIFT: f64 = 0.02;
+/// Cycles of a block in which the phase of a record is compared with the phase of the sweep.
+const BLOCK_CYCLES: f64 = 6.0;
+/// Comparisons, each with the clock of the one before.
+const ROUNDS: usize = 3;
 
 /// Reads a recording on an equally spaced grid. Returns its step, s, and the table.
 ///
@@ -33,7 +49,7 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
         &Wanted { signals: &SIGNALS, columns: &recorded.columns },
         done,
     )?;
-    even(table, &mut |words| done(format!("{name}: {words}")))
+    even_with_gaps(table, GAPS, &mut |words| done(format!("{name}: {words}")))
         .with_context(|| format!("{name} cannot be used"))
 }
 
@@ -53,8 +69,12 @@ pub(super) fn table(
     let (time, torque) = (column("time"), column("tau_cmd"));
     let (from, to) = case.torque.span();
     let to = to.min(case.stop);
-    let first = match &*case.torque {
-        Torque::Profile(profile) if profile.sweep().is_some() => {
+    let profile = match &*case.torque {
+        Torque::Profile(profile) => profile.sweep().map(|sweep| (sweep, profile)),
+        Torque::Rows { .. } => None,
+    };
+    let clock = match profile {
+        Some((sweep, profile)) => {
             let highest = profile.band().map_or(0.0, |band| band.1);
             ensure!(
                 step * highest < 0.5,
@@ -64,27 +84,42 @@ pub(super) fn table(
                 0.5 / highest
             );
             budget::table(budget::steps(to - from, step).with_context(|| name.to_string())?, 4)?;
-            let count = ((to - from) / step).round() as usize;
-            let wanted: Vec<f64> =
-                (0..=count).map(|k| case.torque.at(from + k as f64 * step)).collect();
-            let (lag, correlation) = aligned(torque, &wanted);
-            ensure!(
-                correlation > LEAST_CORRELATION,
-                "{name}: its torque is not {} (correlation {correlation:.2}; allowed: at least {LEAST_CORRELATION}). Is the \
-                 profile another one, or the torque's sign?",
-                case.profile
-            );
-            lag
+            let sought = Sought { step, span: (from, to), sweep };
+            let (clock, correlation) = sought.found_in(torque);
+            if correlation <= LEAST_CORRELATION {
+                let reversed: Vec<f64> = torque.iter().map(|tau| -tau).collect();
+                ensure!(
+                    sought.found_in(&reversed).1 <= LEAST_CORRELATION,
+                    "{name}: its torque is {} with the other sign. A factor of -1 in --columns tau_cmd=COLUMN, or in the logger, turns it",
+                    case.profile
+                );
+                bail!(
+                    "{name}: its torque is not {} (correlation {correlation:.2}; allowed: at least {LEAST_CORRELATION}, with a clock \
+                     that is up to {} ppm off). Another profile, duration or band acted, or the times are in another unit",
+                    case.profile,
+                    1e6 * FASTEST_CLOCK
+                );
+            }
+            clock
         }
         // of a noise nobody knows which it was
-        _ => 0,
+        None => Clock { first: 0.0, rate: 0.0 },
     };
-    if first != 0 {
-        done(format!("{name}: the torque begins at {:.2} s of it", time[0] + first as f64 * step));
+    let Clock { first, rate } = clock;
+    if first != 0.0 {
+        done(format!("{name}: the torque begins at {:.2} s of it", time[0] + first * step));
     }
+    if rate != 0.0 {
+        done(format!(
+            "{name}: its clock runs {:+.0} ppm against that of the torque; times are those of the torque, so that frequencies are \
+             those of the plan",
+            1e6 * rate
+        ));
+    }
+    let (recorded_step, step) = (step, step / (1.0 + rate));
     let rows: Vec<usize> = (0..time.len())
         .filter(|k| {
-            let t = from + (*k as f64 - first as f64) * step;
+            let t = from + (*k as f64 - first) * step;
             t > from - 0.5 * step && t < to + 0.5 * step
         })
         .collect();
@@ -97,11 +132,15 @@ pub(super) fn table(
         100.0 * (1.0 - MISSING)
     );
     // times that already count from the beginning are kept
-    let origin = time[0] + first as f64 * step - from;
+    let origin = time[0] + first * recorded_step - from;
     let origin = if origin.abs() < 1e-9 { 0.0 } else { origin };
     let cut = |values: &[f64]| rows.iter().map(|k| values[*k]).collect::<Vec<f64>>();
+    let times = match rate == 0.0 {
+        true => cut(time).iter().map(|t| t - origin).collect(),
+        false => rows.iter().map(|k| from + (*k as f64 - first) * step).collect(),
+    };
     let mut columns = vec![
-        ("time", cut(time).iter().map(|t| t - origin).collect()),
+        ("time", times),
         ("tau_cmd", cut(torque)),
         ("omega", cut(column("omega"))),
         ("omega_imu", cut(column("omega"))),
@@ -114,6 +153,111 @@ pub(super) fn table(
     // the plan's own step if it is equal to rounding
     let step = if (step / case.step - 1.0).abs() < 1e-6 { case.step } else { step };
     Ok((step, Table::new(names, columns)))
+}
+
+/// The recorder's clock against that of the torque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Clock {
+    /// Row of the record at which the torque begins, possibly before the first or between two.
+    first: f64,
+    /// Relative difference: 1 + rate recorded seconds are a second of the torque.
+    rate: f64,
+}
+
+/// A sweep that is sought in a record.
+struct Sought<'t> {
+    /// Time between rows of the record, s.
+    step: f64,
+    /// First and last time, s.
+    span: (f64, f64),
+    sweep: &'t Sweep,
+}
+
+impl Sought<'_> {
+    /// Finds the sweep in a record, with the clock's difference, and its correlation coefficient there.
+    ///
+    /// A difference of 50 ppm moves the end of 2700 s by half a cycle, so the whole sweep correlates with no stretch of the record. The
+    /// phase of the record against that of the sweep, unwrapped over blocks, is 2π f(t) (α + β t) + 2π n: the start that was
+    /// missed by α, the clock by β, and n whole cycles.
+    fn found_in(&self, record: &[f64]) -> (Clock, f64) {
+        let (from, to) = self.span;
+        let count = ((to - from) / self.step).round() as usize;
+        let wanted: Vec<f64> =
+            (0..=count).map(|k| self.sweep.torque(from + k as f64 * self.step)).collect();
+        let (lag, correlation) = aligned(record, &wanted);
+        let whole = Clock { first: lag as f64, rate: 0.0 };
+        let mut clock = whole;
+        for _ in 0..ROUNDS {
+            clock = self.refined(record, clock).unwrap_or(clock);
+        }
+        let cycles = (self.sweep.phase(to) - self.sweep.phase(from)).abs() / TAU;
+        let is_same = correlation > LEAST_CORRELATION && cycles * clock.rate.abs() < SHIFT;
+        if is_same || clock.rate.abs() > FASTEST_CLOCK {
+            return (whole, correlation);
+        }
+        let found = self.correlation(record, clock);
+        if found > correlation { (clock, found) } else { (whole, correlation) }
+    }
+
+    /// Time of the sweep at a row of the record.
+    fn time(&self, clock: Clock, row: usize) -> f64 {
+        self.span.0 + (row as f64 - clock.first) * self.step / (1.0 + clock.rate)
+    }
+
+    fn correlation(&self, record: &[f64], clock: Clock) -> f64 {
+        let (mut product, mut squares, mut others) = (0.0, 0.0, 0.0);
+        for (row, recorded) in record.iter().enumerate() {
+            let t = self.time(clock, row);
+            if (self.span.0..=self.span.1).contains(&t) {
+                let value = self.sweep.torque(t);
+                product += value * recorded;
+                squares += value * value;
+                others += recorded * recorded;
+            }
+        }
+        product / f64::sqrt(squares * others)
+    }
+
+    /// Returns the clock from the phases of the record against those by a clock that is nearly right; `None` if they determine none.
+    fn refined(&self, record: &[f64], clock: Clock) -> Option<Clock> {
+        let (from, to) = self.span;
+        let rows = (BLOCK_CYCLES / self.sweep.band().0 / self.step).ceil() as usize;
+        let (mut equations, mut last) = (Vec::new(), None);
+        for (block, values) in record.chunks_exact(rows).enumerate() {
+            let row = block * rows;
+            let (begin, end) = (self.time(clock, row), self.time(clock, row + rows));
+            if begin < from || end > to {
+                continue;
+            }
+            let mut sum = Complex64::default();
+            for (k, value) in values.iter().enumerate() {
+                let window = 1.0 - (TAU * (k as f64 + 0.5) / rows as f64).cos();
+                let phase = self.sweep.phase(self.time(clock, row + k));
+                sum += window * value * Complex64::cis(-phase);
+            }
+            // a sine's phase is counted from its cosine
+            let angle = (sum * self.sweep.amplitude.signum()).arg() / TAU + 0.25;
+            let unwrapped = last.map_or(angle, |last: f64| angle - (angle - last).round());
+            last = Some(unwrapped);
+            let middle = 0.5 * (begin + end);
+            let frequency = (self.sweep.phase(end) - self.sweep.phase(begin)) / TAU / (end - begin);
+            equations.push([frequency, frequency * middle, 1.0, unwrapped]);
+        }
+        let columns = |n: usize| DMatrix::from_fn(equations.len(), n, |row, k| equations[row][k]);
+        let solve = |n: usize, right: &dyn Fn(&[f64; 4]) -> f64| {
+            let right = DVector::from_iterator(equations.len(), equations.iter().map(right));
+            columns(n).svd(true, true).solve(&right, 1e-12).ok()
+        };
+        if equations.len() < 4 {
+            return None;
+        }
+        let cycles = solve(3, &|equation| equation[3])?[2].round();
+        let found = solve(2, &|equation| equation[3] - cycles)?;
+        let (alpha, beta) = (found[0], found[1]);
+        let first =
+            clock.first + ((from - alpha) / (1.0 + beta) - from) * (1.0 + clock.rate) / self.step;
+        Some(Clock { first, rate: (1.0 + clock.rate) / (1.0 + beta) - 1.0 })
+    }
 }
 
 /// Returns the row of a record at which a signal begins, possibly before the first row, and the correlation coefficient
@@ -146,7 +290,7 @@ fn aligned(record: &[f64], wanted: &[f64]) -> (i64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::aligned;
+    use super::{Clock, LEAST_CORRELATION, Sought, aligned};
     use analysis::sweep::Sweep;
 
     #[test]
@@ -160,7 +304,37 @@ mod tests {
         assert!(lag == 300 && correlation > 0.999_999, "{lag} {correlation}");
         let (lag, correlation) = aligned(&wanted[400..], &wanted);
         assert!(lag == -400 && correlation > 0.999_999, "{lag} {correlation}");
+        let found = |record: &[f64]| {
+            Sought { step: 0.02, span: (0.0, 100.0), sweep: &sweep }.found_in(record)
+        };
+        // nothing is changed where the clocks agree
+        assert_eq!(found(&late).0, Clock { first: 300.0, rate: 0.0 });
         let reversed: Vec<f64> = wanted.iter().rev().copied().collect();
         assert!(aligned(&reversed, &wanted).1 < 0.9);
+    }
+
+    #[test]
+    fn a_sweep_is_found_by_a_clock_that_is_off_and_over_lost_rows() {
+        let sweep = Sweep::THESIS;
+        let sought = Sought { step: 0.02, span: (0.0, 2700.0), sweep: &sweep };
+        for (rate, begins) in [(5e-5, 5.13), (-3e-4, 5.13), (1e-3, 0.0), (3e-4, -400.0)] {
+            // recorded seconds of the sweep, lines over 3 % of the rows
+            let at = |k: usize| {
+                let t = (0.02 * k as f64 - begins) / (1.0 + rate);
+                if (0.0..2700.0).contains(&t) { sweep.torque(t) } else { 0.0 }
+            };
+            let is_lost = |k: usize| k * 7919 % 100 < 3;
+            let record: Vec<f64> = (0..135_900)
+                .map(|k| if is_lost(k) { 0.5 * (at(k.max(1) - 1) + at(k + 1)) } else { at(k) })
+                .collect();
+            let (clock, correlation) = sought.found_in(&record);
+            assert!(correlation > 0.99, "{rate} {clock:?} {correlation}");
+            // a ppm of 2700 s is 2.7 ms: a hundredth of a cycle
+            assert!((clock.rate - rate).abs() < 1e-6, "{rate} {clock:?}");
+            assert!((clock.first - begins / 0.02).abs() < 0.2, "{rate} {clock:?}");
+        }
+        let other = Sweep { duration: 2600.0, ..sweep };
+        let record: Vec<f64> = (0..135_000).map(|k| other.torque(0.02 * f64::from(k))).collect();
+        assert!(sought.found_in(&record).1 < LEAST_CORRELATION);
     }
 }

@@ -77,6 +77,8 @@ pub struct Bench {
     pub zeta: f64,
     pub bearing: Bearing,
     pub liquid: Liquid,
+    /// An appendage on a spring (with the linear liquid): its inertia, kg·m², and its frequency on a hub that is held, Hz.
+    pub appendage: Option<(f64, f64)>,
     /// A torque that no model has, N·m, of time (s), angle and rate.
     pub besides: fn(f64, f64, f64) -> f64,
 }
@@ -101,6 +103,7 @@ impl Default for Bench {
                 eps: None,
             },
             liquid: Liquid::Linear,
+            appendage: None,
             besides: |_, _, _| 0.0,
         }
     }
@@ -207,8 +210,16 @@ impl Equations<'_> {
             }
             Liquid::Linear => {
                 let force = m * natural * natural * (y[2] - r * theta) + drag * (y[3] - r * omega);
-                driving = torque + r * force;
-                state[1] = (tau + r * force) / self.inertia;
+                // damped to 0.5 % of critical
+                let spring = self.bench.appendage.map_or(0.0, |(inertia, frequency)| {
+                    let natural = std::f64::consts::TAU * frequency;
+                    let (angle, rate) = (y[4] - theta, y[5] - omega);
+                    let spring = inertia * natural * (natural * angle + 0.01 * rate);
+                    (state[4], state[5]) = (y[5], -spring / inertia);
+                    spring
+                });
+                driving = torque + r * force + spring;
+                state[1] = (tau + r * force + spring) / self.inertia;
                 (state[2], state[3]) = (y[3], -force / m);
             }
             Liquid::Spherical => {

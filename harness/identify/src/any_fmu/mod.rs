@@ -16,7 +16,7 @@ use crate::fit::covariance::Covariance;
 use crate::fit::goodness::{Output, outputs};
 use crate::fit::problem::Problem;
 use crate::fit::search::{self, Minimum};
-use crate::input::question::Question;
+use crate::input::question::{Question, Setting};
 use crate::input::record::Record;
 use crate::model::simulate::{Model, Setup};
 use crate::model::unknown::{Unknown, What};
@@ -95,30 +95,41 @@ pub fn identify(
     }
     let (mut minimum, starts) = search::best(&problem, question.starts, &mut told)?;
     let mut problem = problem;
-    for turn in 1..=TURNS {
-        let before: Vec<f64> = problem.channels.iter().map(|c| c.noise.white).collect();
-        let free = problem.unknowns.iter().filter(|unknown| unknown.prior.is_none()).count();
-        let jumps = problem.leave_out_jumps(&minimum.answer.motion);
-        if jumps > 0 {
-            told(&News::Step(format!("left out {jumps} rows next to jumps of an output")));
+    for _ in 0..ROUNDS {
+        for turn in 1..=TURNS {
+            let before: Vec<f64> = problem.channels.iter().map(|c| c.noise.white).collect();
+            let free = problem.unknowns.iter().filter(|unknown| unknown.prior.is_none()).count();
+            let jumps = problem.leave_out_jumps(&minimum.answer.motion);
+            if jumps > 0 {
+                told(&News::Step(format!("left out {jumps} rows next to jumps of an output")));
+            }
+            problem.estimate_noise(&minimum.answer.motion, &minimum.x, free, question.drift);
+            let changes = problem.channels.iter().zip(&before);
+            let change = changes.map(|(c, b)| (c.noise.white / b).ln().abs()).fold(0.0, f64::max);
+            if turn > 2 && change < 0.01 && minimum.converged() {
+                break;
+            }
+            told(&News::Step(format!("noise estimated, turn {turn}")));
+            let (x, steps) = (&minimum.x, minimum.steps);
+            minimum = search::search(&problem, x, steps, (DECREMENT, 30), &mut told)?;
         }
-        problem.estimate_noise(&minimum.answer.motion, &minimum.x, free, question.drift);
-        let changes = problem.channels.iter().zip(&before);
-        let change = changes.map(|(c, b)| (c.noise.white / b).ln().abs()).fold(0.0, f64::max);
-        if turn > 2 && change < 0.01 && minimum.converged() {
+        // the last noise is that of the last minimum
+        minimum.answer.e = problem.stacked(&minimum.answer.motion, &minimum.x);
+        let is_better;
+        (minimum, is_better) = search::not_worse(&problem, minimum, &mut told);
+        if !is_better {
             break;
         }
-        told(&News::Step(format!("noise estimated, turn {turn}")));
-        minimum = search::search(&problem, &minimum.x, minimum.steps, (DECREMENT, 30), &mut told)?;
     }
-    // the last noise is that of the last minimum
-    minimum.answer.e = problem.stacked(&minimum.answer.motion, &minimum.x);
     told(&News::Step("intervals from the profiles of the likelihood".into()));
     let mut found = answer(&problem, &minimum, question)?;
     found.details.starts = starts;
     found.done = done;
     Ok(found)
 }
+
+/// Minima at most, each better than the one before, about which the noise is estimated.
+const ROUNDS: usize = 3;
 
 /// Advice on how to make the solver's errors smaller.
 fn remedy(problem: &Problem, solver: &SolverError) -> String {
@@ -194,8 +205,15 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
     found.details.decided_by_solver = decided.iter().map(|&j| names[j].clone()).collect();
     let shifts = names.iter().cloned().zip(solver.shift.iter().copied().map(finite));
     found.details.solver_shift = shifts.collect();
-    found.fits = (!fits || decided.is_empty()).then_some(fits);
+    let pressed: Vec<String> =
+        minimum.pressed(problem).into_iter().map(|j| names[j].clone()).collect();
+    found.fits = (!fits || decided.is_empty() && pressed.is_empty()).then_some(fits);
     let mut words = match found.fits {
+        None if decided.is_empty() => vec![format!(
+            "{NOT_JUDGED}: the residual of every output is noise, but bounds hold {}: the recordings want to go further, so that \
+             no interval can be trusted. Wider bounds, or another start, may lead to another minimum.",
+            pressed.join(", ")
+        )],
         None => vec![format!(
             "{NOT_JUDGED}: the residual of every output is noise, but the errors of the solver decide estimates."
         )],
@@ -273,6 +291,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
     }
     found.correlations = (names, correlations);
     found.verdict = words;
+    found.settings = question.settings.iter().map(Setting::named).collect();
     let residuals = problem.residuals(&minimum.answer.motion, &minimum.x);
     found.residuals = problem
         .channels

@@ -11,8 +11,11 @@ use crate::fit::problem::{Answer, Problem, Step};
 use crate::input::record::Record;
 use crate::model::unknown::Unknown;
 use crate::news::News;
-use crate::tuning::{BAD_START, CONVERGED, WINDOW_NOISE, WINDOWS};
+use crate::tuning::{BAD_START, CONVERGED, DECREMENT, WINDOW_NOISE, WINDOWS};
 use analysis::random::Random;
+
+/// Standard deviations by which the minimum may lie beyond a bound by chance.
+const PRESSED: f64 = 3.0;
 
 /// End of a search.
 pub type Minimum = minimum::Minimum<Answer, Step>;
@@ -26,6 +29,14 @@ impl Minimum {
     /// Returns true if the search converged.
     pub fn converged(&self) -> bool {
         self.decrement < CONVERGED
+    }
+
+    /// The unknowns at a bound beyond which the minimum lies by more than chance: [`PRESSED`] standard deviations that they have if
+    /// the others are held.
+    pub fn pressed(&self, problem: &Problem) -> Vec<usize> {
+        let (inner, gradient) = (self.inner(problem), self.jacobian.tr_mul(&self.answer.e));
+        let beyond = |j: &usize| gradient[*j].abs() / self.jacobian.column(*j).norm();
+        (0..self.x.len()).filter(|j| !inner.contains(j) && beyond(j) > PRESSED).collect()
     }
 
     /// The unknowns that are not held at a bound.
@@ -153,7 +164,7 @@ pub fn best(
                 if best.as_ref().is_none_or(|best| found.cost() < best.cost()) {
                     best = Some(found);
                 }
-                if bad < BAD_START {
+                if bad < BAD_START && best.as_ref().is_none_or(|b| b.pressed(problem).is_empty()) {
                     break;
                 }
             }
@@ -164,6 +175,53 @@ pub fn best(
         (None, error) => Err(error.context("no search was made")?),
     }
 }
+
+/// Returns a minimum that is not worse than the start, and that no bound holds if a search from inside leaves the bound: where the start is
+/// better than the minimum it is searched from anew, and so is the minimum with an unknown that is pressed against a bound placed
+/// at its start, or in the middle of its bounds.
+pub fn not_worse(
+    problem: &Problem,
+    minimum: Minimum,
+    news: &mut dyn FnMut(&News),
+) -> (Minimum, bool) {
+    let start = problem.start();
+    let mut places = Vec::new();
+    let cost = |x: &[f64]| problem.answer(x).map_or(f64::INFINITY, |a| a.e.norm_squared());
+    if cost(&start) < minimum.cost() {
+        news(&News::Detail("the start is better than the minimum that was found".into()));
+        places.push(start.clone());
+    }
+    let inner = minimum.inner(problem);
+    for j in (0..start.len()).filter(|j| !inner.contains(j)) {
+        let (low, high) = problem.unknowns[j].bounds;
+        let mut x = minimum.x.clone();
+        let is_inside = start[j] > low && start[j] < high;
+        x[j] = if is_inside { start[j] } else { (0.5 * (low + high)).clamp(low, high) };
+        if x[j].is_finite() && !places.contains(&start) {
+            places.push(start.clone());
+        }
+        places.push(x);
+    }
+    let (mut best, mut is_better) = (minimum, false);
+    for x in places.iter().filter(|x| x.iter().all(|x| x.is_finite())) {
+        let Ok(found) = search(problem, x, problem.first_steps(), (DECREMENT, 40), news) else {
+            continue;
+        };
+        // rounding of the runs is no gain
+        if found.cost() < best.cost() - LEAST_GAIN {
+            news(&News::Step(format!(
+                "a search from another start is better: sum of squares {:.4e} for {:.4e}",
+                found.cost(),
+                best.cost()
+            )));
+            (best, is_better) = (found, true);
+        }
+    }
+    (best, is_better)
+}
+
+/// Decrease of the sum of squares below which two minima are one.
+const LEAST_GAIN: f64 = 0.01;
 
 /// A start within the bounds, or within the reach where there are none.
 fn drawn(unknowns: &[Unknown], random: &mut Random) -> Vec<f64> {

@@ -199,6 +199,17 @@ impl FromStr for Setting {
     }
 }
 
+impl Setting {
+    /// Returns the name, with the number of its recording if it is of one alone (`NAME@2`), and the value.
+    pub fn named(&self) -> (String, String) {
+        let name = match self.recording {
+            None => self.name.clone(),
+            Some(recording) => format!("{}@{}", self.name, recording + 1),
+        };
+        (name, self.value.clone())
+    }
+}
+
 /// Whose solver steps the FMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {

@@ -1106,6 +1106,15 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         }
     }
     measurement.insert("inertia".into(), estimated(0, 0.0));
+    let states_liquid = nominal::states_liquid(&options.settings);
+    if !states_liquid {
+        // anything from no liquid to no hub has this inertia
+        let whole = measurement["inertia"].interval[1];
+        let hub = parameters.get_mut(hub::I).expect("one of the first");
+        hub.interval = [0.0, whole.max(hub.value)];
+        hub.std = hub.std.max(hub.interval[1] / 12.0_f64.sqrt());
+        hub.determined = false;
+    }
     let mut combinations = Vec::new();
     let may_have_none = parameters["friction.d"].interval[0] <= 0.0;
     if let Some(profile) = &profile {
@@ -1148,7 +1157,19 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         .filter(|j| of_noise[*j] > 0.0 && share(*j) > TOLD_SHARE)
         .map(|j| format!("{} {:.0} %", problem.names[j], 100.0 * share(j)))
         .collect();
-    let mut remarks = Vec::new();
+    let assumed = nominal::assumed(fmu, &options.settings, &nominal::LIQUID)?;
+    let mut remarks = vec![match (states_liquid, liquid < NO_LIQUID * p[0]) {
+        (false, _) => format!(
+            "hub.I is not known: the recordings show the inertia of hub and liquid, {:.4e} kg·m², and nothing states how much liquid is \
+             in the tank. --empty states that there is none, --set tank.h=… its height. The value is for the liquid of the FMU, \
+             {liquid:.3e} kg·m²: {assumed}.",
+            p[0]
+        ),
+        (true, true) => "The tank is taken as empty: all inertia is the hub's.".into(),
+        (true, false) => format!(
+            "hub.I is the inertia less that of the liquid, {liquid:.4e} kg·m², which counts as exact: {assumed}."
+        ),
+    }];
     if !shares.is_empty() {
         remarks.push(format!(
             "The intervals include tolerances that no recording shows: scale of the torque {} %, scale of the gyro {} %. Their share of \
@@ -1197,6 +1218,9 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     found.verdict.extend(remarks);
     Ok(found)
 }
+
+/// Part of the inertia below which the liquid's counts as none.
+const NO_LIQUID: f64 = 1e-6;
 
 /// Returns a start from the end of a search. At a bound a variable hardly changes its value any more, so the start lies inside: a
 /// logit of 6 is a four-hundredth of the range off.

@@ -40,6 +40,8 @@ pub struct Details {
 pub struct FreeDecay {
     /// Name of the signal that the recordings hold in place of the rate.
     pub signal: &'static str,
+    /// Relative standard deviation of the recordings' clock.
+    pub clock: f64,
 }
 
 impl FreeDecay {
@@ -84,7 +86,6 @@ impl Method for FreeDecay {
             noise,
         });
         let estimates = [
-            ("frequency", found.frequency, "Hz"),
             ("zeta", found.zeta, "1"),
             ("zeta_amplitude", found.zeta_amplitude, inverse),
             ("hardening", found.hardening, squared),
@@ -92,6 +93,12 @@ impl Method for FreeDecay {
         for (name, Value { value, std }, unit) in estimates {
             answer.measurement.insert(name.into(), Estimated::normal(value, std, unit));
         }
+        // a damping ratio does not depend on the clock
+        let f = found.frequency;
+        let frequency = Value { std: f.std.hypot(self.clock * f.value), ..f };
+        let estimated = Estimated::normal(f.value, frequency.std, "Hz");
+        let estimated = Estimated { std_noise: f.std, ..estimated };
+        answer.measurement.insert("frequency".into(), estimated);
         answer.converged = found.converged;
         let residual = |(recording, residual): (&Recording, &Vec<f64>)| Residual {
             name: recording.name.clone(),
@@ -111,8 +118,12 @@ impl Method for FreeDecay {
         answer.verdict = vec![
             format!(
                 "f = {} Hz, ζ = {} at vanishing amplitude (95 % intervals).",
-                plus(found.frequency),
+                plus(frequency),
                 plus(found.zeta)
+            ),
+            format!(
+                "The interval of f includes the clock's tolerance, {} % (--tolerance clock=…).",
+                100.0 * self.clock
             ),
             if found.zeta_amplitude.value.abs() > 1.96 * found.zeta_amplitude.std {
                 format!(

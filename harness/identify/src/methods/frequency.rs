@@ -12,7 +12,8 @@
 //! weighted least squares is maximum likelihood: (JᵀJ)⁻¹ is the estimates' covariance. Noise and whatever
 //! is not linear in the plant are both in σ², as long as the latter looks like noise.
 //!
-//! Back to the bench: [`Plant`].
+//! Back to the bench: [`Plant`]. Scales of torque, gyro and clock, and the bench's arm, density and gravity, which no spectrum shows, count
+//! with their tolerances: each moves the quantities by its standard deviation at first order.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -29,7 +30,8 @@ use crate::estimate::Estimated;
 use crate::fit::bench::start::{self, Plant};
 use crate::fit::covariance::Covariance;
 use crate::input::recording::Recording;
-use crate::model::bench::nominal::{Bench, Nominal};
+use crate::input::tolerance::Tolerances;
+use crate::model::bench::nominal::{self, Bench, Nominal};
 use crate::model::bench::simulate::Intersample;
 use crate::news::News;
 use crate::tuning::{FREQUENCY_MISFIT, VARIANCE_LINES, WEIGHT_ROUNDS};
@@ -37,7 +39,7 @@ use crate::words::identified::{Identified, Residual};
 use crate::words::page::{RATE, Sections};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM};
 use analysis::least_squares::{differences, minimise};
-use names::hubslosh::{FrictionModel, SloshModel, friction, hub, slosh, tank};
+use names::hubslosh::{FrictionModel, G_AXIAL, SloshModel, fluid, friction, hub, slosh, tank};
 
 /// Degree of T. Two are the plant's own; two more take what sampling folds back.
 const TRANSIENT: usize = 4;
@@ -61,6 +63,10 @@ pub struct Frequency {
     pub settings: Vec<(String, String)>,
     /// Intersample behaviour of the torque.
     pub intersample: Intersample,
+    /// Relative standard deviations of what the recording does not show.
+    pub tolerances: Tolerances,
+    /// Relative standard deviation of the gyro's scale.
+    pub gyro_scale: f64,
 }
 
 impl Method for Frequency {
@@ -71,7 +77,13 @@ impl Method for Frequency {
     fn identify(&self, task: &Task, _: &mut dyn FnMut(&News)) -> Result<Found> {
         let nominal = Nominal::of(task.fmu()?, &self.settings, &[])?;
         task.check_size(&nominal)?;
-        identify(task.one()?, nominal.bench, self.intersample)
+        let mut found = identify(task.one()?, nominal.bench, self)?;
+        let assumed =
+            nominal::assumed(task.fmu()?, &self.settings, &[tank::R, fluid::RHO, G_AXIAL])?;
+        found.verdict.push(format!(
+            "tank.d, tank.h and hub.I are those of an upright cylinder with {assumed}."
+        ));
+        Ok(found)
     }
 
     fn lines(found: &Found) -> Vec<String> {
@@ -168,7 +180,8 @@ fn signal(lines: &[Complex64], bins: &std::ops::RangeInclusive<usize>, count: us
 }
 
 /// Fits a recording of a hub with slosh.
-pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -> Result<Found> {
+pub fn identify(recording: &Recording, bench: Bench, asked: &Frequency) -> Result<Found> {
+    let Frequency { intersample, tolerances, gyro_scale, .. } = *asked;
     let measured = start::response(recording)?;
     let rough = TransferFunction::fit(&measured).context("no transfer function fits")?;
     let (step, torque, rate) = recording.even()?;
@@ -229,7 +242,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     let covariance = Covariance::of(&jacobian, &[])?
         .with_context(|| format!("{}: poles and zeros are not determined", recording.name))?;
 
-    let physical = |x: &[f64]| translated(x, unit, step, bench);
+    let physical = |x: &[f64]| translated(x, (unit, step), bench, &Exact::default());
     let quantities =
         physical(&x).context("the poles and zeros are not those of a hub with slosh")?;
     // the delta method
@@ -238,12 +251,29 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     let values = |x: &[f64]| physical(x).unwrap_or(quantities).map(|(.., value)| value).to_vec();
     let slope = differences(&values, &x, &steps);
     let of_values = &slope * &covariance.x * slope.transpose();
+    let moved = Exact::each(&tolerances, gyro_scale).map(|off| {
+        let there = translated(&x, (unit, step), bench, &off).unwrap_or(quantities);
+        let pairs = there.iter().zip(&quantities);
+        pairs.map(|(there, here)| there.2 - here.2).collect::<Vec<f64>>()
+    });
+    let floor = noise * noise * count as f64;
+    let over_noise = (sigma.iter().map(|s| s * s / floor).sum::<f64>() / sigma.len() as f64).sqrt();
     let mut response = BTreeMap::new();
     for (i, (name, unit, value)) in quantities.into_iter().enumerate() {
-        let estimated = Estimated::normal(value, of_values[(i, i)].sqrt(), unit);
+        let std_noise = of_values[(i, i)].sqrt();
+        let std = moved.iter().fold(std_noise, |std, moved| std.hypot(moved[i]));
+        let estimated = Estimated { std_noise, ..Estimated::normal(value, std, unit) };
         response.insert(name.to_string(), estimated);
     }
-    let structure = response.remove("structure").map_or(0.0, |p| p.value / p.std);
+    // a relation between coefficients holds whatever the scales are
+    let structure = response.remove("structure").map_or(0.0, |p| p.value / p.std_noise);
+    let fits = over_noise < FREQUENCY_MISFIT && structure.abs() < 3.3;
+    if !fits {
+        for estimated in response.values_mut() {
+            estimated.interval = [f64::NAN; 2];
+            estimated.determined = false;
+        }
+    }
     let mut parameters = BTreeMap::new();
     for name in [tank::D, tank::H, hub::I] {
         parameters.extend(response.remove(name).map(|p| (name.to_string(), p)));
@@ -251,8 +281,6 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     for (name, of) in [(slosh::ZETA, "slosh_damping"), (friction::B, "friction")] {
         parameters.insert(name.into(), response[of].clone());
     }
-    let floor = noise * noise * count as f64;
-    let over_noise = (sigma.iter().map(|s| s * s / floor).sum::<f64>() / sigma.len() as f64).sqrt();
     let setting = |(name, value): (&str, &str)| (name.to_string(), value.to_string());
     let fit = Fit {
         lines: problem.s.len(),
@@ -261,7 +289,6 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         structure,
         condition: covariance.condition,
     };
-    let fits = over_noise < FREQUENCY_MISFIT && structure.abs() < 3.3;
     let time = (0..count).map(|k| recording.time[0] + k as f64 * step).collect();
     let residual = Residual {
         name: format!("{}, {:.3} to {:.3} Hz", recording.name, band.0, band.1),
@@ -294,10 +321,50 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
 /// A quantity's name, unit and value.
 type Named = (&'static str, &'static str, f64);
 
-/// Returns the bench's parameters for these coefficients (s in units of `unit`).
-fn translated(x: &[f64], unit: f64, step: f64, bench: Bench) -> Option<[Named; 14]> {
-    let scaled = |c: &[f64]| [c[0] * unit, c[1] * unit.powi(2), c[2] * unit.powi(3)];
-    let (numerator, denominator) = (scaled(&x[..3]), scaled(&x[3..6]));
+/// Relative errors of what counts as exact.
+#[derive(Clone, Copy, Default)]
+struct Exact {
+    torque: f64,
+    gyro: f64,
+    clock: f64,
+    bench: [f64; 3],
+}
+
+impl Exact {
+    /// Returns one error of its standard deviation each.
+    fn each(tolerances: &Tolerances, gyro: f64) -> [Exact; 6] {
+        let Tolerances { torque, clock, gravity, arm, density } = *tolerances;
+        let none = Exact::default();
+        [
+            Exact { torque, ..none },
+            Exact { gyro, ..none },
+            Exact { clock, ..none },
+            Exact { bench: [arm, 0.0, 0.0], ..none },
+            Exact { bench: [0.0, density, 0.0], ..none },
+            Exact { bench: [0.0, 0.0, gravity], ..none },
+        ]
+    }
+}
+
+/// Returns the bench's parameters for these coefficients (s in units of `unit`, the delay in `step`), if what counts as exact is off.
+fn translated(
+    x: &[f64],
+    (unit, step): (f64, f64),
+    bench: Bench,
+    off: &Exact,
+) -> Option<[Named; 14]> {
+    let (unit, step) = (unit / (1.0 + off.clock), step * (1.0 + off.clock));
+    let gain = 1.0 / (1.0 + off.gyro) / (1.0 + off.torque);
+    let [arm, density, gravity] = off.bench.map(|part| 1.0 + part);
+    let bench = Bench {
+        arm: bench.arm * arm,
+        density: bench.density * density,
+        gravity: bench.gravity * gravity,
+    };
+    let scaled = |c: &[f64], gain: f64| {
+        [c[0] * gain * unit, c[1] * gain * unit.powi(2), c[2] * gain * unit.powi(3)]
+    };
+    let (numerator, denominator) = (scaled(&x[..3], gain), scaled(&x[3..6], 1.0));
     let plant = Plant::of(numerator, denominator)?;
     // the real root of A by Newton's method from the side where it is slow, then the pair
     let [a2, a1, a0] = denominator;
@@ -344,8 +411,8 @@ fn words(fit: &Fit, fits: bool, converged: bool) -> Vec<String> {
     } else {
         format!(
             "{DOES_NOT_FIT}: the residual of three poles and two zeros is {:.2} times the gyro's noise, and the poles are \
-             {:+.1} standard deviations from those of zeros, inertia and friction. Dry friction and large slosh are not linear; \
-             the intervals hold for what looks like noise alone. Use the time domain (hubslosh identify without --method).",
+             {:+.1} standard deviations from those of zeros, inertia and friction. Dry friction and large slosh are not linear: \
+             no interval is given. Use the time domain (hubslosh identify without --method).",
             fit.over_noise, fit.structure
         )
     });
@@ -388,7 +455,13 @@ mod tests {
             let mut random = Random::new(seed, 5);
             let mut one = clean.clone();
             one.rate.iter_mut().for_each(|w| *w += 4.07e-4 * random.normal());
-            let found = identify(&one, BENCH, Intersample::FirstOrderHold).unwrap();
+            let exact = Frequency {
+                settings: Vec::new(),
+                intersample: Intersample::FirstOrderHold,
+                tolerances: Tolerances::NONE,
+                gyro_scale: 0.0,
+            };
+            let found = identify(&one, BENCH, &exact).unwrap();
             assert!(found.converged && found.fits == Some(true), "{seed}: {:?}", found.verdict);
             if seed == 0 {
                 let page = Frequency::page(&found);

@@ -23,9 +23,9 @@ pub struct Details {
     pub condition: f64,
     /// The error budget.
     pub error_budget: Vec<Effect>,
-    /// Torques that the model lacks.
+    /// Torques that the model lacks, if noise is left with them and their rivals lose.
     pub missing: Vec<Missing>,
-    /// The likeliest cause of a misfit.
+    /// The cause of a misfit, if noise is left with it and its rivals lose.
     pub cause: Option<Cause>,
     /// All models that were tried, the chosen one first.
     pub models: Vec<ModelFit>,

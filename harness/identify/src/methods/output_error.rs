@@ -350,9 +350,9 @@ fn finish(
         let found = cause::find(&problem, &polished.x, (&model, &law), &mut |line| {
             say(line, &problem);
         });
-        findings.cause = found.unwrap_or_else(|error| {
+        findings.rivals = found.unwrap_or_else(|error| {
             say(&format!("the cause of the misfit cannot be sought: {error:#}"), &problem);
-            None
+            Vec::new()
         });
     }
     let profile = friction::profile(&problem, &polished, &speeds)?;
@@ -487,7 +487,7 @@ fn finish(
     let slosh_angle = if fit.model == Frozen.name() { 0.0 } else { largest_angle(&answer) };
     verdict.extend(regime(&fit.model, slosh_angle));
     let (converged, condition) = (fit.converged, covariance.condition);
-    let (missing, cause) = (findings.missing, findings.cause);
+    let (missing, cause) = (findings.missing().to_vec(), findings.cause().cloned());
     let details = Details {
         fit,
         combinations,
@@ -529,7 +529,7 @@ fn judge(
     let changes = budget::slopes(problem, found, &options.tolerances)?;
     let e = problem.stacked(&found.answer, &found.x);
     let findings = Findings {
-        cause: None,
+        rivals: Vec::new(),
         torque: between_rows.words.clone(),
         missing: missing::torques(problem, found, &e, &changes)?,
         doubts: question

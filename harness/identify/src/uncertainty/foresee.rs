@@ -39,8 +39,8 @@ pub struct Bound {
     pub is_parameter: bool,
 }
 
-/// Foresees what recordings with these inputs tell at the starts; `noise`: of a row of each output. Their outputs are not looked at.
-/// `warn` hears the FMU's warnings.
+/// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at the start values. `noise` is the standard
+/// deviation of one sample of each output; tolerances of the question count. `warn` receives the FMU's warnings.
 ///
 /// # Errors
 /// All that is wrong with what is asked; what the FMU refuses.

@@ -7,8 +7,8 @@ use crate::fit::bench::candidate::ModelFit;
 use crate::fit::evidence::probabilities;
 use crate::tuning::{BIC_DECIDES, TOLD_DECREMENT};
 use crate::uncertainty::bench::budget::Effect;
-use crate::uncertainty::bench::cause::Cause;
-use crate::uncertainty::bench::missing::Missing;
+use crate::uncertainty::bench::cause::{Cause, Rivals, wins};
+use crate::uncertainty::bench::missing::{Missing, Torques};
 use crate::uncertainty::bench::sources::Combination;
 use analysis::innovations::{self, Tests};
 use names::hubslosh::{SloshModel, hub};
@@ -40,9 +40,9 @@ pub struct Findings {
     /// Reasons for the choice of the torque's intersample behaviour, in words.
     pub torque: Vec<String>,
     /// Torques that the model lacks.
-    pub missing: Vec<Missing>,
-    /// The likeliest cause of a misfit, if one was found.
-    pub cause: Option<Cause>,
+    pub missing: Torques,
+    /// Effects that explain a misfit.
+    pub rivals: Rivals,
     /// Doubts about recordings or model, in words.
     pub doubts: Vec<String>,
 }
@@ -50,7 +50,23 @@ pub struct Findings {
 impl Findings {
     /// Returns true if the model with this fit explains the recordings.
     pub fn fits(&self, fit: &ModelFit) -> bool {
-        fit.tests.iter().all(Tests::passed) && self.missing.is_empty() && self.doubts.is_empty()
+        fit.tests.iter().all(Tests::passed) && self.missing.all.is_empty() && self.doubts.is_empty()
+    }
+
+    /// Returns the cause of a misfit, if its rivals lose.
+    pub fn cause(&self) -> Option<&Cause> {
+        let torques = Some(self.missing.gain()).filter(|_| self.missing.explain);
+        let second = self.rivals.get(1).map(|rival| rival.gain);
+        self.rivals.first().filter(|best| wins(best.gain, second) && wins(best.gain, torques))
+    }
+
+    /// Returns the torques that are missing, if their rivals lose.
+    pub fn missing(&self) -> &[Missing] {
+        let rival = self.rivals.first().map(|best| best.gain);
+        match self.missing.explain && wins(self.missing.gain(), rival) {
+            true => &self.missing.all,
+            false => &[],
+        }
     }
 }
 
@@ -70,20 +86,22 @@ pub fn words(
     if !fits {
         let mut reasons: Vec<String> =
             fit.tests.iter().flat_map(|tests| failed(tests, "the torque")).collect();
-        // a torque that explains less than the cause does is its shadow
-        let gain = findings.cause.as_ref().map_or(0.0, |cause| cause.gain);
-        let missing = findings.missing.iter();
-        reasons.extend(missing.filter(|m| m.deviations.powi(2) > gain).map(Missing::words));
+        reasons.extend(findings.missing().iter().map(Missing::words));
         reasons.extend(findings.doubts.iter().cloned());
         if reasons.is_empty() {
-            reasons.extend(findings.missing.iter().map(Missing::words));
+            let most = findings.missing.all.iter().map(|m| m.deviations).fold(0.0, f64::max);
+            reasons.push(format!("a torque that the model lacks acts on the hub ({most:.0} σ)"));
         }
         lines.push(format!(
             "{DOES_NOT_FIT}: no model leaves only the gyro's noise as residual ({}). Values and intervals are those of the \
              nearest model and cannot be trusted: something acts on the bench that the models lack.",
             reasons.join("; ")
         ));
-        lines.extend(findings.cause.as_ref().map(Cause::words));
+        match findings.cause() {
+            Some(cause) => lines.push(cause.words()),
+            None if findings.missing().is_empty() => lines.push(unknown_cause(findings, fit)),
+            None => {}
+        }
     }
     if !fit.converged {
         lines.push(format!(
@@ -123,6 +141,28 @@ pub fn words(
     }
     lines.extend(modes(parameters, budget));
     lines
+}
+
+/// Returns the sentence about a misfit without a known cause: where it is, and which effects cannot be told apart.
+fn unknown_cause(findings: &Findings, fit: &ModelFit) -> String {
+    let worst = |test: fn(&Tests) -> (f64, f64)| {
+        let all = fit.tests.iter().map(test);
+        all.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
+    };
+    let ((in_frequency, f), (in_time, t)) = (worst(|t| t.in_frequency), worst(|t| t.in_time));
+    let mut alike: Vec<String> = findings.rivals.iter().map(|r| r.effect.clone()).collect();
+    if findings.missing.explain {
+        let torque = |m: &Missing| format!("a torque that follows {}", m.follows);
+        alike.extend(findings.missing.all.iter().map(torque));
+    }
+    let why = match alike.len() {
+        0 => "no effect that was tried leaves noise alone".to_string(),
+        _ => format!("{} explain it about as well", alike.join(", ")),
+    };
+    format!(
+        "The cause is unknown: {why}. The residual is largest around {f:.2} Hz ({in_frequency:.1} σ) and around {t:.1} s \
+         ({in_time:.1} σ)."
+    )
 }
 
 fn slosh(question: &Question, fits: bool) -> Option<String> {

@@ -57,7 +57,8 @@ pub fn is_one_way(
 }
 
 pub fn options(harmonics: usize) -> acceleration::Options {
-    acceleration::Options { harmonics, ..acceleration::Options::default() }
+    let settings = vec![("tank.h".into(), "0.1".into())];
+    acceleration::Options { harmonics, settings, ..acceleration::Options::default() }
 }
 
 /// The parameters that are three standard deviations or more from the truth; the fit is a minimum, and none is at a bound.

@@ -26,7 +26,8 @@ fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
 }
 
 fn options() -> acceleration::Options {
-    acceleration::Options::default()
+    let settings = vec![("tank.h".into(), "0.1".into())];
+    acceleration::Options { settings, ..acceleration::Options::default() }
 }
 
 /// It comes half a row late, 8.6° of phase at 2.4 Hz: taken as linear it would turn inertia into friction.

@@ -6,6 +6,7 @@ use identify::any_fmu::identify;
 use identify::fit::bench::options::Options;
 use identify::input::question::{Question, Solver};
 use identify::input::recording::Recording;
+use identify::input::tolerance::Tolerances;
 use identify::methods::free_decay::FreeDecay;
 use identify::methods::frequency::Frequency;
 use identify::methods::output_error::OutputError;
@@ -22,7 +23,12 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
     let recordings = std::slice::from_ref(recording);
     let task = Task { fmu: Some(fmu), recordings, validation: &[] };
     let said = |error: Option<anyhow::Error>| error.map(|error| format!("{error:#}"));
-    let frequency = Frequency { settings: Vec::new(), intersample: Intersample::FirstOrderHold };
+    let frequency = Frequency {
+        settings: Vec::new(),
+        intersample: Intersample::FirstOrderHold,
+        tolerances: Tolerances::default(),
+        gyro_scale: 0.01,
+    };
     vec![
         ("frequency", said(frequency.identify(&task, &mut |_| {}).err())),
         ("multisine", said(multisine::analyse(recording, 10.0).err())),
@@ -31,7 +37,10 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
             "acceleration",
             said(acceleration::identify(fmu, recordings, &crate::acceleration::options(0)).err()),
         ),
-        ("free decay", said(FreeDecay { signal: "omega" }.identify(&task, &mut |_| {}).err())),
+        (
+            "free decay",
+            said(FreeDecay { signal: "omega", clock: 1e-4 }.identify(&task, &mut |_| {}).err()),
+        ),
     ]
 }
 

@@ -1,5 +1,7 @@
 //! Recordings of the FMU itself, with its gyro's noise, identified without priors and starts.
 
+use std::f64::consts::TAU;
+
 use analysis::random::Random;
 use analysis::statistics::deviation;
 use experiments::profile::{Profile, Torque};
@@ -21,6 +23,7 @@ use identify::words::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
 use crate::acceleration::{is_one_way, push};
+use crate::bench::{Bench, Drive};
 use crate::fmu_twin::{self, SensorErrors, Twin, Unmodelled};
 
 /// The thesis's sweep of 2700 s.
@@ -173,7 +176,7 @@ fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
     let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
     assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
     let cause = found.details.cause.as_ref().unwrap();
-    assert!(cause.fits && cause.flags == "--actuator-lag", "{cause:?}");
+    assert_eq!(cause.flags, "--actuator-lag", "{cause:?}");
     let says = |words: &str| found.verdict.iter().any(|line| line.contains(words));
     assert!(
         says("an actuator that lags its command") && !says("rate's square"),
@@ -190,7 +193,7 @@ fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
     assert!((inertia.value - 0.322414).abs() < 4.0 * inertia.std, "{inertia:?}");
 }
 
-/// The hub rocks at 4.1 Hz, and the gyro sees some of it: no candidate has that. The one that explains most explains less than half.
+/// The hub rocks at 4.1 Hz, and the gyro sees some of it: no candidate has that.
 #[test]
 fn a_misfit_that_no_candidate_explains_has_no_cause() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -203,14 +206,15 @@ fn a_misfit_that_no_candidate_explains_has_no_cause() {
     let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
     assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
     // one of them is far beyond chance, and would be named if that were enough
-    let explains = found.done.iter().any(|line| line.contains("% of the misfit"));
+    let explains = found.done.iter().any(|line| line.contains("more than noise is left"));
     assert!(
         explains && found.details.cause.is_none(),
         "{:?} {:?}",
         found.details.cause,
         found.done
     );
-    assert!(!found.verdict.iter().any(|line| line.contains("likeliest cause")));
+    let says = |words: &str| found.verdict.iter().any(|line| line.contains(words));
+    assert!(!says("The cause is an") && says("The cause is unknown"), "{:?}", found.verdict);
 }
 
 /// The arm is 2 % longer than its nominal value. Slosh of a third of a radian shows that, and nothing else takes it.
@@ -945,5 +949,57 @@ fn a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way() {
         let combination = format!("{name} (1");
         let of = found.details.combinations.iter().find(|c| c.name.starts_with(&combination));
         assert!(of.is_none(), "{of:?}");
+    }
+}
+
+/// A recording of the independent bench with the thesis's gyro, under a linear sweep.
+fn on_bench(bench: &Bench, seed: u64, seconds: u32) -> Recording {
+    let time: Vec<f64> = (0..=50 * seconds).map(|k| 0.02 * f64::from(k)).collect();
+    let rate = (3.5 - 1.25) / f64::from(seconds);
+    let torque = |t: f64| 0.1 * (TAU * (1.25 * t + 0.5 * rate * t * t)).sin();
+    let tau: Vec<f64> = time.iter().map(|t| torque(*t)).collect();
+    let motion = bench.motion(&Drive::Lines(&time, &tau), &time);
+    let mut random = Random::new(seed, 31);
+    let read = motion.rate.iter().map(|w| w + 4.066e-4 * random.normal()).collect();
+    Recording::of("bench", time, tau, read)
+}
+
+/// A hub with an appendage on a spring was "an actuator that lags", with 12 ms at 8 Hz and 17 ms at 4 Hz.
+#[test]
+fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    for frequency in [8.0, 4.0] {
+        let bench = Bench { appendage: Some((0.05, frequency)), ..Bench::default() };
+        let recording = on_bench(&bench, 1, 200);
+        let found = identify(&fmu, &[recording], &options(), &mut |_| {}).unwrap();
+        let said = found.verdict.join("\n");
+        println!("{frequency} Hz: {said}\n{}", found.done.join("\n"));
+        assert!(found.details.cause.is_none() && found.details.missing.is_empty(), "{said}");
+        match found.fits {
+            Some(true) => assert!(found.parameters.values().all(|p| p.std > 0.0), "{said}"),
+            _ => assert!(said.contains("The cause is unknown") && said.contains(" Hz ("), "{said}"),
+        }
+    }
+}
+
+/// Friction that falls by a third with a time constant of a minute was "the rate's square" at 12 standard deviations.
+#[test]
+fn friction_that_drifts_is_named_as_such_or_not_at_all() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let settings = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
+    let settings = settings.map(|(name, value)| (name.to_string(), value.to_string())).to_vec();
+    let twin = Twin { settings, unmodelled: vec![Unmodelled::Warming], ..Twin::default() };
+    for (seed, torque) in [
+        (1, "lin-sweep:amplitude=0.1,duration=300,f0=1.8,f1=3"),
+        (2, "lin-sweep:amplitude=0.3,duration=300,f0=3,f1=1.8"),
+    ] {
+        let torque = Torque::Profile(torque.parse().unwrap());
+        let recording = twin.record(&fmu, &torque, Some(seed)).unwrap();
+        let found = identify(&fmu, &[recording], &options(), &mut |_| {}).unwrap();
+        let said = found.verdict.join("\n");
+        println!("{said}\n{}", found.done.join("\n"));
+        assert!(found.details.missing.is_empty(), "{said}");
+        let cause = found.details.cause.as_ref();
+        assert!(cause.is_none_or(|cause| cause.effect == "friction that drifts"), "{said}");
     }
 }

@@ -19,6 +19,18 @@ const MOST_ROWS: f64 = 10.0;
 /// # Errors
 /// If time does not grow, or if too much is missing.
 pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
+    even_with_gaps(table, MISSING, done)
+}
+
+/// The same, of a record of which another part than usual may be missing.
+///
+/// # Errors
+/// As [`even`].
+pub fn even_with_gaps(
+    table: Table,
+    most_missing: f64,
+    done: &mut dyn FnMut(String),
+) -> Result<(f64, Table)> {
     let time = table.column("time").unwrap_or_default();
     let rows = time.len();
     ensure!(rows > 2, "{rows} rows are too few");
@@ -41,10 +53,10 @@ pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> 
         time.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > SHORT.max(1.5 * usual));
     let (count, missing) = gaps.fold((0, 0.0), |(n, sum), gap| (n + 1, sum + gap));
     ensure!(
-        missing < MISSING * (last - first),
+        missing < most_missing * (last - first),
         "rows are missing for {missing:.1} of {:.1} s, in {count} gaps (allowed: {} %)",
         last - first,
-        100.0 * MISSING
+        100.0 * most_missing
     );
     let lost = time.windows(2).filter(|pair| pair[1] - pair[0] > 1.5 * usual).count();
     // the whole number of steps that is nearest

@@ -21,7 +21,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use files::input;
 
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
-pub use self::even::even;
+pub use self::even::{even, even_with_gaps};
 pub use self::unit::{Quantity, conversion};
 use crate::parquet_file;
 use crate::table::Table;

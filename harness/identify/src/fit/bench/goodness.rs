@@ -7,6 +7,11 @@ use analysis::statistics::mean;
 
 /// Tests for each channel whether the residual of an answer is noise.
 pub fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
+    tests_of(problem, &problem.innovations(answer))
+}
+
+/// Tests for each channel whether its innovations are noise.
+pub fn tests_of(problem: &Problem, innovations: &[Vec<f64>]) -> Vec<Tests> {
     let one = |(channel, e): (&Channel, &Vec<f64>)| {
         let recording = &problem.recordings[channel.recording];
         let of = |x: &[f64]| match channel.signal {
@@ -15,7 +20,7 @@ pub fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
         };
         Tests::of(&of(&recording.time), &[&of(&recording.torque)], &of(e), channel.noise.white)
     };
-    problem.channels.iter().zip(&problem.innovations(answer)).map(one).collect()
+    problem.channels.iter().zip(innovations).map(one).collect()
 }
 
 /// Fit of the rates, %: 100 (1 − |y − ŷ|/|y − mean y|).

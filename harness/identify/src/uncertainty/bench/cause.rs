@@ -1,10 +1,10 @@
-//! Names the likeliest cause of a misfit: an effect of ordinary benches that was not fitted.
+//! Names the cause of a misfit: an effect of ordinary benches that was not fitted.
 //!
 //! Each candidate is added to the model that fits best. One run shows the direction in which it moves the residual. Of the part that
 //! the unknowns cannot take, the candidate explains a share of the sum of squares at first order. The [`REFITTED`] candidates with
-//! the largest shares are fitted with all unknowns. The one with the least deviance is the cause if the gain is far beyond chance, and
-//! if it explains [`CAUSE_EXPLAINS`] of the misfit: the sum of squares above the number of residuals, or all that is more than noise.
-//! All of this starts from the recording's own noise: the noise of the misfit would hide what it is made of.
+//! the largest shares are fitted with all unknowns. A candidate is the cause if its gain is far beyond chance, if the residual with it is
+//! noise, and if its rivals lose: no other candidate that leaves noise, and no torque that follows the motion, has a deviance
+//! within [`BIC_DECIDES`] of it. Otherwise the cause is unknown. All of this starts from the recording's own noise: the noise of the misfit would hide what it is made of.
 
 use anyhow::Result;
 use nalgebra::DVector;
@@ -16,9 +16,7 @@ use crate::estimate::prose;
 use crate::fit::bench::goodness::tests;
 use crate::fit::bench::problem::{Problem, Rough};
 use crate::model::bench::unknown::{Quantity, Unknown};
-use crate::tuning::{
-    ACTUATOR_LIMIT, BIC_DECIDES, CAUSE_EXPLAINS, CAUSE_LEAST, CAUSE_PART, REFITTED,
-};
+use crate::tuning::{ACTUATOR_LIMIT, BIC_DECIDES, CAUSE_LEAST, CAUSE_PART, REFITTED};
 use analysis::innovations::Tests;
 use analysis::statistics::peak;
 
@@ -33,8 +31,14 @@ pub struct Cause {
     pub size: Option<(String, f64, String)>,
     /// Decrease of −2 ln L.
     pub gain: f64,
-    /// True if the residual that it leaves is noise.
-    pub fits: bool,
+}
+
+/// Effects that leave noise alone, the largest gain first.
+pub type Rivals = Vec<Cause>;
+
+/// Returns true if a gain is beyond chance against that of the best rival.
+pub fn wins(gain: f64, rival: Option<f64>) -> bool {
+    rival.is_none_or(|rival| gain > rival + BIC_DECIDES)
 }
 
 impl Cause {
@@ -44,13 +48,8 @@ impl Cause {
             let unit = if unit == "1" { String::new() } else { format!(" {}", prose(unit)) };
             format!(" ({name} = {value:.3e}{unit})")
         });
-        let leaves = if self.fits {
-            "the residual is noise"
-        } else {
-            "less of the residual is left than with any other"
-        };
         format!(
-            "The likeliest cause is {}: with it{size} {leaves}. {} fits it.",
+            "The cause is {}: with it{size} the residual is noise, and no other effect that was tried explains it as well. {} fits it.",
             self.effect, self.flags
         )
     }
@@ -170,7 +169,7 @@ fn with_candidate<'a>(
     (other, there)
 }
 
-/// Returns the likeliest cause of the misfit that a model with this friction law leaves at x; `None`: no candidate explains it.
+/// Returns the effects that explain the misfit which a model with this friction law leaves at x.
 ///
 /// # Errors
 /// If the FMU refuses the model itself. A candidate that it refuses is left out.
@@ -179,7 +178,7 @@ pub fn find(
     x: &[f64],
     (model, law): (&str, &str),
     tell: &mut dyn FnMut(&str),
-) -> Result<Option<Cause>> {
+) -> Result<Rivals> {
     let problem = fresh(problem);
     let base = problem.search(x, CAUSE_PART.0)?;
     let (jacobian, e) = (&base.jacobian, &base.answer.1);
@@ -208,32 +207,36 @@ pub fn find(
     }
     let before = deviance(&problem, &base);
     let chance = (e.len() as f64).ln() + BIC_DECIDES;
-    let mut best: Option<(f64, Candidate, Problem, Rough)> = None;
+    let mut rivals = Rivals::new();
     let least = scored.first().map_or(0.0, |best| CAUSE_LEAST * best.0).max(chance);
     let worth = scored.into_iter().take(REFITTED).filter(|(score, _)| *score > least);
     for (_, candidate) in worth {
-        let (other, there) = with_candidate(&problem, &candidate, &base.x);
+        let (mut other, there) = with_candidate(&problem, &candidate, &base.x);
         let Ok(found) = other.search(&there, CAUSE_PART.0) else { continue };
         let gain = before - deviance(&other, &found);
-        tell(&format!("with {}, −2 ln L falls by {gain:.1}", candidate.effect));
-        if gain > chance && best.as_ref().is_none_or(|best| gain > best.0) {
-            best = Some((gain, candidate, other, found));
+        let mut fits = false;
+        let mut size = None;
+        if gain > chance {
+            // the noise of the last search is the recording's; the tests need the noise that is left
+            other.estimate_noise(&found.answer.0);
+            let found = other.search(&found.x, CAUSE_PART.1)?;
+            other.estimate_noise(&found.answer.0);
+            fits = tests(&other, &found.answer.0).iter().all(Tests::passed);
+            size = candidate.unknown.as_ref().and(other.unknowns.last()).map(|unknown| {
+                let value = unknown.value(found.x[found.x.len() - 1]);
+                (unknown.quantity.name(), value, unknown.unit.clone())
+            });
+        }
+        tell(&format!(
+            "with {}, −2 ln L falls by {gain:.1}, and {}",
+            candidate.effect,
+            if fits { "noise is left" } else { "more than noise is left" }
+        ));
+        if fits {
+            let (effect, flags) = (candidate.effect.into(), candidate.flags);
+            rivals.push(Cause { effect, flags, size, gain });
         }
     }
-    let Some((gain, candidate, mut other, found)) = best else { return Ok(None) };
-    let cost = |found: &Rough| found.answer.1.norm_squared();
-    let misfit = cost(&base) - e.len() as f64;
-    let explained = (cost(&base) - cost(&found)) / misfit;
-    tell(&format!("{} explains {:.0} % of the misfit", candidate.effect, 100.0 * explained));
-    // the noise of the last search is the recording's; the tests need the noise that is left
-    other.estimate_noise(&found.answer.0);
-    let found = other.search(&found.x, CAUSE_PART.1)?;
-    other.estimate_noise(&found.answer.0);
-    let size = candidate.unknown.as_ref().and(other.unknowns.last()).map(|unknown| {
-        let value = unknown.value(found.x[found.x.len() - 1]);
-        (unknown.quantity.name(), value, unknown.unit.clone())
-    });
-    let fits = tests(&other, &found.answer.0).iter().all(Tests::passed);
-    let (effect, flags) = (candidate.effect.into(), candidate.flags);
-    Ok((fits || explained > CAUSE_EXPLAINS).then_some(Cause { effect, flags, size, gain, fits }))
+    rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    Ok(rivals)
 }

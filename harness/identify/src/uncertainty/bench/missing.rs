@@ -20,11 +20,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::estimate::prose;
+use crate::fit::bench::goodness::tests_of;
 use crate::fit::bench::problem::{Differences, Polished, Problem};
 use crate::input::recording::Recording;
 use crate::model::bench::simulate::{Motion, TORQUE_BESIDES};
 use crate::tuning::{MISSING_LIMIT, MISSING_STEP, QUIET_TORQUE, SEEN_SENSITIVITY};
 use crate::uncertainty::bench::budget::Slope;
+use analysis::innovations::Tests;
 
 /// A row of the model's motion.
 struct Row {
@@ -94,20 +96,35 @@ impl Missing {
     }
 }
 
-/// Torques that the model lacks, what explains most first; none where the FMU has no input for them. `e` are the stacked
-/// innovations at the minimum `found`.
+/// Torques that a model lacks.
+#[derive(Clone, Debug, Default)]
+pub struct Torques {
+    /// The torques, what explains most first.
+    pub all: Vec<Missing>,
+    /// True if noise alone is left with all of them.
+    pub explain: bool,
+}
+
+impl Torques {
+    /// Returns the decrease of −2 ln L by all of them.
+    pub fn gain(&self) -> f64 {
+        self.all.iter().map(|torque| torque.deviations.powi(2)).sum()
+    }
+}
+
+/// Torques that the model lacks; none where the FMU has no input for them. `e` are the stacked innovations at the minimum `found`.
 pub fn torques(
     problem: &Problem,
     found: &Polished,
     e: &DVector<f64>,
     tolerances: &[Slope],
-) -> Result<Vec<Missing>> {
+) -> Result<Torques> {
     let Polished { x, answer, .. } = found;
     let base = &answer.motion;
     // a size to a thousandth is enough
     let problem = &Problem { differences: Differences::Forward, ..problem.clone() };
     if problem.fmu.description().variable(TORQUE_BESIDES).is_err() {
-        return Ok(Vec::new());
+        return Ok(Torques::default());
     }
     let (rows, n) = found.jacobian.shape();
     let more = tolerances.len();
@@ -143,7 +160,14 @@ pub fn torques(
             .map(|(i, (_, s))| (i, score(s)))
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((i, deviations)) = most.filter(|(_, d)| d.abs() > MISSING_LIMIT) else {
-            return Ok(missing);
+            let mut rest = left.iter().copied();
+            let innovations: Vec<Vec<f64>> = problem
+                .innovations(answer)
+                .iter()
+                .map(|channel| rest.by_ref().take(channel.len()).collect())
+                .collect();
+            let explain = tests_of(problem, &innovations).iter().all(Tests::passed);
+            return Ok(Torques { all: missing, explain });
         };
         let (kind, s) = seen.swap_remove(i);
         let norm = s.norm();
