@@ -3,10 +3,10 @@
     python3 harness/studies/six_axes.py [--short] dist/HubSlosh.fmu dist/Spacecraft.fmu
 
 needs Linux, a C compiler, Python 3.11 or newer and valgrind. FMUs packed from older source will
-do, too: what they have no name for is left out. A host in C (six_axes.c) loads the FMU's file. It
-sets a torque and its slope and calls fmi2DoStep with 20 ms, 1000 times after 100. callgrind counts
-the instructions in fmi2DoStep alone, the same on any machine. With --short two rows are counted and
-compared with the page: 10 % apart at most, since compilers differ by some per cent.
+do, too: what they have no name for is left out. The host of step_cost.py sets a torque and its
+slope and calls fmi2DoStep with 20 ms, 1000 times after 100; the table has the mean. With --short
+two rows are counted and compared with the page: 10 % apart at most, since compilers differ by some
+per cent.
 
 | case | what |
 | --- | --- |
@@ -21,12 +21,12 @@ compared with the page: 10 % apart at most, since compilers differ by some per c
 
 import math
 import re
-import subprocess
+import statistics
 import sys
 import tempfile
-import zipfile
 from pathlib import Path
-from xml.etree import ElementTree
+
+import step_cost
 
 PAGE = Path(__file__).resolve().parents[2] / "modelDescription/Spacecraft/documentation/model.md"
 STEP = 0.02  # s
@@ -95,16 +95,8 @@ def parameters(case: str) -> dict[str, float | str]:
     return p
 
 
-def arguments(folder: Path, case: str, tolerance: float) -> list[str]:
-    """Return the arguments of six_axes.c for a case, without the number of steps (the third)."""
-    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
-    variables = {v.get("name"): v for v in root.iter("ScalarVariable")}
-    items = {
-        kind.get("name"): {item.get("name"): item.get("value") for item in kind.iter("Item")}
-        for kind in root.iter("SimpleType")
-    }
-    identifier = root.find("CoSimulation").get("modelIdentifier")
-    library = folder / "binaries" / "linux64" / f"{identifier}.so"
+def count(program: Path, folder: Path, case: str, tolerance: float) -> float:
+    """Return the instructions of one fmi2DoStep, the mean of 1000."""
     values = parameters(case)
     if case == "hub":
         w, swing = 13.0, {"tau_cmd": 0.05}
@@ -114,31 +106,11 @@ def arguments(folder: Path, case: str, tolerance: float) -> list[str]:
     else:
         values["force[3]"] = 2400.0
         w, swing = 2.5, {"torque[1]": 20.0, "torque[2]": 10.0, "torque[3]": 20.0}
-    told = [str(library), root.get("guid"), str(tolerance), "", str(w)]
-    for name, value in values.items():
-        if name not in variables:
-            continue
-        kind = variables[name][0]
-        code = "r" if kind.tag == "Real" else "i"
-        number = items[kind.get("declaredType")][value] if isinstance(value, str) else value
-        told += [code, variables[name].get("valueReference"), str(number)]
-    for name, size in swing.items():
-        told += ["u", variables[name].get("valueReference"), str(size)]
-    return told
-
-
-def count(program: Path, told: list[str]) -> float:
-    """Return the instructions of one fmi2DoStep."""
-    counts = []
-    for steps in STEPS:
-        tool = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
-        command = [*tool, "--toggle-collect=fmi2DoStep", program, *told[:3], str(steps), *told[4:]]
-        done = subprocess.run(command, capture_output=True, text=True)
-        found = re.search(r"Collected : (\d+)", done.stderr)
-        if done.returncode or not found:
-            sys.exit(done.stderr)
-        counts.append(int(found[1]))
-    return (counts[1] - counts[0]) / (STEPS[1] - STEPS[0])
+    told = step_cost.arguments(
+        folder, values, swing,
+        steps=STEPS[1], step=STEP, frequencies=(w, w), tolerance=tolerance,
+    )  # fmt: skip
+    return statistics.mean(step_cost.count_instructions(program, told)[STEPS[0] :])
 
 
 def main() -> None:
@@ -150,17 +122,12 @@ def main() -> None:
     print("| what | instructions | over HubSlosh |")
     print("| --- | --- | --- |")
     with tempfile.TemporaryDirectory() as folder:
-        program = Path(folder, "six_axes")
-        source = Path(__file__).with_suffix(".c")
-        options = ["-std=gnu11", "-O2", "-Wall", "-Wextra"]
-        subprocess.run(["cc", *options, source, "-ldl", "-lm", "-o", program], check=True)
-        hub, craft = Path(folder, "hub"), Path(folder, "craft")
-        zipfile.ZipFile(sys.argv[-2]).extractall(hub)
-        zipfile.ZipFile(sys.argv[-1]).extractall(craft)
+        program = step_cost.build_host(Path(folder))
+        hub = step_cost.unpack(sys.argv[-2], Path(folder, "hub"))
+        craft = step_cost.unpack(sys.argv[-1], Path(folder, "craft"))
         unit = math.nan
         for case, tolerance, what in [row for row in ROWS if row[0] in ("hub", "one") or not short]:
-            told = arguments(hub if case == "hub" else craft, case, tolerance)
-            n = count(program, told)
+            n = count(program, hub if case == "hub" else craft, case, tolerance)
             unit = n if case == "hub" else unit
             print(f"| {what} | {n:,.0f} | {n / unit:.1f} |", flush=True)
             written = re.search(rf"^\| {re.escape(what)}.*?\| ([\d,]+) \|", page, re.MULTILINE)

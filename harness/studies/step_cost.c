@@ -1,184 +1,84 @@
-/* How many instructions one fmi2DoStep takes: median, 99.99th percentile and maximum over a sweep.
+/* The host under which step_cost.py counts instructions: STEPS communication steps of H seconds of any FMU 2.0.
  *
- *   step_cost LIBRARY GUID STEPS H AMPLITUDE TORQUE [REFERENCE TYPE VALUE]...
+ *   step_cost LIBRARY GUID TOLERANCE STEPS H W0 W1 LONG [r REFERENCE VALUE | i REFERENCE VALUE | u REFERENCE SIZE]...
  *
- * H in s, AMPLITUDE in N.m, TORQUE the value reference of the input; TYPE is r, i or b. The sweep goes
- * from 1.25 to 3.5 Hz in STEPS steps, in straight lines between communication points. Prints
- * "median p99.99 maximum" or why there is none.
- *
- * Instructions are counted by single steps of the processor (ptrace), which every Linux has, unlike
- * counters of the hardware; that takes microseconds per instruction. So all steps are timed first,
- * each by the least of five runs from the same saved state, and the slowest are counted, and some
- * from the middle. The functions' types are the official headers'. */
-#define _GNU_SOURCE
+ * Sets reals (r) and integers (i) before the start. Inputs (u) swing with SIZE in straight lines between communication
+ * points, at an angular frequency that goes from W0 to W1, rad/s. With LONG > 0 a last step of LONG seconds follows,
+ * whose status may be anything: a bounded FMU refuses it. */
 #include <dlfcn.h>
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <sys/ptrace.h>
-#include <sys/wait.h>
-#include <time.h>
-#include <unistd.h>
 
-#include "fmi2Functions.h"
+enum { MOST = 8 };            /* inputs */
 
-enum { RUNS = 5, MIDDLE = 9 };
+static void *library, *c;
 
-static void *library;
-#define CALL(name) ((name##TYPE *)dlsym(library, #name))
-
-static fmi2DoStepTYPE *do_step;
-static fmi2Component c;
-static double h;
-
-static void fail(const char *what)
+static void check(const char *name, int status)
 {
-    printf("%s\n", what);
-    exit(1);
-}
-
-static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
-                   fmi2String category, fmi2String format, ...)
-{
-    (void)environment, (void)name, (void)status, (void)category, (void)format;
-}
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-/* Instructions of a child that makes `steps` (0 or 1) steps from here and ends. */
-static long traced(double t, int steps)
-{
-    int status;
-    long count = 0;
-    pid_t child = fork();
-    if (child == 0) {
-        ptrace(PTRACE_TRACEME, 0, NULL, NULL);
-        raise(SIGSTOP);
-        if (steps)
-            do_step(c, t, h, fmi2True);
-        _exit(0);
-    }
-    if (child < 0 || waitpid(child, &status, 0) != child || !WIFSTOPPED(status))
-        fail("this machine does not let a process trace its child");
-    for (;; count++) {
-        if (ptrace(PTRACE_SINGLESTEP, child, NULL, NULL) != 0 || waitpid(child, &status, 0) != child)
-            fail("the child could not be traced");
-        if (WIFEXITED(status))
-            return count;
+    if (status != 0) {
+        fprintf(stderr, "%s answers %d\n", name, status);
+        exit(1);
     }
 }
 
-static long instructions(double t) { return traced(t, 1) - traced(t, 0); }
-
-/* Sets the input for the step that begins at t. */
-static void drive(fmi2ValueReference torque, double amplitude, double t, double end)
+/* sin of the phase after k steps */
+static double swing(double w0, double w1, int steps, double h, int k)
 {
-    const double rate = log(3.5 / 1.25) / end;
-    const double at[] = {t, t + h};
-    double tau[2], slope;
-    int order = 1;
-    for (int i = 0; i < 2; i++)
-        tau[i] = amplitude * sin(2 * M_PI * 1.25 * expm1(rate * at[i]) / rate);
-    slope = (tau[1] - tau[0]) / h;
-    CALL(fmi2SetReal)(c, &torque, 1, &tau[0]);
-    CALL(fmi2SetRealInputDerivatives)(c, &torque, 1, &order, &slope);
+    return sin(h * k * (w0 + 0.5 * (w1 - w0) * k / steps));
 }
 
-static double *took;
-
-static int by_time(const void *a, const void *b)
-{
-    double x = took[*(const int *)a], y = took[*(const int *)b];
-    return (x > y) - (x < y);
-}
-
-static int by_size(const void *a, const void *b)
-{
-    long x = *(const long *)a, y = *(const long *)b;
-    return (x > y) - (x < y);
-}
+/* Calls fmi2NAME of the instance with arguments of these types. */
+#define CALL(name, types, ...)                                                                             \
+    check("fmi2" #name, ((int(*) types)dlsym(library, "fmi2" #name))__VA_ARGS__)
 
 int main(int count, char **argv)
 {
-    if (count < 7 || (count - 7) % 3)
-        fail("usage: see the beginning of step_cost.c");
+    const void *callbacks[5] = {NULL};
+    unsigned inputs[MOST];
+    double sizes[MOST], values[MOST], slopes[MOST];
+    int orders[MOST];
+    size_t n = 0;
+    if (count < 9 || (count - 9) % 3)
+        return fprintf(stderr, "usage: see the beginning of step_cost.c\n"), 1;
     library = dlopen(argv[1], RTLD_NOW);
     if (!library)
-        fail(dlerror());
-    do_step = CALL(fmi2DoStep);
-    int steps = atoi(argv[3]);
-    double amplitude = atof(argv[5]);
-    fmi2ValueReference torque = (fmi2ValueReference)atoi(argv[6]);
-    h = atof(argv[4]);
-    fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
-    c = CALL(fmi2Instantiate)("cost", fmi2CoSimulation, argv[2], "", &callbacks, fmi2False, fmi2False);
+        return fprintf(stderr, "%s\n", dlerror()), 1;
+    double tolerance = atof(argv[3]), h = atof(argv[5]), w0 = atof(argv[6]), w1 = atof(argv[7]), last = atof(argv[8]);
+    int steps = atoi(argv[4]);
+    void *(*instantiate)(const char *, int, const char *, const char *, const void *, int, int) =
+        (void *(*)(const char *, int, const char *, const char *, const void *, int, int))dlsym(
+            library, "fmi2Instantiate");
+    c = instantiate("cost", 1, argv[2], "", callbacks, 0, 0);
     if (!c)
-        fail("no instance");
-    for (int i = 7; i < count; i += 3) {
-        fmi2ValueReference reference = (fmi2ValueReference)atoi(argv[i]);
-        double x = atof(argv[i + 2]);
-        int n = atoi(argv[i + 2]);
-        fmi2Status status = *argv[i + 1] == 'r'   ? CALL(fmi2SetReal)(c, &reference, 1, &x)
-                            : *argv[i + 1] == 'b' ? CALL(fmi2SetBoolean)(c, &reference, 1, &n)
-                                                  : CALL(fmi2SetInteger)(c, &reference, 1, &n);
-        if (status != fmi2OK)
-            fail("a parameter was refused");
+        return fprintf(stderr, "no instance\n"), 1;
+    for (int k = 9; k < count; k += 3) {
+        unsigned reference = (unsigned)atoi(argv[k + 1]);
+        double x = atof(argv[k + 2]);
+        int i = atoi(argv[k + 2]);
+        if (*argv[k] == 'r')
+            CALL(SetReal, (void *, const unsigned *, size_t, const double *), (c, &reference, 1, &x));
+        else if (*argv[k] == 'i')
+            CALL(SetInteger, (void *, const unsigned *, size_t, const int *), (c, &reference, 1, &i));
+        else if (n < MOST)
+            inputs[n] = reference, sizes[n] = x, orders[n] = 1, n++;
     }
-    CALL(fmi2SetupExperiment)(c, fmi2True, 1e-4, 0, fmi2False, 0);
-    CALL(fmi2EnterInitializationMode)(c);
-    if (CALL(fmi2ExitInitializationMode)(c) != fmi2OK)
-        fail("the start was refused");
-
-    took = malloc((size_t)steps * sizeof *took);
-    int *order = malloc((size_t)steps * sizeof *order);
-    char *chosen = calloc((size_t)steps, 1);
-    fmi2FMUstate first = NULL, here = NULL;
-    if (!took || !order || !chosen || CALL(fmi2GetFMUstate)(c, &first) != fmi2OK)
-        fail("no memory");
-    /* The slowest 1.5 in 10,000, by time: among them are those above the percentile, by count. */
-    int rank = steps / 10000, slow = 2 * rank + 10, middle = steps / 2 - MIDDLE / 2;
+    CALL(SetupExperiment, (void *, int, double, double, int, double), (c, 1, tolerance, 0, 0, 0));
+    CALL(EnterInitializationMode, (void *), (c));
+    CALL(ExitInitializationMode, (void *), (c));
     for (int k = 0; k < steps; k++) {
-        order[k] = k;
-        took[k] = INFINITY;
-        drive(torque, amplitude, k * h, steps * h);
-        CALL(fmi2GetFMUstate)(c, &here);
-        for (int run = 0; run < RUNS; run++) {
-            CALL(fmi2SetFMUstate)(c, here);
-            double start = now();
-            if (do_step(c, k * h, h, fmi2True) != fmi2OK)
-                fail("a step was refused");
-            took[k] = fmin(took[k], now() - start);
+        double now = swing(w0, w1, steps, h, k), then = swing(w0, w1, steps, h, k + 1);
+        for (size_t i = 0; i < n; i++) {
+            values[i] = sizes[i] * now;
+            slopes[i] = sizes[i] * (then - now) / h;
         }
+        CALL(SetReal, (void *, const unsigned *, size_t, const double *), (c, inputs, n, values));
+        CALL(SetRealInputDerivatives,
+             (void *, const unsigned *, size_t, const int *, const double *),
+             (c, inputs, n, orders, slopes));
+        CALL(DoStep, (void *, double, double, int), (c, k * h, h, 1));
     }
-    qsort(order, (size_t)steps, sizeof *order, by_time);
-    for (int i = 0; i < slow; i++)
-        chosen[order[steps - 1 - i]] = 1;
-    for (int i = 0; i < MIDDLE; i++)
-        chosen[order[middle + i]] |= 2;
-    long *slowest = calloc((size_t)slow, sizeof *slowest), median[MIDDLE];
-    int slowest_count = 0, median_count = 0;
-    CALL(fmi2SetFMUstate)(c, first);
-    for (int k = 0; k < steps; k++) {
-        drive(torque, amplitude, k * h, steps * h);
-        if (chosen[k]) {
-            long n = instructions(k * h);
-            if (chosen[k] & 1)
-                slowest[slowest_count++] = n;
-            if (chosen[k] & 2)
-                median[median_count++] = n;
-        }
-        do_step(c, k * h, h, fmi2True);
-    }
-    qsort(slowest, (size_t)slowest_count, sizeof *slowest, by_size);
-    qsort(median, (size_t)median_count, sizeof *median, by_size);
-    printf("%ld %ld %ld\n", median[median_count / 2], slowest[slowest_count - 1 - rank],
-           slowest[slowest_count - 1]);
+    if (last > 0)
+        ((int (*)(void *, double, double, int))dlsym(library, "fmi2DoStep"))(c, steps * h, last, 1);
     return 0;
 }

@@ -78,8 +78,6 @@ impl Cli {
             Example(args) => Some(&args.fmu),
             Identify(args) => args.fmu(),
             Design(args) => Some(&args.fmu),
-            // what is traced has no other process around it
-            StepCost(args) => args.counted.is_empty().then_some(&args.fmu),
             _ => None,
         }
     }
@@ -127,7 +125,6 @@ enum Command {
     #[command(hide = true)]
     CheckCalls(check::CheckCallsArgs),
     Scale(scale::ScaleArgs),
-    StepCost(step_cost::StepCostArgs),
     Tank(tank::TankArgs),
     Gyro(gyro::GyroArgs),
     Example(example::ExampleArgs),
@@ -279,7 +276,6 @@ fn carry_out(cli: Cli) -> u8 {
         Some(Command::Check(args)) => args.run(),
         Some(Command::CheckCalls(args)) => args.run(),
         Some(Command::Scale(args)) => args.run(),
-        Some(Command::StepCost(args)) => args.run(),
         Some(Command::Tank(args)) => args.run(),
         Some(Command::Gyro(args)) => args.run(),
         Some(Command::Example(args)) => args.run(),

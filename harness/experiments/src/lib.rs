@@ -11,5 +11,4 @@ pub mod rounding;
 pub mod run;
 pub mod scaling;
 pub mod sensors;
-pub mod step_cost;
 pub mod weight;

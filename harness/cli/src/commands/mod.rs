@@ -29,7 +29,6 @@ pub mod release;
 pub mod review;
 pub mod run;
 pub mod scale;
-pub mod step_cost;
 pub mod tank;
 pub mod torque;
 pub mod variables;

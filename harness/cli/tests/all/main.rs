@@ -12,6 +12,5 @@ mod plans;
 mod recordings;
 mod report;
 mod sizes;
-mod step_cost;
 mod tank;
 mod view;

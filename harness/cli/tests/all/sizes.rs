@@ -81,9 +81,6 @@ view @ --out page.html
 view rest.csv --from 0 --to 0 --out page.html
 torque --profile zero --stop 0 --out torque.csv
 torque --profile zero --step 1e9 --stop 1 --out torque.csv
-step-cost --steps 0
-step-cost --steps 1
-step-cost --fmu Model3.fmu --steps 1
 campaign --plan none.toml --out campaign
 campaign --plan short.toml --out campaign
 campaign --fills 0 --amplitudes 0.1 --model linear --out campaign
@@ -113,14 +110,13 @@ fn sizes_0_and_1_give_a_result_or_one_error() {
     prepare(folder);
     let mut commands = Vec::new();
     for command in COMMANDS.lines().filter(|line| !line.is_empty()) {
-        const OF_FMUS: [&str; 8] = [
+        const OF_FMUS: [&str; 7] = [
             "analyse",
             "campaign",
             "design",
             "gyro --hours",
             "identify",
             "run",
-            "step-cost",
             "view",
         ];
         let takes_fmu = OF_FMUS.iter().any(|begin| command.starts_with(begin));

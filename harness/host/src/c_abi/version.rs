@@ -788,7 +788,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
             }
             bail!(
                 "{name} cannot be set to {text}: it is a structural parameter that sizes arrays, and its value here is {now} \
-                 (`hubslosh run` and `step-cost` can set it)"
+                 (`hubslosh run` can set it)"
             );
         }
         self.set_value(variable, value).with_context(|| format!("{name}={text} was refused"))
