@@ -7,6 +7,7 @@ use plant::{
     SloshSource, State, StepError, StoppedStep,
 };
 use runtime::Model;
+use runtime::clock::Instant;
 use runtime::model::{StepEnd, StepFailure};
 use runtime::table::Table;
 
@@ -217,7 +218,7 @@ impl Model for HubSlosh {
         Ok(match end {
             plant::StepEnd::End => StepEnd::End,
             plant::StepEnd::EventAtEnd => StepEnd::EventAtEnd,
-            plant::StepEnd::Event(time) => StepEnd::Event(time),
+            plant::StepEnd::Event(after) => StepEnd::Event(after),
         })
     }
 
@@ -245,8 +246,8 @@ impl Model for HubSlosh {
         }
     }
 
-    fn set_time(&mut self, time: f64) {
-        self.plant.set_time(time);
+    fn set_time(&mut self, now: Instant) {
+        self.plant.set_time(now.time, now.since_start, now.resolution);
     }
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {

@@ -11,14 +11,13 @@ use taylor::error::StepError;
 
 use crate::contact::Contact;
 use crate::friction::Law;
-use crate::imu::SLACK;
 use crate::inputs::{Inputs, Ramp};
 use crate::motion::out_of_range;
 use crate::outputs::unsigned_zero;
 use crate::parameters::Friction;
 use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
-use crate::state::{Axial, INDICATORS, STATES, indicator, x};
+use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
 /// Largest number of gyro samples due at once. A host that has passed more of them ignores time
 /// events.
@@ -35,9 +34,13 @@ impl Plant {
         self.state.x = *x;
     }
 
-    /// Sets the time from the host, s.
-    pub fn set_time(&mut self, time: f64) {
-        self.state.time = time;
+    /// Sets the host's time, s, and the time since the start if the host integrates. Times of the host that differ by at most
+    /// `resolution` are the same.
+    pub fn set_time(&mut self, time: f64, since_start: Option<f64>, resolution: f64) {
+        (self.state.time, self.resolution) = (time, resolution);
+        if let Some(elapsed) = since_start {
+            self.state.elapsed = [elapsed, 0.0];
+        }
     }
 
     /// Returns x'.
@@ -144,8 +147,8 @@ impl Plant {
         let (before, time) = (self.state, self.state.time);
         let period = 1.0 / self.imu.rate;
         // Too many samples, or a time so far from zero that the clock cannot separate two samples.
-        let endless = |due| time - due > SAMPLES_AT_ONCE * period || time + period <= time;
-        if self.next_time_event().is_some_and(endless) {
+        let endless = |due: f64| -due > SAMPLES_AT_ONCE * period || time + period <= time;
+        if self.next_sample().is_some_and(endless) {
             return Err(StepError::Model(format!(
                 "too many gyro samples are due at t = {time} s. The host has skipped time events, or imu.rate \
                  is too high for the resolution of time there"
@@ -171,9 +174,8 @@ impl Plant {
                 self.state.record_contact(Contact::Backward, time);
             }
         }
-        // Hosts land on a time event exactly or to rounding.
-        let slack = SLACK / self.imu.rate;
-        while self.next_time_event().is_some_and(|due| due <= time + slack) {
+        let slack = self.resolution;
+        while self.next_sample().is_some_and(|due| self.imu.falls_within(due, 0.0, slack)) {
             let omega = self.omega();
             self.imu.sample(&mut self.state.gyro, omega);
         }
@@ -239,7 +241,7 @@ impl Plant {
         self.evaluate(inputs);
         let [mass_height, rate] = self.height();
         let (g, time) = (inputs.g_axial.value, self.state.time);
-        let axial = Axial { work, g, time, mass_height, rate };
+        let axial = Axial { work, g, accepted: Some(Accepted { time, mass_height, rate }) };
         if !axial.is_finite() {
             return Err(StepError::NotFinite { time });
         }
@@ -263,10 +265,15 @@ impl Plant {
         Ok(())
     }
 
-    /// Time of the gyro's next sample, s; `None` without a gyro.
+    /// Time of the gyro's next sample on the host's clock, s; `None` without a gyro.
     pub fn next_time_event(&self) -> Option<f64> {
-        let next = self.state.gyro.next as f64 / self.imu.rate;
-        self.imu.enabled.then_some(self.state.start_time + next)
+        self.next_sample().map(|due| self.state.time + due)
+    }
+
+    /// Delay until the gyro's next sample, s.
+    fn next_sample(&self) -> Option<f64> {
+        let State { gyro, elapsed, .. } = &self.state;
+        self.imu.enabled.then(|| self.imu.due(gyro.next, elapsed[0]))
     }
 }
 
@@ -589,14 +596,14 @@ mod tests {
         let mut plant = Plant::new(&p, &inputs, 1e6, 1e-9).unwrap();
         for _ in 0..100 {
             let due = plant.next_time_event().unwrap();
-            plant.set_time(due);
+            plant.set_time(due, Some(due - 1e6), 2e-9);
             plant.take_event(&inputs).unwrap();
             assert!(plant.next_time_event().unwrap() > due);
         }
         let before = *plant.state();
-        plant.set_time(1e12);
+        plant.set_time(1e12, Some(1e12 - 1e6), 2e-3);
         assert!(plant.take_event(&inputs).is_err());
-        plant.set_time(before.time);
+        plant.set_time(before.time, Some(before.elapsed[0]), 2e-9);
         assert_eq!(*plant.state(), before);
         // At a time whose resolution is seconds.
         let mut plant = Plant::new(&p, &inputs, 1e16, 1e-9).unwrap();

@@ -43,13 +43,10 @@ pub struct Plant {
     pub(crate) motion: Box<Motion>,
     pub(crate) liquid: Liquid,
     pub(crate) state: State,
+    /// Times of the host that differ by less are the same, s.
+    pub(crate) resolution: f64,
     /// The step that has stopped at an event, until it is continued.
     pub(crate) stopped: Option<StoppedStep>,
-}
-
-/// Tolerance for comparing times, s.
-fn rounding(time: f64) -> f64 {
-    4.0 * f64::EPSILON * time.abs()
 }
 
 /// End of a step that stops at events.
@@ -59,7 +56,7 @@ pub enum StepEnd {
     End,
     /// The end of the step, with an event there.
     EventAtEnd,
-    /// An event before the end, at this time, s.
+    /// An event before the end, this long after the beginning, s.
     Event(f64),
 }
 
@@ -116,14 +113,21 @@ impl StoppedStep {
     }
 
     /// Returns true if a step of length `h` from the current state continues the stopped step: same end, same inputs.
-    fn goes_on(&self, state: &State, inputs: &Inputs, h: f64) -> bool {
-        let ends = [state.time + h, self.start.time + self.h];
+    fn goes_on(&self, state: &State, inputs: &Inputs, h: f64, resolution: f64) -> bool {
+        let left = self.h - self.passed;
+        let is_same = |a: f64, b: f64| (a - b).abs() <= resolution.max(rounding(self.h));
         let held = [inputs.tau_cmd, inputs.tau_ext, inputs.g_axial];
         held.iter().all(|input| input.slope == 0.0)
             && held.map(|input| input.value) == self.inputs
-            && (state.time, &state.x) == (self.time, &self.x)
-            && (ends[0] - ends[1]).abs() <= rounding(ends[0])
+            && state.x == self.x
+            && is_same(state.time, self.time)
+            && is_same(h, left)
     }
+}
+
+/// Rounding errors of durations within a step of length `h`, s.
+fn rounding(h: f64) -> f64 {
+    4.0 * f64::EPSILON * h
 }
 
 impl Plant {
@@ -158,7 +162,7 @@ impl Plant {
             ranges: Ranges { regime: Regime::Linear, baffle: true },
             event_count: 0,
             event_time: start_time,
-            start_time,
+            elapsed: [0.0; 2],
             start_g: inputs.g_axial.value,
             axial: Axial::default(),
             gyro: p.imu.start(),
@@ -183,7 +187,6 @@ impl Plant {
         plant.state.contact = plant.present_contact(inputs);
         plant.state.ranges = plant.present_ranges(inputs);
         plant.state.axial.g = inputs.g_axial.value;
-        plant.state.axial.time = start_time;
         plant.accept_step(inputs).map_err(|why| vec![why.to_string()])?;
         if plant.imu.enabled {
             let omega = plant.omega();
@@ -233,6 +236,7 @@ impl Plant {
             liquid: Liquid::new(p, &at_reference),
             calculated,
             state,
+            resolution: 0.0,
             stopped: None,
         }
     }
@@ -293,10 +297,11 @@ impl Plant {
     /// The same as for [`Plant::step`].
     pub fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepError> {
         let (before, stopped) = (self.state, self.stopped.take());
-        let (mut length, mut passed) = (h, -1.0);
-        if let Some(step) = stopped.filter(|step| step.goes_on(&before, inputs, h)) {
+        let (mut length, mut passed, mut begun) = (h, -1.0, 0.0);
+        let goes_on = |step: &StoppedStep| step.goes_on(&before, inputs, h, self.resolution);
+        if let Some(step) = stopped.filter(goes_on) {
             self.state = step.start;
-            (length, passed) = (step.h, step.passed);
+            (length, passed, begun) = (step.h, step.passed, step.passed);
         }
         let start = self.state;
         let mut end = StepEnd::End;
@@ -313,7 +318,7 @@ impl Plant {
                 return Ok(StepEnd::EventAtEnd);
             }
             // No step remains if the event is at the end to rounding.
-            if length - passed > rounding(start.time + length) {
+            if length - passed > self.resolution.max(rounding(length)) {
                 break;
             }
             (self.state, end) = (start, StepEnd::EventAtEnd);
@@ -321,7 +326,7 @@ impl Plant {
         let State { time, x, .. } = self.state;
         let inputs = [inputs.tau_cmd, inputs.tau_ext, inputs.g_axial].map(|input| input.value);
         self.stopped = Some(StoppedStep { start, h: length, passed, inputs, time, x });
-        Ok(StepEnd::Event(time))
+        Ok(StepEnd::Event(passed - begun))
     }
 
     /// Works like [`Plant::step`], but an error leaves the state unusable, and the step stops at the first event later
@@ -337,7 +342,7 @@ impl Plant {
             self.state.axial.work = self.work_axial(inputs);
         }
         let state = &mut self.state;
-        let begin = state.time;
+        let (begin, elapsed) = (state.time, state.elapsed);
         let (mut t, mut steps, mut stopped) = (0.0, self.motion.steps(), None);
         while t < h {
             // A piece of zero length takes no step of the integrator but counts as one.
@@ -350,7 +355,7 @@ impl Plant {
             let acting = (tau, inputs.g_axial.after(t));
             let stop = Stop { offset: t, passed };
             let flow = with_modes!(&mut self.liquid, modes => self.motion.advance(
-                modes, state, acting, length, (&self.imu, stop), &mut steps,
+                modes, state, acting, length, (&self.imu, self.resolution, stop), &mut steps,
             ))?;
             if let ControlFlow::Break(within) = flow {
                 stopped = Some(t + within);
@@ -369,9 +374,9 @@ impl Plant {
         }
         let reached = stopped.unwrap_or(h);
         if reached >= h {
-            state.time = begin + h;
+            state.set_clock((begin, elapsed), h);
         }
-        state.axial.time = state.time;
+        state.axial.accepted = None;
         state.axial.g = inputs.g_axial.at(reached);
         if !state.axial.is_finite() {
             return Err(StepError::NotFinite { time: state.time });
@@ -396,12 +401,14 @@ impl Plant {
     /// Returns the same from g_axial's change since the last accepted step and from the liquid's mass times height.
     pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
         let last = self.state.axial;
-        let h = self.state.time - last.time;
         let c = T::constant;
-        let mean = if h > 0.0 {
-            (c(last.mass_height) + mass_height) * 0.5 + (c(last.rate) - rate) * (h / 12.0)
-        } else {
-            mass_height
+        let mean = match last.accepted {
+            Some(accepted) if self.state.time > accepted.time => {
+                let h = self.state.time - accepted.time;
+                (c(accepted.mass_height) + mass_height) * 0.5
+                    + (c(accepted.rate) - rate) * (h / 12.0)
+            }
+            _ => mass_height,
         };
         c(last.work) + change * mean
     }

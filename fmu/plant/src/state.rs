@@ -79,7 +79,9 @@ pub struct State {
     pub(crate) ranges: Ranges,
     pub(crate) event_count: i32,
     pub(crate) event_time: f64,
-    pub(crate) start_time: f64,
+    /// Time since the start, s, and what rounding has taken from it. It is the sum of the steps' lengths, because a host's clock
+    /// may be off by rounding, may drift, or start at 1e9 s.
+    pub(crate) elapsed: [f64; 2],
     /// g_axial at the start, to which the slosh damping belongs.
     pub(crate) start_g: f64,
     pub(crate) axial: Axial,
@@ -89,12 +91,19 @@ pub struct State {
 /// Work done by a changing g_axial.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
-    /// Work from the start to `time`, J, and the g_axial of that instant, m/s2.
+    /// Work since the start, J, and the g_axial up to which it is known, m/s2.
     pub work: f64,
-    pub time: f64,
     pub g: f64,
-    /// The liquid's mass times height at that instant, kg m, and its rate. Known after an accepted
-    /// step of a host that integrates itself.
+    /// The last accepted step of a host that integrates itself. After a step of the plant's own there is none: g_axial then
+    /// changes at an instant.
+    pub accepted: Option<Accepted>,
+}
+
+/// The liquid at the end of an accepted step.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct Accepted {
+    pub time: f64,
+    /// Mass times height, kg m, and its rate.
     pub mass_height: f64,
     pub rate: f64,
 }
@@ -102,8 +111,8 @@ pub(crate) struct Axial {
 impl Axial {
     /// Returns true if all values and their squares are finite.
     pub(crate) fn is_finite(&self) -> bool {
-        let Axial { work, time, g, mass_height, rate } = *self;
-        [work, time, g, mass_height, rate].iter().all(|x| x.abs() < MAX_MAGNITUDE)
+        let Accepted { time, mass_height, rate } = self.accepted.unwrap_or_default();
+        [self.work, self.g, time, mass_height, rate].iter().all(|x| x.abs() < MAX_MAGNITUDE)
     }
 }
 
@@ -112,13 +121,17 @@ impl State {
     pub const WORDS: usize = 2 + Self::REALS;
 
     /// Number of words that are real numbers; the last of them are x.
-    const REALS: usize = 12 + FLICKERS + STATES;
+    const REALS: usize = 13 + FLICKERS + STATES;
 
     /// Returns the state as words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
-        let discrete =
-            [self.contact as i8 as u8, self.ranges.regime as u8, self.ranges.baffle as u8];
+        let discrete = [
+            self.contact as i8 as u8,
+            self.ranges.regime as u8,
+            u8::from(self.ranges.baffle) | u8::from(self.axial.accepted.is_some()) << 1,
+        ];
+        let Accepted { time, mass_height, rate } = self.axial.accepted.unwrap_or_default();
         words[0] = u64::from(self.event_count as u32)
             | u64::from(discrete[0]) << 32
             | u64::from(discrete[1]) << 40
@@ -127,13 +140,14 @@ impl State {
         let reals = [
             self.time,
             self.event_time,
-            self.start_time,
+            self.elapsed[0],
+            self.elapsed[1],
             self.start_g,
             self.axial.work,
-            self.axial.time,
+            time,
             self.axial.g,
-            self.axial.mass_height,
-            self.axial.rate,
+            mass_height,
+            rate,
             self.gyro.bias,
             self.gyro.held,
             self.gyro.walk,
@@ -154,11 +168,8 @@ impl State {
             _ => return None,
         };
         let regime = Regime::from_number((words[0] >> 40) as u8)?;
-        let baffle = match words[0] >> 48 {
-            0 => false,
-            1 => true,
-            _ => return None,
-        };
+        let flags = words[0] >> 48;
+        let (baffle, is_accepted) = (flags & 1 != 0, flags & 2 != 0);
         let mut reals = [0.0; Self::REALS];
         for (real, word) in reals.iter_mut().zip(&words[2..]) {
             *real = f64::from_bits(*word);
@@ -168,10 +179,11 @@ impl State {
         let [
             time,
             event_time,
-            start_time,
+            elapsed,
+            rest,
             start_g,
             work,
-            axial_time,
+            accepted_time,
             g,
             mass_height,
             rate,
@@ -179,7 +191,8 @@ impl State {
             held,
             walk,
         ] = *head;
-        let finite = reals.iter().all(|real| real.is_finite());
+        let finite = reals.iter().all(|real| real.is_finite()) && flags < 4;
+        let accepted = Accepted { time: accepted_time, mass_height, rate };
         // Beyond this number the instants of the samples cannot be separated.
         let countable = words[1] <= 1 << f64::MANTISSA_DIGITS;
         (finite && countable).then_some(State {
@@ -189,9 +202,9 @@ impl State {
             ranges: Ranges { regime, baffle },
             event_count: words[0] as u32 as i32,
             event_time,
-            start_time,
+            elapsed: [elapsed, rest],
             start_g,
-            axial: Axial { work, time: axial_time, g, mass_height, rate },
+            axial: Axial { work, g, accepted: is_accepted.then_some(accepted) },
             gyro: Gyro { next: words[1], bias, held, walk, flicker: *flicker },
         })
     }
@@ -204,6 +217,18 @@ impl State {
     /// Returns [`State::slosh`], mutable.
     pub(crate) fn slosh_mut(&mut self) -> &mut [[f64; 4]] {
         self.x[x::SLOSH..].as_chunks_mut().0
+    }
+
+    /// Moves the clock to `t` after `begin`, a time of the host and the time since the start, s.
+    pub(crate) fn set_clock(&mut self, begin: (f64, [f64; 2]), t: f64) {
+        let (time, [before, rest]) = begin;
+        self.time = time + t;
+        // Knuth's sum of two numbers and its rounding error, then Dekker's.
+        let sum = before + t;
+        let added = sum - before;
+        let rest = rest + ((before - (sum - added)) + (t - added));
+        let elapsed = sum + rest;
+        self.elapsed = [elapsed, rest - (elapsed - sum)];
     }
 
     /// Records a new contact at `time`. Returns true if it differs from the previous one.
@@ -239,9 +264,13 @@ mod tests {
             ranges: Ranges { regime: Regime::Nonlinear, baffle: true },
             event_count: -1,
             event_time: 0.25,
-            start_time: -7.0,
+            elapsed: [8.5, 1e-16],
             start_g: 9.81,
-            axial: Axial { work: 0.5, time: 1.0, g: 2.0, mass_height: 3.0, rate: 4.0 },
+            axial: Axial {
+                work: 0.5,
+                g: 2.0,
+                accepted: Some(Accepted { time: 1.0, mass_height: 3.0, rate: 4.0 }),
+            },
             gyro: Gyro {
                 next: 12,
                 bias: -1e-5,
@@ -259,7 +288,7 @@ mod tests {
         };
         assert_eq!(with(0, 2 << 32 | 1 << 40), None, "no such contact");
         assert_eq!(with(0, 1 << 32), None, "no such regime");
-        assert_eq!(with(0, 1 << 40 | 2 << 48), None, "no such range");
+        assert_eq!(with(0, 1 << 40 | 4 << 48), None, "no such flag");
         assert_eq!(with(1, u64::MAX), None, "samples that can't be counted");
         for place in 2..State::WORDS {
             assert_eq!(with(place, f64::NAN.to_bits()), None, "{place}");

@@ -9,6 +9,7 @@
 use std::marker::PhantomData;
 
 use crate::call::{CType, Call, Events, Fault, InstanceState, Interface};
+use crate::clock::Clock;
 use crate::model::{Model, StepEnd, StepFailure};
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Causality, Value, Variable, is_finite, text};
@@ -20,9 +21,6 @@ pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 /// The size that a continuous state may not reach.
 pub const MAX_STATE: f64 = 1e100;
-/// Relative tolerance for comparing times, by the larger of time and step: hosts
-/// accumulate steps in their own way and are off by a few units in the last place.
-const TIME_SLACK: f64 = 1e-9;
 
 /// An instance of an FMU, for hosts that speak a version of FMI.
 ///
@@ -36,11 +34,8 @@ pub struct Instance<M: Model, V: Version> {
     /// Form in which the host sees the variables.
     pub(crate) layout: Layout,
     pub(crate) state: InstanceState,
-    pub(crate) start: f64,
-    pub(crate) stop: Option<f64>,
+    pub(crate) clock: Clock,
     pub(crate) tolerance: f64,
-    /// The communication point the host has reached.
-    pub(crate) time: f64,
     /// The parameters' values in the table's order, right or wrong.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
@@ -57,8 +52,6 @@ pub struct Instance<M: Model, V: Version> {
     /// Values of the discrete outputs as the host last saw them in event mode, by slot ([`Events::Reported`]). Empty until
     /// initialization has ended: before, discrete outputs are computed as all others are.
     pub(crate) shown: Vec<i32>,
-    /// The last event, behind which a host that integrates itself may not go back, s.
-    pub(crate) last_event: f64,
     /// Room for the continuous states in the model's order, for directions and derivatives.
     scratch: [Vec<f64>; 2],
 }
@@ -121,10 +114,8 @@ impl<M: Model, V: Version> Instance<M, V> {
             events,
             layout: Layout::Scalars,
             state: InstanceState::Instantiated,
-            start: 0.0,
-            stop: None,
+            clock: Clock::new(interface, 0.0, None),
             tolerance: DEFAULT_TOLERANCE,
-            time: 0.0,
             parameters: M::table().starts(),
             inputs: M::Inputs::default(),
             sloped: false,
@@ -132,7 +123,6 @@ impl<M: Model, V: Version> Instance<M, V> {
             model: None,
             outputs: None,
             shown: Vec::new(),
-            last_event: f64::NEG_INFINITY,
             scratch: [vec![0.0; states], vec![0.0; states]],
         }
     }
@@ -156,7 +146,7 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     /// The communication point the host has reached.
     pub fn time(&self) -> f64 {
-        self.time
+        self.clock.time
     }
 
     /// Makes the instance unusable after a panic: its values cannot be trusted.
@@ -200,9 +190,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             return Err(call.error(problems.join("; ")));
         }
         self.tolerance = tolerance.unwrap_or(DEFAULT_TOLERANCE);
-        self.start = start;
-        self.stop = stop;
-        self.time = start;
+        self.clock = Clock::new(self.interface, start, stop);
         Ok(())
     }
 
@@ -847,7 +835,10 @@ impl<M: Model, V: Version> Instance<M, V> {
             true => model.step_to_event(inputs, h),
             false => model.step(inputs, h).map(|()| StepEnd::End),
         })?;
-        let sampled = self.model.as_ref().and_then(M::next_time_event) != next_time;
+        let sampled = match (next_time, self.model.as_ref().and_then(M::next_time_event)) {
+            (Some(before), Some(after)) => !self.clock.is_same(before, after),
+            (before, after) => before != after,
+        };
         let event = end != StepEnd::End || sampled || self.hides_discrete(call)?;
         Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
     }
@@ -855,29 +846,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Refuses a step from `at` by `h` that is invalid whatever happens during it.
     #[inline(always)]
     pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
-        if !(is_finite(h) && h > 0.0) {
-            return Err(call.error(format_args!(
-                "communicationStepSize = {} s (allowed: greater than 0, finite)",
-                text(h)
-            )));
-        }
-        // Written so that NaN does not pass.
-        let close = (at - self.time).abs() <= TIME_SLACK * self.time.abs().max(h);
-        if !close {
-            return Err(call.error(format_args!(
-                "currentCommunicationPoint = {} s, but the last step ended at {:?} s",
-                text(at),
-                self.time
-            )));
-        }
-        let end = at + h;
-        if let Some(stop) = self.stop
-            && end > stop + TIME_SLACK * stop.abs().max(h)
-        {
-            return Err(call
-                .error(format_args!("the step to {end:?} s would pass the stop time {stop:?} s")));
-        }
-        Ok(())
+        self.clock.check_step(at, h).map_err(|why| call.error(why))
     }
 
     #[inline(always)]
@@ -889,7 +858,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         step: impl FnOnce(&mut M, &M::Inputs) -> Result<StepEnd, StepFailure>,
     ) -> Result<StepEnd, Fault> {
         self.check_step(call, at, h)?;
-        let end = at + h;
+        let now = self.clock.at(at, h);
         let mut inputs = self.inputs;
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
             hold::<M>(&mut inputs);
@@ -897,16 +866,17 @@ impl<M: Model, V: Version> Instance<M, V> {
         let sloped = M::set_dependent_slopes(&mut inputs, h) || self.sloped;
         let mut after = inputs;
         if sloped {
-            follow_slopes::<M>(call, &mut after, h)?;
+            follow_slopes::<M>(call, &mut after, h, now.resolution)?;
         }
         let Some(model) = &mut self.model else {
             return Err(call.error("the instance was never initialised"));
         };
-        // Steps added up drift from the host's clock, on which things may be due.
-        model.set_time(at);
+        model.set_time(now);
         let ended = match step(model, &inputs) {
             Ok(ended) => ended,
             Err(StepFailure { text, shorter_may_succeed }) => {
+                model.set_time(self.clock.now());
+                let end = at + h;
                 let why = format_args!("step from {at:?} s to {end:?} s failed: {text}");
                 // Where failing has a state of its own, there is no going on with a shorter step.
                 if shorter_may_succeed && V::AFTER_ERROR.is_some() {
@@ -916,18 +886,18 @@ impl<M: Model, V: Version> Instance<M, V> {
                 return Err(call.error(why));
             }
         };
-        let end = match ended {
-            StepEnd::Event(time) => {
+        let length = match ended {
+            StepEnd::Event(length) => {
                 after = inputs;
-                follow_slopes::<M>(call, &mut after, time - at)?;
-                time
+                follow_slopes::<M>(call, &mut after, length, now.resolution)?;
+                length
             }
-            _ => end,
+            _ => h,
         };
         self.inputs = after;
         self.past_slopes = M::OUTPUTS_USE_SLOPES && sloped;
         self.sloped = false;
-        self.time = end;
+        self.clock.time = at + length;
         self.outputs = None;
         Ok(ended)
     }
@@ -1026,7 +996,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         let states_changed = event.map_err(|why| call.error(why))?;
         self.state = InstanceState::Event;
         self.outputs = None;
-        self.last_event = self.time;
+        self.clock.last_event = self.clock.time;
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
 
@@ -1034,14 +1004,14 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// shows all that is discrete.
     fn report_discrete_states(&mut self, call: &Call) -> Result<EventInfo, Fault> {
         let inputs = self.inputs;
-        let time = self.time;
+        let now = self.clock.now();
         let model = self.model(call)?;
-        model.set_time(time);
+        model.set_time(now);
         model.take_present_inputs(&inputs);
         self.outputs = None;
         self.show_discrete(call)?;
         // what a damaged saved state has left overdue, the next step takes
-        let next_time = self.model(call)?.next_time_event().filter(|next| *next > time);
+        let next_time = self.model(call)?.next_time_event().filter(|next| *next > now.time);
         Ok(EventInfo { states_changed: false, next_time })
     }
 
@@ -1070,10 +1040,8 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// The host has accepted a step: whether an event has to be handled now.
     pub fn completed_integrator_step(&mut self) -> Result<bool, Fault> {
         let call = self.check(V::COMPLETED_STEP)?;
-        let time = self.time;
-        if let Some(stop) = self.stop
-            && time > stop + TIME_SLACK * stop.abs().max(1.0)
-        {
+        let time = self.clock.time;
+        if let Some(stop) = self.clock.passed_stop() {
             return Err(call.error(format_args!(
                 "the step to {time:?} s has passed the stop time {stop:?} s"
             )));
@@ -1089,19 +1057,12 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// The present time.
     pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
         let call = self.check(V::SET_TIME)?;
-        if !is_finite(time) {
-            let time = text(time);
-            return Err(call.error(format_args!("time = {time} s (allowed: any finite number)")));
-        }
-        if V::SETS_STATES && time < self.last_event - TIME_SLACK * self.last_event.abs() {
-            let (time, last) = (text(time), self.last_event);
-            return Err(call.error(format_args!(
-                "time = {time} s lies before the last event (allowed: {last:?} s or later)"
-            )));
-        }
+        self.clock.check_time(time, !V::SETS_STATES).map_err(|why| call.error(why))?;
         self.leave_initialized(call)?;
-        self.model(call)?.set_time(time);
-        self.time = time;
+        self.model(call)?;
+        self.clock.time = time;
+        let now = self.clock.now();
+        self.model(call)?.set_time(now);
         self.outputs = None;
         Ok(())
     }
@@ -1241,10 +1202,12 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     #[cold]
     fn make_model(&mut self, call: &Call) -> Result<(), Fault> {
-        let made = self
-            .model_parameters()
-            .and_then(|parameters| M::new(&parameters, &self.inputs, self.start, self.tolerance));
-        self.model = Some(made.map_err(|problems| call.error(problems.join("; ")))?);
+        let made = self.model_parameters().and_then(|parameters| {
+            M::new(&parameters, &self.inputs, self.clock.start, self.tolerance)
+        });
+        let mut model = made.map_err(|problems| call.error(problems.join("; ")))?;
+        model.set_time(self.clock.now());
+        self.model = Some(model);
         Ok(())
     }
 
@@ -1350,16 +1313,21 @@ fn state_refusal<M: Model>(scalar: &Scalar<M>, value: Value) -> String {
     format!("{} = {value} (allowed: magnitudes below {MAX_STATE:e})", scalar.name())
 }
 
-/// Takes the inputs to where their slopes lead in `h`, which is in their ranges.
+/// Takes the inputs to where their slopes lead in `h`, which is in their ranges. The host knows `h` to the `resolution` of time.
 #[inline(always)]
-fn follow_slopes<M: Model>(call: &Call, inputs: &mut M::Inputs, h: f64) -> Result<(), Fault> {
+fn follow_slopes<M: Model>(
+    call: &Call,
+    inputs: &mut M::Inputs,
+    h: f64,
+    resolution: f64,
+) -> Result<(), Fault> {
     for scalar in M::table().inputs() {
         let Access::Input(ramp) = scalar.access else { continue };
         let [value, slope] = ramp(inputs, scalar.element);
         if *slope == 0.0 {
             continue;
         }
-        *value = end_of_ramp(scalar, (*value, *slope), h);
+        *value = end_of_ramp(scalar, (*value, *slope), h, resolution);
         if let Some(problem) = scalar.problem(Value::Real(*value)) {
             return Err(call.error(format_args!("at the end of the step {problem}")));
         }
@@ -1379,12 +1347,22 @@ fn hold<M: Model>(inputs: &mut M::Inputs) {
     }
 }
 
-/// Value of an input after `h`. A ramp down to the smallest value may miss it by a rounding error.
+/// Value of an input after `h`. A ramp down to the smallest value may miss it by rounding errors of slope, value and time.
 #[inline]
-fn end_of_ramp<M: Model>(scalar: &Scalar<M>, (value, slope): (f64, f64), h: f64) -> f64 {
+fn end_of_ramp<M: Model>(
+    scalar: &Scalar<M>,
+    (value, slope): (f64, f64),
+    h: f64,
+    resolution: f64,
+) -> f64 {
+    const ROUNDING: f64 = 1e-9;
     let end = value + slope * h;
     match scalar.variable.min() {
-        Some(floor) if end < floor && end > floor - TIME_SLACK * (value - floor) => floor,
+        Some(floor)
+            if end < floor && end > floor - ROUNDING * (value - floor) + slope * resolution =>
+        {
+            floor
+        }
         _ => end,
     }
 }

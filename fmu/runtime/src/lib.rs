@@ -11,6 +11,7 @@
 
 pub mod c_abi;
 pub mod call;
+pub mod clock;
 pub mod hash;
 pub mod instance;
 pub mod log;

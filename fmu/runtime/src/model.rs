@@ -2,6 +2,7 @@
 
 use std::fmt::Debug;
 
+use crate::clock::Instant;
 use crate::table::Table;
 
 /// Failure of a step.
@@ -27,7 +28,7 @@ pub enum StepEnd {
     End,
     /// The end of the step, at an event.
     EventAtEnd,
-    /// An event before the end, at this time, s.
+    /// An event before the end, this long after the step's beginning, s.
     Event(f64),
 }
 
@@ -119,8 +120,8 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// Takes the continuous states from the host.
     fn set_continuous_states(&mut self, x: &[f64]);
 
-    /// Takes the time from the host.
-    fn set_time(&mut self, time: f64);
+    /// Takes the present time from the host's clock.
+    fn set_time(&mut self, now: Instant);
 
     /// The derivatives of the continuous states.
     fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);

@@ -21,6 +21,7 @@
 //! Everything else about a model follows from its parameters.
 
 use crate::call::{Events, InstanceState, Interface};
+use crate::clock::Clock;
 use crate::hash::Hash;
 use crate::instance::{Instance, TOLERANCES};
 use crate::model::Model;
@@ -54,15 +55,17 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     bytes.extend((size as u32).to_le_bytes());
     bytes.extend(V::token::<M>(saved.layout).as_bytes());
     let flag = |is: bool, flag: u8| if is { flag } else { 0 };
-    let flags = flag(saved.stop.is_some(), HAS_STOP)
+    let flags = flag(saved.clock.stop.is_some(), HAS_STOP)
         | flag(saved.model.is_some(), HAS_MODEL)
         | flag(saved.sloped, HAS_SLOPES)
         | flag(saved.past_slopes, HAS_PAST_SLOPES)
         | flag(!saved.shown.is_empty(), HAS_SHOWN);
     bytes.extend([saved.state as u8, flags, saved.interface as u8, saved.events as u8]);
     // Until there is one, any finite number serves.
-    let last_event = saved.last_event.max(f64::MIN);
-    for time in [saved.start, saved.stop.unwrap_or(0.0), saved.tolerance, saved.time, last_event] {
+    let Clock { start, stop, time, last_event, .. } = saved.clock;
+    let last_event = last_event.max(f64::MIN);
+    let stop = stop.unwrap_or(0.0);
+    for time in [start, stop, saved.tolerance, time, last_event] {
         bytes.extend(time.to_le_bytes());
     }
     for value in &saved.parameters {
@@ -146,11 +149,11 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     saved.state = state;
     saved.sloped = flags & HAS_SLOPES != 0;
     saved.past_slopes = flags & HAS_PAST_SLOPES != 0;
-    saved.start = rest.finite("start time")?;
-    saved.stop = Some(rest.finite("stop time")?).filter(|_| flags & HAS_STOP != 0);
+    saved.clock.start = rest.finite("start time")?;
+    saved.clock.stop = Some(rest.finite("stop time")?).filter(|_| flags & HAS_STOP != 0);
     saved.tolerance = rest.finite("tolerance")?;
-    saved.time = rest.finite("time")?;
-    saved.last_event = rest.finite("last event")?;
+    saved.clock.time = rest.finite("time")?;
+    saved.clock.last_event = rest.finite("last event")?;
     if !TOLERANCES.contains(&saved.tolerance) {
         return Err("the saved state is damaged: tolerance".into());
     }
@@ -187,7 +190,9 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     if flags & HAS_MODEL != 0 {
         let parameters = saved.model_parameters().map_err(|problems| problems.join("; "))?;
         let model = M::resume(&parameters, &words, saved.tolerance);
-        saved.model = Some(model.ok_or("the saved state is damaged: the model's state")?);
+        let mut model = model.ok_or("the saved state is damaged: the model's state")?;
+        model.set_time(saved.clock.now());
+        saved.model = Some(model);
     } else if saved.is_running() {
         return Err("the saved state is damaged: the model is missing".into());
     }

@@ -6,6 +6,7 @@ use craft::{
     Coupling, Craft, DampingLaw, Ramp, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES,
     TankInputs, TankParameters, TankState,
 };
+use runtime::clock::Instant;
 use runtime::model::StepFailure;
 use runtime::table::Table;
 
@@ -282,8 +283,8 @@ impl runtime::Model for Model {
         }
     }
 
-    fn set_time(&mut self, time: f64) {
-        self.tank.set_time(time);
+    fn set_time(&mut self, now: Instant) {
+        self.tank.set_time(now.time);
     }
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {

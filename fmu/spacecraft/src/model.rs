@@ -3,6 +3,7 @@
 use std::ops::{Deref, DerefMut};
 
 use craft::{DampingLaw, INPUTS, Inputs, Mount, Outputs, STATES, Spacecraft, State, TANKS};
+use runtime::clock::Instant;
 use runtime::model::StepFailure;
 use runtime::table::Table;
 
@@ -224,8 +225,8 @@ impl runtime::Model for Model {
         }
     }
 
-    fn set_time(&mut self, time: f64) {
-        self.craft.set_time(time);
+    fn set_time(&mut self, now: Instant) {
+        self.craft.set_time(now.time);
     }
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
@@ -322,7 +323,7 @@ mod tests {
             for (x, x_dot) in x.iter_mut().zip(x_dot) {
                 *x += STEP * x_dot;
             }
-            model.set_time(t + STEP);
+            model.set_time(Instant { time: t + STEP, since_start: None, resolution: 0.0 });
             model.set_continuous_states(&x);
             // Inputs that jump at events are held between them.
             model.accept_step(&inputs(if with_events { t } else { t + STEP })).unwrap();

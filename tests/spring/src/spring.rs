@@ -1,5 +1,6 @@
 //! A mass on a spring, m x'' = F - d x' - k x, by Runge-Kutta 4 in steps of 1 ms at most.
 
+use runtime::clock::Instant;
 use runtime::model::{Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
@@ -120,7 +121,7 @@ impl Model for Spring {
         self.x.copy_from_slice(x);
     }
 
-    fn set_time(&mut self, _: f64) {}
+    fn set_time(&mut self, _: Instant) {}
 
     fn derivatives(&mut self, [force, _]: &[f64; 2], x_dot: &mut [f64]) {
         x_dot.copy_from_slice(&self.rate(self.x, *force));

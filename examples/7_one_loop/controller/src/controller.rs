@@ -4,6 +4,7 @@
 //! answer in whatever order a master reads and sets.
 
 use runtime::Model;
+use runtime::clock::Instant;
 use runtime::model::StepFailure;
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
@@ -116,7 +117,7 @@ impl Model for Controller {
         self.tau.copy_from_slice(x);
     }
 
-    fn set_time(&mut self, _: f64) {}
+    fn set_time(&mut self, _: Instant) {}
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
         x_dot[0] = (self.wanted(inputs.theta[0], inputs.omega[0]) - self.tau[0]) / self.p.t_f;

@@ -300,7 +300,7 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
         let mut derivatives = |direction: &[f64; STATES], s: f64| {
             let moved = core::array::from_fn(|i| x[i] + s * direction[i]);
             plant.set_continuous_states(&moved);
-            plant.set_time(t + s);
+            plant.set_time(t + s, Some(t + s), 0.0);
             plant.derivatives(&at(g(t + s)))
         };
         let k1 = derivatives(&[0.0; STATES], 0.0);

@@ -331,7 +331,7 @@ fn a_host_that_locates_the_reversals_meets_the_plants_own_steps() {
             events += 1;
         }
         t += high;
-        plant.set_time(t);
+        plant.set_time(t, Some(t), 0.0);
         plant.take_event(&inputs).unwrap();
     }
     own.step(&inputs, end).unwrap();

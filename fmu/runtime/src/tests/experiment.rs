@@ -11,10 +11,10 @@ fn experiment_is_kept_and_the_motion_begins_at_its_start() {
     let mut instance = fresh(CS);
     assert_eq!((instance.time(), instance.tolerance), (0.0, DEFAULT_TOLERANCE));
     instance.setup_experiment(Some(1e-5), 7.0, Some(7.0)).unwrap();
-    assert_eq!((instance.start, instance.stop), (7.0, Some(7.0)));
+    assert_eq!((instance.clock.start, instance.clock.stop), (7.0, Some(7.0)));
     assert_eq!((instance.time(), instance.tolerance), (7.0, 1e-5));
     instance.setup_experiment(None, -1.0, None).unwrap();
-    assert_eq!((instance.stop, instance.tolerance), (None, DEFAULT_TOLERANCE));
+    assert_eq!((instance.clock.stop, instance.tolerance), (None, DEFAULT_TOLERANCE));
     for tolerance in [1e-14, 1e-1] {
         assert_eq!(instance.setup_experiment(Some(tolerance), 0.0, None), Ok(()));
     }

@@ -2,6 +2,7 @@
 //! derivatives vanish where all is 0.
 
 use crate::Model;
+use crate::clock::Instant;
 use crate::model::StepFailure;
 use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::Dimension::{Fixed, Sized};
@@ -111,7 +112,7 @@ impl Model for Trays {
         self.x.copy_from_slice(x);
     }
 
-    fn set_time(&mut self, _: f64) {}
+    fn set_time(&mut self, _: Instant) {}
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
         x_dot.copy_from_slice(&inputs.q.map(|q| q[0]));

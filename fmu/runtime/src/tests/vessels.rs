@@ -5,6 +5,7 @@
 //! [`OPENS`] of the platform a valve opens, which spills half of the first vessel.
 
 use crate::Model;
+use crate::clock::Instant;
 use crate::model::{StepEnd, StepFailure};
 use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::Dimension::Fixed;
@@ -234,7 +235,7 @@ impl Model for Vessels {
             return self.step(inputs, h).map(|()| StepEnd::End);
         }
         self.step(inputs, left)?;
-        Ok(if left == h { StepEnd::EventAtEnd } else { StepEnd::Event(self.time) })
+        Ok(if left == h { StepEnd::EventAtEnd } else { StepEnd::Event(left) })
     }
 
     fn outputs(&mut self, inputs: &Inputs) -> Outputs {
@@ -261,9 +262,9 @@ impl Model for Vessels {
         self.x.copy_from_slice(x);
     }
 
-    fn set_time(&mut self, time: f64) {
-        self.longest = self.longest.max(time - self.time);
-        self.time = time;
+    fn set_time(&mut self, now: Instant) {
+        self.longest = self.longest.max(now.time - self.time);
+        self.time = now.time;
     }
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {

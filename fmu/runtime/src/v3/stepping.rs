@@ -3,7 +3,6 @@
 #![allow(unsafe_code)]
 
 use std::borrow::Cow;
-use std::cmp::Ordering::{Equal, Greater};
 
 use super::calls::*;
 use super::elements::{check_count, check_elements, expand};
@@ -14,6 +13,7 @@ use crate::c_abi::{Component, array, array_mut, null, on, on_allowed};
 use crate::call::{Call, Fault, InstanceState};
 use crate::instance::StepInfo;
 use crate::model::Model;
+use crate::variable::is_finite;
 use crate::version::Version;
 
 /// Steps follow.
@@ -240,13 +240,26 @@ unsafe fn step_looked_into<M: Model>(
         return ramps;
     }
     // Anywhere in the step; before it begins is at once, and so is NaN.
-    if let Some(time) = wish
-        .early_return
-        .filter(|time| !matches!(time.partial_cmp(&(at + h)), Some(Greater | Equal)))
-    {
-        h = time - at;
+    let (mut is_early, mut moves) = (false, true);
+    let placed = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let clock = &component.instance.clock;
+            if let Some(time) = wish.early_return {
+                let is_late = time.to_bits() == f64::INFINITY.to_bits();
+                is_early = !is_late && (!is_finite(time) || clock.is_before(time, at + h));
+                moves = !is_early || is_finite(time) && clock.is_before(at, time);
+            }
+            if let Some(time) = wish.early_return.filter(|_| is_early && moves) {
+                h = time - at;
+            }
+            Ok(())
+        })
+    };
+    if placed != fmi3OK {
+        return placed;
+    }
+    if is_early {
         unsafe { *answers.early = 1 };
-        let moves = h > 0.0;
         if !moves {
             let drop_ramps = |component: &mut Component<M, Fmi3>| {
                 component.instance.drop_ramps();
