@@ -824,3 +824,27 @@ fn any_values_end_in_numbers_or_in_an_error() {
     values::<Spacecraft::Model>(50);
     values::<SloshTank::Model>(50);
 }
+
+/// Sequences of calls by hosts whose clocks differ (`fmu/fuzz/src/clocks.rs`).
+fn clocks(sequences: [usize; 3]) {
+    fn play<M: runtime::Model>(sequences: usize) {
+        let mut rng = fastrand::Rng::with_seed(3);
+        for _ in 0..sequences {
+            hubslosh_fuzz::clocks::run::<M>(&noise(&mut rng, 400));
+        }
+    }
+    play::<HubSlosh::HubSlosh>(sequences[0]);
+    play::<Spacecraft::Model>(sequences[1]);
+    play::<SloshTank::Model>(sequences[2]);
+}
+
+#[test]
+fn hosts_with_other_clocks_get_the_same_outputs() {
+    clocks([300, 30, 60]);
+}
+
+#[test]
+#[ignore = "minutes: .ci/run --nightly"]
+fn hosts_with_other_clocks_get_the_same_outputs_in_a_hundred_thousand_sequences() {
+    clocks([60_000, 10_000, 30_000]);
+}

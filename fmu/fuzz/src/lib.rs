@@ -4,6 +4,7 @@
 
 #[cfg(feature = "libfuzzer")]
 pub mod calls;
+pub mod clocks;
 pub mod states;
 pub mod values;
 
@@ -27,9 +28,10 @@ pub fn run<M: Model>(data: &[u8]) {
     static TARGET: std::sync::OnceLock<fn(&[u8])> = std::sync::OnceLock::new();
     let target = TARGET.get_or_init(|| match std::env::var("HUBSLOSH_FUZZ_TARGET").as_deref() {
         Ok("calls") => calls::run::<M>,
+        Ok("clocks") => clocks::run::<M>,
         Ok("states") => states::run::<M>,
         Ok("values") => values::run::<M>,
-        _ => panic!("HUBSLOSH_FUZZ_TARGET must be calls, states or values"),
+        _ => panic!("HUBSLOSH_FUZZ_TARGET must be calls, clocks, states or values"),
     });
     target(data);
 }

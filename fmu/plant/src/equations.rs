@@ -174,11 +174,7 @@ impl Plant {
                 self.state.record_contact(Contact::Backward, time);
             }
         }
-        let slack = self.resolution;
-        while self.next_sample().is_some_and(|due| self.imu.falls_within(due, 0.0, slack)) {
-            let omega = self.omega();
-            self.imu.sample(&mut self.state.gyro, omega);
-        }
+        while self.takes_sample() {}
         self.state.ranges = self.present_ranges(inputs);
         if let Err(why) = self.accept_step(inputs) {
             self.state = before;
@@ -268,6 +264,17 @@ impl Plant {
     /// Time of the gyro's next sample on the host's clock, s; `None` without a gyro.
     pub fn next_time_event(&self) -> Option<f64> {
         self.next_sample().map(|due| self.state.time + due)
+    }
+
+    /// Takes the gyro's next sample if it is due where the host is. Returns true if it was.
+    pub(crate) fn takes_sample(&mut self) -> bool {
+        let is_due = |due| self.imu.is_due(due, self.resolution);
+        let takes = self.next_sample().is_some_and(is_due);
+        if takes {
+            let omega = self.omega();
+            self.imu.sample(&mut self.state.gyro, omega);
+        }
+        takes
     }
 
     /// Delay until the gyro's next sample, s.

@@ -14,8 +14,7 @@
 
 use crate::parameters::Imu;
 
-/// Part of a sampling period by which a sample may be early, besides the resolution of the host's clock. Communication points
-/// and time events match sampling instants only to rounding.
+/// Part of a sampling period by which a sample may be early, besides the resolution of the host's clock.
 const SLACK: f64 = 1e-6;
 
 /// Number of processes of the flicker noise.
@@ -58,17 +57,17 @@ impl Imu {
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
-        (since_start, resolution): (f64, f64),
+        since_start: f64,
         length: f64,
         omega: impl Fn(f64) -> f64,
         allowed: usize,
     ) -> usize {
         for taken in 0..=allowed {
             let due = self.due(gyro.next, since_start);
-            if !self.falls_within(due, length, resolution) {
+            if due > length {
                 return taken;
             }
-            self.sample(gyro, omega(due.max(0.0).min(length)));
+            self.sample(gyro, omega(due.max(0.0)));
         }
         allowed + 1
     }
@@ -79,10 +78,11 @@ impl Imu {
         k as f64 / self.rate - since_start
     }
 
-    /// Returns true if a sample is due within `length`, s, up to rounding of a clock with this `resolution`.
+    /// Returns true if a sample that is due after `due`, s, can be taken now, where the host looks in: a host's clock has a
+    /// `resolution`, and communication points and time events match sampling instants only to rounding.
     #[inline(always)]
-    pub(crate) fn falls_within(&self, due: f64, length: f64, resolution: f64) -> bool {
-        due <= length + (SLACK / self.rate + resolution)
+    pub(crate) fn is_due(&self, due: f64, resolution: f64) -> bool {
+        due <= SLACK / self.rate + resolution
     }
 
     /// Takes the next sample of the rate `omega`.
@@ -336,24 +336,19 @@ mod tests {
         imu.sample(&mut gyro, 0.0);
         // From 13 ms on for 0.1 s: samples at 20, 40, ... 100 ms see the rate 7, 27, ... 87 ms
         // after the beginning.
-        assert_eq!(imu.follow(&mut gyro, (0.013, 0.0), 0.1, |t| 2.0 + t, 9), 5);
+        assert_eq!(imu.follow(&mut gyro, 0.013, 0.1, |t| 2.0 + t, 9), 5);
         assert_eq!((gyro.next, gyro.held), (6, 2.0 + (0.1 - 0.013)));
-        // At most a millionth of a period early, with the rate at the end.
-        let early = |share: f64| {
-            let mut gyro = gyro;
-            let length = 0.02 * (1.0 - share);
-            (imu.follow(&mut gyro, (0.1, 0.0), length, |t| t, 9), gyro.held, length)
-        };
-        let (taken, held, length) = early(0.9e-6);
-        assert_eq!((taken, held), (1, length));
-        assert_eq!(early(1.1e-6).0, 0);
+        // None is early within a step; where a host looks in, at most by a millionth of a period and the clock's resolution.
+        assert_eq!(imu.follow(&mut gyro.clone(), 0.1, 0.02 * (1.0 - 1e-9), |t| t, 9), 0);
+        assert!(imu.is_due(0.9e-6 * 0.02, 0.0) && !imu.is_due(1.1e-6 * 0.02, 0.0));
+        assert!(imu.is_due(1.1e-6 * 0.02, 0.2e-6 * 0.02) && imu.is_due(-1.0, 0.0));
         // An overdue sample uses the rate at the beginning. At most one sample more than allowed is
         // taken.
-        assert_eq!(imu.follow(&mut gyro.clone(), (0.121, 0.0), 0.01, |t| 3.0 + t, 9), 1);
+        assert_eq!(imu.follow(&mut gyro.clone(), 0.121, 0.01, |t| 3.0 + t, 9), 1);
         let mut late = gyro;
-        imu.follow(&mut late, (0.121, 0.0), 0.01, |t| 3.0 + t, 9);
+        imu.follow(&mut late, 0.121, 0.01, |t| 3.0 + t, 9);
         assert_eq!(late.held, 3.0);
-        assert_eq!(imu.follow(&mut gyro, (0.1, 0.0), 10.0, |_| 0.0, 7), 8);
+        assert_eq!(imu.follow(&mut gyro, 0.1, 10.0, |_| 0.0, 7), 8);
         assert_eq!(gyro.next, 6 + 8);
     }
 

@@ -55,14 +55,12 @@ impl Stop {
     fn at_sample(
         self,
         (t, h): (f64, f64),
-        (since_start, resolution): (f64, f64),
+        since_start: f64,
         imu: &Imu,
         (next, allowed): (u64, usize),
     ) -> Option<f64> {
         let due = (next..).take(allowed).map(|k| imu.due(k, since_start));
-        due.take_while(|due| imu.falls_within(*due, h, resolution))
-            .map(|due| due.max(0.0).min(h))
-            .find(|due| self.is_at(t + due))
+        due.take_while(|due| *due <= h).map(|due| due.max(0.0)).find(|due| self.is_at(t + due))
     }
 }
 
@@ -344,23 +342,16 @@ impl Motion {
         state: &mut State,
         acting: (Ramp, Ramp),
         h: f64,
-        (imu, resolution, stop): (&Imu, f64, Stop),
+        (imu, stop): (&Imu, Stop),
         steps: &mut Steps,
     ) -> Result<ControlFlow<f64>, StepError> {
         // The usual case is compiled separately: one mode, no loops over modes and orders.
         match modes {
             [one] if M::UNROLLED && acting.1.slope == 0.0 && self.is_plain() => {
                 let one = core::slice::from_mut(one);
-                self.advance_along::<true, M>(one, state, acting, h, (imu, resolution, stop), steps)
+                self.advance_along::<true, M>(one, state, acting, h, (imu, stop), steps)
             }
-            _ => self.advance_along::<false, M>(
-                modes,
-                state,
-                acting,
-                h,
-                (imu, resolution, stop),
-                steps,
-            ),
+            _ => self.advance_along::<false, M>(modes, state, acting, h, (imu, stop), steps),
         }
     }
 
@@ -377,7 +368,7 @@ impl Motion {
         state: &mut State,
         acting: (Ramp, Ramp),
         h: f64,
-        (imu, resolution, stop): (&Imu, f64, Stop),
+        (imu, stop): (&Imu, Stop),
         steps: &mut Steps,
     ) -> Result<ControlFlow<f64>, StepError> {
         let (begin, elapsed, tolerance) = (state.time, state.elapsed, self.tolerance);
@@ -399,7 +390,6 @@ impl Motion {
             state: &mut *state,
             acting,
             imu,
-            resolution,
             stop,
             varies,
             begin,
@@ -435,8 +425,6 @@ struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
     /// Torque and specific force from the start of the stretch on.
     acting: (Ramp, Ramp),
     imu: &'a Imu,
-    /// Times of the host that differ by less are the same, s.
-    resolution: f64,
     stop: Stop,
     /// True if the specific force, the drag or the weight changes.
     varies: bool,
@@ -544,10 +532,10 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         let mut flow = ControlFlow::Continue(());
         let Stretch { motion, modes, state, begin, .. } = self;
         if self.imu.enabled {
-            let clock = (state.elapsed[0] + self.t, self.resolution);
+            let since_start = state.elapsed[0] + self.t;
             let samples = (state.gyro.next, steps.left());
             if self.stop.passed < f64::INFINITY
-                && let Some(due) = self.stop.at_sample((self.t, h), clock, self.imu, samples)
+                && let Some(due) = self.stop.at_sample((self.t, h), since_start, self.imu, samples)
             {
                 if due < h {
                     (h, t) = (due, self.t + due);
@@ -556,7 +544,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
                 flow = ControlFlow::Break(t);
             }
             let omega = |s| series::values([&motion.hub.omega], n, s)[0];
-            let taken = self.imu.follow(&mut state.gyro, clock, h, omega, steps.left());
+            let taken = self.imu.follow(&mut state.gyro, since_start, h, omega, steps.left());
             steps.count(taken, *begin + self.t)?;
         }
         let varies = !UNROLLED && self.varies;

@@ -355,7 +355,7 @@ impl Plant {
             let acting = (tau, inputs.g_axial.after(t));
             let stop = Stop { offset: t, passed };
             let flow = with_modes!(&mut self.liquid, modes => self.motion.advance(
-                modes, state, acting, length, (&self.imu, self.resolution, stop), &mut steps,
+                modes, state, acting, length, (&self.imu, stop), &mut steps,
             ))?;
             if let ControlFlow::Break(within) = flow {
                 stopped = Some(t + within);
@@ -380,6 +380,11 @@ impl Plant {
         state.axial.g = inputs.g_axial.at(reached);
         if !state.axial.is_finite() {
             return Err(StepError::NotFinite { time: state.time });
+        }
+        // The end of a step matches an instant of the gyro only to rounding.
+        while self.imu.enabled && reached >= h && self.takes_sample() {
+            steps.count(1, begin + h)?;
+            stopped = Some(h).filter(|_| passed < f64::INFINITY);
         }
         Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }

@@ -898,6 +898,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.past_slopes = M::OUTPUTS_USE_SLOPES && sloped;
         self.sloped = false;
         self.clock.time = at + length;
+        model.set_time(self.clock.now());
         self.outputs = None;
         Ok(ended)
     }
