@@ -23,7 +23,7 @@ PICTURE = ROOT / "book" / "ball.svg"
 DRY, BACK, FORWARD = 1180.0, -11.8, 60.0  # kg, N, N
 REVERSED, RESUMED, END = 10.0, 50.0, 100.0  # s
 PARAMETERS = {
-    "tank[1].ball.travel": 0.6, "init.omega[1]": 0.0, "init.omega[3]": 0.0,
+    "tank[1].ball.travel": 0.6,
 }  # fmt: skip
 OUTPUTS = [
     "velocity[3]", "energy", "work", "dissipated", "tank[1].angle_y[1]",

@@ -3,8 +3,8 @@
 use std::ops::{Deref, DerefMut};
 
 use craft::{
-    Coupling, Craft, DampingLaw, Ramp, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES,
-    TankInputs, TankParameters, TankState,
+    Coupling, Craft, DampingLaw, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs,
+    TankParameters, TankState,
 };
 use runtime::clock::Instant;
 use runtime::model::StepFailure;
@@ -119,25 +119,14 @@ impl Parameters {
     }
 }
 
-/// The host's motion. The slope of omega follows from omega_dot; a slope that the host sets has no effect. By default
-/// the tank has the specific force [`START_ACCELERATION`].
-#[derive(Clone, Copy, Debug)]
+/// The host's motion, by default rest without specific force. The slope of omega follows from omega_dot; a slope that the host
+/// sets has no effect.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     /// Inputs of the tank model.
     pub tank: TankInputs,
     /// The slope of omega, rad/s2.
     pub omega_slope: [f64; 3],
-}
-
-/// Start value of `a`, m/s2: standard gravity along the tank's axis and a lateral acceleration, so that a first plot
-/// without connections shows the liquid swinging.
-pub const START_ACCELERATION: [f64; 3] = [0.1, 0.0, 9.80665];
-
-impl Default for Inputs {
-    fn default() -> Self {
-        let tank = TankInputs { a: Ramp::held(START_ACCELERATION), ..TankInputs::default() };
-        Inputs { tank, omega_slope: [0.0; 3] }
-    }
 }
 
 impl runtime::Model for Model {

@@ -1,5 +1,5 @@
 //! Every variable of SloshTank.fmu, once. Start values are those of
-//! `craft::TankParameters::default()` with the specific force `model::START_ACCELERATION`.
+//! `craft::TankParameters::default()`; the host is at rest.
 
 use craft::{BallState, Coupling, DampingLaw, MODES, POINTS, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};

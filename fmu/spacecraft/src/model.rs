@@ -82,14 +82,9 @@ pub struct Parameters {
     pub points: [i32; TANKS],
 }
 
-/// Start value of `init.omega`, rad/s: a slow spin that is not about a principal axis, so that a first plot without
-/// settings shows nutation and the liquid's response.
-pub const START_RATE: [f64; 3] = [0.02, 0.0, 0.1];
-
 impl Default for Parameters {
     fn default() -> Self {
-        let mut craft = craft::Parameters::default();
-        craft.init.omega = START_RATE;
+        let craft = craft::Parameters::default();
         let modes = craft.tank.map(|tank| tank.modes as i32);
         let points = craft.tank.map(|tank| tank.fill.points as i32);
         let (tanks, damping_law_kind) = (craft.tanks as i32, [0; TANKS]);

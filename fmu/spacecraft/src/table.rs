@@ -1,5 +1,5 @@
-//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`
-//! with the angular velocity `model::START_RATE`.
+//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`:
+//! the craft is at rest.
 //!
 //! A variant for fewer tanks and modes uses the same table with shorter arrays.
 //!
@@ -485,7 +485,7 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("init.q", |p, n| &mut p.init.q[n], "1", "q at the start; the FMU normalises it")
         .shape(QUATERNION),
     V::parameter("init.omega", |p, n| &mut p.init.omega[n], "rad/s",
-        "omega at the start; not 0 by default, so that a run without settings moves")
+        "omega at the start")
         .display_unit("deg/s").shape(VECTOR).range(-1e3, 1e3),
     V::parameter("init.position", |p, n| &mut p.init.position[n], "m", "position at the start")
         .shape(VECTOR),

@@ -3,17 +3,13 @@
 use anyhow::Result;
 use host::description::ModelDescription;
 use host::fmu::{Fmu, Instance};
-use names::{hubslosh, sloshtank, spacecraft};
+use names::hubslosh;
 
-/// Parameters and inputs by which this project's FMUs move if nobody sets anything, for the first plot of any host; 0 is at
-/// rest. FMUs of others have none.
+/// Parameters by which HubSlosh moves if nobody sets anything, for the first plot of any host; 0 is at rest. Other FMUs have
+/// none.
 pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
     match description.model_name.as_str() {
         "HubSlosh" => vec![hubslosh::init::SLOSH_ANGLE.into()],
-        name if name.starts_with("Spacecraft") => {
-            [1, 3].map(|i| spacecraft::init::OMEGA.at([i])).into()
-        }
-        "SloshTank" => [1, 3].map(|i| sloshtank::A.at([i])).into(),
         _ => Vec::new(),
     }
 }

@@ -36,11 +36,7 @@ class RunError(FmuError):
 
 
 # Start values by which the package's FMUs move when nobody sets anything, for a host's first plot.
-_STARTS = {
-    "HubSlosh": ["init.slosh_angle"],
-    "Spacecraft": ["init.omega[1]", "init.omega[3]"],
-    "SloshTank": ["a[1]", "a[3]"],
-}
+_STARTS = {"HubSlosh": ["init.slosh_angle"]}
 
 
 class Instance:
@@ -56,7 +52,7 @@ class Instance:
         """The FMU."""
         self.native = native.Instance(fmu.native, exchange)
         """The instance in the compiled half of this package."""
-        for start in _STARTS.get(fmu.name.partition("_")[0], []):
+        for start in _STARTS.get(fmu.name, []):
             self.set(start, 0.0)
 
     def __enter__(self) -> Self:

@@ -862,8 +862,6 @@ def uncertain(
     from .program import Identification
 
     given = dict(parameters_of(parameters))
-    # the point is at rest unless the caller says otherwise, which is refused below
-    given = {f"init.omega[{i}]": 0.0 for i in (1, 2, 3)} | given
     craft = _read(model, given)
     values = dict(craft.values)
     ranges = dict(ranges or {})

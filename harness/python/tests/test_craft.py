@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import option
+from fmpy import simulate_fmu
 
 import hubslosh
 from hubslosh import Craft, FmuError, FmuWarning, MountedTank, attitude
@@ -44,6 +45,19 @@ def shifted(mass: float, arm: np.ndarray) -> np.ndarray:
         [[y * y + z * z, -x * y, -x * z], [-x * y, x * x + z * z, -y * z],
          [-x * z, -y * z, x * x + y * y]]
     )  # fmt: skip
+
+
+def test_fmpy_with_the_parameters_of_a_craft_is_simulate_with_them(craft: Craft) -> None:
+    """Bit for bit: nothing but the parameters is set in either."""
+    values = craft.parameters("50%")
+    names = [f"{name}[{i}]" for name in ("omega", "velocity", "slosh_torque") for i in (1, 2, 3)]
+    steps = {"stop_time": 5.0, "output_interval": 0.05, "step_size": 0.05}
+    theirs = simulate_fmu(str(craft.model), start_values=values, output=names, **steps)
+    ours = hubslosh.simulate(craft.model, values, stop=5.0, step=0.05, outputs=names)
+    assert len(theirs) == len(ours) == 101
+    for name in names:
+        assert theirs[name].tolist() == ours[name].tolist()
+    assert ours["omega[1]"].any()
 
 
 def test_rigid_mass_properties_are_sums_by_hand(craft: Craft) -> None:
