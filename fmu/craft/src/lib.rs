@@ -51,6 +51,7 @@ mod state;
 mod surface;
 mod table;
 
+pub use formulas::limits::LimitedBy;
 pub use formulas::regime::Regime;
 pub use outputs::{Outputs, TankOutputs};
 pub use parameters::{Ball, Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};

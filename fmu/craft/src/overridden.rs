@@ -17,7 +17,8 @@ impl Tank {
                 | "hinge"
                 | "wave"
                 | "zeta"
-                | "breaking_steepness"
+                | "angle_limit"
+                | "swirl_limit"
                 | "nonlinear_inertia"
                 | "nonlinear_stiffness"
         );
@@ -31,6 +32,9 @@ impl Tank {
             "zeta" if self.fill.has_zeta(n) => {
                 Some(format!("fill.zeta[{},1] to fill.zeta[{0},{}]", n + 1, self.fill.points))
             }
+            "angle_limit" | "swirl_limit" if self.fill.limits_everywhere(field, n) => {
+                Some(format!("fill.{field}[{},1] to fill.{field}[{0},{}]", n + 1, self.fill.points))
+            }
             "nonlinear_inertia" | "nonlinear_stiffness" if self.fill.has_surface(n) => {
                 Some(format!("fill.{field}[{},1] to fill.{field}[{0},{}]", n + 1, self.fill.points))
             }
@@ -42,9 +46,6 @@ impl Tank {
             }
             "length" if self.frequency[n] > 0.0 => {
                 Some(format!("frequency[{}] = {:?} Hz", n + 1, self.frequency[n]))
-            }
-            "breaking_steepness" if self.zeta_breaking[n] == 0.0 => {
-                Some(format!("zeta_breaking[{}] = 0.0", n + 1))
             }
             _ => None,
         }

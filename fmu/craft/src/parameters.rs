@@ -223,6 +223,14 @@ pub struct Tank {
     pub nonlinear_inertia: [f64; MODES],
     /// Coefficient kappa of the mode's stiffness at finite amplitude, 1 for a pendulum (`surface.rs`).
     pub nonlinear_stiffness: [f64; MODES],
+    /// Slosh angle above which the mode is out of range, rad; 0 if it is not known (`ranges.rs`).
+    pub angle_limit: [f64; MODES],
+    /// Slosh angle above which rotary motion of the mode is out of range because its branch folds, rad; 0 if it is not
+    /// known.
+    pub swirl_limit: [f64; MODES],
+    /// Specific force along the axis, m/s2, below which surface tension matters that the parameters do not include; 0 if it
+    /// is not known.
+    pub g_bond: f64,
     /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
     /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and the table
@@ -584,6 +592,8 @@ const CYLINDER: FillTable = FillTable {
     zeta: [[0.0; POINTS]; MODES],
     nonlinear_inertia: [[1.0; POINTS]; MODES],
     nonlinear_stiffness: [[1.0; POINTS]; MODES],
+    angle_limit: [[0.0; POINTS]; MODES],
+    swirl_limit: [[0.0; POINTS]; MODES],
 };
 
 impl Default for Tank {
@@ -618,6 +628,9 @@ impl Default for Tank {
             breaking_steepness: [0.0; MODES],
             nonlinear_inertia: [1.0; MODES],
             nonlinear_stiffness: [1.0; MODES],
+            angle_limit: [0.0; MODES],
+            swirl_limit: [0.0; MODES],
+            g_bond: 0.0,
             wave: modes_of([0.376618, 0.0328144, 0.0125218]),
             ball: Ball::default(),
             fill: FillTable { points: 0, ..CYLINDER },
@@ -787,6 +800,11 @@ impl Tank {
                 ] {
                     problems.number(&name_of(what), column[n][i], -1e3, 1e3, "");
                 }
+                for (what, column) in
+                    [("angle_limit", &table.angle_limit), ("swirl_limit", &table.swirl_limit)]
+                {
+                    problems.number(&name_of(what), column[n][i], 0.0, 1.6, "rad");
+                }
                 sum += mass;
             }
             if sum > masses[i] {
@@ -833,6 +851,7 @@ impl Tank {
         }
         problems.number(&format!("{name}.g_ref"), self.g_ref, 1e-9, 1e6, "m/s2");
         problems.number(&format!("{name}.g_floor"), self.g_floor, 0.0, 1e6, "m/s2");
+        problems.number(&format!("{name}.g_bond"), self.g_bond, 0.0, 1e6, "m/s2");
         self.find_ball_problems(name, problems);
         for n in 0..self.modes.min(MODES) {
             let i = n + 1;
@@ -865,6 +884,11 @@ impl Tank {
                 ("nonlinear_stiffness", self.nonlinear_stiffness[n]),
             ] {
                 problems.number(&format!("{name}.{what}[{i}]"), value, -1e3, 1e3, "");
+            }
+            for (what, value) in
+                [("angle_limit", self.angle_limit[n]), ("swirl_limit", self.swirl_limit[n])]
+            {
+                problems.number(&format!("{name}.{what}[{i}]"), value, 0.0, 1.6, "rad");
             }
             problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
             let before = problems.0.len();

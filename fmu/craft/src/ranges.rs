@@ -5,20 +5,44 @@
 //! after Dodge). R is that of an upright cylinder with the tank's wave per slosh angle, R = wave (xi^2 - 1)/2, which is
 //! exact for a cylinder.
 //!
-//! Thrust or capillarity holds the liquid at the bottom of its tank: w^2 = x/l + k/m > 0, with x the specific force
-//! along the tank at the hinge. Otherwise a bob would swing over while real liquid would fall. Beyond 45 degrees from
-//! the tank's axis the bob represents no surface. Detached liquid (`lump.rs`) is outside the range of the pendulums.
+//! The reasons for which a tank is out of range, in the order in which they are given if there are several:
+//!
+//! ```text
+//! contact              x/l + k/m <= 0, or the liquid is detached (`lump.rs`)
+//! empty                the liquid of the first point of the fill table, below which a tank cannot drain
+//! spin                 Omega^2 R/(l w^2) > 0.3, or 2 Omega/w > (1 + C_0)^(-1/2)   (`formulas::limits::SpinLimit`)
+//! bond_number          x below g_bond
+//! secondary_resonance  A above swirl_limit in rotary motion
+//! breaking             steepness 2 xi A/(xi^2 - 1) above breaking_steepness, if that is above 0
+//! third_order          A above angle_limit, or above 45 degrees
+//! ```
+//!
+//! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m that of mode 1, Omega the rate of the
+//! tank about its axis, sin A = |p_perp|. With x/l + k/m below 0 a bob would swing over while real liquid would fall. Beyond
+//! 45 degrees from the tank's axis the bob represents no surface.
+//!
+//! Motion is rotary if the ellipse of the bob has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2 + q'^2), which
+//! does not depend on the phase.
 
 use formulas::cylinder::XI;
+use formulas::limits::{LimitedBy, SpinLimit, cylinder, swirl_fold};
 use formulas::regime::Regime;
+use formulas::third_order;
+use taylor::vector::{Vec3, dot, rotation, unit_quaternion};
 
 use crate::lump::COS_45;
 use crate::outputs::TankOutputs;
 use crate::parameters::Tank;
-use crate::sizes::MODES;
+use crate::sizes::{MODES, POINTS};
 use crate::state::{BallState, Ranges};
 
-/// Bounds of a tank's ranges. For a draining tank they belong to its initial contents.
+/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2.
+const ROTARY: f64 = 0.8;
+
+/// Mass of liquid at which a tank is empty, relative to the first point of its fill table; a host's rounding.
+const EMPTY: f64 = 1.0 + 1e-9;
+
+/// Bounds of a tank's ranges. For a draining tank they belong to its initial contents, except `over_fill`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,
@@ -26,43 +50,182 @@ pub(crate) struct Bounds {
     radius: f64,
     /// Lower bound of x, per mode. Below it the liquid leaves the bottom.
     lowest: [f64; MODES],
+    mode: [ModeBounds; MODES],
+    /// Limits over the mass of liquid, of a tank that can drain.
+    over_fill: Option<OverFill>,
+    /// Smallest x in w^2, m/s2.
+    g_floor: f64,
+    g_bond: f64,
+    spin: SpinLimit,
+    /// The tank's axis, axes of the craft or host.
+    axis: Vec3,
+}
+
+/// Bounds of a mode; 0 for those that are not known.
+#[derive(Clone, Copy, Debug)]
+struct ModeBounds {
+    /// Slosh angles, rad.
+    angle: f64,
+    swirl: f64,
+    /// Angle at which waves begin to break, rad.
+    breaking: f64,
+    /// 1/l, 1/m, and k/m, 1/s2.
+    inv_l: f64,
+    k_m: f64,
+}
+
+/// Limits of the slosh angles at the points of a fill table.
+#[derive(Clone, Copy, Debug)]
+struct OverFill {
+    points: usize,
+    liquid: [f64; POINTS],
+    angle: [[f64; POINTS]; MODES],
+    swirl: [[f64; POINTS]; MODES],
+}
+
+impl OverFill {
+    /// Returns a mode's limits, interpolated linearly. Between a known and an unknown one there is none.
+    fn at(&self, n: usize, liquid: f64) -> [f64; 2] {
+        let masses = &self.liquid[..self.points];
+        let last = self.points - 2;
+        let i = (0..last).find(|&i| liquid < masses[i + 1]).unwrap_or(last);
+        let share = ((liquid - masses[i]) / (masses[i + 1] - masses[i])).clamp(0.0, 1.0);
+        [&self.angle[n], &self.swirl[n]].map(|y| match [y[i], y[i + 1]] {
+            [a, b] if a > 0.0 && b > 0.0 => a + (b - a) * share,
+            [a, _] if share == 0.0 => a,
+            [_, b] if share == 1.0 => b,
+            _ => 0.0,
+        })
+    }
 }
 
 impl Bounds {
     /// Creates the bounds of a tank whose derived parameters are resolved.
     pub fn new(tank: &Tank) -> Bounds {
+        let radius = tank.wave[0] * (XI[0] * XI[0] - 1.0) / 2.0;
+        let of_mode = |n: usize| {
+            if n >= tank.modes {
+                return ModeBounds { angle: 0.0, swirl: 0.0, breaking: 0.0, inv_l: 1.0, k_m: 0.0 };
+            }
+            let [angle, swirl] = tank.limits(n);
+            ModeBounds {
+                angle,
+                swirl,
+                breaking: tank.breaking_steepness[n] * (XI[n] * XI[n] - 1.0) / (2.0 * XI[n]),
+                inv_l: 1.0 / tank.length[n],
+                k_m: tank.k[n] / tank.mass[n],
+            }
+        };
+        let fill = &tank.fill;
         Bounds {
             modes: tank.modes,
-            radius: tank.wave[0] * (XI[0] * XI[0] - 1.0) / 2.0,
+            radius,
             lowest: core::array::from_fn(|n| if n < tank.modes { tank.lowest(n) } else { 0.0 }),
+            mode: core::array::from_fn(of_mode),
+            over_fill: (fill.points > 1).then_some(OverFill {
+                points: fill.points,
+                liquid: fill.liquid,
+                angle: fill.angle_limit,
+                swirl: fill.swirl_limit,
+            }),
+            g_floor: tank.smallest_acceleration(),
+            g_bond: tank.g_bond,
+            spin: SpinLimit::new(if tank.modes > 0 { tank.length[0] } else { 1.0 }, radius),
+            axis: rotation(&unit_quaternion(tank.q)).map(|row| row[2]),
         }
     }
 
-    /// Returns the ranges for a tank's outputs.
-    pub fn of(&self, out: &TankOutputs) -> Ranges {
+    /// Returns the ranges for a tank's outputs, at the angular velocity `omega`, rad/s, and mass of liquid, kg.
+    pub fn of(&self, out: &TankOutputs, omega: Vec3, liquid: f64) -> Ranges {
         if out.ball_state != BallState::Settled {
-            return Ranges { regime: Regime::Nonlinear, in_range: false };
+            let limited_by = LimitedBy::Contact;
+            return Ranges { regime: Regime::Nonlinear, limited_by, is_physical: false };
         }
-        let heights = out.p.map(|p| p[2]);
-        let in_range = self.contain(heights, out.axial);
-        let upright = self.are_upright(heights);
+        let upright = self.are_upright(out.p.map(|p| p[2]));
         // Without a wave per angle, use that of a cylinder: 2 R/(xi^2 - 1).
         let height = match self.radius > 0.0 {
             true => out.wave_height / self.radius,
             false => 2.0 * libm::hypot(out.angle_x[0], out.angle_y[0]) / (XI[0] * XI[0] - 1.0),
         };
         let regime = if upright { Regime::of(height) } else { Regime::Nonlinear };
-        Ranges { regime, in_range }
+        let limited_by = self.reason(out, dot(omega, self.axis), liquid);
+        Ranges { regime, limited_by, is_physical: upright && self.is_held(out.axial) }
     }
 
-    /// Returns true if the tank is in its range, from the bobs' p_z and the specific force along
-    /// its axis.
+    fn reason(&self, out: &TankOutputs, rate: f64, liquid: f64) -> LimitedBy {
+        if !self.is_held(out.axial) {
+            return LimitedBy::Contact;
+        }
+        if self.over_fill.as_ref().is_some_and(|table| liquid <= table.liquid[0] * EMPTY) {
+            return LimitedBy::Empty;
+        }
+        if self.modes == 0 {
+            return LimitedBy::None;
+        }
+        let x = out.axial.max(self.g_floor);
+        let omega2 = |n: usize| x * self.mode[n].inv_l + self.mode[n].k_m;
+        if self.spin.is_exceeded(rate, omega2(0)) {
+            return LimitedBy::Spin;
+        }
+        if self.g_bond > 0.0 && out.axial < self.g_bond {
+            return LimitedBy::BondNumber;
+        }
+        let mut reason = LimitedBy::None;
+        for n in 0..self.modes {
+            let mode = &self.mode[n];
+            let [mut angle, mut swirl] = [mode.angle, mode.swirl];
+            if let Some(table) = &self.over_fill {
+                let [a, s] = table.at(n, liquid);
+                (angle, swirl) = (if a > 0.0 { a } else { angle }, if s > 0.0 { s } else { swirl });
+            }
+            let ([x, y, _], [x_d, y_d, _]) = (out.p[n], out.p_dot[n]);
+            let exceeds = |limit: f64| {
+                limit > 0.0
+                    && libm::hypot(x, y) > libm::sin(limit.min(core::f64::consts::FRAC_PI_2))
+            };
+            let omega2 = omega2(n);
+            let squares = (x * x + y * y) * omega2 + x_d * x_d + y_d * y_d;
+            let area = 2.0 * (x * y_d - y * x_d).abs() * libm::sqrt(omega2);
+            if exceeds(swirl) && area > ROTARY * squares {
+                return LimitedBy::SecondaryResonance;
+            }
+            if exceeds(mode.breaking) {
+                reason = LimitedBy::Breaking;
+            } else if reason == LimitedBy::None && exceeds(angle) {
+                reason = LimitedBy::ThirdOrder;
+            }
+        }
+        let upright = self.are_upright(out.p.map(|p| p[2]));
+        if reason == LimitedBy::None && !upright { LimitedBy::ThirdOrder } else { reason }
+    }
+
+    /// Returns true if the motion is physical: the liquid stays at the bottom and the bobs are within 45 degrees of the axis, from the bobs' p_z
+    /// and the specific force along the axis.
     pub fn contain(&self, heights: [f64; MODES], axial: f64) -> bool {
-        let held = self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest);
-        held && self.are_upright(heights)
+        self.is_held(axial) && self.are_upright(heights)
+    }
+
+    fn is_held(&self, axial: f64) -> bool {
+        self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest)
     }
 
     fn are_upright(&self, heights: [f64; MODES]) -> bool {
         heights[..self.modes].iter().all(|height| *height < -COS_45)
+    }
+}
+
+impl Tank {
+    /// Returns the slosh angles at which mode `n`, from 0, and its rotary motion leave their range, rad; 0 if they are not
+    /// known. Mode 1 of a cylinder of known dimensions has those of potential flow.
+    fn limits(&self, n: usize) -> [f64; 2] {
+        let given = [self.angle_limit[n], self.swirl_limit[n]];
+        if n > 0 || self.diameter <= 0.0 {
+            return given;
+        }
+        let fill = 2.0 * self.depth / self.diameter;
+        let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
+        let own = cylinder(fill, third_order::shifts(s, kappa).map(Some)).forced;
+        let own = [own, swirl_fold(fill).unwrap_or(0.0)];
+        [0, 1].map(|i| if given[i] > 0.0 { given[i] } else { own[i] })
     }
 }

@@ -1172,7 +1172,7 @@ impl SloshTank {
     /// Returns the ranges of the current motion.
     pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
-        self.bounds.of(&outputs.tank)
+        self.bounds.of(&outputs.tank, inputs.omega, self.motion.state.x[LIQUID])
     }
 
     /// Returns the ranges as of the last event.
@@ -1190,9 +1190,8 @@ impl SloshTank {
         self.motion.state_of_ball() != BallState::Settled
     }
 
-    /// Returns true if the motion is in the tank's range at the end of its last step, of length `h`. Detached liquid
-    /// has no range.
-    pub fn is_in_range_after(&self, inputs: &TankInputs, h: f64) -> bool {
+    /// Returns true if the motion is physical at the end of the last step, of length `h`. Detached liquid always is.
+    pub fn is_physical_after(&self, inputs: &TankInputs, h: f64) -> bool {
         let TankMotion { state, ball, .. } = &*self.motion;
         if ball.is_some() {
             return true;
@@ -1252,7 +1251,8 @@ impl SloshTank {
     /// Returns the outputs under the inputs' current values.
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let mut outputs = self.outputs_held(inputs);
-        outputs.tank.ranges = self.bounds.of(&outputs.tank);
+        let liquid = self.motion.state.x[LIQUID];
+        outputs.tank.ranges = self.bounds.of(&outputs.tank, inputs.omega, liquid);
         outputs
     }
 
@@ -1449,10 +1449,10 @@ mod tests {
     use super::*;
     use taylor::ramp::Ramp;
 
-    /// Upright under 9.81 m/s2 along its axis the tank is in range. After 2 s of 30 m/s2 across it, the pendulum has
+    /// Upright under 9.81 m/s2 along its axis the tank is physical. After 2 s of 30 m/s2 across it, the pendulum has
     /// passed 45 degrees. At 1 m/s2 downwards the specific force has the wrong sign.
     #[test]
-    fn a_tank_is_in_range_while_its_bobs_are_upright_and_the_force_holds_them() {
+    fn a_tank_is_physical_while_its_bobs_are_upright_and_the_force_holds_them() {
         let after = |a: [f64; 3], h: f64| {
             let p = TankParameters::default();
             let start =
@@ -1460,7 +1460,7 @@ mod tests {
             let mut tank = SloshTank::new(&p, &start, 0.0, 1e-9).unwrap();
             let inputs = TankInputs { a: Ramp::<[f64; 3]>::held(a), ..start };
             tank.step(&inputs, h).unwrap();
-            tank.is_in_range_after(&inputs, h)
+            tank.is_physical_after(&inputs, h)
         };
         assert!(after([0.0, 0.0, 9.81], 0.5));
         assert!(after([1.0, 0.0, 9.81], 0.5));

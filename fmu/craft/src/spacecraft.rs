@@ -164,18 +164,18 @@ impl Spacecraft {
         self.motion.state.ranges
     }
 
-    /// Returns true if a tank without a model of detached liquid is out of its range.
+    /// Returns true if the motion of a tank without a model of detached liquid is not physical.
     pub fn leaves_range(&self, ranges: &[Ranges; TANKS]) -> bool {
-        (0..TANKS).any(|i| !ranges[i].in_range && !self.has_ball(i))
+        (0..TANKS).any(|i| !ranges[i].is_physical && !self.has_ball(i))
     }
 
     fn has_ball(&self, tank: usize) -> bool {
         self.motion.lumps.iter().any(|lump| lump.tank == tank)
     }
 
-    /// Returns true if every tank without a model of detached liquid is in its range after a step. The liquid's directions at the
+    /// Returns true if the motion of every tank without a model of detached liquid is physical after a step. The liquid's directions at the
     /// end and the accelerations during the step decide.
-    pub fn is_in_range(&self) -> bool {
+    pub fn is_physical(&self) -> bool {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
             let mut first = bobs.iter().filter(|bob| bob.tank == i && bob.mode == 0);
@@ -190,8 +190,9 @@ impl Spacecraft {
 
     /// Updates the ranges among the outputs to the current outputs.
     fn update_ranges(&self, outputs: &mut Outputs) {
-        for (tank, limits) in outputs.tank.iter_mut().zip(&self.bounds) {
-            tank.ranges = limits.of(tank);
+        let (omega, x) = (outputs.omega, &self.motion.state.x);
+        for (i, (tank, limits)) in outputs.tank.iter_mut().zip(&self.bounds).enumerate() {
+            tank.ranges = limits.of(tank, omega, x[index::LIQUID + i]);
         }
     }
 

@@ -1,5 +1,6 @@
 //! The craft's continuous states x in their order, its inputs, and its saved state.
 
+use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
 use taylor::vector::Vec3;
@@ -80,27 +81,36 @@ pub struct Inputs {
 pub struct Ranges {
     /// Amplitude class of the wave.
     pub regime: Regime,
-    /// True if the liquid is held at the tank's bottom, and every bob is within 45 degrees of the axis.
-    pub in_range: bool,
+    /// Reason why the pendulums do not represent the liquid, if they do not.
+    pub limited_by: LimitedBy,
+    /// True if the liquid is held at the tank's bottom, and every bob is within 45 degrees of the axis. Otherwise the
+    /// motion is not physical.
+    pub is_physical: bool,
 }
 
 impl Default for Ranges {
     fn default() -> Self {
-        Ranges { regime: Regime::Linear, in_range: true }
+        Ranges { regime: Regime::Linear, limited_by: LimitedBy::None, is_physical: true }
     }
 }
 
 impl Ranges {
+    /// Returns true if the pendulums represent the liquid.
+    pub fn is_in_range(&self) -> bool {
+        self.limited_by == LimitedBy::None
+    }
+
     /// Returns the ranges as a word, for saving.
     pub(crate) fn to_word(self) -> u64 {
-        self.regime as u64 | u64::from(self.in_range) << 8
+        self.regime as u64 | (self.limited_by as u64) << 8 | u64::from(self.is_physical) << 16
     }
 
     /// Reads the ranges from a word.
     pub(crate) fn from_word(word: u64) -> Option<Ranges> {
         let regime = Regime::from_number(word as u8)?;
-        match word >> 8 {
-            held @ 0..=1 => Some(Ranges { regime, in_range: held == 1 }),
+        let limited_by = LimitedBy::from_number((word >> 8) as u8)?;
+        match word >> 16 {
+            flag @ 0..=1 => Some(Ranges { regime, limited_by, is_physical: flag == 1 }),
             _ => None,
         }
     }

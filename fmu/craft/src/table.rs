@@ -47,6 +47,10 @@ pub struct FillTable {
     pub nonlinear_inertia: [[f64; POINTS]; MODES],
     /// Coefficient kappa of each mode's stiffness at finite amplitude.
     pub nonlinear_stiffness: [[f64; POINTS]; MODES],
+    /// `Tank::angle_limit` of each mode; 0 at all points of a mode for that of the tank at every fill.
+    pub angle_limit: [[f64; POINTS]; MODES],
+    /// `Tank::swirl_limit` of each mode, likewise.
+    pub swirl_limit: [[f64; POINTS]; MODES],
 }
 
 impl FillTable {
@@ -64,6 +68,12 @@ impl FillTable {
     pub(crate) fn has_surface(&self, n: usize) -> bool {
         let columns = [&self.nonlinear_inertia[n], &self.nonlinear_stiffness[n]];
         columns.iter().any(|column| column.iter().take(self.points).any(|x| *x != 1.0))
+    }
+
+    /// Returns true if the table gives the limit `field`, `angle_limit` or `swirl_limit`, of mode `n` (from 0) at every fill.
+    pub(crate) fn limits_everywhere(&self, field: &str, n: usize) -> bool {
+        let column = if field == "angle_limit" { self.angle_limit[n] } else { self.swirl_limit[n] };
+        self.points > 0 && column[..self.points].iter().all(|limit| *limit > 0.0)
     }
 
     /// Returns mass, length and hinge height of mode `n`, from 0, at this mass of liquid, kg.

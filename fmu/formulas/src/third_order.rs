@@ -61,8 +61,33 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
 /// is not valid.
 const DETUNING: f64 = 0.01;
 
+/// Fills h/R between which the coefficients are bridged: modes (2,2) and (0,2) resonate with twice the frequency of mode
+/// 1 at 0.831 and 1.010.
+pub const BRIDGED: [f64; 2] = [0.70, 1.20];
+
 /// Returns s and kappa at h/R = `fill`.
+///
+/// Between the fills [`BRIDGED`] the third order has poles, close to which it holds at very small amplitudes only. There
+/// both coefficients are interpolated linearly between those fills. Fully nonlinear potential flow at h/R 0.8 and 1.0
+/// has the frequencies of the bridged pair within 0.3 % up to 16 degrees, while a pendulum is 26 % low in a forced
+/// response at h/R 1.0.
 pub fn coefficients(fill: f64) -> (f64, f64) {
+    let [low, high] = BRIDGED;
+    if fill <= low || fill >= high {
+        return unbridged(fill);
+    }
+    let [(s_0, kappa_0), (s_1, kappa_1)] = BRIDGED.map(unbridged);
+    let share = (fill - low) / (high - low);
+    (s_0 + (s_1 - s_0) * share, kappa_0 + (kappa_1 - kappa_0) * share)
+}
+
+/// Returns the shifts of omega^2 per squared slosh angle, in planar and in circular motion.
+pub fn shifts(s: f64, kappa: f64) -> [f64; 2] {
+    [0.375 * kappa - 0.5 * s, 0.5 * kappa]
+}
+
+/// Returns s and kappa of the third order at h/R = `fill`, with its poles.
+pub fn unbridged(fill: f64) -> (f64, f64) {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     let k2 = XI[0] * XI[0];
     let mut planar = 3.0 / 64.0 * k2 * M;

@@ -9,7 +9,9 @@
 //! Ranges exclude values that no plant can have, such as a negative inertia, and are wide
 //! otherwise. `Plant::new` checks combinations of parameters.
 
-use plant::{DampingLaw, FrictionModel, INDICATORS, MODES, Ramp, SloshModel, SloshSource, x};
+use plant::{
+    DampingLaw, FrictionModel, INDICATORS, LimitedBy, MODES, Ramp, SloshModel, SloshSource, x,
+};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
@@ -49,6 +51,12 @@ const HUB_AND_LIQUID: &[&str] =
 #[rustfmt::skip]
 const HEAT: &[&str] = &[
     "theta", "omega", "bristle",
+    "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
+    "g_axial",
+];
+#[rustfmt::skip]
+const RANGE: &[&str] = &[
+    "omega",
     "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
     "g_axial",
 ];
@@ -186,6 +194,18 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local_enumeration("regime", &REGIME, |o, _| o.discrete.regime as i32,
         "Amplitude class of the wave, by wave_height over the tank's radius")
         .depends_on(&["slosh.q_radial", "slosh.q_tangential"]),
+    V::local_boolean("in_range", |o, _| o.discrete.limited_by == LimitedBy::None,
+        "True while the slosh modes represent the liquid; limited_by has the reason if not")
+        .depends_on(RANGE),
+    V::local_integer("in_range_kind", |o, _| i32::from(o.discrete.limited_by == LimitedBy::None),
+        "in_range as an integer, for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
+        .depends_on(RANGE),
+    V::local_enumeration("limited_by", &LIMITED_BY, |o, _| o.discrete.limited_by as i32,
+        "Reason why the slosh modes do not represent the liquid now; of several the first of spin, bond_number, secondary_resonance, breaking, third_order")
+        .depends_on(RANGE),
+    V::local_integer("limited_by_kind", |o, _| o.discrete.limited_by as i32,
+        "limited_by as an integer, for hosts that misread enumerations")
+        .depends_on(RANGE),
     V::local_boolean("baffle.in_range", |o, _| o.discrete.baffle_in_range,
         "True while the damping law of the ring baffle holds: the liquid's stroke at the ring is 0.64 to 6.4 times its width, the wave does not uncover it, and it covers less than a quarter of the section. True without a baffle")
         .depends_on(WAVE_1),
@@ -403,6 +423,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("slosh.table.nonlinear_stiffness", |p, n| &mut p.slosh.table.nonlinear_stiffness[n], "1",
         "Coefficient kappa of a slosh mode, source table and slosh.model = liquid: its restoring force grows with 1 + kappa A^2/2 over the amplitude A. The amplitude changes the squared frequency of circular motion by kappa/2 A^2. 1 for a pendulum")
         .shape(TABLE_OF_MODES).range(-1e6, 1e6),
+    V::parameter("slosh.table.angle_limit", |p, n| &mut p.slosh.table.angle_limit[n], "rad",
+        "Slosh angle above which a slosh mode is out of range (limited_by = third_order), source table: the smaller of the angles at which the frequency of slosh.model = liquid errs by 0.3 % and a forced response by 3 %. Other models end at smaller angles, which follow from nonlinear_inertia and nonlinear_stiffness. 0: not known")
+        .shape(TABLE_OF_MODES).display_unit("deg").range(0.0, 1.6),
+    V::parameter("slosh.table.swirl_limit", |p, n| &mut p.slosh.table.swirl_limit[n], "rad",
+        "Slosh angle above which rotary motion of a slosh mode is out of range (limited_by = secondary_resonance), source table: there its branch folds by a secondary resonance. 0: not known")
+        .shape(TABLE_OF_MODES).display_unit("deg").range(0.0, 1.6),
     V::parameter("slosh.table.direction", |p, n| &mut p.slosh.table.direction[n], "rad",
         "Direction in which a slosh mode moves its mass, source table: angle from the tangent, positive outwards (0 tangential, 90 deg radial). For slosh.model = linear and planar. List modes of the same direction in the order of their frequencies")
         .shape(TABLE_OF_MODES).display_unit("deg").range(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2),
@@ -639,6 +665,25 @@ static REGIME: Enumeration = Enumeration {
         Item::new("linear", "Below 0.15 R: linear theory holds"),
         Item::new("transitional", "0.15 R to 0.25 R"),
         Item::new("nonlinear", "Above 0.25 R: heights and forces are only indications"),
+    ],
+};
+
+/// The same items as in the other FMUs.
+static LIMITED_BY: Enumeration = Enumeration {
+    name: "LimitedBy",
+    description: "Reason why the slosh modes do not represent the liquid",
+    items: &[
+        Item::new("none", "In range"),
+        Item::new("third_order", "Slosh angle above that at which the model's frequency is wrong"),
+        Item::new("breaking", "Waves so steep that they break: above slosh.breaking_steepness"),
+        Item::new(
+            "secondary_resonance",
+            "Rotary motion beyond the fold of its branch by a secondary resonance",
+        ),
+        Item::new("spin", "The hub turns so fast that the liquid's spin matters"),
+        Item::new("bond_number", "Surface tension matters, and the model does not include it"),
+        Item::new("empty", "A tank of Spacecraft or SloshTank has drained"),
+        Item::new("contact", "Liquid of Spacecraft or SloshTank leaves the bottom of its tank"),
     ],
 };
 

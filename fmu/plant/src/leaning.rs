@@ -180,19 +180,6 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
             p.tank.h,
             libm::atan(fill)
         ));
-    } else if p.slosh.model == SloshModel::Liquid {
-        let (s, spring) = quartic(0, p, 0.0);
-        // A softening spring holds up to u = (3 |H|)^(-1/2), s = 2 u/3.
-        let most =
-            if spring < 0.0 { 2.0 / (3.0 * libm::sqrt(-3.0 * spring)) } else { f64::INFINITY };
-        let u = if slope < most { rest(spring, slope) } else { slope };
-        if slope >= most || 1.0 + s * u * u <= 0.0 {
-            problems.push(format!(
-                "bench.tilt = {tilt} rad: slosh.model = liquid at h/R = {fill:.3} (s = {s:.3}, kappa = {:.3}) has no position of \
-                 rest at this tilt. Use a smaller bench.tilt or another slosh.model",
-                2.0 * spring
-            ));
-        }
     }
     problems
 }

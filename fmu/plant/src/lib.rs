@@ -24,6 +24,7 @@ mod hub;
 mod imu;
 mod inputs;
 mod leaning;
+mod limits;
 mod motion;
 mod outputs;
 mod overridden;
@@ -37,6 +38,7 @@ mod tank;
 mod wheel;
 
 pub use contact::Contact;
+pub use formulas::limits::LimitedBy;
 pub use formulas::regime::Regime;
 pub use inputs::{Inputs, Ramp};
 pub use outputs::{Discrete, Outputs};

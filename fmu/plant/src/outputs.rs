@@ -1,5 +1,6 @@
 //! Outputs of the plant at an instant, and their time derivatives along a direction.
 
+use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
 use taylor::number::{Dual, Number};
 use taylor::series::number;
@@ -79,6 +80,8 @@ pub struct Discrete {
     pub stuck: bool,
     /// Amplitude class of the wave.
     pub regime: Regime,
+    /// Reason why the slosh modes do not represent the liquid.
+    pub limited_by: LimitedBy,
     /// True within the range of the baffle's drag law, and without a baffle.
     pub baffle_in_range: bool,
     /// Set-valued friction: -1 slipping backwards, 0 stuck, 1 slipping forwards; other laws: 1.
@@ -190,6 +193,7 @@ impl Plant {
             discrete: Discrete {
                 stuck: state.contact == Contact::Stuck,
                 regime: state.ranges.regime,
+                limited_by: state.ranges.limited_by,
                 baffle_in_range: state.ranges.baffle,
                 friction_mode: state.contact as i32,
                 event_count: state.event_count,
@@ -223,15 +227,24 @@ impl Plant {
 
     /// Updates the ranges among the outputs to the current outputs.
     pub fn update_ranges(&self, outputs: &mut Outputs) {
-        let Ranges { regime, baffle } = self.ranges_of(outputs);
+        let Ranges { regime, baffle, limited_by } = self.ranges_of(outputs);
         outputs.discrete.regime = regime;
+        outputs.discrete.limited_by = limited_by;
         outputs.discrete.baffle_in_range = baffle;
     }
 
-    /// Returns the ranges for the outputs.
+    /// Returns the ranges for the outputs, for which the equations must have been evaluated last.
     pub(crate) fn ranges_of(&self, outputs: &Outputs) -> Ranges {
         let regime = Regime::of(outputs.wave_height / self.radius);
         let baffle = self.baffle.is_none_or(|range| range.contains(outputs.baffle_wave));
-        Ranges { regime, baffle }
+        let limited_by = with_modes!(&self.liquid, modes => {
+            let modes = modes.iter().map(|mode| {
+                let pendulum = mode.pendulum();
+                let [g, _]: [f64; 2] = pendulum.restoring_and_drag();
+                (mode.angles(), g * pendulum.inv_l, pendulum.l)
+            });
+            self.limits.reason(modes, outputs.omega)
+        });
+        Ranges { regime, baffle, limited_by }
     }
 }

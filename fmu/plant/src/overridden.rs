@@ -23,9 +23,6 @@ impl Parameters {
             table if table.starts_with("slosh.table.") && !is_table => {
                 Some("slosh.source = geometry".into())
             }
-            "slosh.breaking_steepness" if slosh.zeta_breaking == 0.0 => {
-                Some("slosh.zeta_breaking is 0; waves do not break".into())
-            }
             "slosh.table.nonlinear_inertia" | "slosh.table.nonlinear_stiffness"
                 if !matches!(slosh.model, SloshModel::Linear | SloshModel::Liquid) =>
             {

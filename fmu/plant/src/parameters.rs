@@ -156,6 +156,9 @@ pub struct ModeTable {
     /// Coefficients s and kappa of the third order in the amplitude; 1 and 1 for a pendulum.
     pub nonlinear_inertia: [f64; MODES],
     pub nonlinear_stiffness: [f64; MODES],
+    /// Slosh angles, rad, above which a mode, and its rotary motion, is out of range; 0 if they are not known.
+    pub angle_limit: [f64; MODES],
+    pub swirl_limit: [f64; MODES],
     /// Angle of the direction in which a mode moves its mass, from the tangent, positive outwards, rad.
     pub direction: [f64; MODES],
 }
@@ -347,6 +350,8 @@ impl Default for ModeTable {
             wave_number: none,
             nonlinear_inertia: [1.0; MODES],
             nonlinear_stiffness: [1.0; MODES],
+            angle_limit: none,
+            swirl_limit: none,
             direction: none,
         }
     }

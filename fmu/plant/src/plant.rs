@@ -10,6 +10,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
+use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
 use taylor::error::StepError;
 use taylor::number::Number;
@@ -19,6 +20,7 @@ use crate::contact::Contact;
 use crate::damping::Damping;
 use crate::friction::Law;
 use crate::inputs::{Inputs, Ramp};
+use crate::limits::Limits;
 use crate::motion::{Motion, Stop};
 use crate::parameters::{Imu, MODES, Parameters, Wheel};
 use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
@@ -38,6 +40,7 @@ pub struct Plant {
     pub(crate) wave: [f64; MODES],
     pub(crate) radius: f64,
     pub(crate) baffle: Option<Range>,
+    pub(crate) limits: Limits,
     pub(crate) wheel: Wheel,
     pub(crate) imu: Imu,
     pub(crate) motion: Box<Motion>,
@@ -159,7 +162,7 @@ impl Plant {
             time: start_time,
             x: [0.0; STATES],
             contact: Contact::Forward,
-            ranges: Ranges { regime: Regime::Linear, baffle: true },
+            ranges: Ranges { regime: Regime::Linear, baffle: true, limited_by: LimitedBy::None },
             event_count: 0,
             event_time: start_time,
             elapsed: [0.0; 2],
@@ -230,6 +233,7 @@ impl Plant {
             wave,
             radius: p.tank.d / 2.0,
             baffle: Range::new(p),
+            limits: Limits::new(p, &at_reference),
             wheel: p.wheel,
             imu: p.imu,
             motion: Box::new(motion),

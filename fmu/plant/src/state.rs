@@ -1,6 +1,7 @@
 //! The plant's state and the indices of its parts. Only this file declares continuous states and
 //! event indicators.
 
+use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
 
@@ -66,6 +67,7 @@ pub const INDICATORS: usize = indicator::COUNT;
 pub(crate) struct Ranges {
     pub regime: Regime,
     pub baffle: bool,
+    pub limited_by: LimitedBy,
 }
 
 /// Everything that a saved state of the plant needs besides parameters and inputs.
@@ -135,7 +137,8 @@ impl State {
         words[0] = u64::from(self.event_count as u32)
             | u64::from(discrete[0]) << 32
             | u64::from(discrete[1]) << 40
-            | u64::from(discrete[2]) << 48;
+            | u64::from(discrete[2]) << 48
+            | (self.ranges.limited_by as u64) << 56;
         words[1] = self.gyro.next;
         let reals = [
             self.time,
@@ -168,7 +171,8 @@ impl State {
             _ => return None,
         };
         let regime = Regime::from_number((words[0] >> 40) as u8)?;
-        let flags = words[0] >> 48;
+        let limited_by = LimitedBy::from_number((words[0] >> 56) as u8)?;
+        let flags = words[0] >> 48 & 0xff;
         let (baffle, is_accepted) = (flags & 1 != 0, flags & 2 != 0);
         let mut reals = [0.0; Self::REALS];
         for (real, word) in reals.iter_mut().zip(&words[2..]) {
@@ -199,7 +203,7 @@ impl State {
             time,
             x: x.try_into().ok()?,
             contact,
-            ranges: Ranges { regime, baffle },
+            ranges: Ranges { regime, baffle, limited_by },
             event_count: words[0] as u32 as i32,
             event_time,
             elapsed: [elapsed, rest],
@@ -261,7 +265,7 @@ mod tests {
             time: 1.5,
             x: core::array::from_fn(|i| i as f64 - 3.0),
             contact: Contact::Backward,
-            ranges: Ranges { regime: Regime::Nonlinear, baffle: true },
+            ranges: Ranges { regime: Regime::Nonlinear, baffle: true, limited_by: LimitedBy::Spin },
             event_count: -1,
             event_time: 0.25,
             elapsed: [8.5, 1e-16],
@@ -286,9 +290,12 @@ mod tests {
             wrong[place] = word;
             State::from_words(&wrong)
         };
-        assert_eq!(with(0, 2 << 32 | 1 << 40), None, "no such contact");
-        assert_eq!(with(0, 1 << 32), None, "no such regime");
-        assert_eq!(with(0, 1 << 40 | 4 << 48), None, "no such flag");
+        let none = 1 << 56;
+        assert!(with(0, 1 << 40 | none).is_some());
+        assert_eq!(with(0, 2 << 32 | 1 << 40 | none), None, "no such contact");
+        assert_eq!(with(0, 1 << 32 | none), None, "no such regime");
+        assert_eq!(with(0, 1 << 40 | 4 << 48 | none), None, "no such flag");
+        assert_eq!(with(0, 1 << 40), None, "no such reason");
         assert_eq!(with(1, u64::MAX), None, "samples that can't be counted");
         for place in 2..State::WORDS {
             assert_eq!(with(place, f64::NAN.to_bits()), None, "{place}");

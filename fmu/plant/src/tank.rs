@@ -18,7 +18,7 @@ use alloc::vec::Vec;
 use formulas::cylinder::{self, XI};
 use formulas::damping;
 use formulas::similarity;
-use formulas::third_order::{coefficients, secondary_resonance};
+use formulas::third_order::{BRIDGED, coefficients};
 
 use crate::amplitude::{Breaking, Growth};
 use crate::baffle::{self, Baffle};
@@ -229,7 +229,7 @@ impl Slosh {
 
     /// Returns the breaking of mode `n`, from 0, whose wave at the wall is `wave` per angle, m/rad. Without a wave number
     /// in the table, it is that of an upright cylinder of this radius.
-    fn breaking(&self, n: usize, wave: f64, radius: f64) -> Breaking {
+    pub(crate) fn breaking(&self, n: usize, wave: f64, radius: f64) -> Breaking {
         let k = match self.source {
             SloshSource::Table if self.table.wave_number[n] > 0.0 => self.table.wave_number[n],
             _ => XI[n] / radius,
@@ -260,7 +260,7 @@ fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     (0..slosh.modes.min(MODES)).filter_map(falling).map(move |(n, s)| match slosh.source {
         SloshSource::Geometry => format!(
             "slosh.model = liquid at tank.h / (tank.d/2) = {fill:.4}: the inertia coefficient s = {s:.3} is not above 0, so \
-             the kinetic energy would be indefinite. Use a fill with s above 0, such as 0.35 to 0.82 or above 1.02, or \
+             the kinetic energy would be indefinite. Use a fill with s above 0, such as 0.35 and above, or \
              slosh.model = spherical or paraboloid"
         ),
         SloshSource::Table => format!(
@@ -283,11 +283,12 @@ fn third_order_warning(fill: f64) -> Option<String> {
              order in the amplitude (s = {s:.3}, kappa = {kappa:.3}) holds only for very small waves"
         ));
     }
-    secondary_resonance(fill).map(|(azimuth, n)| {
+    let [low, high] = BRIDGED;
+    (fill > low && fill < high).then(|| {
         format!(
-            "slosh.model = liquid at h/R = {fill:.3}: twice the frequency of mode 1 is within 1 % \
-             of that of mode ({azimuth},{n}). Near this secondary resonance the dependence \
-             on amplitude (s = {s:.3}, kappa = {kappa:.3}) is unknown"
+            "slosh.model = liquid at h/R = {fill:.3}: between {low:.2} and {high:.2} the third order has poles, where other modes \
+             have twice the frequency of mode 1. The coefficients (s = {s:.3}, kappa = {kappa:.3}) are interpolated between these \
+             depths"
         )
     })
 }
@@ -450,8 +451,9 @@ mod tests {
     fn shallow_liquid_and_secondary_resonances_are_warned_of() {
         assert!(third_order_warning(0.3).is_some_and(|text| text.contains("shallow")));
         assert!(third_order_warning(SHALLOW).is_none());
-        assert!(third_order_warning(0.831).is_some_and(|text| text.contains("mode (2,2)")));
-        assert!(third_order_warning(1.01).is_some_and(|text| text.contains("mode (0,2)")));
+        for fill in [0.71, 0.831, 1.01, 1.19] {
+            assert!(third_order_warning(fill).is_some_and(|text| text.contains("interpolated")));
+        }
         assert!([5.0, 1.3, 0.6].iter().all(|fill| third_order_warning(*fill).is_none()));
     }
 }

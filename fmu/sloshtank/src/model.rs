@@ -161,7 +161,7 @@ impl runtime::Model for Model {
 
     fn warnings(&self, parameters: &Parameters, _: &Inputs) -> Vec<String> {
         let mut warnings = Vec::new();
-        if !self.tank.has_ball() && !self.tank.ranges_held().in_range {
+        if !self.tank.has_ball() && !self.tank.ranges_held().is_physical {
             warnings.push(format!("at the start {OUT_OF_RANGE}"));
         }
         let ratio = self.coupling_ratio;
@@ -209,7 +209,7 @@ impl runtime::Model for Model {
             text: why.to_string(),
             shorter_may_succeed: why.shorter_may_succeed(),
         })?;
-        self.has_left_range |= !self.tank.is_in_range_after(&inputs.tank, h);
+        self.has_left_range |= !self.tank.is_physical_after(&inputs.tank, h);
         self.has_had_lump |= self.tank.has_lump();
         Ok(())
     }
@@ -237,7 +237,7 @@ impl runtime::Model for Model {
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
         self.tank.check_surfaces().map_err(|why| why.to_string())?;
         let ranges = self.tank.ranges(&inputs.tank);
-        self.has_left_range |= !ranges.in_range && !self.tank.has_ball();
+        self.has_left_range |= !ranges.is_physical && !self.tank.has_ball();
         self.has_had_lump |= self.tank.has_lump();
         Ok(ranges != self.tank.ranges_held() || self.tank.is_event_overdue(&inputs.tank))
     }

@@ -45,7 +45,7 @@ const EVERYTHING: &[&str] =
 const TANK: &[&str] = &["tank."];
 const PLACES: &[&str] = &["tank.p", "tank.liquid", "tank.ball.position"];
 // Dependencies of tank.in_range.
-const MOTION: &[&str] = &["tank.p", "a", "omega", "omega_dot"];
+const MOTION: &[&str] = &["tank.p", "tank.p_dot", "tank.liquid", "a", "omega", "omega_dot"];
 
 const MODE: Dimension = Sized("tank.modes", MODES);
 const VECTOR: &[Dimension] = &[Fixed(3)];
@@ -122,11 +122,17 @@ static VARIABLES: &[Variable<Model>] = &[
     V::local_enumeration("tank.regime", &REGIME, |o, _| o.tank.ranges.regime as i32,
         "Amplitude class of the wave, by tank.wave_height over the free surface's radius; nonlinear also while a bob is beyond 45 degrees or the liquid is detached")
         .depends_on(&["tank.p"]),
-    V::local_boolean("tank.in_range", |o, _| o.tank.ranges.in_range,
-        "True while the pendulums represent the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis. False while the liquid is detached")
+    V::local_boolean("tank.in_range", |o, _| o.tank.ranges.is_in_range(),
+        "True while the pendulums represent the liquid; tank.limited_by has the reason if not. False while the liquid is detached")
         .depends_on(MOTION),
-    V::local_integer("tank.in_range_kind", |o, _| i32::from(o.tank.ranges.in_range),
+    V::local_integer("tank.in_range_kind", |o, _| i32::from(o.tank.ranges.is_in_range()),
         "tank.in_range as an integer, for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
+        .depends_on(MOTION),
+    V::local_enumeration("tank.limited_by", &LIMITED_BY, |o, _| o.tank.ranges.limited_by as i32,
+        "Reason why the pendulums do not represent the liquid now; of several the first of contact, empty, spin, bond_number, secondary_resonance, breaking, third_order")
+        .depends_on(MOTION),
+    V::local_integer("tank.limited_by_kind", |o, _| o.tank.ranges.limited_by as i32,
+        "tank.limited_by as an integer, for hosts that misread enumerations")
         .depends_on(MOTION),
     V::local_enumeration("tank.ball.state", &BALL_STATE, |o, _| ball_state(o.tank.ball_state),
         "State of the liquid with tank.ball.travel above 0. Unless it is settled, no pendulum represents the liquid (in_range), and slosh angles and wave_height are 0")
@@ -246,12 +252,18 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank.zeta_breaking", |p, n| &mut p.tank.zeta_breaking[n], "1", "Growth of a mode's damping ratio with the steepness k a of its wave, where waves break. It adds zeta_breaking max(0, k a - breaking_steepness) to zeta(A), with a rounded corner. 0: waves do not break. Measured values in water are 0.03 to 0.09")
         .shape(PER_MODE).range(0.0, 10.0),
-    V::parameter("tank.breaking_steepness", |p, n| &mut p.tank.breaking_steepness[n], "1", "Steepness k a at which a mode's waves begin to break: wave number k times elevation a at the wall. The FMU takes the k a of an upright cylinder, in mode 1 1.54 times the slosh angle in rad. For a box set 1.21 times its steepness. Measured values in water are 0.60 to 0.66. Without effect if zeta_breaking is 0")
+    V::parameter("tank.breaking_steepness", |p, n| &mut p.tank.breaking_steepness[n], "1", "Steepness k a at which a mode's waves begin to break: wave number k times elevation a at the wall. The FMU takes the k a of an upright cylinder, in mode 1 1.54 times the slosh angle in rad. For a box set 1.21 times its steepness. Measured values in water are 0.60 to 0.66. Above 0 the mode is out of range beyond it (limited_by = breaking), and it has no other effect if zeta_breaking is 0")
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank.nonlinear_inertia", |p, n| &mut p.tank.nonlinear_inertia[n], "1", "Third-order coefficient s of a slosh mode's inertia. The slosh angle A changes the frequency of a planar wave by the share (3 kappa/8 - s/2) A^2/2. The default, a pendulum, is 1. A negative value, for shallow liquid, bounds the slosh angle")
         .shape(PER_MODE).range(-1e3, 1e3),
     V::parameter("tank.nonlinear_stiffness", |p, n| &mut p.tank.nonlinear_stiffness[n], "1", "Third-order coefficient kappa of a slosh mode's stiffness. The slosh angle A changes the frequency of a rotary wave by the share kappa A^2/4. The default, a pendulum, is 1")
         .shape(PER_MODE).range(-1e3, 1e3),
+    V::parameter("tank.angle_limit", |p, n| &mut p.tank.angle_limit[n], "rad", "Slosh angle above which a mode is out of range (limited_by = third_order): the smaller of the angles at which its frequency errs by 0.3 % and a forced response by 3 %. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
+        .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
+    V::parameter("tank.swirl_limit", |p, n| &mut p.tank.swirl_limit[n], "rad", "Slosh angle above which rotary motion of a mode is out of range (limited_by = secondary_resonance), because its branch folds by a secondary resonance. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
+        .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
+    V::parameter("tank.g_bond", |p, _| &mut p.tank.g_bond, "m/s2", "Specific force along the tank's axis below which surface tension matters that the parameters do not include (limited_by = bond_number); 0: not known")
+        .range(0.0, 1e6),
     V::parameter("tank.wave", |p, n| &mut p.tank.wave[n], "m", "Surface elevation at the wall per slosh angle of a slosh mode, used for wave_height only")
         .shape(PER_MODE).range(0.0, 1e9),
     V::parameter("tank.ball.travel", |p, _| &mut p.tank.ball.travel, "m",
@@ -295,6 +307,10 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(TABLE_OF_MODE).range(-1e3, 1e3),
     V::parameter("tank.fill.nonlinear_stiffness", |p, n| &mut p.tank.fill.nonlinear_stiffness[n / POINTS][n % POINTS], "1", "Third-order coefficient kappa (nonlinear_stiffness) of a slosh mode at each point of the fill table; see fill.nonlinear_inertia")
         .shape(TABLE_OF_MODE).range(-1e3, 1e3),
+    V::parameter("tank.fill.angle_limit", |p, n| &mut p.tank.fill.angle_limit[n / POINTS][n % POINTS], "rad", "angle_limit of a slosh mode at each point of the fill table, interpolated linearly; 0 where it is not known, then angle_limit holds")
+        .display_unit("deg").shape(TABLE_OF_MODE).range(0.0, 1.6),
+    V::parameter("tank.fill.swirl_limit", |p, n| &mut p.tank.fill.swirl_limit[n / POINTS][n % POINTS], "rad", "swirl_limit of a slosh mode at each point of the fill table, likewise")
+        .display_unit("deg").shape(TABLE_OF_MODE).range(0.0, 1.6),
     V::parameter("tank.p_0", |p, n| &mut p.tank.p_0[n / 3][n % 3], "1",
         "Unit vector from hinge to bob at the start, tank axes; the FMU normalises it, for a planar mode within its plane")
         .shape(MODE_VECTOR),
@@ -348,6 +364,24 @@ static REGIME: Enumeration = Enumeration {
         Item::new("linear", "Below 0.15 R: linear theory holds"),
         Item::new("transitional", "0.15 R to 0.25 R"),
         Item::new("nonlinear", "Above 0.25 R: heights and forces are only indications"),
+    ],
+};
+
+static LIMITED_BY: Enumeration = Enumeration {
+    name: "LimitedBy",
+    description: "Reason why no pendulum represents the liquid",
+    items: &[
+        Item::new("none", "In range"),
+        Item::new("third_order", "Slosh angle above angle_limit, or above 45 degrees"),
+        Item::new("breaking", "Waves so steep that they break: above breaking_steepness"),
+        Item::new(
+            "secondary_resonance",
+            "Rotary motion above swirl_limit, where its branch folds by a secondary resonance",
+        ),
+        Item::new("spin", "The tank turns about its axis so fast that the liquid's spin matters"),
+        Item::new("bond_number", "Surface tension matters, and the parameters do not include it"),
+        Item::new("empty", "The tank has drained to the first point of its fill table"),
+        Item::new("contact", "The liquid leaves the bottom of its tank, or is detached"),
     ],
 };
 

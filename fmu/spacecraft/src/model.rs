@@ -196,7 +196,7 @@ impl runtime::Model for Model {
             text: why.to_string(),
             shorter_may_succeed: why.shorter_may_succeed(),
         })?;
-        self.has_left_range |= !self.craft.is_in_range();
+        self.has_left_range |= !self.craft.is_physical();
         self.has_had_lump |= self.craft.has_lump();
         Ok(())
     }

@@ -29,6 +29,10 @@ pub const WHEEL_SPEED: &str = "wheel_speed";
 pub const STUCK: &str = "stuck";
 pub const STUCK_KIND: &str = "stuck_kind";
 pub const REGIME: &str = "regime";
+pub const IN_RANGE: &str = "in_range";
+pub const IN_RANGE_KIND: &str = "in_range_kind";
+pub const LIMITED_BY: &str = "limited_by";
+pub const LIMITED_BY_KIND: &str = "limited_by_kind";
 pub const FRICTION_MODE: &str = "friction_mode";
 pub const EVENT_COUNT: &str = "event_count";
 pub const EVENT_TIME: &str = "event_time";
@@ -79,6 +83,8 @@ pub mod slosh {
             crate::Array("slosh.table.nonlinear_inertia");
         pub const NONLINEAR_STIFFNESS: crate::Array<1> =
             crate::Array("slosh.table.nonlinear_stiffness");
+        pub const ANGLE_LIMIT: crate::Array<1> = crate::Array("slosh.table.angle_limit");
+        pub const SWIRL_LIMIT: crate::Array<1> = crate::Array("slosh.table.swirl_limit");
         pub const DIRECTION: crate::Array<1> = crate::Array("slosh.table.direction");
     }
 }
@@ -181,6 +187,10 @@ pub mod solver {
 
 enumeration! {
     Regime: Linear = 1 "linear", Transitional = 2 "transitional", Nonlinear = 3 "nonlinear"
+}
+
+enumeration! {
+    LimitedBy: None = 1 "none", ThirdOrder = 2 "third_order", Breaking = 3 "breaking", SecondaryResonance = 4 "secondary_resonance", Spin = 5 "spin", BondNumber = 6 "bond_number", Empty = 7 "empty", Contact = 8 "contact"
 }
 
 enumeration! {

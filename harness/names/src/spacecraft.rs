@@ -47,6 +47,8 @@ pub mod tank {
     pub const REGIME: crate::Array<1> = crate::Array("tank[].regime");
     pub const IN_RANGE: crate::Array<1> = crate::Array("tank[].in_range");
     pub const IN_RANGE_KIND: crate::Array<1> = crate::Array("tank[].in_range_kind");
+    pub const LIMITED_BY: crate::Array<1> = crate::Array("tank[].limited_by");
+    pub const LIMITED_BY_KIND: crate::Array<1> = crate::Array("tank[].limited_by_kind");
     pub const ANGLE_X: crate::Array<2> = crate::Array("tank[].angle_x");
     pub const ANGLE_Y: crate::Array<2> = crate::Array("tank[].angle_y");
     pub const P: crate::Array<3> = crate::Array("tank[].p");
@@ -85,6 +87,9 @@ pub mod tank {
     pub const BREAKING_STEEPNESS: crate::Array<2> = crate::Array("tank[].breaking_steepness");
     pub const NONLINEAR_INERTIA: crate::Array<2> = crate::Array("tank[].nonlinear_inertia");
     pub const NONLINEAR_STIFFNESS: crate::Array<2> = crate::Array("tank[].nonlinear_stiffness");
+    pub const ANGLE_LIMIT: crate::Array<2> = crate::Array("tank[].angle_limit");
+    pub const SWIRL_LIMIT: crate::Array<2> = crate::Array("tank[].swirl_limit");
+    pub const G_BOND: crate::Array<1> = crate::Array("tank[].g_bond");
     pub const WAVE: crate::Array<2> = crate::Array("tank[].wave");
     pub const LIQUID_0: crate::Array<1> = crate::Array("tank[].liquid_0");
     pub const OUTLET: crate::Array<1> = crate::Array("tank[].outlet");
@@ -117,6 +122,8 @@ pub mod tank {
             crate::Array("tank[].fill.nonlinear_inertia");
         pub const NONLINEAR_STIFFNESS: crate::Array<3> =
             crate::Array("tank[].fill.nonlinear_stiffness");
+        pub const ANGLE_LIMIT: crate::Array<3> = crate::Array("tank[].fill.angle_limit");
+        pub const SWIRL_LIMIT: crate::Array<3> = crate::Array("tank[].fill.swirl_limit");
     }
 }
 
@@ -144,6 +151,10 @@ pub mod solver {
 
 enumeration! {
     Regime: Linear = 1 "linear", Transitional = 2 "transitional", Nonlinear = 3 "nonlinear"
+}
+
+enumeration! {
+    LimitedBy: None = 1 "none", ThirdOrder = 2 "third_order", Breaking = 3 "breaking", SecondaryResonance = 4 "secondary_resonance", Spin = 5 "spin", BondNumber = 6 "bond_number", Empty = 7 "empty", Contact = 8 "contact"
 }
 
 enumeration! {

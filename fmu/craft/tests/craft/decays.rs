@@ -156,12 +156,12 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_a_pushed_back_tank_is_out_of_
         (Nonlinear, false),
         (Nonlinear, false),
     ];
-    assert_eq!(seen.map(|ranges| (ranges.regime, ranges.in_range)), expected);
+    assert_eq!(seen.map(|ranges| (ranges.regime, ranges.is_in_range())), expected);
     // Without thrust the liquid stays where it is; against it, where centring holds it: k l/m > 1.3 m/s2.
-    assert!(ranges(0.0, 0.0, 0.1).in_range);
-    assert!(!ranges(0.0, -2000.0, 0.1).in_range);
-    assert!(!ranges(500.0, -2000.0, 0.1).in_range);
-    assert!(ranges(800.0, -2000.0, 0.1).in_range);
+    assert!(ranges(0.0, 0.0, 0.1).is_in_range());
+    assert!(!ranges(0.0, -2000.0, 0.1).is_in_range());
+    assert!(!ranges(500.0, -2000.0, 0.1).is_in_range());
+    assert!(ranges(800.0, -2000.0, 0.1).is_in_range());
 }
 
 /// The wave of each mode counts. 0.1 rad of the first mode are 0.084 R, in the linear range. 0.1 rad of both, with half
@@ -198,18 +198,18 @@ fn a_step_ends_out_of_range_where_any_bob_of_any_tank_does() {
             let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
             let [held, shown] = [craft.ranges_held(), craft.ranges(&inputs)];
             assert_eq!(held, shown);
-            assert_eq!(held[tank].in_range, angle < 0.7);
+            assert_eq!(held[tank].is_in_range(), angle < 0.7);
             assert_eq!(craft.leaves_range(&held), angle > 0.7);
             craft.step(&inputs, 1e-3).unwrap();
-            let in_range = craft.outputs(&inputs).tank.map(|tank| tank.ranges.in_range);
+            let in_range = craft.outputs(&inputs).tank.map(|tank| tank.ranges.is_in_range());
             let expected: [bool; 4] = std::array::from_fn(|i| i != tank || angle < 0.7);
             assert_eq!(in_range, expected);
-            assert_eq!(craft.is_in_range(), angle < 0.7, "{tank} {mode} {angle}");
-            found[usize::from(craft.is_in_range())] += 1;
+            assert_eq!(craft.is_physical(), angle < 0.7, "{tank} {mode} {angle}");
+            found[usize::from(craft.is_physical())] += 1;
             // Liquid that may leave its tank's bottom is never out of range.
             p.tank[tank].ball.travel = 0.6;
             let craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
-            assert!(!craft.leaves_range(&craft.ranges_held()) && craft.is_in_range());
+            assert!(!craft.leaves_range(&craft.ranges_held()) && craft.is_physical());
         }
     }
     assert_eq!(found, [6, 6]);
@@ -226,8 +226,8 @@ fn each_tank_s_range_is_that_of_the_acceleration_along_its_own_axis() {
         let inputs = Inputs { force: Ramp::held([0.0, 0.0, 2000.0]), ..Inputs::default() };
         let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
         craft.step(&inputs, 1e-3).unwrap();
-        let in_range = craft.outputs(&inputs).tank.map(|tank| tank.ranges.in_range);
-        assert_eq!((in_range[0], in_range[1], craft.is_in_range()), (true, holds, holds), "{k}");
+        let in_range = craft.outputs(&inputs).tank.map(|tank| tank.ranges.is_in_range());
+        assert_eq!((in_range[0], in_range[1], craft.is_physical()), (true, holds, holds), "{k}");
     }
 }
 

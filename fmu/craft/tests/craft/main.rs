@@ -16,6 +16,7 @@ mod impulses;
 mod independent;
 mod invariances;
 mod life;
+mod limits;
 mod mass;
 mod planar;
 mod random;

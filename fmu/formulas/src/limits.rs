@@ -1,0 +1,287 @@
+//! Ends of the range in which a pendulum, or a bob of the third order, represents the liquid in its tank.
+//!
+//! Slosh angles: the model's frequency over the amplitude is compared with fully nonlinear potential flow in upright
+//! cylinders. That flow was computed for this project by two independent methods, a variational one and one that
+//! marches in time; they agree within 0.04 % at h/R 0.5 and more, and within 0.12 % at 0.3. The frequency of the bob is
+//! that of `fmu/craft/src/surface.rs` by quadrature. Two ends are given: at [`FREQUENCY`] the frequency itself is wrong,
+//! and at [`FORCED`] a forced response near resonance is. The second value is where amplitude, force or phase of the two
+//! depths tried (h/R 0.5 and 0.65, forced at 0.985 to 1 times the first frequency with damping ratios of 0.005 and
+//! 0.01) leave 3 %, 3 % or 3 degrees; both depths give the same value. Forced motion in deep liquid (h/R 1.227, 17.2
+//! degrees) agrees with it.
+//!
+//! Swirl: above h/R 0.83 mode (2,2) resonates with twice the frequency of mode 1, so that the branch of rotary motion
+//! folds at the angle [`swirl_fold`], and another one takes over. No single mode has two branches.
+//!
+//! Spin: in a liquid that turns with its tank a wave has two frequencies, and a pendulum is wrong about both.
+
+use crate::cylinder::XI;
+use crate::third_order;
+
+/// Reason why no pendulum represents the liquid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum LimitedBy {
+    /// The liquid is in range.
+    #[default]
+    None = 1,
+    /// The slosh angle is above the one at which the model's frequency or forced response is wrong.
+    ThirdOrder = 2,
+    /// The wave is so steep that it breaks.
+    Breaking = 3,
+    /// Rotary motion beyond the fold of its branch by a secondary resonance.
+    SecondaryResonance = 4,
+    /// The tank turns about its axis so fast that the spin of the liquid matters.
+    Spin = 5,
+    /// Surface tension matters, and the parameters do not hold for it.
+    BondNumber = 6,
+    /// The tank has drained to the first point of its table.
+    Empty = 7,
+    /// The liquid has lost contact with the bottom of its tank.
+    Contact = 8,
+}
+
+impl LimitedBy {
+    /// All reasons, in the order of their numbers.
+    pub const ALL: [LimitedBy; 8] = [
+        LimitedBy::None,
+        LimitedBy::ThirdOrder,
+        LimitedBy::Breaking,
+        LimitedBy::SecondaryResonance,
+        LimitedBy::Spin,
+        LimitedBy::BondNumber,
+        LimitedBy::Empty,
+        LimitedBy::Contact,
+    ];
+
+    /// Returns the reason with this number.
+    pub fn from_number(number: u8) -> Option<LimitedBy> {
+        LimitedBy::ALL.into_iter().find(|reason| *reason as u8 == number)
+    }
+
+    /// Returns the reason in words, as the end of the sentence "out of range: …".
+    pub fn words(self) -> &'static str {
+        match self {
+            LimitedBy::None => "in range",
+            LimitedBy::ThirdOrder => {
+                "slosh angle above the limit of the amplitude model (third order)"
+            }
+            LimitedBy::Breaking => "waves break",
+            LimitedBy::SecondaryResonance => "swirl beyond its fold by a secondary resonance",
+            LimitedBy::Spin => "the liquid spins with its tank",
+            LimitedBy::BondNumber => "surface tension matters (Bond number)",
+            LimitedBy::Empty => "the tank has drained to the end of its fill table",
+            LimitedBy::Contact => "the liquid leaves the bottom of its tank",
+        }
+    }
+}
+
+/// Relative error of the frequency at the end of the amplitude model.
+pub const FREQUENCY: f64 = 3e-3;
+/// Relative error of the frequency at which a forced response near resonance errs by 3 %.
+pub const FORCED: f64 = 8.5e-4;
+
+/// Slosh angles of planar motion in an upright cylinder, degrees, at which the frequency of the third order errs by
+/// [`FREQUENCY`] and by [`FORCED`], at h/R. Rotary motion ends at larger angles, except by the fold. From h/R
+/// [`third_order::BRIDGED`] on the coefficients are bridged. `harness/tank/tests/tank/backbones.rs` computes these
+/// numbers from the backbones in `harness/tank/tests/backbones.csv`.
+const THIRD_ORDER: [[f64; 3]; 12] = [
+    [0.25, 4.41, 3.11],
+    [0.3, 7.11, 5.13],
+    [0.35, 9.44, 6.97],
+    [0.4, 11.46, 8.44],
+    [0.5, 14.61, 10.72],
+    [0.6, 16.81, 12.30],
+    [0.65, 17.75, 13.02],
+    [0.8, 16.50, 9.87],
+    [1.0, 20.00, 17.13],
+    [1.227, 21.19, 18.18],
+    [2.0, 22.02, 17.88],
+    [2.5, 22.06, 17.89],
+];
+
+/// Slosh angles of rotary motion, degrees, at which its branch folds, at h/R. The first depth is that of the resonance.
+/// At h/R 1 and 2.5 the computation ends there.
+const FOLD: [[f64; 2]; 6] =
+    [[0.8314, 0.5], [0.9, 4.6], [1.0, 7.0], [1.227, 9.4], [2.0, 10.8], [2.5, 10.4]];
+
+/// Slosh angles, rad, at which a model of the first mode ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AngleLimit {
+    /// The model's frequency errs by [`FREQUENCY`].
+    pub frequency: f64,
+    /// Its frequency errs by [`FORCED`], and a forced response by 3 %.
+    pub forced: f64,
+}
+
+/// Returns the limit of a model in an upright cylinder filled to h/R = `fill`, whose omega^2 shifts by these parts of the
+/// squared angle in planar and in circular motion: none for a linear mode, -1/8 and 1/2 for a pendulum. The difference
+/// from the shifts of the third order adds to that order's own error. A motion that the model does not have has `None`.
+pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
+    let (s, kappa) = third_order::coefficients(fill);
+    let own = |error: f64, column: usize| {
+        shifted(degrees_at(fill, column), error, shifts, third_order::shifts(s, kappa))
+    };
+    AngleLimit { frequency: own(FREQUENCY, 1), forced: own(FORCED, 2) }
+}
+
+/// Returns the slosh angle, rad, up to which a model errs by at most the part `error` of the frequency: `limit` if its
+/// shifts are the `exact` ones to third order, otherwise at most the angle at which the difference is that large.
+pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]) -> f64 {
+    let off = shifts.iter().zip(exact);
+    let off = off.filter_map(|(shift, exact)| Some((shift.as_ref()? - exact).abs()));
+    // omega errs by half as much as its square
+    off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
+}
+
+/// Returns a column of the table at h/R = `fill`, rad. Shallower liquid continues the power law of the first two rows,
+/// deeper liquid has the last row's value.
+fn degrees_at(fill: f64, column: usize) -> f64 {
+    let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
+    let degrees = if fill < first[0] {
+        let power = libm::log(second[column] / first[column]) / libm::log(second[0] / first[0]);
+        first[column] * libm::pow(fill / first[0], power)
+    } else {
+        interpolate(fill, THIRD_ORDER.map(|row| [row[0], row[column]]))
+    };
+    degrees.to_radians()
+}
+
+/// Returns the slosh angle, rad, at which rotary motion in an upright cylinder folds by a secondary resonance; `None` in
+/// shallower liquid, which has none.
+pub fn swirl_fold(fill: f64) -> Option<f64> {
+    (fill >= FOLD[0][0]).then(|| interpolate(fill, FOLD).to_radians())
+}
+
+/// Returns y at `x` between rows of x and y, constant beyond the last.
+fn interpolate<const N: usize>(x: f64, rows: [[f64; 2]; N]) -> f64 {
+    let Some(i) = rows.iter().position(|row| x < row[0]) else { return rows[N - 1][1] };
+    let [[x_0, y_0], [x_1, y_1]] = [rows[i.max(1) - 1], rows[i.max(1)]];
+    y_0 + (y_1 - y_0) * (x - x_0) / (x_1 - x_0)
+}
+
+/// Largest Omega^2 R/g of a tank that spins about its axis, for which pendulums are used.
+pub const SPIN_NUMBER: f64 = 0.3;
+
+/// A tank's first mode for the limits by spin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpinLimit {
+    /// 4 (1 + C_0): above omega_0^2/Omega^2 the slower wave is among the inertial waves.
+    factor: f64,
+    /// R/l
+    ratio: f64,
+}
+
+impl SpinLimit {
+    /// Creates the limits of a pendulum of this length in a tank with this radius of the free surface, m. A radius of 0
+    /// is one that is not known; the liquid is then taken as deep.
+    ///
+    /// C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1) is the liquid's gyroscopic coefficient, 0.418 in deep liquid and 0.837 in
+    /// shallow liquid, with tanh kh = 1/(k l).
+    pub fn new(length: f64, radius: f64) -> SpinLimit {
+        let deep = 1.0 / XI[0];
+        let ratio = if radius > 0.0 { radius / length } else { XI[0] };
+        // 1/(k l), below 1 except by rounding and in tanks that are no cylinders
+        let t = ratio * deep;
+        let share = match t {
+            t if t < 1e-3 => 1.0,
+            t if t < 1.0 => 0.5 * libm::log((1.0 + t) / (1.0 - t)) * (1.0 - t * t) / t,
+            _ => 0.0,
+        };
+        let gyroscopic = (1.0 + share) / (XI[0] * XI[0] - 1.0);
+        SpinLimit { factor: 4.0 * (1.0 + gyroscopic), ratio }
+    }
+
+    /// Returns true if liquid that turns with its tank at `rate`, rad/s, about its axis is beyond the limits;
+    /// `omega2`, 1/s^2, is the squared frequency without spin.
+    ///
+    /// Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2) a wave that runs with the spin is among the inertial waves of the liquid.
+    /// Beyond Omega^2 R/g = 0.3 even the gyroscopic formula errs by more than 2 %, and the surface is 0.075 R lower at
+    /// its centre.
+    pub fn is_exceeded(&self, rate: f64, omega2: f64) -> bool {
+        let rate2 = rate * rate;
+        rate2 * self.factor > omega2 || rate2 * self.ratio > SPIN_NUMBER * omega2
+    }
+}
+
+/// Bond number below which surface tension matters.
+pub const LOW_BOND: f64 = 100.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_has_its_number_and_no_other_number_is_one() {
+        for (i, reason) in LimitedBy::ALL.into_iter().enumerate() {
+            assert_eq!(reason as usize, i + 1);
+            assert_eq!(LimitedBy::from_number(reason as u8), Some(reason));
+        }
+        assert_eq!([0, 9, 255].map(LimitedBy::from_number), [None; 3]);
+    }
+
+    /// Rows of the table are met, and values between them lie between theirs.
+    #[test]
+    fn limits_are_those_of_the_table() {
+        let third = |fill: f64| {
+            let (s, kappa) = third_order::coefficients(fill);
+            cylinder(fill, third_order::shifts(s, kappa).map(Some))
+        };
+        for [fill, frequency, forced] in THIRD_ORDER {
+            let limit = third(fill);
+            assert!((limit.frequency.to_degrees() - frequency).abs() < 1e-9, "{fill} {limit:?}");
+            assert!((limit.forced.to_degrees() - forced).abs() < 1e-9, "{fill} {limit:?}");
+        }
+        assert!((third(0.45).frequency.to_degrees() - 0.5 * (11.46 + 14.61)).abs() < 1e-9);
+        assert_eq!(third(9.0), third(2.5));
+        let shallow = [0.24, 0.15, 0.1].map(|fill| third(fill).frequency.to_degrees());
+        assert!(shallow[0] < 4.41 && shallow[0] > 3.9, "{shallow:?}");
+        assert!(shallow[1] < 1.2 && shallow[2] < 0.5 && shallow[2] > 0.0, "{shallow:?}");
+    }
+
+    /// Degrees at which a pendulum's frequency is 0.3 % from fully nonlinear flow, planar motion, are 1.6, 3.5, 8.3 and 7.8
+    /// at these depths: the next order changes them by at most 0.3.
+    #[test]
+    fn a_pendulum_ends_where_the_third_order_parts_from_it() {
+        for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {
+            let limit = cylinder(fill, [Some(-0.125), Some(0.5)]).frequency.to_degrees();
+            assert!((limit - exact).abs() < 0.3, "{fill}: {limit} {exact}");
+        }
+        let linear = cylinder(1.227, [Some(0.0), None]);
+        // -0.429 A^2/2 = -0.003
+        assert!((linear.frequency.to_degrees() - 6.78).abs() < 0.01, "{linear:?}");
+        assert!(linear.forced < linear.frequency);
+    }
+
+    #[test]
+    fn swirl_folds_above_the_resonance_with_mode_2_2() {
+        assert_eq!([0.5, 0.83].map(swirl_fold), [None; 2]);
+        for [fill, angle] in FOLD {
+            let found = swirl_fold(fill).unwrap().to_degrees();
+            assert!((found - angle).abs() < 1e-9, "{fill} {found}");
+        }
+        assert_eq!(swirl_fold(9.0), swirl_fold(2.5));
+    }
+
+    /// R 0.3 m, h 0.4 m, 5 m/s^2, 9 rad/s: 2 Omega/omega_0 = 3.3 and Omega^2 R/g = 4.86. C_0 is 0.418 in deep liquid, and
+    /// 2/(xi^2 - 1) = 0.837 in shallow liquid.
+    #[test]
+    fn a_spinning_tank_leaves_its_range_at_the_inertial_waves_or_a_deep_paraboloid() {
+        let limit = |fill: f64| {
+            let l = 1.0 / (XI[0] / 0.3 * libm::tanh(XI[0] * fill));
+            (SpinLimit::new(l, 0.3), 5.0 / l)
+        };
+        let (bottle, omega2) = limit(4.0 / 3.0);
+        assert!(bottle.is_exceeded(9.0, omega2) && bottle.is_exceeded(-9.0, omega2));
+        assert!(!bottle.is_exceeded(0.0, omega2) && !bottle.is_exceeded(0.1, omega2));
+        for (fill, c_0) in [(5.0, 0.4184), (1.0, 0.4960), (0.01, 0.8367)] {
+            let (found, _) = limit(fill);
+            assert!((found.factor / 4.0 - 1.0 - c_0).abs() < 2e-4, "{fill} {found:?}");
+        }
+        // The paraboloid's limit comes first in shallow liquid: omega_0 is small, and beta is not.
+        let (found, omega2) = limit(2.0);
+        let beta = libm::sqrt(SPIN_NUMBER * 5.0 / 0.3);
+        assert!(
+            !found.is_exceeded(0.999 * beta, omega2) && found.is_exceeded(1.001 * beta, omega2)
+        );
+    }
+}

@@ -1,0 +1,132 @@
+//! Ends of the range in which the slosh modes represent the liquid. The reasons, in the order in which they are given if
+//! there are several:
+//!
+//! ```text
+//! spin                 omega^2 R/(l w^2) > 0.3, or 2 omega/w > (1 + C_0)^(-1/2)   (`formulas::limits::SpinLimit`)
+//! bond_number          rho g R^2/sigma < 100 in a tank without capillarity or centring stiffness
+//! secondary_resonance  A above the fold of rotary motion
+//! breaking             steepness above slosh.breaking_steepness, if that is above 0
+//! third_order          A above the angle at which the model's frequency is wrong, or above 45 degrees
+//! ```
+//!
+//! w^2 = g/l + k/m is that of mode 1, and sin A = displacement/l. In an upright cylinder the angles follow from the depth and
+//! from the dependence of the model's frequency on the amplitude. A table of modes gives its own angles.
+
+use formulas::limits::{self, LOW_BOND, LimitedBy, SpinLimit};
+use formulas::third_order;
+
+use crate::parameters::{MODES, Parameters, SloshModel, SloshSource};
+use crate::pendulum::Pendulum;
+use crate::slosh::Angles;
+use crate::tank::Calculated;
+
+/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2.
+const ROTARY: f64 = 0.8;
+/// Largest slosh angle of any mode, rad.
+const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
+
+/// Limits of a plant's modes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    mode: [ModeLimits; MODES],
+    spin: SpinLimit,
+    /// Bond number over g, s2/m; 0 if it does not matter.
+    bond_per_g: f64,
+}
+
+/// Slosh angles at which a mode is out of range, rad; 0 for those that are not known.
+#[derive(Clone, Copy, Debug, Default)]
+struct ModeLimits {
+    angle: f64,
+    swirl: f64,
+    breaking: f64,
+}
+
+/// Returns the shifts of omega^2 over the squared angle of a model's mode; `None` for a motion that it does not have.
+fn shifts(model: SloshModel, pendulum: &Pendulum) -> [Option<f64>; 2] {
+    match model {
+        SloshModel::Frozen | SloshModel::Linear => [Some(0.0), None],
+        SloshModel::Planar => [Some(third_order::shifts(1.0, 1.0)[0]), None],
+        SloshModel::Spherical => third_order::shifts(1.0, 1.0).map(Some),
+        SloshModel::Paraboloid | SloshModel::Liquid => {
+            let kappa = 2.0 * pendulum.l * pendulum.l * pendulum.hardening;
+            third_order::shifts(pendulum.s, kappa).map(Some)
+        }
+    }
+}
+
+impl Limits {
+    /// Creates the limits of the modes in use.
+    pub fn new(p: &Parameters, calculated: &Calculated) -> Limits {
+        let (slosh, radius) = (&p.slosh, p.tank.d / 2.0);
+        let mut mode = [ModeLimits::default(); MODES];
+        for (n, (mode, pendulum)) in mode.iter_mut().zip(calculated.pendulums(p)).enumerate() {
+            let shifts = shifts(slosh.model, &pendulum);
+            let fill = p.tank.h / radius;
+            match slosh.source {
+                SloshSource::Geometry if n == 0 => {
+                    mode.angle = limits::cylinder(fill, shifts).forced;
+                    mode.swirl = limits::swirl_fold(fill).unwrap_or(0.0);
+                }
+                SloshSource::Geometry => {}
+                SloshSource::Table => {
+                    let table = &slosh.table;
+                    let (s, kappa) = (table.nonlinear_inertia[n], table.nonlinear_stiffness[n]);
+                    let exact = third_order::shifts(s, kappa);
+                    if table.angle_limit[n] > 0.0 {
+                        mode.angle =
+                            limits::shifted(table.angle_limit[n], limits::FORCED, shifts, exact);
+                    }
+                    mode.swirl = table.swirl_limit[n];
+                }
+            }
+            let breaking = slosh.breaking(n, pendulum.wave, radius);
+            mode.breaking = breaking.onset / breaking.steepness;
+        }
+        let length = if calculated.length[0] > 0.0 { calculated.length[0] } else { 1.0 };
+        let is_flat = calculated.mass[0] > 0.0 && calculated.centring[0] == 0.0;
+        Limits {
+            mode,
+            spin: SpinLimit::new(length, radius),
+            bond_per_g: match is_flat && p.fluid.sigma > 0.0 {
+                true => p.fluid.rho * radius * radius / p.fluid.sigma,
+                false => 0.0,
+            },
+        }
+    }
+
+    /// Returns the reason why modes at these angles, with their squared frequencies, do not represent the liquid on a hub with
+    /// the rate `omega`.
+    pub fn reason(&self, modes: impl Iterator<Item = (Angles, f64, f64)>, omega: f64) -> LimitedBy {
+        let mut reason = LimitedBy::None;
+        for (n, (angles, omega2, l)) in modes.enumerate() {
+            if n == 0 {
+                if self.spin.is_exceeded(omega, omega2) {
+                    return LimitedBy::Spin;
+                }
+                if self.bond_per_g > 0.0 && omega2 * l * self.bond_per_g < LOW_BOND {
+                    return LimitedBy::BondNumber;
+                }
+            }
+            // Displacement and rate over the length; an angle of the linear model may be above 90 degrees.
+            let largest = core::f64::consts::FRAC_PI_2;
+            let [(x, c_x), (y, c_y)] =
+                angles.angle.map(|angle| libm::sincos(angle.clamp(-largest, largest)));
+            let [x_d, y_d] = [angles.rate[0] * c_x, angles.rate[1] * c_y];
+            let exceeds =
+                |limit: f64| limit > 0.0 && libm::hypot(x, y) > libm::sin(limit.min(largest));
+            let squares = (x * x + y * y) * omega2 + x_d * x_d + y_d * y_d;
+            let area = 2.0 * (x * y_d - y * x_d).abs() * libm::sqrt(omega2.max(0.0));
+            let ModeLimits { angle, swirl, breaking } = self.mode[n];
+            if exceeds(swirl) && area > ROTARY * squares {
+                return LimitedBy::SecondaryResonance;
+            }
+            if exceeds(breaking) {
+                reason = LimitedBy::Breaking;
+            } else if reason == LimitedBy::None && (exceeds(angle) || exceeds(LARGEST)) {
+                reason = LimitedBy::ThirdOrder;
+            }
+        }
+        reason
+    }
+}
