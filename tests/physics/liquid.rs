@@ -1,7 +1,7 @@
 //! The model `liquid`: its coefficients are those of potential flow, and its free oscillations have
 //! the shifts of frequency that potential flow has.
 
-use formulas::third_order::coefficients;
+use formulas::third_order::unbridged;
 use hubslosh_tank::third_order::Overlaps;
 use plant::SloshModel;
 
@@ -14,7 +14,7 @@ fn coefficients_of_the_model_are_those_of_potential_flow() {
     let all = Overlaps::new(60);
     for i in 0..290 {
         let fill = 0.2 + 0.02 * f64::from(i);
-        let (s, kappa) = coefficients(fill);
+        let (s, kappa) = unbridged(fill);
         let expected = all.equivalent(fill);
         for (found, expected) in [(s, expected[0]), (kappa, expected[1])] {
             assert!(

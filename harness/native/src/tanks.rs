@@ -164,7 +164,7 @@ impl Solved {
 
     /// Return warnings about the surface tension.
     fn warnings(&self) -> Vec<String> {
-        self.data.capillarity.as_ref().map_or(Vec::new(), |found| found.warnings.clone())
+        parameters::surface_tension_warnings(&self.data, self.liquid.0)
     }
 
     /// Return the parameters of a model by name, and warnings.

@@ -30,7 +30,42 @@ pub struct Coefficients {
     /// Second-order elevation at the wall per squared slosh angle, m/rad². At an angle A the crest is wave A + wave_second
     /// A^2 high, the trough wave A - wave_second A^2 deep.
     pub wave_second: f64,
-    /// Angle above which the third order is not valid, rad: the second-order wave is half of the first-order wave. At most 30
-    /// degrees.
+    /// Angle above which the mode is out of range, rad: the smaller of the angles at which its frequency errs by 0.3 % and a
+    /// forced response by 3 %.
     pub angle_limit: f64,
+    /// Source of `angle_limit`.
+    pub angle_limit_from: LimitSource,
+    /// Angle at which the frequency errs by 0.3 %, rad; `None` if it is not known.
+    pub frequency_limit: Option<f64>,
+    /// Angle above which rotary motion is out of range, because its branch folds by a secondary resonance, rad; `None` if
+    /// no fold is known.
+    pub swirl_limit: Option<f64>,
+    /// Angle at which the second-order wave is half of the first-order wave, rad, at most 30 degrees. The series is not
+    /// valid above; it says nothing about the error below.
+    pub series_limit: f64,
+    /// True if the coefficients are interpolated over the fill across a pole of the third order.
+    pub bridged: bool,
+}
+
+/// Source of the angle at which a mode is out of range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitSource {
+    /// Comparison with fully nonlinear potential flow in upright cylinders (`formulas::limits`).
+    PotentialFlow,
+    /// Share of the angle at which the second-order wave is half of the first-order wave: the smallest one that upright
+    /// cylinders have.
+    Estimate,
+}
+
+impl LimitSource {
+    /// Returns the source in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            LimitSource::PotentialFlow => "fully nonlinear potential flow in upright cylinders",
+            LimitSource::Estimate => {
+                "an estimate, not a comparison: a share of the angle at which the series breaks down"
+            }
+        }
+    }
 }

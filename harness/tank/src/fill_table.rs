@@ -10,8 +10,8 @@ use names::sloshtank::tank::MOST_MODES as MODES;
 use names::sloshtank::tank::fill;
 pub use names::sloshtank::tank::fill::MOST_POINTS as POINTS;
 use names::sloshtank::tank::{
-    H_0, HINGE, I_0, I_Z, LENGTH, LIQUID_0, M_0, MASS, NONLINEAR_INERTIA, NONLINEAR_STIFFNESS,
-    OUTLET, ZETA,
+    ANGLE_LIMIT, H_0, HINGE, I_0, I_Z, LENGTH, LIQUID_0, M_0, MASS, NONLINEAR_INERTIA,
+    NONLINEAR_STIFFNESS, OUTLET, SWIRL_LIMIT, ZETA,
 };
 
 use crate::contour::Problems;
@@ -226,6 +226,11 @@ pub fn parameters(
     let ratio = |set: &ParameterSet, n: usize| value(set, "zeta", n).unwrap_or(0.0);
     let ratios: Vec<Vec<f64>> =
         sets.iter().map(|set| (1..=modes).map(|n| ratio(set, n)).collect()).collect();
+    let limits = |what: &str, n: usize| -> Vec<Option<f64>> {
+        sets.iter().map(|set| value(set, what, n)).collect()
+    };
+    let limits: Vec<_> =
+        (1..=modes).map(|n| [around(limits("angle_limit", n)), limits("swirl_limit", n)]).collect();
     let middle = between.map_or(&[][..], |between| &between.rows);
     let middle_sets = solved(middle, Liquid { nu: None, ..liquid })?;
     let third_order = third_order(AtFill::all(rows, &sets), AtFill::all(middle, &middle_sets));
@@ -288,7 +293,8 @@ pub fn parameters(
     let of_modes = of_modes.chain(ratios_of_modes);
     let coefficients =
         (1..=modes).flat_map(|n| [NONLINEAR_INERTIA.at([n]), NONLINEAR_STIFFNESS.at([n])]);
-    let of_modes = of_modes.chain(coefficients);
+    let of_limits = (1..=modes).flat_map(|n| [ANGLE_LIMIT.at([n]), SWIRL_LIMIT.at([n])]);
+    let of_modes = of_modes.chain(coefficients).chain(of_limits);
     let replaced = [M_0, H_0, I_0, I_Z].map(String::from).into_iter().chain(of_modes);
     let replaced: Vec<String> = replaced.map(|name| target.name(&name)).collect();
     set.values.retain(|(name, _)| !replaced.contains(name));
@@ -320,8 +326,27 @@ pub fn parameters(
             real(&fill::NONLINEAR_STIFFNESS.at([n, i + 1]), kappa);
         }
     }
+    for (n, [angle, swirl]) in limits.into_iter().enumerate() {
+        for (i, (angle, swirl)) in angle.into_iter().zip(swirl).enumerate() {
+            for (array, limit) in [(fill::ANGLE_LIMIT, angle), (fill::SWIRL_LIMIT, swirl)] {
+                if let Some(limit) = limit {
+                    real(&array.at([n + 1, i + 1]), limit);
+                }
+            }
+        }
+    }
     set.values.push((target.name(fill::POINTS), Value::Integer(rows.len() as i64)));
     Ok(set)
+}
+
+/// Returns the limits over the fill with the smaller of the nearest known ones where a limit is not known.
+fn around(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
+    let nearest = |i: usize| {
+        let below = limits[..i].iter().rev().find_map(|limit| *limit);
+        let above = limits[i..].iter().find_map(|limit| *limit);
+        below.into_iter().chain(above).reduce(f64::min)
+    };
+    (0..limits.len()).map(|i| limits[i].or_else(|| nearest(i))).collect()
 }
 
 /// Beginning of the note about the coefficients of one fill.

@@ -12,7 +12,10 @@
 
 use core::f64::consts::PI;
 
-use crate::coefficients::{Coefficients, FiniteAmplitude};
+use formulas::limits;
+use formulas::third_order::{BRIDGED, coefficients};
+
+use crate::coefficients::{Coefficients, FiniteAmplitude, LimitSource};
 use crate::contour::Wall;
 use crate::contour_waves;
 use crate::curve::Point;
@@ -35,6 +38,10 @@ const NEARLY_SQUARE: f64 = 0.1;
 /// Largest angle of the third order's validity, rad. At 26 degrees the circular wave of a cylinder with h/R 0.613 is 4 %
 /// from fully nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
+/// Angle at which a mode leaves its range over the angle at which the second-order wave is [`STEEPEST`] of the first-order
+/// wave, for tanks that nobody has compared with fully nonlinear flow: the smallest ratio in upright cylinders, that of deep
+/// liquid; at h/R 0.3 it is 0.6.
+const ESTIMATED_SHARE: f64 = 0.43;
 /// Largest second-order wave at the wall, over the first-order wave, for which the third order holds.
 const STEEPEST: f64 = 0.5;
 
@@ -60,8 +67,53 @@ impl Coefficients {
             planar: fine.planar,
             circular: fine.circular,
             wave_second: fine.second,
-            angle_limit: (STEEPEST * wave / fine.second).abs().min(MOST_ANGLE),
+            angle_limit: (ESTIMATED_SHARE * STEEPEST * wave / fine.second).abs().min(MOST_ANGLE),
+            angle_limit_from: LimitSource::Estimate,
+            frequency_limit: None,
+            swirl_limit: None,
+            series_limit: (STEEPEST * wave / fine.second).abs().min(MOST_ANGLE),
+            bridged: false,
         }
+    }
+
+    /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Across the poles both
+    /// coefficients are bridged; the second-order wave is then interpolated, too.
+    fn of_cylinder(self, fill: f64, wave: f64, second: impl Fn(f64) -> f64) -> Coefficients {
+        let mut known = self;
+        let [low, high] = BRIDGED;
+        if fill > low && fill < high {
+            let (s, kappa) = coefficients(fill);
+            let [planar, circular] = formulas::third_order::shifts(s, kappa);
+            let [below, above] = [low, high].map(second);
+            let wave_second = below + (above - below) * (fill - low) / (high - low);
+            known = Coefficients {
+                nonlinear_inertia: s,
+                nonlinear_stiffness: kappa,
+                error: WORST,
+                planar,
+                circular: Some(circular),
+                wave_second,
+                series_limit: (STEEPEST * wave / wave_second).abs().min(MOST_ANGLE),
+                bridged: true,
+                ..known
+            };
+        }
+        let limit = limits::cylinder(fill, [Some(known.planar), known.circular]);
+        Coefficients {
+            angle_limit: limit.forced,
+            angle_limit_from: LimitSource::PotentialFlow,
+            frequency_limit: Some(limit.frequency),
+            swirl_limit: limits::swirl_fold(fill),
+            ..known
+        }
+    }
+
+    /// Returns the slosh angle, rad, at which a pendulum in place of these coefficients is out of range.
+    pub(crate) fn pendulum_limit(&self) -> f64 {
+        let [planar, circular] = formulas::third_order::shifts(1.0, 1.0);
+        let shifts = [Some(planar), self.circular.map(|_| circular)];
+        let exact = [self.planar, self.circular.unwrap_or(circular)];
+        limits::shifted(self.angle_limit, limits::FORCED, shifts, exact)
     }
 }
 
@@ -103,7 +155,11 @@ pub fn of_tank(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
             let known = match (ring(data), &data.wall) {
                 (Some([inner, outer]), _) => {
                     let all = COUNTS.map(|count| Overlaps::round(inner, outer, count));
-                    of_overlaps(all.each_ref(), depth, mode.wave, &mut warnings)
+                    let all = all.each_ref();
+                    match inner > 0.0 {
+                        true => of_overlaps(all, depth, mode.wave, &mut warnings),
+                        false => Some(of_cylinder(all, depth, outer, mode.wave, &mut warnings)),
+                    }
                 }
                 (None, Some(wall)) => of_contour(wall, mode.wave, mode.lambda, &mut warnings),
                 (None, None) => None,
@@ -121,11 +177,11 @@ pub fn of_tank(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
             ));
             return None;
         }
-        if known.angle_limit < LEAST_ANGLE {
+        if known.series_limit < LEAST_ANGLE {
             warnings.push(format!(
-                "finite amplitude: s and kappa of mode 1 hold up to {:.2} degrees. There the second-order wave is {STEEPEST} of the \
-                 first-order wave (shallow liquid, or a mode of the surface near twice the frequency)",
-                known.angle_limit.to_degrees()
+                "finite amplitude: s and kappa of mode 1 hold up to {:.2} degrees at most. There the second-order wave is {STEEPEST} \
+                 of the first-order wave (shallow liquid, or a mode of the surface near twice the frequency)",
+                known.series_limit.to_degrees()
             ));
         }
         Some(known)
@@ -146,6 +202,34 @@ fn of_overlaps(
     let excited = fine.secondary_resonance(depth);
     let detuned = |detuning| fine.detuned_equivalent(depth, detuning);
     known.bounded_near(excited, &detuned, warnings).then_some(known)
+}
+
+/// Returns the coefficients of an upright cylinder of this radius, m.
+fn of_cylinder(
+    all: [&Overlaps; 2],
+    depth: f64,
+    radius: f64,
+    wave: f64,
+    warnings: &mut Vec<String>,
+) -> Coefficients {
+    let known = Coefficients::new(all.map(|x| Found::of(x, depth)), wave);
+    let known = known.of_cylinder(depth / radius, wave, |fill| all[1].second_wave(fill * radius));
+    if known.bridged {
+        warnings.push(format!(
+            "finite amplitude: at h/R {:.3} s and kappa are interpolated between h/R {} and {}, because modes of the surface have \
+             nearly twice the frequency of mode 1, and the third order has poles there",
+            depth / radius,
+            BRIDGED[0],
+            BRIDGED[1]
+        ));
+    }
+    if let Some(limit) = known.swirl_limit {
+        warnings.push(format!(
+            "finite amplitude: rotary motion folds at {:.1} degrees by a secondary resonance; beyond, another branch takes over",
+            limit.to_degrees()
+        ));
+    }
+    known
 }
 
 impl Coefficients {

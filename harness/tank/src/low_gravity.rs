@@ -39,6 +39,15 @@ pub struct Capillary {
     pub unknown: bool,
 }
 
+/// Largest share of capillarity in omega^2 of a mode whose shape it changes.
+const LARGEST_SHARE: f64 = 0.1;
+
+/// Returns the specific force, m/s², below which [`flat`] is not known for a mode whose shape changes; `tension` is
+/// sigma/rho.
+pub fn least_gravity(mode: &Mode, tension: f64) -> f64 {
+    tension * mode.surface_gradient / LARGEST_SHARE
+}
+
 /// Computes capillarity for a flat surface (contact angle 90 degrees) with a contact line free to
 /// slide at a vertical wall: omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F
 /// (phi_r^2 + phi^2/r^2) r dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2)
@@ -46,7 +55,7 @@ pub struct Capillary {
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;
     let gravity = fluid.g * mode.lambda;
-    let unknown = !mode.upright && added > 0.1 * gravity;
+    let unknown = !mode.upright && added > LARGEST_SHARE * gravity;
     let mut outside = Vec::new();
     if !mode.vertical_wall {
         outside.push("the wall is not vertical at the free surface; nothing is known for a free contact line there".to_string());

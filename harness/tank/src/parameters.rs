@@ -11,6 +11,8 @@ use names::{sloshtank, spacecraft};
 use crate::coefficients::{Coefficients, FiniteAmplitude};
 use crate::contour::Problems;
 use crate::finite_amplitude;
+use formulas::limits::LOW_BOND;
+
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
 use crate::table::{short, significant};
@@ -19,6 +21,10 @@ use crate::{damping, modal};
 
 /// Largest share of capillarity in the stiffness of mode 1 at which the coefficients of finite amplitude hold.
 const MOST_CAPILLARY: f64 = 0.1;
+
+/// Surface tension over density, m3/s2, of a liquid whose surface tension is not given: that of water, the largest of common
+/// liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
+const LARGEST_TENSION: f64 = 7.3e-5;
 
 /// The FMU that the parameters are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +68,32 @@ pub struct Liquid {
 }
 
 impl Liquid {
+    /// Returns a warning if no surface tension is given and it may matter: with [`LARGEST_TENSION`] the Bond number is
+    /// below [`LOW_BOND`].
+    fn missing_tension(&self, data: &ModalData) -> Option<String> {
+        let bond = self.gravity * half_width(data).powi(2) / LARGEST_TENSION;
+        let matters = self.sigma.is_none() && self.gravity > 0.0 && bond < LOW_BOND;
+        (matters && !data.modes.is_empty()).then(|| {
+            format!(
+                "surface tension: none is given (sigma). With {LARGEST_TENSION:e} m³/s² over density, that of water, the Bond number \
+                 is {bond:.3}, and below {LOW_BOND} surface tension changes frequencies and masses. Give sigma, in N/m"
+            )
+        })
+    }
+
+    /// Returns the specific force along the axis, m/s2, below which the stiffnesses of the modes miss surface tension; `None`
+    /// if they hold down to 0.
+    fn lowest_gravity(&self, data: &ModalData) -> Option<f64> {
+        let mode = data.modes.first()?;
+        match self.sigma {
+            None => Some(LOW_BOND * LARGEST_TENSION / half_width(data).powi(2)),
+            Some(sigma) if !mode.upright => {
+                Some(low_gravity::least_gravity(mode, sigma / data.rho))
+            }
+            Some(_) => None,
+        }
+    }
+
     /// Returns whether `data` was solved with this viscosity at this gravity, surface tension and contact angle.
     fn damped(&self, data: &ModalData) -> bool {
         let damping = data.damping.as_ref().map(|of| (of.nu, of.gravity));
@@ -69,6 +101,12 @@ impl Liquid {
         damping == self.nu.map(|nu| (nu, self.gravity))
             && surface == self.sigma.map(|sigma| (sigma, self.contact_angle))
     }
+}
+
+/// Returns the radius of a tank's free surface, of a box half its shorter length, m.
+fn half_width(data: &ModalData) -> f64 {
+    let lengths = [data.length_x, data.length_y].into_iter().flatten();
+    data.r_surface.unwrap_or_else(|| 0.5 * lengths.fold(f64::INFINITY, f64::min))
 }
 
 /// A parameter's value.
@@ -160,6 +198,7 @@ fn springs(
             warnings
                 .push("nothing centres the liquid at 0 m/s² without surface tension".to_string());
         }
+        warnings.extend(liquid.missing_tension(data));
         return vec![0.0; modes.len()];
     };
     let fluid = Fluid { rho: data.rho, sigma, g: liquid.gravity };
@@ -189,6 +228,15 @@ fn along_both(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
         chosen.push((usize::from(mass(1) > mass(0)), 1));
     }
     chosen
+}
+
+/// Returns warnings about the surface tension of a tank's modes: the ranges that its formulas leave, or that it is not given
+/// although it matters.
+pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String> {
+    match &data.capillarity {
+        Some(found) => found.warnings.clone(),
+        None => liquid.missing_tension(data).into_iter().collect(),
+    }
 }
 
 /// Returns the natural frequencies of a tank's modes with the surface tension and contact angle of the liquid, at its
@@ -384,17 +432,38 @@ impl ParameterSet {
             .enumerate()
             .filter(|(_, (_, of_axis))| *of_axis == 0 && !is_linear)
             .filter_map(|(n, (axis, _))| Some((n + 1, [found.mode, found.mode_y][*axis]?)))
-            .filter(|(_, known)| known.angle_limit >= finite_amplitude::LEAST_ANGLE)
+            .filter(|(_, known)| known.series_limit >= finite_amplitude::LEAST_ANGLE)
             .collect();
+        // Without its coefficients a mode is a pendulum.
+        let limits: Vec<(usize, [Option<f64>; 2])> = chosen
+            .iter()
+            .enumerate()
+            .filter(|(_, (_, of_axis))| *of_axis == 0)
+            .filter_map(|(n, (axis, _))| Some((n + 1, [found.mode, found.mode_y][*axis]?)))
+            .map(|(n, known)| {
+                let angle = match third_order.iter().any(|(mode, _)| *mode == n) {
+                    true => known.angle_limit,
+                    false => known.pendulum_limit(),
+                };
+                (n, [Some(angle), known.swirl_limit])
+            })
+            .collect();
+        if limits.is_empty() {
+            notes.push("angle_limit is not known: in_range ends at 45 degrees alone".to_string());
+        }
         for (n, known) in &third_order {
             notes.push(format!(
-                "nonlinear_inertia[{0}] = {1}, nonlinear_stiffness[{0}] = {2}: third order of potential flow, error {3:.0e}, for \
-                 slosh angles up to {4:.0} degrees",
+                "nonlinear_inertia[{0}] = {1}, nonlinear_stiffness[{0}] = {2}: third order of potential flow, {3}, for slosh angles up \
+                 to {4:.1} degrees (angle_limit, {5})",
                 n,
                 significant(known.nonlinear_inertia),
                 significant(known.nonlinear_stiffness),
-                known.error,
-                known.angle_limit.to_degrees()
+                match known.bridged {
+                    true => "bridged".to_string(),
+                    false => format!("error {:.0e}", known.error),
+                },
+                known.angle_limit.to_degrees(),
+                known.angle_limit_from.words()
             ));
         }
         if is_linear {
@@ -414,6 +483,13 @@ impl ParameterSet {
                     ("wave", mode.wave),
                 ] {
                     values.push((format!("{prefix}.{what}[{}]", n + 1), Value::Real(value)));
+                }
+            }
+            for (n, limits) in &limits {
+                for (what, value) in ["angle_limit", "swirl_limit"].into_iter().zip(*limits) {
+                    if let Some(value) = value {
+                        values.push((format!("{prefix}.{what}[{n}]"), Value::Real(value)));
+                    }
                 }
             }
             for (n, known) in &third_order {
@@ -463,7 +539,7 @@ impl ParameterSet {
                 values.push((slosh::MODES.into(), Value::Integer(modes.len() as i64)));
             }
             Target::SloshTank | Target::Spacecraft { .. } => {
-                use sloshtank::tank::{DI_Y, DIRECTION, G_REF, H_0, I_0, I_Z, M_0, MODES};
+                use sloshtank::tank::{DI_Y, DIRECTION, G_BOND, G_REF, H_0, I_0, I_Z, M_0, MODES};
                 if let Target::Spacecraft { tank: number } = target
                     && !(1..=spacecraft::MOST_TANKS).contains(&number)
                 {
@@ -486,6 +562,9 @@ impl ParameterSet {
                 real(target.name(I_Z), data.i_eff_axis.unwrap_or(0.0));
                 if liquid.gravity > 0.0 {
                     real(target.name(G_REF), liquid.gravity);
+                }
+                if let Some(lowest) = liquid.lowest_gravity(data) {
+                    real(target.name(G_BOND), lowest);
                 }
                 if let Some(axes) = both {
                     real(target.name(DI_Y), axes.x.i_eff_cg - axes.y.i_eff_cg);

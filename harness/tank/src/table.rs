@@ -102,11 +102,28 @@ fn amplitude_section(text: &mut String, found: &FiniteAmplitude, waves: [f64; 2]
             known.circular.map_or(String::new(), |shift| format!(", circular {shift:+.4} A^2"));
         let _ = writeln!(
             text,
-            "  {along}s = {:.4}, kappa = {:.4}, error {:.0e}, up to {:.0} degrees",
+            "  {along}s = {:.4}, kappa = {:.4}, {}",
             known.nonlinear_inertia,
             known.nonlinear_stiffness,
-            known.error,
-            known.angle_limit.to_degrees()
+            match known.bridged {
+                true => "bridged across a secondary resonance".to_string(),
+                false => format!("error {:.0e} of the series", known.error),
+            }
+        );
+        let frequency = known.frequency_limit.map_or(String::new(), |limit| {
+            format!(
+                "frequency within 0.3 % up to {:.1} degrees, a forced response within 3 % ",
+                limit.to_degrees()
+            )
+        });
+        let swirl = known.swirl_limit.map_or(String::new(), |limit| {
+            format!(", rotary motion up to {:.1} degrees", limit.to_degrees())
+        });
+        let _ = writeln!(
+            text,
+            "  in range: {frequency}up to {:.1} degrees{swirl} ({})",
+            known.angle_limit.to_degrees(),
+            known.angle_limit_from.words()
         );
         let _ = writeln!(
             text,

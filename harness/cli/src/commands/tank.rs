@@ -118,10 +118,12 @@ impl TankArgs {
             Some(fill) => {
                 let data = parameters::solve(&tank, fill, self.modes, self.liquid());
                 let data = data.with_context(read)?;
-                let found = data.capillarity.iter().flat_map(|found| &found.warnings);
-                // The table has them, and --parameters warns of its own.
-                let is_read = self.parameters.is_some() || !(self.json || self.out.is_some());
-                found.filter(|_| !is_read).for_each(terminal::warn);
+                // The table has those of a given surface tension, and --parameters warns of its own.
+                let has_table = !(self.json || self.out.is_some()) && data.capillarity.is_some();
+                if self.parameters.is_none() && !has_table {
+                    let found = parameters::surface_tension_warnings(&data, self.liquid());
+                    found.iter().for_each(terminal::warn);
+                }
                 set = self
                     .set_file(|target, liquid| ParameterSet::new(&tank, &data, target, liquid))?;
                 let json = serde_json::to_string_pretty(&data)? + "\n";
