@@ -7,6 +7,7 @@ use anyhow::{Result, ensure};
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use files::input;
+use files::output::{self, Destination};
 
 /// Options whose values are files or directories that a command writes: command, option, and the endings of files that
 /// it writes there. Every other value that names a file is an input.
@@ -79,7 +80,9 @@ pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
                 format!(".{}", endings.join(" or ."))
             }
         );
-        let other = outputs[..k].iter().find(|(_, other, _)| place(other) == place(path));
+        let file = place(path);
+        let other =
+            outputs[..k].iter().find(|(_, other, _)| file.is_some() && place(other) == file);
         if let Some((other, _, _)) = other {
             anyhow::bail!("{} is to be two files at once (--{other}, --{option})", path.display());
         }
@@ -125,12 +128,12 @@ fn files_in(value: &OsStr) -> Vec<PathBuf> {
     paths
 }
 
-/// The place that a path leads to, whether or not a file is there.
-fn place(path: &Path) -> PathBuf {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or(Path::new(".")).canonicalize();
-    match (folder, path.file_name()) {
-        (Ok(folder), Some(name)) => folder.join(name),
-        _ => path.to_path_buf(),
+/// The plain file that a path leads to, whether or not it exists; `None` for a device or a pipe, which takes several outputs.
+fn place(path: &Path) -> Option<PathBuf> {
+    let Ok(Destination::File(file)) = output::destination(path) else { return None };
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match (folder.unwrap_or(Path::new(".")).canonicalize(), file.file_name()) {
+        (Ok(folder), Some(name)) => Some(folder.join(name)),
+        _ => Some(file),
     }
 }

@@ -1,39 +1,118 @@
-//! Files appear whole or not at all: written to the same folder under a temporary name, then
-//! renamed. And what is in one, as a hash.
+//! Outputs: a file appears whole or not at all, because it is written to the same folder under a temporary name, then
+//! renamed; links are followed, and devices and pipes are written to. Hashes of files.
 
-use std::fs::File;
-use std::io::{Read, Write};
-use std::path::Path;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read, Seek, Write};
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail, ensure};
 use sha2::{Digest, Sha256};
 
 use crate::{input, temporary};
 
-/// Writes `path` through `write`; if that fails, nothing is left and an older file stays as it was.
-/// The file is on the disk before it gets its name, so that a power cut leaves no empty one. A protected input
-/// ([`input::protect`]) is never replaced.
+/// Destination to which the path of an output leads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Destination {
+    /// A plain file at this path, which may not exist yet: the output replaces it as a whole.
+    File(PathBuf),
+    /// A device, a named pipe or an open descriptor such as `/dev/stdout`: the output is written to it.
+    Stream,
+}
+
+/// Symbolic links that are followed, as Linux follows them.
+const LINKS: usize = 40;
+
+/// Finds the destination of an output. Symbolic links are followed, also to a file that does not exist yet.
+///
+/// # Errors
+/// If the path leads to a directory, or its links lead in a circle.
+pub fn destination(path: &Path) -> Result<Destination> {
+    let name = path.display();
+    let mut place = path.to_path_buf();
+    for _ in 0..LINKS {
+        let Ok(found) = place.symlink_metadata() else { return Ok(Destination::File(place)) };
+        if !found.is_symlink() {
+            ensure!(!found.is_dir(), "{name} cannot be written: it is a directory");
+            return Ok(if found.is_file() {
+                Destination::File(place)
+            } else {
+                Destination::Stream
+            });
+        }
+        let folder = folder_of(&place).to_path_buf();
+        // these links open a descriptor; their text names a pipe, or a file that somebody else is writing
+        if folder.canonicalize().is_ok_and(|folder| folder.starts_with("/proc")) {
+            return Ok(Destination::Stream);
+        }
+        let next = place.read_link().with_context(|| format!("{name} cannot be written"))?;
+        place = folder.join(next);
+    }
+    bail!(
+        "{name} cannot be written: it is a symbolic link that leads to itself, or over {LINKS} others"
+    )
+}
+
+/// The folder of a path; `.` for a bare name.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Writes an output through `write`, completely or not at all. A plain file is replaced when its successor is on the disk, so
+/// that neither an error nor a power cut leaves half of it; a device or a pipe receives the bytes when all of them exist. A
+/// protected input ([`input::protect`]) is never written to.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
     input::check_replaceable(path)?;
-    let name = path.display();
-    let directory = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
+    let cannot = || format!("{} cannot be written", path.display());
+    let place = match destination(path)? {
+        Destination::File(place) => place,
+        Destination::Stream => {
+            let mut draft = tempfile::tempfile().with_context(cannot)?;
+            let result = write(&mut draft).with_context(cannot)?;
+            draft.rewind().with_context(cannot)?;
+            pour(&mut draft, path).with_context(cannot)?;
+            return Ok(result);
+        }
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".hubslosh-");
     #[cfg(unix)] // what any other program would give a new file; tempfile's 0600 is for secrets
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file =
-        builder.tempfile_in(directory).with_context(|| format!("{name} cannot be written"))?;
-    if path.is_dir() {
-        anyhow::bail!("{name} cannot be written: it is a directory");
-    }
+    let mut file = builder.tempfile_in(folder_of(&place)).with_context(cannot)?;
     let _registered = temporary::register(file.path());
-    let result = write(file.as_file_mut()).with_context(|| format!("{name} cannot be written"))?;
-    file.as_file().sync_all().with_context(|| format!("{name} cannot be written"))?;
-    file.persist(path).with_context(|| format!("{name} cannot be written"))?;
+    let result = write(file.as_file_mut()).with_context(cannot)?;
+    file.as_file().sync_all().with_context(cannot)?;
+    file.persist(&place).with_context(cannot)?;
     Ok(result)
+}
+
+/// Moves a complete file to where the path of an output leads: it takes the place of a plain file, and its bytes go to a device or
+/// a pipe.
+///
+/// # Errors
+/// If that fails; the message names `path`.
+pub fn put(draft: &Path, path: &Path) -> Result<()> {
+    let move_or_pour = || -> Result<()> {
+        match destination(path)? {
+            Destination::File(place) => match fs::rename(draft, &place) {
+                // a link leads to another disk
+                Err(error) if error.kind() == ErrorKind::CrossesDevices => {
+                    atomically(&place, |file| Ok(io::copy(&mut File::open(draft)?, file)?))?;
+                    Ok(fs::remove_file(draft)?)
+                }
+                renamed => Ok(renamed?),
+            },
+            Destination::Stream => {
+                pour(&mut File::open(draft)?, path)?;
+                Ok(fs::remove_file(draft)?)
+            }
+        }
+    };
+    move_or_pour().with_context(|| format!("{} cannot be written", path.display()))
+}
+
+/// Writes the rest of a file to a device or a pipe.
+fn pour(draft: &mut File, path: &Path) -> io::Result<()> {
+    io::copy(draft, &mut File::options().append(true).open(path)?).map(drop)
 }
 
 /// Writes `path` as [`atomically`] does.
@@ -88,5 +167,96 @@ mod tests {
         assert_eq!(error, format!("{} cannot be written: no more", path.display()));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_stay_links() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = |name: &str| directory.path().join(name);
+        fs::create_dir(at("far")).unwrap();
+        fs::write(at("far/old.csv"), "old").unwrap();
+        let links =
+            [("one.csv", "far/old.csv"), ("two.csv", "one.csv"), ("new.csv", "far/new.csv")];
+        for (link, to) in links {
+            std::os::unix::fs::symlink(to, at(link)).unwrap();
+        }
+        for (link, file) in [("two.csv", "far/old.csv"), ("new.csv", "far/new.csv")] {
+            write(&at(link), link).unwrap();
+            assert!(at(link).is_symlink() && !at(file).is_symlink());
+            assert_eq!(fs::read_to_string(at(file)).unwrap(), link);
+            fs::write(at("draft"), "draft").unwrap();
+            put(&at("draft"), &at(link)).unwrap();
+            assert_eq!(fs::read_to_string(at(file)).unwrap(), "draft");
+            assert!(!at("draft").exists() && at(link).is_symlink());
+        }
+        std::os::unix::fs::symlink("circle", at("circle")).unwrap();
+        let error = format!("{:#}", write(&at("circle"), "").unwrap_err());
+        assert!(error.contains("a symbolic link that leads to itself"), "{error}");
+        let error = format!("{:#}", write(&at("far"), "").unwrap_err());
+        assert!(error.ends_with("cannot be written: it is a directory"), "{error}");
+    }
+
+    /// The file of the same kind as before.
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_gets_all_bytes_and_stays_a_pipe() {
+        use std::os::unix::fs::FileTypeExt;
+        let directory = tempfile::tempdir().unwrap();
+        let pipe = directory.path().join("a.csv");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for k in 0..2 {
+            let reader = std::thread::spawn({
+                let pipe = pipe.clone();
+                move || fs::read(pipe).unwrap()
+            });
+            let bytes = vec![b'x'; 200_000]; // more than a pipe holds
+            match k {
+                0 => write(&pipe, &bytes).unwrap(),
+                _ => {
+                    let draft = directory.path().join("draft");
+                    fs::write(&draft, &bytes).unwrap();
+                    put(&draft, &pipe).unwrap();
+                    assert!(!draft.exists());
+                }
+            }
+            assert_eq!(reader.join().unwrap(), bytes);
+            assert!(pipe.symlink_metadata().unwrap().file_type().is_fifo());
+        }
+    }
+
+    /// A copy of `/dev/full`, which takes no byte; only root can make one.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_written_to_and_its_error_is_reported() {
+        use std::os::unix::fs::FileTypeExt;
+        let directory = tempfile::tempdir().unwrap();
+        let full = directory.path().join("full");
+        let made = std::process::Command::new("mknod").arg(&full).args(["c", "1", "7"]).output();
+        let is_device = || full.symlink_metadata().is_ok_and(|f| f.file_type().is_char_device());
+        if !made.unwrap().status.success() || File::open(&full).is_err() {
+            // not root: the real one, which then nobody can replace, by a link
+            std::os::unix::fs::symlink("/dev/full", &full).unwrap();
+            assert_eq!(destination(&full).unwrap(), Destination::Stream);
+            return;
+        }
+        let error = format!("{:#}", write(&full, "bytes").unwrap_err());
+        assert!(error.contains("full cannot be written: No space left"), "{error}");
+        assert!(is_device());
+        let draft = directory.path().join("draft");
+        fs::write(&draft, "bytes").unwrap();
+        assert!(put(&draft, &full).is_err() && draft.exists() && is_device());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn an_open_descriptor_is_written_to() {
+        use std::os::fd::AsRawFd;
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("log");
+        fs::write(&path, "first ").unwrap();
+        let open = File::options().append(true).open(&path).unwrap();
+        write(Path::new(&format!("/dev/fd/{}", open.as_raw_fd())), "second").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "first second");
     }
 }

@@ -14,5 +14,6 @@ pub mod fmi2;
 pub mod fmi3;
 pub mod fmu;
 pub mod guard;
+pub mod parameter_set;
 pub mod symbol;
 pub mod xml;

@@ -2,8 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,22 +40,10 @@ def _columns(table: "pd.DataFrame") -> dict[str, Any]:
     return {str(name): table[name].to_numpy() for name in table.columns}
 
 
-@contextmanager
-def _beside(path: Path) -> "Iterator[Path]":
-    """Yield a file in the same folder that takes the place of ``path`` when all is written."""
-    try:
-        with temporary.folder(path.parent, ".hubslosh-") as folder:
-            new = folder / path.name
-            yield new
-            new.replace(path)
-    except OSError as error:
-        raise FmuError(f"{path} cannot be written: {error}") from None
-
-
 def to_csv(table: "pd.DataFrame", path: str | Path) -> None:
     """Write a table as .csv, every digit; the file appears complete or not at all."""
     path = _checked(table, path, ".csv")
-    with _beside(path) as new:
+    with temporary.output(path) as new:
         table.to_csv(new, index=False)
 
 
@@ -108,7 +95,7 @@ def to_mat(
         arrays = _apart(_columns(table), table.attrs.get("units", {}))
     from scipy.io import savemat
 
-    with _beside(_named(path, ".mat")) as new:
+    with temporary.output(_named(path, ".mat")) as new:
         savemat(new, arrays, oned_as="column", do_compression=False)
 
 
@@ -151,7 +138,8 @@ def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def write_file(path: str | Path, ending: str, text: str) -> None:
-    """Write a text; the file appears complete or not at all."""
-    with _beside(_named(path, ending)) as new:
-        new.write_text(text, encoding="utf-8")
+def write_file(path: str | Path, ending: str, text: Callable[[], str]) -> None:
+    """Write a text, which is made after the file's name was checked."""
+    path = _named(path, ending)
+    with temporary.output(path) as new:
+        new.write_text(text(), encoding="utf-8")

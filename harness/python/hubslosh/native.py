@@ -41,4 +41,5 @@ FmuError = _native.FmuError
 FmuWarning = _native.FmuWarning
 """Python warning that passes on a warning of an FMU or of the program ``hubslosh``."""
 Model = _native.Model
+destination, put, read_parameters = _native.destination, _native.put, _native.read_parameters
 Liquid, Tank, solve, table = _native.Liquid, _native.Tank, _native.solve, _native.table

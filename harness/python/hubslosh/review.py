@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from .files import write_file
 from .fmu import Fmu, FmuError, FmuWarning, Quantity, did_you_mean
 from .linearization import LinearModel, linearize
 from .loop import Loop
@@ -197,13 +198,7 @@ class Review:
 
     def save(self, path: str | Path) -> None:
         """Write the page, .html. Needs matplotlib."""
-        if Path(path).suffix.lower() != ".html":
-            raise FmuError(f"{path}: the name of the page must end in .html")
-        text = self.html()
-        try:
-            Path(path).write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise FmuError(f"{path} cannot be written: {error}") from None
+        write_file(path, ".html", self.html)
 
     def __str__(self) -> str:
         """Return the answer, then what it rests on."""

@@ -29,6 +29,7 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 
 from .fmu import FmuError
+from .native import put
 from .temporary import try_lock
 
 FORMAT = 2
@@ -199,7 +200,7 @@ class Store:
         text = "".join(f"{self._sums[name]}  {name}\n" for name in sorted(self._sums))
         draft = self.path / UNFINISHED / MANIFEST
         _write(draft, text.encode())
-        draft.replace(self.path / MANIFEST)
+        put(draft, self.path / MANIFEST)
 
     def _publish(self, name: str, data: bytes) -> None:
         """Write a file: its line in the manifest first, then under its name."""
@@ -216,7 +217,7 @@ class Store:
         except OSError:
             self._manifest.truncate(end)  # half a line would damage the next one
             raise
-        draft.replace(self.path / name)
+        put(draft, self.path / name)
         self._sums[name] = sum_
 
     def _compare(self, there: dict[str, Any]) -> None:

@@ -1,17 +1,14 @@
 """Tables of numbers as files, .csv or .parquet by their names' endings, and files of parameters."""
 
 import argparse
-import json
-import math
-import tomllib
-import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from . import temporary
+from . import native, temporary
 from .fmu import DefinedUnit, FmuError, Quantity, Value
 
 
@@ -74,96 +71,19 @@ def read_parameters(path: str | Path) -> dict[str, Quantity]:
     """
     if not isinstance(path, str | Path):
         raise FmuError(f"the file of parameters must be a path, not {path!r}")
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-        if path.suffix == ".toml":
-            found = dict(_flatten("", tomllib.loads(text)))
-        elif path.suffix == ".ssv":
-            found = dict(_parameters_of(ET.fromstring(text)))
-        elif path.suffix == ".json":
-            found = _identified(json.loads(text), path)
-        else:
-            raise FmuError(f"{path}: the name must end in .toml, .ssv or .json")
-    except (OSError, ValueError, ET.ParseError) as error:
-        raise FmuError(f"{path} cannot be read: {error}") from None
-    allowed = bool | int | float | str | tuple  # a tuple is a number with its unit
-    wrong = [n for n, value in found.items() if not isinstance(value, allowed)]
-    if wrong or not found:
-        what = f"{', '.join(wrong)} must be numbers, true, false or texts" if wrong else "is empty"
-        raise FmuError(f"{path}: {what}")
-    return found
+    found, texts = native.read_parameters(Path(path))
+    for text in texts:
+        warnings.warn(f"{path}: {text}", native.FmuWarning, stacklevel=2)
+    return {name: _with_unit(value, unit, base) for name, value, unit, base in found}
 
 
-def _identified(result: object, path: Path) -> dict[str, Value]:
-    """Return settings and estimates of a result of ``hubslosh identify``."""
-    try:
-        estimates = {name: e["value"] for name, e in result["parameters"].items()}
-        return dict(result.get("settings", {})) | estimates
-    except (KeyError, TypeError, AttributeError):
-        raise FmuError(f"{path} is not a result of hubslosh identify") from None
-
-
-def _flatten(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, object]]:
-    for key, value in table.items():
-        name = f"{prefix}.{key}" if prefix else key
-        if isinstance(value, Mapping):
-            yield from _flatten(name, value)
-        else:
-            yield name, value
-
-
-_KINDS: Mapping[str, Callable[[str], Value]] = {
-    "Real": float,
-    "Integer": int,
-    "Boolean": lambda text: _TRUTHS[text.strip()],
-}
-"""Converts the text of a parameter of this kind; others are texts."""
-
-_TRUTHS = {"true": True, "1": True, "false": False, "0": False}
-"""Values of xs:boolean."""
-
-
-def _parameters_of(root: ET.Element) -> Iterator[tuple[str, Quantity]]:
-    """Yield the parameters of SSP's parameter set, those with a unit as (number, unit)."""
-    space = root.tag[: root.tag.find("}") + 1]
-    units = dict(_units_of(root))
-    seen = set()
-    for parameter in root.iterfind(f"{space}Parameters/{space}Parameter"):
-        value = next(iter(parameter), None)
-        if value is None or "value" not in value.attrib or "name" not in parameter.attrib:
-            raise FmuError("a Parameter without name or value")
-        name, kind = parameter.attrib["name"], value.tag.removeprefix(space)
-        if name in seen:
-            raise FmuError(f"{name} is given twice")
-        seen.add(name)
-        try:
-            number = _KINDS.get(kind, str)(value.attrib["value"])
-        except (ValueError, KeyError):
-            text = value.attrib["value"]
-            raise FmuError(f"{name} cannot be {text!r} (allowed: a value of type {kind})") from None
-        unit = value.get("unit")
-        yield name, number if unit is None else (number, units.get(unit, unit))
-
-
-def _units_of(root: ET.Element) -> Iterator[tuple[str, DefinedUnit]]:
-    """Yield the units that a parameter set defines (SSP 1.0, section 4.5.3)."""
-    for unit in root.iterfind("{*}Units/{*}Unit"):
-        name, base = unit.get("name"), unit.find("{*}BaseUnit")
-        if name is None or base is None:
-            raise FmuError("a Unit without name or BaseUnit")
-        try:
-            exponents = {key: int(base.get(key, "0")) for key in DefinedUnit.EXPONENTS}
-            factor, offset = (float(base.get(key, default)) for key, default in _SCALE.items())
-        except ValueError as error:
-            raise FmuError(f"the unit {name}: {error}") from None
-        if not (math.isfinite(factor) and factor and math.isfinite(offset)):
-            raise FmuError(f"the unit {name}: factor and offset must be finite, and factor not 0")
-        yield name, DefinedUnit(name, exponents, factor, offset)
-
-
-_SCALE = {"factor": "1", "offset": "0"}
-"""Attributes of a BaseUnit, with their defaults."""
+def _with_unit(value: Value, unit: str | None, base: tuple | None) -> Quantity:
+    if unit is None or isinstance(value, str):
+        return value
+    if base is None:
+        return value, unit
+    exponents = dict(zip(DefinedUnit.EXPONENTS, base[0], strict=True))
+    return value, DefinedUnit(unit, exponents, *base[1:])
 
 
 def write_table(
@@ -178,17 +98,11 @@ def write_table(
     import pyarrow.parquet
 
     columns = pyarrow.table(dict(table)).replace_schema_metadata(dict(notes or {}))
-    ending = ending_of(path)
-    try:
-        with temporary.folder(path.parent, ".hubslosh-") as folder:
-            beside = folder / path.name
-            if ending == "csv":
-                pyarrow.csv.write_csv(columns, beside)
-            else:
-                pyarrow.parquet.write_table(columns, beside, compression="zstd")
-            beside.replace(path)
-    except OSError as error:
-        raise FmuError(f"{path} cannot be written: {error}") from None
+    with temporary.output(path) as new:
+        if ending_of(path) == "csv":
+            pyarrow.csv.write_csv(columns, new)
+        else:
+            pyarrow.parquet.write_table(columns, new, compression="zstd")
 
 
 def ending_of(path: Path) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import native
+from .files import write_file
 from .fmu import FmuError, FmuWarning
 
 if TYPE_CHECKING:
@@ -82,12 +83,7 @@ class Tank:
 
     def save(self, path: str | Path) -> None:
         """Write the picture, .svg."""
-        if Path(path).suffix.lower() != ".svg":
-            raise FmuError(f"{path}: the picture is SVG, its name ends in .svg")
-        try:
-            Path(path).write_text(self.picture, encoding="utf-8")
-        except OSError as error:
-            raise FmuError(f"{path} cannot be written: {error}") from None
+        write_file(path, ".svg", lambda: self.picture)
 
     def parameters(
         self,

@@ -15,6 +15,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from .native import FmuError, destination, put
+
 PREFIX, ALIVE, FILES = "hubslosh-", "alive", "files"
 
 if sys.platform == "win32":
@@ -83,6 +85,23 @@ def folder(parent: Path | None = None, prefix: str = PREFIX) -> Iterator[Path]:
         yield made.files
     finally:
         made.remove()
+
+
+@contextmanager
+def output(path: Path) -> Iterator[Path]:
+    """Yield a file that becomes the output ``path`` when all of it is written.
+
+    Links of ``path`` are followed. A plain file is replaced; a device or a pipe gets the bytes.
+    """
+    place = destination(path)
+    parent, prefix = (None, PREFIX) if place is None else (Path(place).parent, f".{PREFIX}")
+    try:
+        with folder(parent, prefix) as there:
+            new = there / path.name
+            yield new
+            put(new, path)
+    except OSError as error:
+        raise FmuError(f"{path} cannot be written: {error}") from None
 
 
 def sweep(parent: Path, prefix: str = PREFIX) -> None:

@@ -785,7 +785,7 @@ class UncertainModel:
 
         every = {key: value.tolist() if hasattr(value, "tolist") else value
                  for key, value in self.as_dict().items()}  # fmt: skip
-        write_file(path, ".json", json.dumps(every, indent=1, ensure_ascii=False) + "\n")
+        write_file(path, ".json", lambda: json.dumps(every, indent=1, ensure_ascii=False) + "\n")
 
     def to_control(self) -> Any:
         """Return M as ``control.StateSpace``, signals of Δ first; needs the package control.

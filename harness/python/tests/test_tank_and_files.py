@@ -1,8 +1,11 @@
 """A tank from Python as from the command line; tables as files; plots of everything."""
 
 import json
+import os
 import pickle
 import subprocess
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import matplotlib as mpl
@@ -241,12 +244,20 @@ def test_units_of_a_parameter_set_are_converted(
         (parameter("friction.model", "1", "m", "Integer"), "", "has no unit"),
         (parameter("tank.h", "50 mm"), "", "allowed: a value of type Real"),
         (parameter("gyro.on", "yes", kind="Boolean"), "", "allowed: a value of type Boolean"),
-        (parameter("tank.h", "1") * 2, "", "tank.h is given twice"),
-        (parameter("tank.h", "1"), '<ssc:Unit name="x"/>', "a Unit without name or BaseUnit"),
+        (
+            parameter("tank.h", "1") + "\n" + parameter("tank.h", "1"),
+            "",
+            r"line 5: tank.h is given twice, first in line 4 \(allowed: once\)",
+        ),
+        (
+            parameter("tank.h", "1"),
+            '<ssc:Unit name="x"/>',
+            'line 8: the unit "x" has no valid BaseUnit',
+        ),
         (
             parameter("tank.h", "1"),
             '<ssc:Unit name="x"><ssc:BaseUnit m="1" factor="0"/></ssc:Unit>',
-            "the unit x: factor and offset must be finite, and factor not 0",
+            "a finite factor other than 0",
         ),
     ],
 )
@@ -258,3 +269,35 @@ def test_a_unit_that_is_not_one_of_the_variable_is_refused(
     file.write_text(SSV.format(parameters=text, units=units))
     with pytest.raises(FmuError, match=said):
         hubslosh.simulate(fmu, file, stop=0.2)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
+@pytest.mark.parametrize("write", [hubslosh.to_csv, hubslosh.to_parquet, hubslosh.to_mat])
+def test_an_output_follows_links_and_is_written_to_a_pipe(
+    tmp_path: Path, write: Callable[[pd.DataFrame, Path], None]
+) -> None:
+    """As the program writes: a link stays a link, a pipe a pipe."""
+    ending = write.__name__.removeprefix("to_")
+    table = pd.DataFrame({"time": [0.0, 1.0], "omega": [1.0, 2.0]})
+    plain, link, far, pipe = (tmp_path / f"{n}.{ending}" for n in ("plain", "link", "far", "pipe"))
+    write(table, plain)
+    link.symlink_to(far)
+    write(table, link)
+    assert link.is_symlink()
+    assert far.stat().st_size == plain.stat().st_size
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor() as pool:
+        read = pool.submit(pipe.read_bytes)
+        write(table, pipe)
+    assert len(read.result()) == plain.stat().st_size
+    assert pipe.is_fifo()
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        path.name for path in (plain, link, far, pipe)
+    )
+    if not Path("/dev/full").exists():
+        return  # only Linux has it
+    link.unlink()
+    link.symlink_to("/dev/full")
+    with pytest.raises(FmuError, match="cannot be written: No space left"):
+        write(table, link)
+    assert link.is_symlink()

@@ -42,8 +42,7 @@ impl ExamplesArgs {
         for (name, bytes) in &files {
             let path = to.join(name);
             output::directory(path.parent().unwrap_or(&to))?;
-            std::fs::write(&path, bytes)
-                .with_context(|| format!("{} could not be written", path.display()))?;
+            output::write(&path, bytes)?;
         }
         done!("{} files in {}", files.len(), to.display());
         Ok(())

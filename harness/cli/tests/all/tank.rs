@@ -278,7 +278,7 @@ fn set_files_that_are_none_are_refused_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text, words) in [
         ("set.txt", "a = 1", "must end in .toml, .ssv or .json"),
-        ("set.toml", "a = [1]", "a is a array"),
+        ("set.toml", "a = [1]", "line 1: a cannot be a value of a parameter"),
         ("set.toml", "", "sets nothing"),
         ("set.toml", "\"tank.q\" = 1", "tank.q"),
         ("set.ssv", "<a/>", "its root is a, not ParameterSet"),
@@ -287,7 +287,13 @@ fn set_files_that_are_none_are_refused_in_a_sentence() {
             "<ParameterSet><Parameters><Parameter name='x'/></Parameters></ParameterSet>",
             "x has no value",
         ),
-        ("set.ssv", "<ParameterSet>", "could not be read"),
+        ("set.ssv", "<ParameterSet>", "set.ssv: 1:"),
+        (
+            "set.ssv",
+            "<ParameterSet><Parameters><Parameter name='x'><Real value='1'/></Parameter>\n<Parameter name='x'><Real \
+             value='2'/></Parameter></Parameters></ParameterSet>",
+            "set.ssv: line 2: x is given twice, first in line 1 (allowed: once)",
+        ),
         ("set.json", "{}", "it is not a result of hubslosh identify"),
         ("set.json", r#"{"parameters": {"hub.I": 1}}"#, "hub.I has no number"),
     ] {

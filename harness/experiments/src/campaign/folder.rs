@@ -219,7 +219,7 @@ impl Folder {
             input::check_replaceable(&self.path.join(&file))?;
             table.write(&draft, recipe)?;
             self.add(file.clone(), sha256(&fs::read(&draft)?))?;
-            Ok(fs::rename(&draft, self.path.join(&file))?)
+            output::put(&draft, &self.path.join(&file))
         };
         store().with_context(|| format!("{} cannot be stored", self.path.join(&file).display()))
     }
@@ -258,9 +258,7 @@ impl Folder {
                 let _ = fs::remove_file(self.path.join(name));
             }
             for name in names {
-                fs::rename(self.unfinished.join(name), self.path.join(name)).with_context(
-                    || format!("{} cannot be written", self.path.join(name).display()),
-                )?;
+                output::put(&self.unfinished.join(name), &self.path.join(name))?;
             }
             Ok(())
         };

@@ -1,0 +1,387 @@
+//! Files of parameters: `"name" = value` as TOML, SSP's parameter set (.ssv), or the result of `hubslosh identify` (.json). The
+//! command line and the Python package read them here.
+
+use std::fmt;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use files::input;
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, Visitor};
+use toml::de::{DeTable, DeValue};
+
+use crate::description::{BaseUnit, ModelDescription, Type, Value};
+use crate::xml::Element;
+
+/// Parameters of a file.
+#[derive(Clone, Debug, Default)]
+pub struct ParameterSet {
+    /// In the order of the file, each name once.
+    pub parameters: Vec<Parameter>,
+    /// Reasons not to trust the values.
+    pub warnings: Vec<String>,
+}
+
+/// A parameter of a file.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Name of the FMU's variable.
+    pub name: String,
+    /// Value in its unit.
+    pub value: Value,
+    /// Unit, if the file names one; otherwise the value is in the unit of the FMU.
+    pub unit: Option<Unit>,
+    /// Line of the file, 0 if unknown.
+    line: u64,
+}
+
+/// Unit of a parameter.
+#[derive(Clone, Debug)]
+pub struct Unit {
+    /// Name.
+    pub name: String,
+    /// Definition by SI base units in the file. Without one it must be a unit of the FMU's variable.
+    pub base: Option<BaseUnit>,
+}
+
+impl ParameterSet {
+    /// Reads a file by its ending.
+    ///
+    /// # Errors
+    /// If the file cannot be read so, sets nothing, or sets a parameter twice. The message begins with the path.
+    pub fn read(path: &Path) -> Result<ParameterSet> {
+        let shown = path.display();
+        let text = input::text(path).with_context(|| format!("could not read {shown}"))?;
+        let read = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("toml") => from_toml(&text),
+            Some("ssv") => from_ssv(&text),
+            Some("json") => from_json(&text),
+            _ => bail!("{shown}: the name must end in .toml, .ssv or .json"),
+        };
+        let found = read.with_context(|| shown.to_string())?;
+        ensure!(!found.parameters.is_empty(), "{shown} sets nothing");
+        Ok(found)
+    }
+}
+
+impl Parameter {
+    /// The value as a text in the unit of the FMU's variable.
+    ///
+    /// # Errors
+    /// If the variable has no unit, or the value cannot be converted to it.
+    pub fn text(&self, description: &ModelDescription) -> Result<String> {
+        let name = &self.name;
+        let Some(unit) = &self.unit else { return Ok(text(&self.value)) };
+        let in_line = || match self.line {
+            0 => name.clone(),
+            line => format!("line {line}"),
+        };
+        let convert = || -> Result<f64> {
+            let variable = description.variable(name)?;
+            ensure!(
+                variable.kind() == Type::Real,
+                "{name} is a {:?} and has no unit, but \"{}\" is given",
+                variable.kind(),
+                unit.name
+            );
+            let Value::Real(number) = self.value else {
+                bail!("{name} expects a number, not \"{}\"", text(&self.value))
+            };
+            match &unit.base {
+                Some(base) => description.converted(variable, number, &unit.name, base),
+                None => match description.value(variable, &format!("{number:?} {}", unit.name))? {
+                    Value::Real(value) => Ok(value),
+                    _ => Ok(number),
+                },
+            }
+        };
+        Ok(format!("{:?}", convert().with_context(in_line)?))
+    }
+}
+
+fn text(value: &Value) -> String {
+    match value {
+        Value::Real(number) => format!("{number:?}"),
+        Value::Integer(number) => number.to_string(),
+        Value::Boolean(truth) => truth.to_string(),
+        Value::String(text) => text.clone(),
+    }
+}
+
+/// Fails if two parameters have one name.
+fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
+    for (k, parameter) in parameters.iter().enumerate() {
+        let Parameter { name, line, .. } = parameter;
+        if let Some(first) = parameters[..k].iter().find(|other| other.name == *name) {
+            bail!(
+                "line {line}: {name} is given twice, first in line {} (allowed: once)",
+                first.line
+            );
+        }
+    }
+    Ok(ParameterSet { parameters, warnings: Vec::new() })
+}
+
+/// TOML, in which nested tables are names with dots.
+fn from_toml(text: &str) -> Result<ParameterSet> {
+    fn flatten(
+        prefix: &str,
+        table: &DeTable,
+        text: &str,
+        found: &mut Vec<Parameter>,
+        wrong: &mut Vec<String>,
+    ) {
+        for (key, value) in table {
+            let own = key.get_ref();
+            let name = if prefix.is_empty() { own.to_string() } else { format!("{prefix}.{own}") };
+            let line = 1 + text[..key.span().start].matches('\n').count() as u64;
+            let digits = |text: &str| text.replace('_', "");
+            let value = match value.get_ref() {
+                DeValue::Table(inside) => {
+                    flatten(&name, inside, text, found, wrong);
+                    continue;
+                }
+                DeValue::Float(number) => digits(number.as_str()).parse().ok().map(Value::Real),
+                DeValue::Integer(number) => {
+                    i64::from_str_radix(&digits(number.as_str()), number.radix())
+                        .ok()
+                        .map(Value::Integer)
+                }
+                DeValue::Boolean(truth) => Some(Value::Boolean(*truth)),
+                DeValue::String(text) => Some(Value::String(text.to_string())),
+                _ => None,
+            };
+            match value {
+                Some(value) => found.push(Parameter { name, value, unit: None, line }),
+                None => wrong.push(format!("line {line}: {name}")),
+            }
+        }
+    }
+    let table = DeTable::parse(text)?;
+    let (mut found, mut wrong) = (Vec::new(), Vec::new());
+    flatten("", table.get_ref(), text, &mut found, &mut wrong);
+    ensure!(
+        wrong.is_empty(),
+        "{} cannot be a value of a parameter (allowed: numbers, true and false, texts)",
+        wrong.join("; ")
+    );
+    once(found)
+}
+
+/// An object of JSON that has each name once. (A map would keep the last one without a word.)
+#[derive(Default)]
+struct Entries<T>(Vec<(String, T)>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entries<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Of<T>(std::marker::PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Of<T> {
+            type Value = Entries<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entries<T>, A::Error> {
+                let mut all: Vec<(String, T)> = Vec::new();
+                while let Some((name, value)) = map.next_entry::<String, T>()? {
+                    if all.iter().any(|(other, _)| *other == name) {
+                        let words = format!("{name} is given twice (allowed: once)");
+                        return Err(serde::de::Error::custom(words));
+                    }
+                    all.push((name, value));
+                }
+                Ok(Entries(all))
+            }
+        }
+        deserializer.deserialize_map(Of(std::marker::PhantomData))
+    }
+}
+
+/// Result of an identification, as far as it is read.
+#[derive(Deserialize)]
+struct Identified {
+    parameters: Option<Entries<serde_json::Value>>,
+    #[serde(default)]
+    settings: Entries<serde_json::Value>,
+    /// `described` until version 0.2.
+    #[serde(alias = "described")]
+    fits: Option<bool>,
+    converged: Option<bool>,
+    #[serde(default)]
+    decided_by_solver: Vec<serde_json::Value>,
+}
+
+/// Reads the result of an identification: `settings`, then the estimates of `parameters`, which take the place of settings. The
+/// initial states of the recordings are not parameters of the FMU and stand elsewhere in the file.
+fn from_json(text: &str) -> Result<ParameterSet> {
+    let none =
+        "it is not a result of hubslosh identify, or one of a --method without any parameters";
+    let found: Identified = serde_json::from_str(text).context(none)?;
+    let estimates =
+        found.parameters.with_context(|| format!("it has no \"parameters\": {none}"))?;
+    let mut warnings = Vec::new();
+    if !found.decided_by_solver.is_empty() {
+        warnings.push(
+            "the errors of the FMU's solver decided some of these parameters; see the verdict in the file"
+                .into(),
+        );
+    }
+    if found.fits == Some(false) || found.converged == Some(false) {
+        warnings.push(
+            "these parameters do not fit the recording that they are from; see its verdict".into(),
+        );
+    }
+    let mut parameters = Vec::new();
+    let mut add = |name, value| parameters.push(Parameter { name, value, unit: None, line: 0 });
+    for (name, value) in found.settings.0 {
+        let text = value.as_str().with_context(|| format!("settings: {name} is not a text"))?;
+        if !estimates.0.iter().any(|(other, _)| *other == name) {
+            add(name, Value::String(text.into()));
+        }
+    }
+    for (name, estimate) in estimates.0 {
+        let value = estimate.get("value").and_then(serde_json::Value::as_f64);
+        let value = value.with_context(|| format!("parameters: {name} has no number \"value\""))?;
+        add(name, Value::Real(value));
+    }
+    Ok(of_one_run(ParameterSet { parameters, warnings }))
+}
+
+/// Keeps the parameters of one run: those of all recordings, and those of the only recording (`NAME@1`). If there are several
+/// recordings, their own parameters are left out, and a warning names them.
+fn of_one_run(found: ParameterSet) -> ParameterSet {
+    let recording = |name: &str| -> Option<usize> { name.rsplit_once('@')?.1.parse().ok() };
+    let has_others = found.parameters.iter().any(|p| recording(&p.name).is_some_and(|n| n > 1));
+    let (mut left_out, mut parameters, mut warnings) = (Vec::new(), Vec::new(), found.warnings);
+    for mut parameter in found.parameters {
+        if recording(&parameter.name).is_none() {
+            parameters.push(parameter);
+        } else if has_others {
+            left_out.push(parameter.name);
+        } else {
+            let plain = parameter.name.rsplit_once('@').map_or("", |(plain, _)| plain).into();
+            parameter.name = plain;
+            parameters.push(parameter);
+        }
+    }
+    if !left_out.is_empty() {
+        warnings.push(format!(
+            "{} belong to single recordings and are not set: --set NAME=VALUE sets the one of this run",
+            left_out.join(", ")
+        ));
+    }
+    ParameterSet { parameters, warnings }
+}
+
+/// SSP 1.0 and 2.0, "SystemStructureParameterValues".
+fn from_ssv(text: &str) -> Result<ParameterSet> {
+    let root = Element::parse(text.as_bytes()).map_err(anyhow::Error::msg)?;
+    ensure!(root.name == "ParameterSet", "its root is {}, not ParameterSet", root.name);
+    let attribute = |element: &Element, name: &str| {
+        element.get(name).map(String::from).with_context(|| {
+            format!("line {}: {} has no attribute {name}", element.line, element.name)
+        })
+    };
+    let inside = |group: &'static str, name: &'static str| {
+        let groups = root.children.iter().filter(move |element| element.name == group);
+        groups.flat_map(|element| &element.children).filter(move |element| element.name == name)
+    };
+    let mut units = Vec::new();
+    for unit in inside("Units", "Unit") {
+        let name = attribute(unit, "name")?;
+        let base = BaseUnit::of(unit).with_context(|| {
+            format!(
+                "line {}: the unit \"{name}\" has no valid BaseUnit (allowed: whole exponents, a finite offset, and a finite \
+                 factor other than 0)",
+                unit.line
+            )
+        })?;
+        units.push((name, base));
+    }
+    let mut parameters = Vec::new();
+    for parameter in inside("Parameters", "Parameter") {
+        let name = attribute(parameter, "name")?;
+        let line = parameter.line;
+        let element = parameter
+            .children
+            .first()
+            .with_context(|| format!("line {line}: {name} has no value"))?;
+        let text = attribute(element, "value")?;
+        let value = match &*element.name {
+            "Real" => text.trim().parse().ok().map(Value::Real),
+            "Integer" => text.trim().parse().ok().map(Value::Integer),
+            "Boolean" => match text.trim() {
+                "true" | "1" => Some(Value::Boolean(true)),
+                "false" | "0" => Some(Value::Boolean(false)),
+                _ => None,
+            },
+            _ => Some(Value::String(text.clone())),
+        };
+        let value = value.with_context(|| {
+            format!(
+                "line {line}: {name} cannot be \"{text}\" (allowed: a value of type {})",
+                element.name
+            )
+        })?;
+        let unit = element.get("unit").map(|unit| {
+            let base = units.iter().find(|(name, _)| name == unit).map(|(_, base)| *base);
+            Unit { name: unit.into(), base }
+        });
+        parameters.push(Parameter { name, value, unit, line });
+    }
+    once(parameters)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_that_is_given_twice_is_refused_with_both_lines() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            format!("{:#}", ParameterSet::read(&path).unwrap_err())
+        };
+        let one = |value: f64| {
+            format!("<Parameter name=\"tank.h\"><Real value=\"{value}\"/></Parameter>\n")
+        };
+        let ssv = format!(
+            "<ParameterSet>\n<Parameters>\n{}{}</Parameters></ParameterSet>",
+            one(0.1),
+            one(0.2)
+        );
+        for (name, text, words) in [
+            (
+                "a.ssv",
+                &*ssv,
+                "a.ssv: line 4: tank.h is given twice, first in line 3 (allowed: once)",
+            ),
+            (
+                "a.toml",
+                "\"tank.h\" = 1\n\n[tank]\nh = 2\n",
+                "line 4: tank.h is given twice, first in line 1",
+            ),
+            ("a.toml", "\"tank.h\" = 1\n\"tank.h\" = 2\n", "line 2"),
+            (
+                "a.json",
+                "{\"parameters\": {\"hub.I\": {\"value\": 1},\n\"hub.I\": {\"value\": 2}}}",
+                "hub.I is given twice (allowed: once) at line 2",
+            ),
+            ("a.json", "{\"parameters\": {},\n\"parameters\": {}}", "duplicate field `parameters`"),
+        ] {
+            let error = error(name, text);
+            assert!(error.contains(words), "{words}: {error}");
+        }
+    }
+
+    #[test]
+    fn values_of_toml_have_their_types() {
+        let found = from_toml("a = 1_000.5\nb.c = 0x10\nd = true\ne = 'x'\nf = inf").unwrap();
+        let texts: Vec<_> = found.parameters.iter().map(|p| (&*p.name, text(&p.value))).collect();
+        let expected = [("a", "1000.5"), ("b.c", "16"), ("d", "true"), ("e", "x"), ("f", "inf")];
+        assert_eq!(texts, expected.map(|(name, text)| (name, text.to_string())));
+    }
+}

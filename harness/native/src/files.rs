@@ -1,0 +1,52 @@
+//! Files: parameters that are read, and places of outputs.
+
+use std::path::PathBuf;
+
+use ::files::output::{self, Destination};
+use host::description::Value;
+use host::parameter_set::ParameterSet;
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+use crate::fmu::error;
+
+/// Exponents of SI's base units, factor, offset.
+type Base = ([i32; 8], f64, f64);
+
+/// Return the parameters of a file, each with name, value, and the name and the definition of its unit; and warnings.
+#[pyfunction]
+pub fn read_parameters(py: Python, path: PathBuf) -> PyResult<(Bound<PyList>, Vec<String>)> {
+    let found = py.detach(|| ParameterSet::read(&path)).map_err(error)?;
+    let all = PyList::empty(py);
+    for parameter in found.parameters {
+        let (unit, base) = match parameter.unit {
+            Some(unit) => (Some(unit.name), unit.base),
+            None => (None, None),
+        };
+        let base: Option<Base> = base.map(|base| (base.exponents, base.factor, base.offset));
+        let name = parameter.name;
+        match parameter.value {
+            Value::Real(value) => all.append((name, value, unit, base))?,
+            Value::Integer(value) => all.append((name, value, unit, base))?,
+            Value::Boolean(value) => all.append((name, value, unit, base))?,
+            Value::String(value) => all.append((name, value, unit, base))?,
+        }
+    }
+    Ok((all, found.warnings))
+}
+
+/// Return the plain file to which the path of an output leads, which the output may replace; None for a device or a pipe, to which
+/// it is written.
+#[pyfunction]
+pub fn destination(path: PathBuf) -> PyResult<Option<PathBuf>> {
+    match output::destination(&path).map_err(error)? {
+        Destination::File(file) => Ok(Some(file)),
+        Destination::Stream => Ok(None),
+    }
+}
+
+/// Move a complete file to where the path of an output leads; a device or a pipe gets its bytes.
+#[pyfunction]
+pub fn put(py: Python, draft: PathBuf, path: PathBuf) -> PyResult<()> {
+    py.detach(|| output::put(&draft, &path)).map_err(error)
+}
