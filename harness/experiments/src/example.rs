@@ -117,9 +117,7 @@ impl Example {
         thinned(fmu.description(), &answer).write(&folder.join(self.reference()), &none)?;
         let options =
             format!("StartTime, 0\nStopTime, {STOP}\nStepSize, {STEP}\nRelTol, {TOLERANCE:e}\n");
-        let path = folder.join(self.options());
-        std::fs::write(&path, options)
-            .with_context(|| format!("{} was not written", path.display()))
+        output::write(&folder.join(self.options()), options)
     }
 
     fn histories(&self) -> Table {
@@ -139,7 +137,7 @@ impl Example {
 /// does not set slopes.
 pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Result<Table> {
     let description = fmu.description();
-    let mut others = histories(description, input, None, hold, false)?;
+    let mut others = histories(description, input, None, hold, false, &mut |_| {})?;
     let (first, torque) = others.remove(0);
     let (_, stop) = torque.span();
     let run = Run {

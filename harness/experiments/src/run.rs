@@ -13,7 +13,8 @@ use host::description::{ModelDescription, Type, Value, Variable};
 use host::drive::Inputs;
 use host::fmu::{Fmu, Instance};
 use names::hubslosh::TAU_CMD;
-use signals::table::{self, Table};
+use signals::recording::{self, Between, Columns, Signal, Wanted};
+use signals::table::Table;
 
 /// A run of an FMU.
 #[derive(Clone, Debug)]
@@ -69,9 +70,9 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
 pub const SLOPE: &str = "tau_slope";
 
 /// Reads a file's histories of inputs: every column that is an input of the FMU, and [`SLOPE`] with [`TORQUE`].
-/// Integers, enumerations (by value) and Booleans (0 and 1) hold from row to row. Other columns except `time` are
+/// Integers, enumerations (by value) and Booleans (true and false, or 1 and 0) hold from row to row. Other columns except `time` are
 /// refused by name, or ignored with `ignore`. The first history is the input `chosen`, else [`TORQUE`], else the
-/// file's first.
+/// file's first. `done` hears in what units the columns are read.
 ///
 /// # Errors
 /// The file has no such column, or other columns. The error lists all problems of the columns.
@@ -81,21 +82,33 @@ pub fn histories(
     chosen: Option<&str>,
     held: bool,
     ignore: bool,
+    done: &mut dyn FnMut(String),
 ) -> Result<Vec<(String, Torque)>> {
-    let kind = |name: &str| {
-        let named = |v: &&Variable| v.name == name && v.causality == Causality::Input;
-        description.variables.iter().find(named).map(Variable::kind)
-    };
-    let is_input = |name: &str| kind(name).is_some_and(Inputs::takes);
+    let named = |v: &&Variable| v.causality == Causality::Input && Inputs::takes(v.kind());
+    let takes: Vec<&Variable> = description.variables.iter().filter(named).collect();
+    let kind = |name: &str| takes.iter().find(|v| v.name == name).map(|v| v.kind());
+    let is_input = |name: &str| kind(name).is_some();
     let file = path.display();
-    let there = table::names(path)?;
-    let columns: Vec<&str> = there.iter().map(String::as_str).collect();
+    let signal = |name, unit| Signal { name, required: true, between: Between::Missing, unit };
+    let mut signals: Vec<Signal> = takes
+        .iter()
+        .map(|v| match v.kind() {
+            Type::Real => signal(v.name.as_str(), Some(description.unit(v))),
+            _ => signal(v.name.as_str(), Some("")),
+        })
+        .collect();
+    signals.extend([signal("time", None), signal(SLOPE, Some("N.m/s"))]);
+    // by the names of the inputs, whatever units stand behind them
+    let there = recording::assigned(path, &signals)?;
+    let columns: Vec<&str> = there
+        .iter()
+        .map(|(name, signal)| signal.map_or(name.as_str(), |k| signals[k].name))
+        .collect();
     let (inputs, rest): (Vec<&str>, Vec<&str>) = columns.iter().partition(|name| is_input(name));
     let slope = rest.contains(&SLOPE) && inputs.contains(&TORQUE);
     let known = |name: &str| name == "time" || (slope && name == SLOPE);
     let wrong: Vec<&str> = rest.iter().copied().filter(|name| !known(name)).collect();
-    let all: Vec<&str> =
-        description.variables.iter().map(|v| v.name.as_str()).filter(|n| is_input(n)).collect();
+    let all: Vec<&str> = takes.iter().map(|v| v.name.as_str()).collect();
     let mut problems = Vec::new();
     if !columns.contains(&"time") {
         problems.push("it has no column time".to_string());
@@ -123,9 +136,16 @@ pub fn histories(
     let first = chosen.or_else(|| inputs.contains(&TORQUE).then_some(TORQUE)).unwrap_or(inputs[0]);
     let rest = inputs.iter().copied().filter(|name| *name != first);
     let ordered: Vec<&str> = [first].into_iter().chain(rest).collect();
-    let wanted: Vec<&str> =
-        ["time"].into_iter().chain(ordered.iter().copied()).chain(slope.then_some(SLOPE)).collect();
-    let table = Table::read(path, &wanted)?;
+    let wanted: Vec<Signal> = ordered
+        .iter()
+        .copied()
+        .chain(slope.then_some(SLOPE))
+        .filter_map(|name| signals.iter().find(|signal| signal.name == name).copied())
+        .collect();
+    let booleans: Vec<&str> =
+        ordered.iter().copied().filter(|name| kind(name) == Some(Type::Boolean)).collect();
+    let wanted = Wanted { signals: &wanted, columns: &Columns::default() };
+    let table = recording::read_inputs(path, &wanted, &booleans, done)?;
     let column = |name| table.column(name).unwrap_or_default();
     ordered
         .into_iter()
@@ -143,7 +163,7 @@ pub fn histories(
                     row + 1,
                     values[row],
                     if kind == Type::Boolean {
-                        "0 and 1, it is a Boolean"
+                        "true and false, or 1 and 0: it is a Boolean"
                     } else {
                         "integers of 32 bits"
                     }

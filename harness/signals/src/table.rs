@@ -282,6 +282,6 @@ fn read_parquet(path: &Path, wanted: &[&str]) -> Result<Table> {
     let place = wanted.iter().position(|name| *name == "time");
     let time = place.map(|place| parquet_file::Time { place, stated: None, remedy: IN_SECONDS });
     let names = |names: &[String]| positions(names.iter().map(String::as_str), wanted);
-    let found = parquet_file::read(path, names, time)?;
+    let found = parquet_file::read(path, names, time, &[])?;
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), found.columns))
 }

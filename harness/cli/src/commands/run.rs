@@ -30,8 +30,9 @@ pub struct RunArgs {
         required_unless_present = "input"
     )]
     profile: Option<String>,
-    /// Histories of inputs, .csv or .parquet, with the column time (s). Every column with the name of an input of the FMU drives
-    /// that input, such as tau_cmd, tau_ext, g_axial; tau_slope is tau_cmd's derivative until the next row.
+    /// Histories of inputs: text in columns, .parquet or .mat, with the column time. Every column with the name of an input of the
+    /// FMU drives that input, such as tau_cmd, tau_ext, g_axial, in the unit of the file (`tau_cmd [mNm]`), else of the FMU; times
+    /// without a unit are in s. tau_slope is tau_cmd's derivative until the next row.
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
     /// Pass over columns of --input that are no inputs, instead of refusing them.
@@ -113,7 +114,10 @@ impl RunArgs {
                 (driven(description, drive)?, torque, Vec::new())
             }
             (None, Some(path)) => {
-                let all = histories(description, path, drive, self.hold, self.ignore_columns)?;
+                let (hold, ignore) = (self.hold, self.ignore_columns);
+                let all = histories(description, path, drive, hold, ignore, &mut |line| {
+                    terminal::note(line);
+                })?;
                 let mut all = all.into_iter();
                 let Some((input, history)) = all.next() else { bail!("nothing is driven") };
                 (Some(input), history, all.collect())

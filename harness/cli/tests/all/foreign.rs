@@ -130,6 +130,12 @@ fn booleans_are_driven_from_a_file_and_held() {
         if done.status.success() { Ok(out) } else { Err(error) }
     };
     let out = run("0,0,0\n0.95,0,1\n1.45,0,0\n2,0,0\n").unwrap();
+    // as pandas and as spreadsheets write them
+    for words in [["True", "False"], ["TRUE", "FALSE"], ["true", "false"]] {
+        let [on, off] = words;
+        let same = run(&format!("0,0,{off}\n0.95,0,{on}\n1.45,0,{off}\n2,0,{off}\n"));
+        assert_eq!(same.unwrap(), out, "{words:?}");
+    }
     let mut high = 0;
     for line in out.lines().skip(1) {
         let row: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
@@ -140,5 +146,28 @@ fn booleans_are_driven_from_a_file_and_held() {
     }
     assert_eq!(high, 5, "{out}");
     let error = run("0,0,0\n1,0,2\n2,0,0\n").unwrap_err();
-    assert!(error.contains("row 2: on is 2 (allowed: 0 and 1, it is a Boolean)"), "{error}");
+    assert!(error.contains("row 2: on is 2 (allowed: true and false, or 1 and 0"), "{error}");
+    let error = run("0,0,true\n1,0,yes\n2,0,true\n").unwrap_err();
+    assert!(
+        error.contains("line 3, column on: \"yes\" is not a Boolean (allowed: true,"),
+        "{error}"
+    );
+    let error = run("0,0,true\n1,true,true\n2,0,true\n").unwrap_err();
+    assert!(error.contains("line 3, column u: \"true\" is not a number"), "{error}");
+    // the date changes, and nothing shows whether days or months come first
+    let error = run("01/02/2026 23:59:59,0,0\n02/02/2026 00:00:01,0,0\n").unwrap_err();
+    assert!(
+        error.contains("line 3, column time: \"02/02/2026 00:00:01\" may have the day first"),
+        "{error}"
+    );
+    for rows in [
+        "11:59:59 AM,0,0\n12:00:01 PM,0,0\n",
+        "2026-01-31T23:59:59+0100,0,0\n2026-02-01T00:00:01+0100,0,0\n",
+        "31/01/2026 23:59:59,0,0\n01/02/2026 00:00:01,0,0\n",
+        "12:00:00:000,0,0\n12:00:02:000,0,0\n",
+        "0,0,0\r2,0,0\r",
+    ] {
+        let same = run(rows).unwrap_or_else(|error| panic!("{rows}: {error}"));
+        assert_eq!(same.lines().count(), 22, "{rows}: {same}");
+    }
 }

@@ -229,6 +229,38 @@ fn a_recorded_gyro_at_rest_is_characterised() {
                 && directory.join(format!("g/{name}.csv")).is_file()
         );
     }
+    // the unit in the name, and what no unit means
+    let text = std::fs::read_to_string(directory.join("rest.csv")).unwrap();
+    let named = |head: &str| std::fs::write(directory.join("named.csv"), text.replace("t,w", head));
+    let characterise = |columns: &str| {
+        let of = [
+            "gyro",
+            "--recording",
+            "named.csv",
+            "--chunk",
+            "50",
+            "--out",
+            "n",
+            "--columns",
+            columns,
+        ];
+        hubslosh(directory, &of)
+    };
+    for head in ["t_ms,gyro_dps", "TimeMS,w_deg_s", "t [ms],w{deg/s}", "t in ms,w in deg/s"] {
+        named(head).unwrap();
+        let (time, rate) = head.split_once(',').unwrap();
+        let said = characterise(&format!("time={time},omega={rate}")).unwrap();
+        assert!(said.contains(line), "{head}: {said}");
+    }
+    named("t,gyro_dps").unwrap();
+    let error = characterise("time=t,omega=gyro_dps").unwrap_err();
+    assert!(error.contains("column t states no unit, and its rows are 20 apart"), "{error}");
+    named("t_ms,w").unwrap();
+    let said = characterise("time=t_ms,omega=w").unwrap();
+    assert!(said.contains("omega = w, no unit stated, taken as rad/s"), "{said}");
+    named("t_ms,gyro_deg").unwrap();
+    let error = characterise("time=t_ms,omega=gyro_deg").unwrap_err();
+    assert!(error.contains("column gyro_deg: \"deg\" is not a unit of a rate"), "{error}");
     let error = hubslosh(directory, &[&of[..], &["--out", "g"]].concat()).unwrap_err();
     assert!(
         error.contains("it lasts 1000 s, in chunks of 900 s (allowed: at least 3 chunks"),
@@ -270,6 +302,41 @@ fn a_free_decay_of_30_s_tells_frequency_damping_and_its_growth() {
         assert!((value - truth).abs() < 4.0 * std && std < 0.05 * truth, "{name}: {estimate}");
         assert_eq!(estimate["unit"], unit);
     }
+    // times of other units without one, and whole seconds, of which 50 rows have each
+    let probe = text.lines().skip(2).map(|line| line.split_once('\t').unwrap());
+    let rows: Vec<(f64, String)> =
+        probe.map(|(t, wave)| (t.parse().unwrap(), wave.to_string())).collect();
+    let write = |head: &str, time: &dyn Fn(f64) -> String| {
+        let lines = rows.iter().map(|(t, wave)| format!("{};{wave}\n", time(*t)));
+        let text = format!("{head}\n{}", lines.collect::<String>());
+        std::fs::write(directory.join("other.csv"), text).unwrap();
+        let of = ["identify", "other.csv", "--out", "o.json", "--method", "free-decay"];
+        hubslosh(directory, &of)
+    };
+    let estimate = |file: &str| -> f64 {
+        let text = std::fs::read_to_string(directory.join(file)).unwrap();
+        let found: serde_json::Value = serde_json::from_str(&text).unwrap();
+        found["measurement"]["frequency"]["value"].as_f64().unwrap()
+    };
+    for factor in [1e3, 1e6, 1e9] {
+        let error = write("time;wave_height [mm]", &|t| format!("{:.0}", t * factor)).unwrap_err();
+        assert!(error.contains("column time states no unit, and its rows are"), "{error}");
+    }
+    for (head, factor) in [("time_ms", 1e3), ("time_us", 1e6), ("time [ns]", 1e9)] {
+        let head = format!("{head};wave_height_mm");
+        write(&head, &|t| format!("{:.0}", t * factor)).unwrap();
+        assert!((estimate("o.json") / estimate("d.json") - 1.0).abs() < 1e-9, "{head}");
+    }
+    let error = write("time_s;wave_height [mm]", &|t| format!("{:.0}", t.floor())).unwrap_err();
+    assert!(
+        error.contains("rows share each time, and the time between rows is known to"),
+        "{error}"
+    );
+    let of_ros = write("stamp.sec;stamp.nanosec;wave_height_mm", &|t| {
+        format!("{:.0};{:.0}", 1.7e9 + t.floor(), 1e9 * t.fract())
+    });
+    assert!(of_ros.unwrap().contains("its times are the columns stamp.sec and stamp.nanosec"));
+    assert!((estimate("o.json") / estimate("d.json") - 1.0).abs() < 1e-9);
     let error = hubslosh(directory, &of).unwrap_err();
     assert!(
         error.contains(

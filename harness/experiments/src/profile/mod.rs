@@ -19,7 +19,7 @@ pub use self::kinds::{Allowed, FILE, KINDS, Kind, Parameter};
 pub use self::noise::TONES;
 pub use self::shape::Shape;
 use analysis::sweep::Sweep;
-use signals::table::Table;
+use signals::recording::{self, Between, Columns, Signal, Wanted};
 
 /// A torque history with a formula: an entry of [`KINDS`] with values for its parameters.
 #[derive(Clone, Debug)]
@@ -321,9 +321,12 @@ pub enum Torque {
 }
 
 impl Torque {
-    /// Reads the columns `time,tau_cmd` of a CSV or Parquet file.
+    /// Reads the columns `time,tau_cmd` of a file.
     pub fn read(path: &Path, held: bool) -> Result<Self> {
-        let table = Table::read(path, &["time", TAU_CMD])?;
+        let signal =
+            Signal { name: TAU_CMD, required: true, between: Between::Missing, unit: None };
+        let wanted = Wanted { signals: &[signal], columns: &Columns::default() };
+        let table = recording::read_inputs(path, &wanted, &[], &mut |_| {})?;
         let column = |name| table.column(name).unwrap_or_default();
         Torque::rows(column("time"), column(TAU_CMD), None, held)
             .with_context(|| format!("{} cannot be used", path.display()))

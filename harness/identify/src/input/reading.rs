@@ -119,22 +119,23 @@ pub fn read_decay(
     let name = path.display().to_string();
     let given = DECAYING.iter().filter(|name| source.columns.names(name)).collect::<Vec<_>>();
     ensure!(given.len() < 2, "--columns names {} signals; a free decay is one", given.len());
-    let there = recording::names(path)?;
+    let signal = |name| Signal { name, required: true, between: Between::Line, unit: None };
+    let there = recording::assigned(path, &DECAYING.map(signal))?;
+    let own = |k: usize| there.iter().any(|(_, signal)| *signal == Some(k));
     let found = given
         .first()
         .copied()
-        .or_else(|| DECAYING.iter().find(|name| there.iter().any(|n| n == *name)));
+        .or_else(|| (0..DECAYING.len()).find(|k| own(*k)).map(|k| &DECAYING[k]));
     let Some(found) = found.copied() else {
         bail!(
             "{name} has no column {} (columns in it: {}; --columns time=COLUMN,wave_height=COLUMN:UNIT says which is \
              which)",
             DECAYING.join(", "),
-            there.join(", ")
+            there.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
         )
     };
-    let signals = [Signal { name: found, required: true, between: Between::Line, unit: None }];
-    let table =
-        recording::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
+    let wanted = Wanted { signals: &[signal(found)], columns: &source.columns };
+    let table = recording::read(path, &wanted, done)?;
     let column =
         |name: &str| table.column(name).map(<[f64]>::to_vec).context("a column that was read");
     let (time, signal) = (column("time")?, column(found)?);

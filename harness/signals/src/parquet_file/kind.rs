@@ -87,6 +87,8 @@ pub enum Kind {
     Time(Temporal),
     /// Durations of months, days and milliseconds, 12 bytes.
     Interval,
+    /// True and false, which are 1 and 0.
+    Boolean,
 }
 
 impl fmt::Display for Kind {
@@ -95,6 +97,7 @@ impl fmt::Display for Kind {
             Kind::Time(Temporal { tick, is_date: true }) => write!(f, "dates in {}", tick.name()),
             Kind::Time(Temporal { tick, .. }) => write!(f, "durations in {}", tick.name()),
             Kind::Interval => f.write_str("durations"),
+            Kind::Boolean => f.write_str("true and false"),
             _ => f.write_str("numbers"),
         }
     }
@@ -170,6 +173,7 @@ impl Kind {
                 Ok(arrow.map_or(Kind::Integer { signed: true }, Kind::Time))
             }
             Physical::FLOAT | Physical::DOUBLE => Ok(Kind::Real),
+            Physical::BOOLEAN => Ok(Kind::Boolean),
             other => Err(format!("its type is {other}")),
         }
     }

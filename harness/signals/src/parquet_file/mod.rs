@@ -71,7 +71,8 @@ pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
 
-/// Reads the columns at the places that `positions` finds among the names of all.
+/// Reads the columns at the places that `positions` finds among the names of all. Those at which `booleans` is true may hold true
+/// and false.
 ///
 /// # Errors
 /// If the file cannot be read, a column holds no numbers, or the unit of the time is not known.
@@ -79,6 +80,7 @@ pub fn read(
     path: &Path,
     positions: impl Fn(&[String]) -> Result<Vec<usize>>,
     time: Option<Time>,
+    booleans: &[bool],
 ) -> Result<Found> {
     guarded(|| {
         let reader = open(path)?;
@@ -100,12 +102,15 @@ pub fn read(
             let name = &names[position];
             let kind = Kind::of(&column, arrow.get(name).copied())
                 .map_err(|why| anyhow!("column {name} does not hold numbers: {why}"))?;
-            match time.filter(|time| time.place == k) {
-                Some(time) => kind.check_time(name, &time)?,
-                None => ensure!(
-                    !matches!(kind, Kind::Time(_)),
-                    "column {name} holds {kind} (allowed: numbers)"
-                ),
+            let is_time = time.filter(|time| time.place == k);
+            let is_fine = match kind {
+                Kind::Time(_) => is_time.is_some(),
+                Kind::Boolean => booleans.get(k) == Some(&true),
+                _ => true,
+            };
+            ensure!(is_fine, "column {name} holds {kind} (allowed: numbers)");
+            if let Some(time) = is_time {
+                kind.check_time(name, &time)?;
             }
             kinds.push((kind, column.max_def_level()));
         }
@@ -185,7 +190,9 @@ fn values(
         ColumnReader::ByteArrayColumnReader(r) => {
             batches(r, rows, level, into, |v| kind.bytes(v.data()))
         }
-        ColumnReader::BoolColumnReader(_) => bail!("it does not hold numbers"),
+        ColumnReader::BoolColumnReader(r) => {
+            batches(r, rows, level, into, |v| Ok(f64::from(u8::from(*v))))
+        }
     }
 }
 

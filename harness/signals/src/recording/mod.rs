@@ -1,10 +1,12 @@
 //! Recordings: signals in SI units from files that others wrote. The name's ending separates
-//! text in columns, Parquet and MATLAB's `.mat`. [`Columns`], a row of units or units in the names of the columns
-//! (`gyro_z [deg/s]`) give the signal and the unit of each column.
+//! text in columns, Parquet and MATLAB's `.mat`. [`Columns`], a row of units or the names of the columns (`gyro_z [deg/s]`,
+//! `gyro_z_dps`) give the signal and the unit of each column; a unit that none of them states is SI's, which is said, or the file is
+//! refused where that is implausible.
 //!
 //! The rows of a recording are those with a value of one signal, its rows' signal. Where another one has none,
 //! because it is slower or was lost, it is completed: held, or joined by lines. Nothing is resampled. Times that are
-//! printed to few digits are put back onto their even grid ([`stamps`]).
+//! printed to few digits are put back onto their even grid ([`stamps`]). Files of inputs ([`read_inputs`]) are read by the same
+//! rules, with every row as it is.
 
 mod columns;
 mod even;
@@ -12,6 +14,7 @@ mod matlab;
 mod number;
 mod stamps;
 mod text;
+mod time;
 mod unit;
 
 use std::io::Read as _;
@@ -22,27 +25,32 @@ use files::input;
 
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
 pub use self::even::{even, even_with_gaps};
+use self::stamps::Stamps;
+use self::unit::{Dimension, Fault};
 pub use self::unit::{Quantity, conversion};
 use crate::parquet_file;
 use crate::table::Table;
 
 /// Names and units of a file's columns.
 struct Header {
+    /// Names without a unit in brackets at the end.
     names: Vec<String>,
-    /// Units in the file; `None` for a column without one.
-    units: Vec<Option<String>>,
+    /// Names as they are in the file.
+    full: Vec<String>,
+    /// Units in a row below the names; `None` for a column without one.
+    row: Vec<Option<String>>,
 }
 
 impl Header {
-    /// From names, which may end in a unit in brackets, and a row of units.
+    /// From names and a row of units.
     fn of(names: Vec<String>, row: Option<Vec<String>>) -> Header {
-        let mut header = Header { names: Vec::new(), units: Vec::new() };
+        let mut header = Header { names: Vec::new(), full: Vec::new(), row: Vec::new() };
         for (k, name) in names.into_iter().enumerate() {
-            let (bare, unit) = bracketed(&name).unwrap_or((&name, ""));
-            let below = row.as_ref().and_then(|row| row.get(k)).map(|unit| unit.as_str());
-            let unit = below.unwrap_or(unit).trim_matches(['[', ']', '(', ')', ' ']);
-            header.units.push((!unit.is_empty()).then(|| unit.to_string()));
-            header.names.push(bare.to_string());
+            let below = row.as_ref().and_then(|row| row.get(k)).map_or("", |unit| unit.as_str());
+            let unit = below.trim_matches(['[', ']', '(', ')', ' ']);
+            header.row.push((!unit.is_empty()).then(|| unit.to_string()));
+            header.names.push(bracketed(&name).map_or(name.as_str(), |(bare, _)| bare).to_string());
+            header.full.push(name);
         }
         header
     }
@@ -51,23 +59,97 @@ impl Header {
     fn widen(&mut self, width: usize) {
         for k in self.names.len()..width {
             self.names.push(format!("#{}", k + 1));
-            self.units.push(None);
+            self.full.push(format!("#{}", k + 1));
+            self.row.push(None);
         }
     }
 
-    /// Position of a column.
-    fn place(&self, column: &str) -> Result<usize> {
+    /// Position of a column: by its name as it is in the file, without a unit in brackets, or without any unit of that dimension.
+    fn place(&self, column: &str, dimension: Option<Dimension>) -> Result<usize> {
         let number = column.strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
         if let Some(place) = number.filter(|n| (1..=self.names.len()).contains(n)) {
             return Ok(place - 1);
         }
         let bare = bracketed(column).map_or(column, |(name, _)| name);
-        let found: Vec<usize> = (0..self.names.len()).filter(|k| self.names[*k] == bare).collect();
+        let without_unit = |k: &usize| {
+            let stated = dimension.map(|dimension| unit::in_name(&self.full[*k], dimension));
+            matches!(stated, Some(Ok(Some(unit))) if unit.is_last && unit.before == column)
+        };
+        let all = || 0..self.names.len();
+        let mut found: Vec<usize> = all().filter(|k| self.full[*k] == column).collect();
+        if found.is_empty() {
+            found = all().filter(|k| self.names[*k] == bare).collect();
+        }
+        if found.is_empty() {
+            found = all().filter(without_unit).collect();
+        }
         match found[..] {
             [place] => Ok(place),
             [] => Err(anyhow!("no column {column}")),
             _ => Err(anyhow!("more than one column {column} (#{} and others)", found[0] + 1)),
         }
+    }
+
+    /// Unit of a signal in its column, and the factor to the unit in which it is wanted; `None` if the file states none.
+    fn unit(&self, place: usize, signal: &Signal) -> Result<Option<(String, f64)>> {
+        let row = match &self.row[place] {
+            Some(unit) => Some((unit.clone(), factor(signal, unit)?)),
+            None => None,
+        };
+        let wanted = dimension(signal).filter(|_| self.full[place] != signal.name);
+        let named = match wanted
+            .map(|(dimension, own)| (unit::in_name(&self.full[place], dimension), own))
+        {
+            None | Some((Ok(None), _)) => None,
+            Some((Ok(Some(stated)), own)) => Some((stated.text, stated.factor / own)),
+            Some((Err(Fault::Foreign(unit)), _)) => Some((unit.clone(), factor(signal, &unit)?)),
+            Some((Err(Fault::Two(one, other)), _)) => {
+                bail!("its name states two units, {one} and {other}")
+            }
+        };
+        match (row, named) {
+            (Some((below, a)), Some((unit, b))) => {
+                ensure!(
+                    (a / b - 1.0).abs() < 1e-9,
+                    "its name states {unit}, the row of units {below}"
+                );
+                Ok(Some((unit, b)))
+            }
+            (row, named) => Ok(named.or(row)),
+        }
+    }
+
+    /// Columns of whole seconds and of the rest of a second, with the factor of the rest: `stamp.sec`, `stamp.nanosec`.
+    fn halves(&self) -> Vec<(usize, usize, f64)> {
+        const RESTS: [(&str, f64); 11] = [
+            ("nanosecs", 1e-9),
+            ("nanosec", 1e-9),
+            ("nanoseconds", 1e-9),
+            ("nsecs", 1e-9),
+            ("nsec", 1e-9),
+            ("ns", 1e-9),
+            ("microseconds", 1e-6),
+            ("usecs", 1e-6),
+            ("usec", 1e-6),
+            ("us", 1e-6),
+            ("millisec", 1e-3),
+        ];
+        let lower: Vec<String> = self.names.iter().map(|name| name.to_lowercase()).collect();
+        let mut found = Vec::new();
+        for (rest, name) in lower.iter().enumerate() {
+            let stem =
+                RESTS.iter().find_map(|(end, factor)| Some((name.strip_suffix(end)?, *factor)));
+            let Some((stem, factor)) = stem else { continue };
+            let is_whole = |other: &String| {
+                other
+                    .strip_prefix(stem)
+                    .is_some_and(|end| ["sec", "secs", "seconds", "s"].contains(&end))
+            };
+            if let Some(whole) = lower.iter().position(is_whole) {
+                found.push((whole, rest, factor));
+            }
+        }
+        found
     }
 }
 
@@ -131,6 +213,10 @@ pub struct Wanted<'a> {
 const LATE: f64 = 1e6;
 /// Latest time whose unit may be unstated, s since 1970: the year 5138. Milliseconds since 1970 are later.
 const LATEST: f64 = 1e11;
+/// Time between rows, s, from which on a unit must be stated: slosh has periods of a second.
+const SLOWEST: f64 = 1.0;
+/// The same, up to which one must be stated: no slosh is recorded at 20 kHz, and rows at 50 Hz in days are 2e-7 apart.
+const FASTEST: f64 = 5e-5;
 /// Largest magnitude of a value in SI: its fourth power, which statistics take, is finite in sums over all rows.
 const LARGEST: f64 = 1e60;
 /// Rows that a slow signal may miss in succession, in units of its usual spacing, and at least [`SHORT`].
@@ -146,14 +232,47 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
     Ok(file.header().names.clone())
 }
 
+/// Returns every column of a file by its name there, with the place among `signals` of the one that it is: it has the signal's name,
+/// with a unit or without.
+pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<usize>)>> {
+    let file = File::open(path).with_context(|| format!("{} cannot be used", path.display()))?;
+    let header = file.header();
+    let mut found: Vec<_> = header.full.iter().map(|name| (name.clone(), None)).collect();
+    for (k, signal) in signals.iter().enumerate() {
+        let dimension = dimension(signal).map(|(dimension, _)| dimension);
+        if let Ok(place) = header.place(signal.name, dimension) {
+            found[place].1 = Some(k);
+        }
+    }
+    Ok(found)
+}
+
 /// Reads a recording: `time` (s) and the signals that are there, in SI units. `done` hears what was done to it.
 ///
 /// # Errors
 /// If the file cannot be read so. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
-    read_as(path, wanted, &mut |words| done(format!("{name}: {words}")))
+    read_as(path, wanted, None, &mut |words| done(format!("{name}: {words}")))
         .with_context(|| format!("{name} cannot be used"))
+}
+
+/// Reads histories of inputs: `time` (s) and the signals, every row as it is. Those among `booleans` may be `true` and `false`, which
+/// are 1 and 0. Rows may come at any times, and each must have every value.
+///
+/// # Errors
+/// If the file cannot be read so.
+pub fn read_inputs(
+    path: &Path,
+    wanted: &Wanted,
+    booleans: &[&str],
+    done: &mut dyn FnMut(String),
+) -> Result<Table> {
+    let name = path.display().to_string();
+    let read = read_as(path, wanted, Some(booleans), &mut |words| done(format!("{name}: {words}")));
+    let table = read.with_context(|| format!("{name} cannot be used"))?;
+    table.all_finite().map_err(|error| anyhow!("{name}, {error}"))?;
+    Ok(table)
 }
 
 /// The kinds of files.
@@ -218,7 +337,13 @@ fn refuse_binary(path: &Path) -> Result<()> {
     }
 }
 
-fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
+/// Reads a recording, or with `inputs`, of which those are Booleans, histories of inputs.
+fn read_as(
+    path: &Path,
+    wanted: &Wanted,
+    inputs: Option<&[&str]>,
+    done: &mut dyn FnMut(String),
+) -> Result<Table> {
     let file = File::open(path)?;
     let header = file.header();
     // time first, then the signals that are there
@@ -227,15 +352,15 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     let time_signal = Signal { name: "time", required: true, between: Between::Line, unit: None };
     let counted = wanted.columns.rate();
     if let Some(rate) = counted {
-        let own = header.names.iter().find(|name| *name == "time");
-        let own = own
-            .cloned()
-            .or_else(|| wanted.columns.names("time").then(|| wanted.columns.of("time").name));
         ensure!(
-            own.is_none(),
-            "--rate {rate} is for files without times, and column {} is this one's (allowed: --rate or times)",
-            own.unwrap_or_default()
+            !wanted.columns.names("time"),
+            "--rate {rate} is for rows whose times are not read, and --columns names the column of the time, {} (allowed: one of \
+             them)",
+            wanted.columns.of("time").name
         );
+        if let Ok(own) = header.place("time", Some(Quantity::Time.dimension())) {
+            done(format!("its column {} is passed over (--rate)", header.full[own]));
+        }
     }
     let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());
     let mut stated = None; // seconds in the unit of the time, if one is stated
@@ -246,23 +371,30 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
         format!("--columns {name} is of no use here (allowed: time, {})", names.join(", "))
     }));
     let mut timeless = false;
+    let halves = header.halves();
     let own_time = counted.is_none().then_some(&time_signal);
     for signal in own_time.into_iter().chain(wanted.signals) {
         let column = wanted.columns.of(signal.name);
-        let place = match header.place(&column.name) {
+        let is_time = signal.name == "time";
+        let place = match header
+            .place(&column.name, dimension(signal).map(|(dimension, _)| dimension))
+        {
             Ok(place) => place,
             Err(_) if !signal.required && !wanted.columns.names(signal.name) => continue,
+            Err(_) if is_time && halves.len() == 1 && !wanted.columns.names("time") => halves[0].0,
             Err(error) => {
-                timeless |= signal.name == "time";
+                timeless |= is_time;
                 problems.push(error.to_string());
                 continue;
             }
         };
-        let unit = column.unit.clone().or_else(|| header.units[place].clone());
-        let factor = match unit.as_deref().map(|unit| factor(signal, unit)) {
-            None => 1.0,
-            Some(Ok(factor)) => factor,
-            Some(Err(error)) => {
+        let unit = match &column.unit {
+            Some(unit) => factor(signal, unit).map(|factor| Some((unit.clone(), factor))),
+            None => header.unit(place, signal),
+        };
+        let unit = match unit {
+            Ok(unit) => unit,
+            Err(error) => {
                 problems.push(format!(
                     "column {}: {error}; --columns {}={}:UNIT says which it is",
                     header.names[place], signal.name, column.name
@@ -270,17 +402,21 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
                 continue;
             }
         };
-        if signal.name == "time" && unit.is_some() {
-            stated = Some(factor);
+        if is_time {
+            stated = unit.as_ref().map(|(_, factor)| *factor);
         }
-        used.push(match &unit {
-            Some(unit) => format!("{} = {} in {unit}", signal.name, header.names[place]),
-            None if header.names[place] == signal.name => signal.name.to_string(),
-            None => format!("{} = {}", signal.name, header.names[place]),
+        let named = match header.full[place] == signal.name {
+            true => signal.name.to_string(),
+            false => format!("{} = {}", signal.name, header.names[place]),
+        };
+        used.push(match (&unit, unstated(signal)) {
+            (Some((unit, _)), _) => format!("{named} in {unit}"),
+            (None, Some(unit)) => format!("{named}, no unit stated, taken as {unit}"),
+            (None, None) => named,
         });
         signals.push(*signal);
         places.push(place);
-        factors.push(factor);
+        factors.push(unit.map_or(1.0, |(_, factor)| factor));
     }
     ensure!(
         problems.is_empty(),
@@ -291,17 +427,31 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
         if timeless { "; --rate HZ takes equally spaced rows without times" } else { "" }
     );
     ensure!(!places.is_empty(), "it has no signal that is wanted");
-    let time = header.names[places[0]].as_str();
+    let time = header.full[places[0]].as_str();
     let timed = counted.is_none();
+    // seconds and the rest of them in two columns are one time
+    let half = halves.iter().find(|(whole, rest, _)| {
+        timed && (places[0] == *whole && stated.is_none_or(|s| s == 1.0) || places[0] == *rest)
+    });
+    if let Some((whole, rest, _)) = half {
+        places[0] = *whole;
+        places.push(*rest);
+    }
     let remedy = format!("--columns time={time}:ms, or :s, :us, :ns, :min, :h, states it");
+    let booleans: Vec<bool> = (signals.iter())
+        .map(|signal| inputs.is_some_and(|booleans| booleans.contains(&signal.name)))
+        .chain([false])
+        .collect();
     let found = match &file {
         File::Text(layout) => {
             layout.notes.iter().cloned().for_each(&mut *done);
-            layout.read(path, &places, timed, done)?
+            layout.read(path, &places, timed, &booleans, done)?
         }
         File::Parquet(_) => {
+            let stated = if half.is_some() { Some(1.0) } else { stated };
             let time = parquet_file::Time { place: 0, stated, remedy: &remedy };
-            let found = parquet_file::read(path, |_| Ok(places.clone()), timed.then_some(time))?;
+            let time = timed.then_some(time);
+            let found = parquet_file::read(path, |_| Ok(places.clone()), time, &booleans)?;
             Found { columns: found.columns, origin: found.origin, seconds: found.seconds }
         }
         File::Matlab(header) => {
@@ -310,7 +460,21 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
         }
     };
     done(format!("columns used: {}", used.join(", ")));
-    let Found { mut columns, origin, seconds } = found;
+    let Found { mut columns, origin, mut seconds } = found;
+    if let Some((whole, rest, factor)) = half {
+        let part = columns.pop().unwrap_or_default();
+        if let Some((first, joined)) = joined(&columns[0], &part, *factor) {
+            columns[0] = joined;
+            seconds = true;
+            done(format!(
+                "its times are the columns {} and {}: time counts from {first} s",
+                header.full[*whole], header.full[*rest]
+            ));
+        } else if time == header.full[*rest] {
+            // a time of its own
+            columns[0] = part;
+        }
+    }
     for (k, (column, factor)) in columns.iter_mut().zip(&factors).enumerate() {
         if *factor != 1.0 && !(seconds && k == 0) {
             column.iter_mut().for_each(|value| *value *= factor);
@@ -326,16 +490,6 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
             );
         }
     }
-    if timed
-        && stated.is_none()
-        && !seconds
-        && let Some(late) = columns[0].iter().find(|t| t.abs() > LATEST)
-    {
-        bail!(
-            "column {time} is {late} s, millennia after 1970: it counts ms, us or ns (allowed: up to {LATEST:e} s where no unit is \
-             stated): {remedy}"
-        );
-    }
     if let Some(origin) = origin {
         done(format!("its times are dates: time counts from {origin}"));
     }
@@ -345,20 +499,78 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
         signals.insert(0, time_signal);
         done(format!("it has no times: its rows are taken as {rate} a second (--rate)"));
     }
-    if let Some(grid) = stamps::regular(&columns[0]) {
-        done(format!(
-            "its times are printed to {}: rows {:.6} ms apart have these times, and are taken so",
-            stamps::words(grid.quantum),
-            1e3 * grid.step
-        ));
-        columns[0] = grid.time;
-    }
     let names = signals.iter().map(|signal| signal.name.to_string()).collect();
+    if inputs.is_some() {
+        return Ok(Table::new(names, columns));
+    }
+    if timed && stated.is_none() && !seconds {
+        plausible(&columns[0]).map_err(|why| anyhow!("column {time} {why}: {remedy}"))?;
+    }
+    match stamps::regular(&columns[0]) {
+        Stamps::AsTheyAre => {}
+        Stamps::On(grid) => {
+            done(format!(
+                "its times are printed to {}: rows {:.6} ms apart have these times, and are taken so",
+                stamps::words(grid.quantum),
+                1e3 * grid.step
+            ));
+            columns[0] = grid.time;
+        }
+        Stamps::Unknown(why) => bail!(
+            "column {time}: {why} (allowed: times that grow from row to row; log them with more digits, or leave them out and give the \
+             rows a second, if these are even and complete: --rate HZ)"
+        ),
+    }
     let columns = complete(&signals, columns, rows_signal, done)?;
     Ok(Table::new(names, columns))
 }
 
-/// Factor from a unit to SI for a signal.
+/// Times of whole seconds and parts of them, s, from the first whole second, which comes first; `None` if they are not.
+fn joined(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f64>)> {
+    let first = *whole.first()?;
+    let fine =
+        |(whole, part): (&f64, &f64)| whole.fract() == 0.0 && (0.0..1.0).contains(&(part * factor));
+    let all = || whole.iter().zip(part);
+    (whole.len() == part.len() && all().all(fine))
+        .then(|| (first, all().map(|(whole, part)| whole - first + part * factor).collect()))
+}
+
+/// Fails if times whose unit is not stated are none in seconds: milliseconds, days.
+fn plausible(time: &[f64]) -> Result<()> {
+    if let Some(late) = time.iter().find(|t| t.abs() > LATEST) {
+        bail!(
+            "is {late} s, millennia after 1970 (allowed where no unit is stated: up to {LATEST:e} s)"
+        );
+    }
+    let steps = time.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut steps: Vec<f64> = steps.filter(|step| step.is_finite()).collect();
+    let Some(middle) = steps.len().checked_sub(1).map(|last| last / 2) else { return Ok(()) };
+    let mut usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    if usual == 0.0 {
+        usual = (time[time.len() - 1] - time[0]) / steps.len() as f64;
+    }
+    ensure!(
+        usual < SLOWEST && (usual > FASTEST || usual <= 0.0),
+        "states no unit, and its rows are {usual} apart (allowed where no unit is stated: between {FASTEST} and {SLOWEST} s)"
+    );
+    Ok(())
+}
+
+/// Unit that is taken for a signal whose file states none; `None` for an FMU's variable without a unit.
+fn unstated<'a>(signal: &Signal<'a>) -> Option<&'a str> {
+    let own = signal.unit.or_else(|| Some(quantity(signal.name).ok()?.unit()));
+    own.filter(|unit| !unit.is_empty())
+}
+
+/// Dimension of a signal and the value in SI of the unit in which it is wanted.
+fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
+    match signal.unit {
+        Some(unit) => unit::dimension_of(unit),
+        None => quantity(signal.name).ok().map(|quantity| (quantity.dimension(), 1.0)),
+    }
+}
+
+/// Factor from a unit to the one in which a signal is wanted.
 fn factor(signal: &Signal, unit: &str) -> Result<f64> {
     let Some(own) = signal.unit else {
         let quantity = quantity(signal.name)?;

@@ -24,11 +24,51 @@ const BEYOND: f64 = 0.02;
 /// Fewest rows.
 const FEWEST: usize = 20;
 
-/// Returns the grid under times, s; `None` where they are on an even grid anyway or on none that explains them.
-pub fn regular(time: &[f64]) -> Option<Grid> {
+/// What the times of a recording are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stamps {
+    /// On an even grid anyway, or on none that explains them.
+    AsTheyAre,
+    /// Rounded times of a grid.
+    On(Grid),
+    /// Times that several rows share, of which the true ones are not known; the reason.
+    Unknown(String),
+}
+
+/// Relative error of a grid's step up to which it is taken: that of a logger's clock, which every recording has.
+const LARGEST_ERROR: f64 = 1e-4;
+/// Part of the rows that share their time with the row before from which on the times are not those of the rows.
+const SHARED: f64 = 0.05;
+
+/// Returns the grid under times, s.
+pub fn regular(time: &[f64]) -> Stamps {
     if time.len() < FEWEST || !time.iter().all(|t| t.is_finite()) {
-        return None;
+        return Stamps::AsTheyAre;
     }
+    let shared = time.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let steps = (time.len() - 1) as f64;
+    let is_shared = shared as f64 > SHARED * steps;
+    let grid = grid(time);
+    match grid {
+        Some((grid, error)) if error < LARGEST_ERROR => Stamps::On(grid),
+        found if is_shared => Stamps::Unknown(format!(
+            "{:.1} rows share each time, {}",
+            steps / (steps - shared as f64).max(1.0),
+            match found {
+                Some((_, error)) => format!(
+                    "and the time between rows is known to {:.2} % only, where {} % is needed",
+                    100.0 * error,
+                    100.0 * LARGEST_ERROR
+                ),
+                None => "and no even spacing of the rows explains that".into(),
+            }
+        )),
+        _ => Stamps::AsTheyAre,
+    }
+}
+
+/// The even grid that explains rounded times, and the relative error that its step may have.
+fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     let quantum = quantum(time)?;
     let units: Vec<f64> = time.iter().map(|t| ((t - time[0]) / quantum).round()).collect();
     let steps: Vec<f64> = units.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -39,7 +79,7 @@ pub fn regular(time: &[f64]) -> Option<Grid> {
     let middle = (steps.len() - 1) / 2;
     let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
     // nothing was rounded
-    if steps.iter().all(|step| usual > 0.0 && (step / usual).fract() == 0.0) {
+    if steps.iter().all(|step| *step > 0.0 && (step / usual).fract() == 0.0) {
         return None;
     }
     let indices = (0..time.len()).map(|k| k as f64).collect();
@@ -55,7 +95,32 @@ pub fn regular(time: &[f64]) -> Option<Grid> {
     };
     let (counts, from, step) = fitted(&units, indices).or_else(|| fitted(&units, counted()))?;
     let at = |k: &f64| time[0] + quantum * (from + step * k);
-    Some(Grid { quantum, step: quantum * step, time: counts.iter().map(at).collect() })
+    let grid = Grid { quantum, step: quantum * step, time: counts.iter().map(at).collect() };
+    Some((grid, uncertainty(&units, &counts, step) / step))
+}
+
+/// How far the step may be from `step`, in quanta, such that a grid still explains all stamps: the spread of the stamps about the
+/// grid is a convex function of the step.
+fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
+    let spread = |step: f64| {
+        let off = units.iter().zip(counts).map(|(unit, count)| unit - step * count);
+        let (low, high) =
+            off.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        high - low
+    };
+    let reach = |sign: f64| {
+        let (mut inside, mut outside) = (0.0, 2.0 / (counts[counts.len() - 1] - counts[0]));
+        for _ in 0..20 {
+            let middle = 0.5 * (inside + outside);
+            if spread(step + sign * middle) <= 1.0 + BEYOND {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        outside
+    };
+    reach(1.0).max(reach(-1.0))
 }
 
 /// A quantum in words.
@@ -115,38 +180,72 @@ mod tests {
         rows.map(|k| (k as f64 * step / quantum).round() * quantum).collect()
     }
 
+    fn on(time: &[f64]) -> Grid {
+        match regular(time) {
+            Stamps::On(grid) => grid,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Whole seconds: of a minute the step is known to 0.03 %, of twenty minutes to the error of any clock.
+    #[test]
+    fn a_grid_counts_only_if_its_step_is_known() {
+        let whole =
+            |rows| (0..rows).map(|k| (f64::from(k) * 0.02 + 0.3).floor()).collect::<Vec<f64>>();
+        let Stamps::Unknown(why) = regular(&whole(3000)) else { panic!("a minute is accepted") };
+        assert!(
+            why.contains("rows share each time, and the time between rows is known to 0.0"),
+            "{why}"
+        );
+        assert!((on(&whole(60_000)).step / 0.02 - 1.0).abs() < LARGEST_ERROR);
+        let mut lost = whole(60_000);
+        lost.retain({
+            let mut state = 1_u32;
+            move |_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                state >> 24 > 8
+            }
+        });
+        let Stamps::Unknown(why) = regular(&lost) else { panic!("lost rows are accepted") };
+        assert!(why.contains("no even spacing"), "{why}");
+    }
+
     #[test]
     fn rounded_times_are_put_back_onto_their_grid() {
         // the last one has rows closer than its digits
         for (step, quantum) in [(1.0 / 33.0, 1e-3), (1.0 / 60.0, 1e-2), (1.0 / 120.0, 1e-2)] {
-            let grid = regular(&printed(step, 0..5000, quantum)).unwrap();
+            let grid = on(&printed(step, 0..5000, quantum));
             assert_eq!(grid.quantum, quantum);
             let off = |(k, t): (usize, &f64)| (t - grid.time[0] - k as f64 * step).abs();
             let worst = grid.time.iter().enumerate().map(off).fold(0.0, f64::max);
-            assert!(worst < 1e-2 * quantum, "{step} {worst:e}");
+            // of the last one the rounded halves, all up, turn the grid a little
+            assert!(worst < 2e-2 * quantum, "{step} {worst:e}");
         }
         // two stretches of rows are missing
         let mut gaps = printed(1.0 / 33.0, 0..5000, 1e-3);
         gaps.drain(4000..4077);
         gaps.drain(1000..1007);
-        let grid = regular(&gaps).unwrap();
+        let grid = on(&gaps);
         assert!((grid.time[4900] - grid.time[0] - 4984.0 / 33.0).abs() < 2e-5);
     }
 
     #[test]
     fn times_that_no_grid_explains_stay_as_they_are() {
         let even = printed(0.02, 0..5000, 1e-3);
-        assert_eq!(regular(&even), None);
+        assert_eq!(regular(&even), Stamps::AsTheyAre);
         let mut lost = even.clone();
         lost.drain(100..110);
-        assert_eq!(regular(&lost), None);
+        assert_eq!(regular(&lost), Stamps::AsTheyAre);
         // real jitter of 3 ms, printed in ms
         let mut state = 1_u64;
         let jitter = even.iter().map(|t| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             t + 1e-3 * ((state >> 33) % 4) as f64
         });
-        assert_eq!(regular(&jitter.collect::<Vec<_>>()), None);
-        assert_eq!(regular(&printed(std::f64::consts::PI / 100.0, 0..5000, 1e-12)), None);
+        assert_eq!(regular(&jitter.collect::<Vec<_>>()), Stamps::AsTheyAre);
+        assert_eq!(
+            regular(&printed(std::f64::consts::PI / 100.0, 0..5000, 1e-12)),
+            Stamps::AsTheyAre
+        );
     }
 }

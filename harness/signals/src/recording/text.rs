@@ -7,10 +7,10 @@ use std::io::{BufRead, BufReader, Read as _};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use chrono::{DateTime, NaiveDateTime, NaiveTime, Timelike as _};
 use files::{budget, input};
 
 use super::number::Style;
+use super::time::{Moment, Times, moment};
 use super::{Found, Header};
 
 /// Lines from which separator and header are seen.
@@ -30,9 +30,6 @@ enum Separator {
     Char(char),
     Blanks,
 }
-
-/// Nanoseconds of a day.
-const DAY: i64 = 86_400_000_000_000;
 
 /// In the order in which they are preferred.
 const SEPARATORS: [Separator; 4] =
@@ -85,12 +82,9 @@ impl Separator {
 #[derive(Clone, Debug, PartialEq)]
 enum Value {
     Number(f64),
-    /// Nanoseconds since 1970.
-    Date(i64),
-    /// Nanoseconds since midnight.
-    Clock(i64),
+    Time(Moment),
     Missing,
-    /// A number that can be read in two ways; the reason.
+    /// A number or a time that can be read in two ways, or in none; the reason.
     Ambiguous(String),
     Other,
 }
@@ -102,52 +96,21 @@ impl Value {
     }
 }
 
-/// Forms of dates, all with a time of day and any number of decimals of the second.
-const DATES: [&str; 5] = [
-    "%Y-%m-%dT%H:%M:%S%.f",
-    "%Y-%m-%d %H:%M:%S%.f",
-    "%Y/%m/%d %H:%M:%S%.f",
-    "%d.%m.%Y %H:%M:%S%.f",
-    "%d-%b-%Y %H:%M:%S%.f",
-];
-
-/// Nanoseconds since 1970 of a date and time by ISO 8601, with slashes or as 31.1.2026, in UTC unless it says otherwise.
-fn date(field: &str) -> Option<i64> {
-    if field.len() < 14 || !field.contains(':') {
-        return None;
-    }
-    // decimal commas, as Python's logging writes them
-    let field = &field.replace(',', ".");
-    let zoned = || DateTime::parse_from_rfc3339(field).ok()?.timestamp_nanos_opt();
-    let plain =
-        |form| NaiveDateTime::parse_from_str(field, form).ok()?.and_utc().timestamp_nanos_opt();
-    zoned().or_else(|| DATES.iter().find_map(|form| plain(form)))
-}
-
-/// Nanoseconds since midnight of a time of day, 23:59:59.98, or of a duration as pandas writes it, 0 days 00:00:00.02.
-fn clock(field: &str) -> Option<i64> {
-    if let Some((days, rest)) = field.split_once(" days ") {
-        let days = days.parse::<i64>().ok().filter(|days| (0..100_000).contains(days))?;
-        return Some(days * DAY + clock(rest)?);
-    }
-    if field.len() < 7 || field.bytes().filter(|byte| *byte == b':').count() != 2 {
-        return None;
-    }
-    let time = NaiveTime::parse_from_str(&field.replace(',', "."), "%H:%M:%S%.f").ok()?;
-    Some(i64::from(time.num_seconds_from_midnight()) * 1_000_000_000 + i64::from(time.nanosecond()))
-}
-
 /// Divides a field into the date or clock time that a terminal program puts before each line, and the rest:
 /// `12:00:00.020 -> 5`, `[12:00:00.020] 5`, `12:00:00.020 5`.
 fn stamped(field: &str) -> Option<(&str, &str)> {
-    if !field.contains(':') {
+    if !field.contains(':') || matches!(moment(field), Ok(Some(_))) {
         return None;
     }
     let bracketed = field.strip_prefix('[').and_then(|field| field.split_once(']'));
     let (stamp, rest) =
         bracketed.or_else(|| field.split_once('>')).or_else(|| field.rsplit_once(' '))?;
+    // 12:00:00 CET
+    if bracketed.is_none() && rest.len() < 6 && rest.chars().all(|c| c.is_ascii_uppercase()) {
+        return None;
+    }
     let (stamp, rest) = (stamp.trim_end_matches([' ', '-']), rest.trim());
-    (!rest.is_empty() && (date(stamp).is_some() || clock(stamp).is_some())).then_some((stamp, rest))
+    (!rest.is_empty() && matches!(moment(stamp), Ok(Some(_)))).then_some((stamp, rest))
 }
 
 /// Returns true for a field that marks a missing value, or what C's library and spreadsheets print for NaN.
@@ -184,12 +147,21 @@ fn value((field, quoted): (&str, bool), separator: Separator, style: &mut Style)
     match style.number(field, comma) {
         Ok(Some(number)) => Value::Number(number),
         Ok(None) if missing(field) => Value::Missing,
-        Ok(None) => match (date(field), clock(field)) {
-            (Some(date), _) => Value::Date(date),
-            (None, Some(clock)) => Value::Clock(clock),
-            (None, None) => Value::Other,
+        Ok(None) => match moment(field) {
+            Ok(Some(moment)) => Value::Time(moment),
+            Ok(None) => Value::Other,
+            Err(reason) => Value::Ambiguous(reason),
         },
         Err(reason) => Value::Ambiguous(reason),
+    }
+}
+
+/// The number of a Boolean.
+fn truth(field: &str) -> Result<f64, String> {
+    match field.to_ascii_lowercase().as_str() {
+        "true" => Ok(1.0),
+        "false" => Ok(0.0),
+        _ => Err("is not a Boolean (allowed: true, false, 1, 0)".into()),
     }
 }
 
@@ -393,13 +365,20 @@ struct Lines {
     ended: bool,
     /// The last comment, without its sign.
     comment: Option<String>,
+    /// The byte that ends a line.
+    end: u8,
 }
 
 impl Lines {
     fn open(path: &Path) -> Result<Self> {
         let file = input::open(path).context("it cannot be opened")?;
+        let mut reader = BufReader::with_capacity(1 << 16, file);
+        let start = reader.fill_buf()?;
+        // lines that end in CR alone, as of old Macs and some instruments
+        let is_old = start.contains(&b'\r') && !start.contains(&b'\n');
         Ok(Lines {
-            reader: BufReader::with_capacity(1 << 16, file),
+            reader,
+            end: if is_old { b'\r' } else { b'\n' },
             bytes: Vec::new(),
             number: 0,
             ended: true,
@@ -411,12 +390,13 @@ impl Lines {
     fn next(&mut self, text: &mut String) -> Result<bool> {
         loop {
             self.bytes.clear();
-            let read = (&mut self.reader).take(LONGEST_LINE).read_until(b'\n', &mut self.bytes)?;
+            let read =
+                (&mut self.reader).take(LONGEST_LINE).read_until(self.end, &mut self.bytes)?;
             self.number += 1;
             if read == 0 {
                 return Ok(false);
             }
-            self.ended = self.bytes.ends_with(b"\n");
+            self.ended = self.bytes.ends_with(&[self.end]);
             let line = self.number;
             ensure!(
                 (read as u64) < LONGEST_LINE,
@@ -429,6 +409,12 @@ impl Lines {
                 "it is UTF-16; save it as UTF-8"
             );
             ensure!(!self.bytes.contains(&0), "line {line} has a byte 0: it is not text");
+            let cut = self.bytes.trim_ascii_end();
+            ensure!(
+                !cut.contains(&b'\r') && !cut.contains(&b'\n'),
+                "line {line} has a carriage return within it: some lines of the file end in CR alone, others in LF (allowed: one kind \
+                 of line ends)"
+            );
             text.clear();
             match std::str::from_utf8(&self.bytes) {
                 Ok(valid) => text.push_str(valid),
@@ -615,12 +601,13 @@ impl Layout {
     }
 
     /// Reads the columns at these places, that of the time first if the file has `times`: dates and clock times are
-    /// allowed there. NaN where a value is missing.
+    /// allowed there. `true` and `false` are allowed where `booleans` is true. NaN where a value is missing.
     pub fn read(
         &self,
         path: &Path,
         places: &[usize],
         times: bool,
+        booleans: &[bool],
         done: &mut dyn FnMut(String),
     ) -> Result<Found> {
         let mut lines = Lines::open(path)?;
@@ -628,7 +615,7 @@ impl Layout {
         let mut columns = vec![Vec::new(); places.len()];
         let mut styles = vec![Style::default(); places.len()];
         let mut text = String::new();
-        let (mut stamps, mut faults, mut count) = (None, Vec::new(), 0_usize);
+        let (mut stamps, mut faults, mut count) = (Times::default(), Vec::new(), 0_usize);
         let mut fault = |words: String| {
             count += 1;
             if count <= NAMED {
@@ -662,10 +649,15 @@ impl Layout {
                 let is_time = times && k == 0;
                 let begins = columns[k].is_empty();
                 let parsed = match value(fields[place], self.separator, &mut styles[k]) {
-                    Value::Number(number) if !is_time || stamps.is_none() => Ok(number),
+                    Value::Number(number) if !is_time || stamps.is_empty() => Ok(number),
                     Value::Missing => Ok(f64::NAN),
-                    Value::Date(at) if is_time => Stamps::date(&mut stamps, begins, at),
-                    Value::Clock(at) if is_time => Stamps::clock(&mut stamps, begins, at),
+                    Value::Time(moment) if is_time && (begins || !stamps.is_empty()) => {
+                        stamps.seconds(moment, fields[place].0)
+                    }
+                    Value::Time(_) if is_time => {
+                        Err("is a date or a clock time, where the lines above have numbers".into())
+                    }
+                    Value::Other if booleans[k] => truth(fields[place].0),
                     Value::Ambiguous(reason) => Err(reason),
                     _ => Err("is not a number".into()),
                 };
@@ -691,53 +683,8 @@ impl Layout {
                 faults.join("; ")
             );
         }
-        let origin = stamps.as_ref().map(Stamps::origin);
+        let origin = stamps.origin();
         let seconds = origin.is_some();
         Ok(Found { columns, origin, seconds })
-    }
-}
-
-/// Times that are dates or clock times.
-enum Stamps {
-    /// Since the first one, ns since 1970.
-    Dates(i64),
-    /// Since the first one, ns since midnight; the last one, with the days that have passed.
-    Clock(i64, i64),
-}
-
-impl Stamps {
-    /// Seconds from the first date to another one.
-    fn date(stamps: &mut Option<Stamps>, begins: bool, at: i64) -> Result<f64, String> {
-        let first = match stamps {
-            None if begins => at,
-            Some(Stamps::Dates(first)) => *first,
-            _ => return Err("is a date, where the lines above have none".into()),
-        };
-        *stamps = Some(Stamps::Dates(first));
-        Ok((i128::from(at) - i128::from(first)) as f64 * 1e-9)
-    }
-
-    /// Seconds from the first clock time to another one, midnights counted.
-    fn clock(stamps: &mut Option<Stamps>, begins: bool, at: i64) -> Result<f64, String> {
-        let (first, last) = match stamps {
-            None if begins => (at, at),
-            Some(Stamps::Clock(first, last)) => (*first, *last),
-            _ => return Err("is a clock time, where the lines above have none".into()),
-        };
-        // half a day back is a midnight
-        let days = (last - at + DAY / 2).div_euclid(DAY).max(0);
-        let at = at + days * DAY;
-        *stamps = Some(Stamps::Clock(first, at));
-        Ok((at - first) as f64 * 1e-9)
-    }
-
-    /// The first one, in words.
-    fn origin(&self) -> String {
-        match self {
-            Stamps::Dates(at) => DateTime::from_timestamp_nanos(*at).to_rfc3339(),
-            Stamps::Clock(at, _) => {
-                DateTime::from_timestamp_nanos(*at).format("%H:%M:%S%.f").to_string()
-            }
-        }
     }
 }

@@ -1,4 +1,9 @@
-//! Units in which recordings come, and what they are in SI.
+//! Units in which recordings come, and their values in SI.
+//!
+//! One grammar reads a unit wherever a file states it: in brackets, in a row of units, and in the name of a column itself
+//! ([`in_name`]). A unit is a product of symbols (`mN`, `deg`, `s`) or words (`degrees`, `microseconds`) with whole exponents:
+//! `N·m`, `mN.m`, `Nm`, `m/s^2`, `m s⁻²`, `deg per sec`, `deg_s`. Which product a text means is decided by the quantity that is
+//! expected: `nm` is a torque in newton metres or a length in nanometres.
 
 use std::fmt;
 
@@ -23,96 +28,546 @@ pub enum Quantity {
 
 use Quantity::{Acceleration, Angle, Force, Length, Rate, Time, Torque};
 
+/// Exponents of kg, m, s and rad.
+pub(super) type Dimension = [i8; 4];
+
 /// Standard gravity, m/s² (BIPM, The International System of Units, 3rd CGPM 1901).
 const GRAVITY: f64 = 9.80665;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// The force of a pound under standard gravity, N (0.453 592 37 kg, the international yard and pound agreement of 1959).
+const POUND: f64 = 0.453_592_37 * GRAVITY;
 
-/// Units by name, and one of them in SI; of each quantity the SI unit first. Names are written without dots,
-/// blanks and powers' signs ([`plain`]).
-const UNITS: &[(Quantity, &str, f64)] = &[
-    (Time, "s", 1.0),
-    (Time, "ms", 1e-3),
-    (Time, "us", 1e-6),
-    (Time, "ns", 1e-9),
-    (Time, "min", 60.0),
-    (Time, "h", 3600.0),
-    (Torque, "Nm", 1.0),
-    (Torque, "mNm", 1e-3),
-    (Torque, "uNm", 1e-6),
-    (Torque, "Ncm", 1e-2),
-    (Torque, "kNm", 1e3),
-    (Rate, "rad/s", 1.0),
-    (Rate, "mrad/s", 1e-3),
-    (Rate, "deg/s", DEGREE),
-    (Rate, "mdeg/s", 1e-3 * DEGREE),
-    (Rate, "dps", DEGREE),
-    (Rate, "deg/h", DEGREE / 3600.0),
-    (Rate, "rpm", 6.0 * DEGREE),
-    (Angle, "rad", 1.0),
-    (Angle, "mrad", 1e-3),
-    (Angle, "urad", 1e-6),
-    (Angle, "deg", DEGREE),
-    (Angle, "arcsec", DEGREE / 3600.0),
-    (Acceleration, "m/s2", 1.0),
-    (Acceleration, "mm/s2", 1e-3),
-    (Acceleration, "g", GRAVITY),
-    (Acceleration, "mg", 1e-3 * GRAVITY),
-    (Length, "m", 1.0),
-    (Length, "cm", 1e-2),
-    (Length, "mm", 1e-3),
-    (Length, "um", 1e-6),
-    (Force, "N", 1.0),
-    (Force, "mN", 1e-3),
-    (Force, "kN", 1e3),
+/// A symbol: its dimension, its value in SI, and the prefixes that it takes.
+type Symbol = (&'static str, Dimension, f64, &'static str);
+
+const SYMBOLS: [Symbol; 20] = [
+    ("s", [0, 0, 1, 0], 1.0, "mun"),
+    ("min", [0, 0, 1, 0], 60.0, ""),
+    ("h", [0, 0, 1, 0], 3600.0, ""),
+    ("d", [0, 0, 1, 0], 86_400.0, ""),
+    ("rad", [0, 0, 0, 1], 1.0, "mu"),
+    ("deg", [0, 0, 0, 1], DEGREE, "m"),
+    ("arcmin", [0, 0, 0, 1], DEGREE / 60.0, ""),
+    ("arcsec", [0, 0, 0, 1], DEGREE / 3600.0, ""),
+    ("rev", [0, 0, 0, 1], 360.0 * DEGREE, ""),
+    ("dps", [0, 0, -1, 1], DEGREE, "m"),
+    ("rpm", [0, 0, -1, 1], 6.0 * DEGREE, ""),
+    ("m", [0, 1, 0, 0], 1.0, "mcun"),
+    ("in", [0, 1, 0, 0], 0.0254, ""),
+    ("ft", [0, 1, 0, 0], 0.3048, ""),
+    ("N", FORCE, 1.0, "muk"),
+    ("lbf", FORCE, POUND, ""),
+    ("ozf", FORCE, POUND / 16.0, ""),
+    ("kg", [1, 0, 0, 0], 1.0, ""),
+    ("g", [0, 1, -2, 0], GRAVITY, "mu"),
+    ("gal", [0, 1, -2, 0], 1e-2, "m"),
 ];
 
-/// A unit's name as [`UNITS`] has it: N·m, N.m, N*m and "N m" are Nm, m/s² and m/s^2 are m/s2, °/s and deg/sec are deg/s.
-fn plain(text: &str) -> String {
-    let text = text.replace('°', "deg").replace(['µ', 'μ'], "u").replace('²', "2");
-    let name: String =
-        text.chars().filter(|c| !matches!(c, '·' | '.' | '*' | '^' | ' ' | '⋅')).collect();
-    match name.strip_suffix("sec") {
-        Some(start) if !start.ends_with("arc") => format!("{start}s"),
-        _ => name,
+const FORCE: Dimension = [1, 1, -2, 0];
+const LENGTH: Dimension = [0, 1, 0, 0];
+const PREFIXES: [(&str, &str, f64); 5] = [
+    ("m", "milli", 1e-3),
+    ("u", "micro", 1e-6),
+    ("n", "nano", 1e-9),
+    ("c", "centi", 1e-2),
+    ("k", "kilo", 1e3),
+];
+
+/// Words in lower case for symbols, in the singular.
+const WORDS: [(&str, &str); 26] = [
+    ("sec", "s"),
+    ("second", "s"),
+    ("msec", "ms"),
+    ("milli", "ms"),
+    ("usec", "us"),
+    ("micro", "us"),
+    ("nsec", "ns"),
+    ("nano", "ns"),
+    ("min", "min"),
+    ("minute", "min"),
+    ("hr", "h"),
+    ("hour", "h"),
+    ("day", "d"),
+    ("rad", "rad"),
+    ("radian", "rad"),
+    ("deg", "deg"),
+    ("degree", "deg"),
+    ("rev", "rev"),
+    ("revolution", "rev"),
+    ("newton", "N"),
+    ("meter", "m"),
+    ("metre", "m"),
+    ("inch", "in"),
+    ("foot", "ft"),
+    ("lb", "lbf"),
+    ("oz", "ozf"),
+];
+
+/// A product of symbols.
+type Product = (Dimension, f64);
+
+/// The symbol of that name; with `fold` in any case.
+fn symbol(name: &str, fold: bool) -> Vec<Product> {
+    let same = |a: &str, b: &str| if fold { a.eq_ignore_ascii_case(b) } else { a == b };
+    let mut found = Vec::new();
+    for (own, dimension, factor, prefixes) in SYMBOLS {
+        if same(own, name) {
+            found.push((dimension, factor));
+        }
+        for (prefix, _, scale) in PREFIXES.iter().filter(|(p, ..)| prefixes.contains(p)) {
+            let rest = name.get(1..).filter(|_| name.get(..1).is_some_and(|p| same(p, prefix)));
+            if rest.is_some_and(|rest| same(rest, own)) {
+                found.push((dimension, scale * factor));
+            }
+        }
     }
+    found
 }
 
-/// Units of what no signal measures, by which a row of units is known.
-const OTHERS: [&str; 38] = [
-    "-", "1", "%", "V", "mV", "A", "mA", "W", "J", "ohm", "K", "C", "degC", "degF", "Pa", "hPa",
-    "kPa", "MPa", "bar", "mbar", "psi", "Hz", "kHz", "kg", "l", "m/s", "km/h", "mph", "km", "T",
-    "uT", "mT", "G", "rad/s2", "deg/s2", "dB", "counts", "raw",
+/// Words are the same in any case, in the plural, and with a prefix before them: `Milliseconds`.
+fn word(name: &str) -> Vec<Product> {
+    let lower = name.to_lowercase();
+    let singular = [Some(lower.as_str()), lower.strip_suffix('s')];
+    let mut found = Vec::new();
+    for text in singular.into_iter().flatten() {
+        let direct = WORDS.iter().filter(|(word, _)| *word == text);
+        found.extend(direct.flat_map(|(_, own)| symbol(own, false)));
+        for (_, prefix, scale) in PREFIXES {
+            let rest = text.strip_prefix(prefix).filter(|rest| rest.len() > 2);
+            let word = WORDS.iter().find(|(word, _)| Some(*word) == rest);
+            let product = word.and_then(|(_, own)| symbol(own, false).pop());
+            found.extend(product.map(|(dimension, factor)| (dimension, scale * factor)));
+        }
+    }
+    found
+}
+
+/// A run of letters: a symbol, a word, or two of them without a sign between (`mNm`, `inlb`).
+fn run(name: &str, fold: bool) -> Vec<Product> {
+    let either = |name: &str| [symbol(name, fold), word(name)].concat();
+    let mut found = either(name);
+    // in capitals mega and milli are the same: both, so that neither is taken
+    if fold && name.starts_with(['M']) && name[1..].starts_with(['n', 'N']) {
+        let milli = run(&format!("m{}", &name[1..]), true);
+        return milli.iter().map(|m| (m.0, 1e9 * m.1)).chain(milli.clone()).collect();
+    }
+    for at in 1..name.len() {
+        let (left, right) = (&name[..at], &name[at..]);
+        let pairs =
+            either(left).into_iter().flat_map(|a| either(right).into_iter().map(move |b| (a, b)));
+        let is_pound = ["lb", "lbf", "oz", "ozf"].contains(&&*right.to_lowercase());
+        found.extend(pairs.filter_map(|(a, b)| match (a.0, b.0) {
+            (FORCE, LENGTH) => Some(times(a, b, 1)),
+            (LENGTH, FORCE) if is_pound => Some(times(a, b, 1)),
+            _ => None,
+        }));
+    }
+    found
+}
+
+fn times(a: Product, b: Product, exponent: i8) -> Product {
+    let mut dimension = a.0;
+    dimension
+        .iter_mut()
+        .zip(b.0)
+        .for_each(|(a, b)| *a = a.saturating_add(b.saturating_mul(exponent)));
+    let factor = match exponent {
+        1 => a.1 * b.1,
+        -1 => a.1 / b.1,
+        power => a.1 * b.1.powi(power.into()),
+    };
+    (dimension, factor)
+}
+
+/// A run of letters within a unit.
+struct Term {
+    letters: String,
+    exponent: i8,
+    /// True if the sign before it may stand for a product or for a quotient: `deg_s`.
+    is_soft: bool,
+}
+
+/// The terms of a unit; `None` if a text is none.
+fn terms(text: &str) -> Option<Vec<Term>> {
+    let text = text.replace('°', "deg").replace(['µ', 'μ', 'Μ'], "u").replace('″', "arcsec");
+    let mut found: Vec<Term> = Vec::new();
+    let (mut divides, mut is_soft, mut signs) = (false, false, String::new());
+    let mut all = text.chars().peekable();
+    while let Some(c) = all.next() {
+        match c {
+            'a'..='z' | 'A'..='Z' => {
+                let mut letters = String::from(c);
+                while let Some(c) = all.next_if(char::is_ascii_alphabetic) {
+                    letters.push(c);
+                }
+                if letters.eq_ignore_ascii_case("per") {
+                    divides = true;
+                    continue;
+                }
+                let exponent = if divides { -1 } else { 1 };
+                found.push(Term { letters, exponent, is_soft });
+                (divides, is_soft) = (false, false);
+                signs.clear();
+            }
+            '0'..='9' | '²' | '³' | '¹' => {
+                let size = match c {
+                    '¹' => 1,
+                    '²' => 2,
+                    '³' => 3,
+                    digit => digit.to_digit(10)? as i8,
+                };
+                let last = found.last_mut().filter(|last| last.exponent.abs() == 1 && size > 0)?;
+                if signs.ends_with(['-', '−', '⁻']) {
+                    last.exponent = -last.exponent;
+                }
+                last.exponent *= size;
+                (is_soft, divides) = (false, false);
+                signs.clear();
+            }
+            '/' => divides = true,
+            '_' => is_soft = true,
+            ' ' | '.' | '·' | '⋅' | '∙' | '•' | '×' | '*' | '^' | '-' | '−' | '⁻' => {
+                signs.push(c)
+            }
+            '(' | ')' | '{' | '}' | '[' | ']' => {}
+            _ => return None,
+        }
+    }
+    (!found.is_empty() && !divides).then_some(found)
+}
+
+/// The products that a unit may mean. With `fold` the case of letters does not count, with `divide` soft signs divide.
+fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
+    let Some(terms) = terms(text).filter(|terms| terms.len() < 6) else { return Vec::new() };
+    // m/s² without the sign of division
+    if let [Term { letters, exponent: 2 | -2, .. }] = &terms[..]
+        && letters.eq_ignore_ascii_case("ms")
+    {
+        return vec![([0, 1, -2, 0], 1.0)];
+    }
+    let mut found = vec![([0; 4], 1.0)];
+    let is_single = terms.len() == 1;
+    for term in terms {
+        let exponent = if divide && term.is_soft { -term.exponent } else { term.exponent };
+        // mps2 is m/s²; dps is a symbol
+        let whole = run(&term.letters, fold);
+        if whole.is_empty() {
+            let letters = &term.letters;
+            let split = letters.to_lowercase().find("per").filter(|at| *at > 0);
+            let split = split.map(|at| (&letters[..at], &letters[at + 3..]));
+            let Some((left, right)) = split.or(letters.strip_suffix("ps").map(|l| (l, "s"))) else {
+                return Vec::new();
+            };
+            let (left, right) = (run(left, fold), run(right, fold));
+            let each = found.iter().flat_map(|a| {
+                let above = left.iter().map(move |b| times(*a, *b, exponent.signum()));
+                above.flat_map(|a| right.iter().map(move |b| times(a, *b, -exponent)))
+            });
+            found = each.collect();
+            continue;
+        }
+        // rads^-1 is rad/s
+        let left = term.letters.strip_suffix(['s', 'S']).filter(|_| is_single && exponent < 0);
+        let left = left.map(|left| run(left, fold)).unwrap_or_default();
+        let each = found.iter().flat_map(|a| {
+            let direct = whole.iter().map(move |b| times(*a, *b, exponent));
+            let second = ([0, 0, 1, 0], 1.0);
+            direct.chain(left.iter().map(move |b| times(times(*a, *b, 1), second, exponent)))
+        });
+        found = each.collect();
+        found.truncate(64);
+    }
+    found
+}
+
+/// Values in SI of a unit of that dimension: one for a unit, none for a text that is none, several for one that is ambiguous.
+pub(super) fn factors(text: &str, dimension: Dimension) -> Vec<f64> {
+    for fold in [false, true] {
+        for divide in [false, true] {
+            let mut found: Vec<f64> = Vec::new();
+            for (own, factor) in products(text, fold, divide) {
+                let is_new = |f: &f64| (f / factor - 1.0).abs() > 1e-12;
+                if own == dimension && found.iter().all(is_new) {
+                    found.push(factor);
+                }
+            }
+            if !found.is_empty() {
+                return found;
+            }
+        }
+    }
+    Vec::new()
+}
+
+/// Units of quantities that no signal has, by which a row of units is known.
+const OTHERS: [&str; 42] = [
+    "-", "1", "%", "V", "mV", "A", "mA", "W", "J", "ohm", "K", "C", "degC", "°C", "degF", "Pa",
+    "hPa", "kPa", "MPa", "bar", "mbar", "psi", "Hz", "kHz", "l", "m/s", "km/h", "mph", "km", "T",
+    "uT", "mT", "G", "rad/s2", "rad/s^2", "deg/s2", "deg/s^2", "dB", "counts", "raw", "rps",
+    "grad",
 ];
 
-/// Returns true for the name of a unit, which may stand in brackets.
+/// Returns true for the name of a unit, which may stand in brackets. The halves of a time (`nanosec`) are names of columns.
 pub(super) fn is_unit(text: &str) -> bool {
-    let name = plain(text.trim_matches(['[', ']', '(', ')', ' ']));
-    UNITS.iter().any(|(_, unit, _)| *unit == name) || OTHERS.contains(&name.as_str())
+    let text = text.trim_matches(['[', ']', '(', ')', ' ']);
+    if ["nanosec", "nanosecs", "nsec", "nsecs"].contains(&text) {
+        return false;
+    }
+    let known = |quantity: Quantity| {
+        products(text, false, false).iter().any(|(own, _)| *own == quantity.dimension())
+    };
+    OTHERS.contains(&text) || Quantity::ALL.into_iter().any(known)
 }
 
 /// Factor from one unit to another; `None` unless both are known units of one quantity.
 pub fn conversion(from: &str, to: &str) -> Option<f64> {
-    let (from, to) = (plain(from), plain(to));
     if from == to {
         return Some(1.0);
     }
-    let known = |name: &str| UNITS.iter().find(|(_, unit, _)| *unit == name);
-    let ((quantity, _, factor), (other, _, own)) = (known(&from)?, known(&to)?);
-    (quantity == other).then_some(factor / own)
+    let (dimension, own) = dimension_of(to)?;
+    match factors(from, dimension)[..] {
+        [factor] => Some(factor / own),
+        _ => None,
+    }
+}
+
+/// Dimension and value in SI of a unit of an FMU.
+pub(super) fn dimension_of(unit: &str) -> Option<Product> {
+    match products(unit, false, false)[..] {
+        [only] => Some(only),
+        _ => None,
+    }
+}
+
+/// Signs between the words of a column's name.
+const BETWEEN: [char; 11] = ['_', '.', ' ', '-', ',', ':', '/', '(', ')', '[', ']'];
+/// Words at the end of a name that are units and often something else: minimum, input, revision.
+const OFTEN_OTHERS: [&str; 5] = ["min", "in", "rev", "raw", "counts"];
+
+/// A unit within the name of a column.
+#[derive(Debug, PartialEq)]
+pub(super) struct Stated {
+    /// As it is written.
+    pub text: String,
+    /// Value in SI.
+    pub factor: f64,
+    /// Beginning of the name, up to the unit.
+    pub before: String,
+    /// True if the name ends with the unit.
+    pub is_last: bool,
+}
+
+/// What is wrong with the unit in a name.
+#[derive(Debug, PartialEq)]
+pub(super) enum Fault {
+    /// It is not one of the dimension.
+    Foreign(String),
+    /// There are two.
+    Two(String, String),
+}
+
+/// Finds the unit of a dimension within the name of a column: `gyro [deg/s]`, `gyro{deg/s} z`, `gyro_dps`, `gyroDegPerSec`,
+/// `gyro in deg/s`, `time_ms_boot`, `TIME_US`.
+///
+/// # Errors
+/// If it names a unit of another dimension, or two units.
+pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>, Fault> {
+    let stated = |from: usize, to: usize, text: &str, factor: f64| Stated {
+        text: text.trim().into(),
+        factor,
+        before: before(&name[..from]).into(),
+        is_last: name[to..].trim().is_empty(),
+    };
+    let mut found: Vec<Stated> = Vec::new();
+    let mut other = None;
+    for (from, to) in brackets(name) {
+        let inside = name[from..to].trim_matches(['[', ']', '(', ')', '{', '}', '<', '>', ' ']);
+        match factors(inside, dimension)[..] {
+            [factor] => {
+                let found_here = stated(from, to, inside, factor);
+                // t_ms [s]
+                if let Ok(Some(also)) = in_name(&found_here.before, dimension)
+                    && also.text.len() > 1
+                    && also.factor != factor
+                {
+                    return Err(Fault::Two(also.text, inside.into()));
+                }
+                found.push(found_here);
+            }
+            // `data(3)` of a .mat file is a name
+            [] if inside.chars().all(|c| c.is_ascii_digit()) => {}
+            [] if !is_unit(inside) && !name[to..].trim().is_empty() => {}
+            _ => other = Some(inside),
+        }
+    }
+    if found.is_empty() && other.is_none() {
+        let starts: Vec<usize> = (0..name.len()).filter(|k| begins(name, *k)).collect();
+        let ends: Vec<usize> = (1..=name.len()).filter(|k| ends(name, *k)).collect();
+        let mut taken = (usize::MAX, 0);
+        let mut windows: Vec<(usize, usize)> =
+            starts.iter().flat_map(|from| ends.iter().map(move |to| (*from, *to))).collect();
+        // gyro in deg/s
+        let leads = |from: usize| name[from..].to_lowercase().starts_with("in ");
+        windows.retain(|(from, to)| from < to && to - from <= 40 && !leads(*from));
+        // the longest first, of equal ones the last
+        windows.sort_by_key(|(from, to)| (std::cmp::Reverse(to - from), std::cmp::Reverse(*from)));
+        for (from, to) in windows {
+            let text = &name[from..to];
+            let is_last = name[to..].trim().is_empty();
+            let is_inside = taken.0 <= from && to <= taken.1;
+            if is_inside || !may_be_unit(name, text, from, is_last, dimension) {
+                continue;
+            }
+            let read = |text: &str| factors(text, dimension);
+            let mut factors = read(text);
+            if factors.is_empty() {
+                factors = read(&parted(text));
+            }
+            // Nm_s is no torque
+            let rest = name[from..].trim();
+            let continues = !is_last
+                && [false, true].iter().any(|divide| !products(rest, false, *divide).is_empty());
+            match factors[..] {
+                [] => continue,
+                [factor] if !continues => found.push(stated(from, to, text, factor)),
+                _ => other = other.or(Some(if continues { rest } else { text })),
+            }
+            if taken.0 == usize::MAX {
+                taken = (from, to);
+            }
+        }
+        let is_foreign = |text: &str| {
+            let minutes = dimension == Time.dimension() && text.eq_ignore_ascii_case("m");
+            minutes || text.len() > 1 && !OFTEN_OTHERS.contains(&text) && is_unit(text)
+        };
+        if found.is_empty() && other.is_none() {
+            let ends = starts.iter().filter(|from| **from > 0).map(|from| name[*from..].trim());
+            other = ends.into_iter().find(|text| is_foreign(text));
+        }
+    }
+    let second = found.iter().find(|stated| stated.factor != found[0].factor);
+    match (second.map(|stated| stated.text.as_str()).or(other), found.is_empty()) {
+        (None, true) => Ok(None),
+        (None, false) => Ok(Some(found.swap_remove(0))),
+        (Some(other), true) => Err(Fault::Foreign(other.into())),
+        (Some(other), false) => Err(Fault::Two(found[0].text.clone(), other.into())),
+    }
+}
+
+/// Returns true if a part of a name can be a unit. A single letter is one only at the end, after a sign, and in the right case; a
+/// whole name only if it is a time (`millis`).
+fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Dimension) -> bool {
+    let shouts = !name.contains(|c: char| c.is_lowercase());
+    let is_time = dimension == Time.dimension();
+    match text.chars().count() {
+        _ if from == 0 && is_last => is_time && text != "d" && text != "h" && text != "m",
+        1 if text.is_ascii() => {
+            let after = name[..from].chars().next_back();
+            let own = text.chars().all(|c| c == 'N' || c.is_lowercase() && c != 'n') || shouts;
+            is_last && own && text != "d" && after.is_some_and(|c| BETWEEN.contains(&c))
+        }
+        _ => true,
+    }
+}
+
+/// A name without the signs and the word "in" that lead to its unit.
+fn before(name: &str) -> &str {
+    let name = name.trim_end_matches(|c| BETWEEN.contains(&c) || ['[', '(', '{', '<'].contains(&c));
+    let cut = name.strip_suffix(" in").unwrap_or(name);
+    cut.trim_end_matches(|c| BETWEEN.contains(&c))
+}
+
+/// Places of what stands in brackets.
+fn brackets(name: &str) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
+        let mut from = 0;
+        while let Some(start) = name[from..].find(open).map(|k| from + k) {
+            let Some(end) = name[start..].find(close).map(|k| start + k + 1) else { break };
+            found.push((start, end));
+            from = end;
+        }
+    }
+    // [rad/(s)] counts once
+    let inside = |a: &(usize, usize), b: &(usize, usize)| a != b && b.0 <= a.0 && a.1 <= b.1;
+    let all = found.clone();
+    found.retain(|a| !all.iter().any(|b| inside(a, b)));
+    found
+}
+
+/// Returns true if a word begins at a place: after a sign, or at a capital after a small letter.
+fn begins(name: &str, at: usize) -> bool {
+    let (Some(left), Some(right)) = (name.get(..at), name.get(at..)) else { return false };
+    let (Some(next), last) = (right.chars().next(), left.chars().next_back()) else { return false };
+    let is_hump = |last| is_hump(last, next, right.chars().nth(1));
+    !BETWEEN.contains(&next) && last.is_none_or(|last| BETWEEN.contains(&last) || is_hump(last))
+}
+
+fn ends(name: &str, at: usize) -> bool {
+    let (Some(left), Some(right)) = (name.get(..at), name.get(at..)) else { return false };
+    let (Some(last), next) = (left.chars().next_back(), right.chars().next()) else { return false };
+    let is_hump = |next| is_hump(last, next, right.chars().nth(1));
+    !BETWEEN.contains(&last) && next.is_none_or(|next| BETWEEN.contains(&next) || is_hump(next))
+}
+
+/// Returns true if a word begins with `next`: aB, and A before Bc.
+fn is_hump(last: char, next: char, after: Option<char>) -> bool {
+    next.is_uppercase() && (!last.is_uppercase() || after.is_some_and(char::is_lowercase))
+}
+
+/// `DegPerSec` as `Deg_Per_Sec`.
+fn parted(text: &str) -> String {
+    let mut found = String::new();
+    for (at, c) in text.char_indices() {
+        let after = text[at..].chars().nth(1);
+        if found.chars().next_back().is_some_and(|last| is_hump(last, c, after)) {
+            found.push('_');
+        }
+        found.push(c);
+    }
+    found
 }
 
 impl Quantity {
-    /// Factor from that unit to SI; `None` for an unknown unit.
-    pub fn factor(self, unit: &str) -> Option<f64> {
-        let unit = plain(unit);
-        let found = UNITS.iter().find(|(quantity, name, _)| *quantity == self && *name == unit);
-        found.map(|(_, _, factor)| *factor)
+    const ALL: [Quantity; 7] = [Time, Torque, Rate, Angle, Acceleration, Length, Force];
+
+    /// Its dimension.
+    pub(super) fn dimension(self) -> Dimension {
+        match self {
+            Time => [0, 0, 1, 0],
+            Torque => [1, 2, -2, 0],
+            Rate => [0, 0, -1, 1],
+            Angle => [0, 0, 0, 1],
+            Acceleration => [0, 1, -2, 0],
+            Length => LENGTH,
+            Force => FORCE,
+        }
     }
 
-    /// The names of its units.
-    pub fn units(self) -> String {
-        let names = UNITS.iter().filter(|(quantity, _, _)| *quantity == self);
-        names.map(|(_, name, _)| *name).collect::<Vec<_>>().join(", ")
+    /// Factor from that unit to SI; `None` for an unknown unit.
+    pub fn factor(self, unit: &str) -> Option<f64> {
+        match factors(unit, self.dimension())[..] {
+            [factor] => Some(factor),
+            _ => None,
+        }
+    }
+
+    /// The names of common units, the SI unit first.
+    pub fn units(self) -> &'static str {
+        match self {
+            Time => "s, ms, us, ns, min, h, d",
+            Torque => "N.m, mN.m, uN.m, N.cm, kN.m, lbf.in, ozf.in",
+            Rate => "rad/s, mrad/s, deg/s, mdeg/s, dps, deg/h, rpm",
+            Angle => "rad, mrad, urad, deg, arcmin, arcsec",
+            Acceleration => "m/s2, mm/s2, g, mg",
+            Length => "m, cm, mm, um, in",
+            Force => "N, mN, kN, lbf",
+        }
+    }
+
+    /// The SI unit.
+    pub fn unit(self) -> &'static str {
+        self.units().split(',').next().unwrap_or_default()
     }
 }
 
@@ -136,13 +591,143 @@ mod tests {
 
     #[test]
     fn a_unit_is_known_in_each_of_its_spellings() {
-        for text in ["mN.m", "mN·m", "mNm", "mN*m", "mN m"] {
-            assert_eq!(Torque.factor(text), Some(1e-3), "{text}");
+        let cases: [(Quantity, f64, &[&str]); 12] = [
+            (
+                Torque,
+                1e-3,
+                &[
+                    "mN.m",
+                    "mN·m",
+                    "mNm",
+                    "mN*m",
+                    "mN m",
+                    "mN_m",
+                    "mN-m",
+                    "mnm",
+                    "millinewton meters",
+                ],
+            ),
+            (Torque, 1.0, &["Nm", "N.m", "NM", "nm", "newton-metres", "kg.m2/s2", "kg m^2 s^-2"]),
+            (Torque, POUND * 0.0254, &["lbf.in", "in-lb", "inlb", "lb in", "lbf·in"]),
+            (
+                Rate,
+                DEGREE,
+                &[
+                    "deg/s",
+                    "°/s",
+                    "dps",
+                    "DPS",
+                    "deg/sec",
+                    "deg_s",
+                    "deg per second",
+                    "degrees/s",
+                    "deg s-1",
+                    "deg·s⁻¹",
+                    "degps",
+                    "deg_per_sec",
+                ],
+            ),
+            (Rate, 1.0, &["rad/s", "rad_s", "radps", "rad s^-1", "rad/(s)", "Rad/Sec"]),
+            (Rate, DEGREE / 3600.0, &["deg/h", "deg/hr", "°/h"]),
+            (
+                Acceleration,
+                1.0,
+                &["m/s²", "m/s^2", "m/s2", "m_s2", "ms-2", "mps2", "m/s/s", "m s⁻²"],
+            ),
+            (Acceleration, 1e-3 * GRAVITY, &["mg"]),
+            (Time, 1e-6, &["us", "µs", "μs", "usec", "microseconds", "US", "micros"]),
+            (Time, 1e-3, &["ms", "msec", "millis", "Milliseconds", "MS"]),
+            (Time, 86_400.0, &["d", "days"]),
+            (Angle, DEGREE, &["deg", "°", "degrees"]),
+        ];
+        for (quantity, factor, texts) in cases {
+            for text in texts {
+                let found = quantity.factor(text);
+                assert!(
+                    found.is_some_and(|f| (f / factor - 1.0).abs() < 1e-14),
+                    "{text}: {found:?}"
+                );
+            }
         }
-        assert_eq!(Rate.factor("°/s"), Some(std::f64::consts::PI / 180.0));
-        assert_eq!(Acceleration.factor("m/s²"), Acceleration.factor("m/s^2"));
         assert_eq!((conversion("mN.m", "N.m"), conversion("kg", "kg")), (Some(1e-3), Some(1.0)));
         assert_eq!((conversion("deg", "rad/s"), conversion("mm", "furlong")), (None, None));
-        assert_eq!((Rate.factor("deg"), Torque.factor("mnm")), (None, None));
+        for (quantity, text) in [
+            (Rate, "deg"),
+            (Torque, "MNm"),
+            (Torque, "Nm/rad"),
+            (Rate, "1/s"),
+            (Time, ""),
+            (Time, "x"),
+            (Rate, "rps"),
+            (Time, "ms2"),
+            (Length, "min"),
+            (Rate, "V"),
+            (Time, "s/"),
+        ] {
+            assert_eq!(quantity.factor(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_name_states_its_unit_in_many_ways() {
+        let text = |name: &str, quantity: Quantity| {
+            in_name(name, quantity.dimension()).map(|found| found.map(|s| (s.before, s.text)))
+        };
+        for (quantity, name, before, unit) in [
+            (Rate, "gyro [deg/s]", "gyro", "deg/s"),
+            (Rate, "gyro{deg/s}", "gyro", "deg/s"),
+            (Rate, "Gyro (deg/s) Z", "Gyro", "deg/s"),
+            (Rate, "gyro_dps", "gyro", "dps"),
+            (Rate, "gyro_z_deg_s", "gyro_z", "deg_s"),
+            (Rate, "gyro in deg/s", "gyro", "deg/s"),
+            (Torque, "torque in N.m", "torque", "N.m"),
+            (Rate, "omega_s °/s", "omega_s", "°/s"),
+            (Rate, "Gyro Z, deg per sec", "Gyro Z", "deg per sec"),
+            (Rate, "gyroZDegPerSec", "gyroZ", "DegPerSec"),
+            (Rate, "ω / (deg/s)", "ω", "deg/s"),
+            (Rate, "wheel_speed_rpm", "wheel_speed", "rpm"),
+            (Torque, "torque_mNm", "torque", "mNm"),
+            (Torque, "TORQUE_NM", "TORQUE", "NM"),
+            (Time, "time_ms", "time", "ms"),
+            (Time, "TimeUS", "Time", "US"),
+            (Time, "time_boot_ms", "time_boot", "ms"),
+            (Time, "time_ms_boot", "time", "ms"),
+            (Time, "t/s", "t", "s"),
+            (Time, "TIME_S", "TIME", "S"),
+            (Time, "millis", "", "millis"),
+            (Acceleration, "acc_m_s2", "acc", "m_s2"),
+            (Force, "force_N", "force", "N"),
+        ] {
+            assert_eq!(text(name, quantity), Ok(Some((before.into(), unit.into()))), "{name}");
+        }
+        for (quantity, name) in [
+            (Rate, "gyro_z"),
+            (Rate, "omega_s"),
+            (Rate, "omega_m"),
+            (Torque, "T_cmd"),
+            (Torque, "torque_in"),
+            (Angle, "theta_min"),
+            (Time, "time"),
+            (Time, "timestamp"),
+            (Torque, "data(3)"),
+            (Torque, "tau_cmd"),
+            (Force, "force_n"),
+            (Rate, "gyro_raw"),
+        ] {
+            assert_eq!(text(name, quantity), Ok(None), "{name}");
+        }
+        let foreign = |text: &str| Err(Fault::Foreign(text.into()));
+        for (quantity, name, fault) in [
+            (Rate, "gyro_deg", foreign("deg")),
+            (Rate, "gyro [deg]", foreign("deg")),
+            (Rate, "gyro (furlong)", foreign("furlong")),
+            (Time, "time_m", foreign("m")),
+            (Torque, "torque_MNm", foreign("MNm")),
+            (Torque, "torque_Nm_s", foreign("Nm_s")),
+            (Time, "t_ms [s]", Err(Fault::Two("ms".into(), "s".into()))),
+            (Time, "us_or_ms", Err(Fault::Two("ms".into(), "us".into()))),
+        ] {
+            assert_eq!(text(name, quantity), fault, "{name}");
+        }
     }
 }

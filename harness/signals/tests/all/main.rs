@@ -2,6 +2,7 @@
 
 mod corpus;
 mod fourier;
+mod headers;
 mod recording;
 mod scale;
 mod table;

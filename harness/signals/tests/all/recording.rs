@@ -391,9 +391,9 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
             "--columns force is of no use here (allowed: time, omega, tau_cmd, theta)",
         ),
         ("time,omega,tau_cmd,omega\n0,0,0,0\n", "", "more than one column omega (#2 and others)"),
-        ("time,tau_cmd,omega\n,0,0\n1,0,0\n", "", "row 1 of its values has no time"),
+        ("time,tau_cmd,omega\n,0,0\n0.1,0,0\n", "", "row 1 of its values has no time"),
         (
-            "time,tau_cmd,omega\n0,0,\n1,0,3\n",
+            "time,tau_cmd,omega\n0,0,\n0.1,0,3\n",
             "",
             "omega has values in 1 rows (allowed: at least 2)",
         ),
@@ -488,7 +488,7 @@ fn clock_times_and_dates_of_all_kinds_are_seconds() {
             // nobody's day has an hour 24
             let error = found.unwrap_err();
             assert!(
-                error.contains("line 3, column time: \"24:00:00,010\" is not a number"),
+                error.contains("line 3, column time: \"24:00:00,010\" is no time of day (allowed: hours 0 to 23"),
                 "{error}"
             );
             continue;
@@ -521,7 +521,7 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
         ),
         ("a,b\nidle,x\nbusy,y\n", "line 2, \"idle,x\", is not a row of numbers"),
         // numbers of rows and no omega, or a separator at the end of each row
-        ("time;tau_cmd;omega\n1;0;5;\n2;0;6;\n3;0;7;\n", "omega has values in 0 rows"),
+        ("time [ms];tau_cmd;omega\n1;0;5;\n2;0;6;\n3;0;7;\n", "omega has values in 0 rows"),
     ];
     for (text, words) in cases {
         let error = read_text("csv", text.as_bytes(), "").unwrap_err();
@@ -543,10 +543,15 @@ fn a_file_without_times_is_read_at_a_stated_rate_alone() {
     assert_close(column(&table, "tau_cmd"), &TORQUE, text);
     assert!(said.contains("its rows are taken as 50 a second (--rate)"), "{said}");
     assert!(Columns::default().with_rate(Some(0.0)).is_err());
-    std::fs::write(&path, "time,tau_cmd,omega\n0,0,0\n1,0,0\n").unwrap();
-    let error = read_file(&path, &at_50_hz).unwrap_err();
+    // what a time column says is passed over, unless it is asked for
+    std::fs::write(&path, format!("time,{text}").replace('\n', "\n7,")).unwrap();
+    let (table, said) = read_file(&path, &at_50_hz).unwrap();
+    assert_close(column(&table, "time"), &TIME, text);
+    assert!(said.contains("its column time is passed over (--rate)"), "{said}");
+    let both = columns("time=time:ms").with_rate(Some(50.0)).unwrap();
+    let error = read_file(&path, &both).unwrap_err();
     assert!(
-        error.contains("--rate 50 is for files without times, and column time is this one's"),
+        error.contains("--columns names the column of the time, time (allowed: one of them)"),
         "{error}"
     );
     // a matrix of a .mat file, and Parquet
@@ -554,11 +559,34 @@ fn a_file_without_times_is_read_at_a_stated_rate_alone() {
     let of = columns("tau_cmd=T_cmd:mNm,omega=gyro(3):deg/s").with_rate(rate).unwrap();
     let (table, _) = read_file(&stored("plain.mat"), &of).unwrap();
     assert!((column(&table, "time")[1] - 0.02).abs() < 1e-12);
-    let (table, _) =
-        read_file(&stored("dur_ns.parquet"), &columns("tau_cmd=omega").with_rate(rate).unwrap())
-            .map_err(|error| assert!(error.contains("column time is this one's"), "{error}"))
-            .unwrap_or_default();
-    assert_eq!(table.rows(), 0);
+    let of = columns("tau_cmd=omega").with_rate(rate).unwrap();
+    let (_, said) = read_file(&stored("dur_ns.parquet"), &of).unwrap();
+    assert!(said.contains("its column time is passed over"), "{said}");
+}
+
+#[test]
+fn seconds_and_nanoseconds_are_one_time_unless_each_is_one() {
+    let rows = "0,0,0\n0,20000000,1\n0,40000000,2\n";
+    for (head, of) in [
+        ("sec,nanosec,omega", "tau_cmd=omega"),
+        ("header.stamp.secs,header.stamp.nsecs,omega", "tau_cmd=omega"),
+        ("tv_sec,tv_nsec,omega", "time=tv_sec,tau_cmd=omega"),
+        ("tv_sec,tv_nsec,omega", "time=tv_nsec,tau_cmd=omega"),
+    ] {
+        let (table, said) = read_text("csv", format!("{head}\n{rows}").as_bytes(), of).unwrap();
+        assert_close(column(&table, "time"), &TIME, head);
+        assert!(said.contains("its times are the columns"), "{said}");
+    }
+    // two full times
+    let rows = "1.00,1000000000,0\n1.02,1020000000,1\n1.04,1040000000,2\n";
+    for time in ["t_s", "t_ns"] {
+        let text = format!("t_s,t_ns,omega\n{rows}");
+        let of = format!("time={time},tau_cmd=omega");
+        let (table, said) = read_text("csv", text.as_bytes(), &of).unwrap();
+        let off = |(t, expected): (&f64, f64)| (t - 1.0 - expected).abs() < 1e-12;
+        assert!(column(&table, "time").iter().zip(TIME).all(off), "{time}: {table:?}");
+        assert!(!said.contains("its times are the columns"), "{said}");
+    }
 }
 
 #[test]

@@ -227,7 +227,9 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
         _ => first,
     };
     // a time of day in ms is an i32, which is left out here: a plain integer without a unit
-    let is_unstated = kind == 2 || kind == 1 && unit == "ms";
+    let is_integer = kind == 2 || kind == 1 && unit == "ms";
+    // numbers whose steps are no seconds
+    let is_unstated = is_integer || kind == 5 && step.max(ns) >= 1_000_000_000;
     let omega = Type::primitive_type_builder("omega", Physical::DOUBLE);
     let fields =
         [first, omega].map(|f| Arc::new(f.with_repetition(Repetition::REQUIRED).build().unwrap()));

@@ -1,0 +1,436 @@
+//! Times as dates and clock times: the one parser of times in text.
+//!
+//! Dates by ISO 8601 (also without signs), 2026/01/31, 31.01.2026, 31-Jan-2026, Jan 31, 2026, and with slashes or dashes in the
+//! order that the file shows; clocks of 24 and 12 hours with any decimals, `12:00:00:020`; offsets from UTC as Z, UTC, +01:00,
+//! +0100, +01; durations as `1 days 00:00:00.02`. What can be read in two ways is an error.
+
+use chrono::{DateTime, Datelike as _, NaiveDate};
+
+/// Nanoseconds of a second and of a day.
+const SECOND: i64 = 1_000_000_000;
+const DAY: i64 = 86_400 * SECOND;
+
+/// A date, or a clock time without one.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Moment {
+    /// Nanoseconds since 1970, UTC unless the text says otherwise.
+    Date(i64),
+    /// Nanoseconds since midnight.
+    Clock(i64),
+    /// A date whose order is not known, and the nanoseconds since its midnight.
+    Ordered(Ordered, i64),
+}
+
+/// A date as 3/4/2026: day or month first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ordered {
+    first: u32,
+    second: u32,
+    year: i32,
+    /// True for a year of two digits, which may as well stand first.
+    is_short: bool,
+}
+
+impl Ordered {
+    /// Days since 1970.
+    fn day(self, day_first: bool) -> Result<i64, String> {
+        let Ordered { first, second, year, .. } = self;
+        let (day, month) = if day_first { (first, second) } else { (second, first) };
+        days(year, month, day)
+    }
+}
+
+fn days(year: i32, month: u32, day: u32) -> Result<i64, String> {
+    let date = NaiveDate::from_ymd_opt(year, month, day);
+    let date =
+        date.ok_or(format!("has no date: there is no day {day} of month {month} in {year}"))?;
+    Ok(i64::from(date.num_days_from_ce()) - 719_163) // 1 January 1970
+}
+
+/// Months by the beginnings of their English names.
+const MONTHS: [&str; 12] =
+    ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
+const WEEKDAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
+
+/// The moment of a field; `None` for a text that is none.
+///
+/// # Errors
+/// If it is one that cannot be read, or in two ways: the reason, to stand after the field.
+pub fn moment(field: &str) -> Result<Option<Moment>, String> {
+    if field.len() < 4
+        || field.len() > 60
+        || !field.starts_with(|c: char| c.is_ascii_alphanumeric())
+    {
+        return Ok(None);
+    }
+    let Some(colon) = field.find(':') else { return basic(field) };
+    // decimal commas, as Python's logging writes them
+    let bytes = field.as_bytes();
+    let decimal = field.rfind(',').filter(|at| {
+        *at > colon
+            && bytes.get(at + 1).is_some_and(u8::is_ascii_digit)
+            && bytes[at - 1].is_ascii_digit()
+    });
+    let mut text = field.to_string();
+    if let Some(at) = decimal {
+        text.replace_range(at..=at, ".");
+    }
+    let start = text[..colon].rfind([' ', 'T', 't']).map_or(0, |at| at + 1);
+    let (before, clock) = text.split_at(start);
+    let before = before.trim_end_matches(['T', 't', ' ', ',']).trim();
+    if !clock.starts_with(|c: char| c.is_ascii_digit())
+        || !text[..colon].ends_with(|c: char| c.is_ascii_digit())
+    {
+        return Ok(None);
+    }
+    let Some((clock, offset)) = zoned(clock)? else { return Ok(None) };
+    let Some(time) = clock_time(&clock, !before.is_empty())? else { return Ok(None) };
+    if before.is_empty() {
+        return Ok(Some(Moment::Clock(time - offset)));
+    }
+    // pandas and Python: 1 days 00:00:00.02; 1 day, 0:00:00.02
+    if let Some((count, word)) = before.split_once(' ')
+        && matches!(word, "day" | "days")
+    {
+        let count = count.parse::<i64>().ok().filter(|days| (0..100_000).contains(days));
+        return Ok(count.map(|count| Moment::Clock(count * DAY + time)));
+    }
+    Ok(match date(before)? {
+        None => None,
+        Some(Day::Known(day)) => {
+            (day.checked_mul(DAY)).and_then(|at| at.checked_add(time - offset)).map(Moment::Date)
+        }
+        Some(Day::Either(ordered)) => Some(Moment::Ordered(ordered, time - offset)),
+    })
+}
+
+/// ISO 8601 without signs, 20260131T120000.020.
+fn basic(field: &str) -> Result<Option<Moment>, String> {
+    let Some((day, clock)) = field.split_once(['T', ' ', '_']) else { return Ok(None) };
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let clock = clock.strip_suffix('Z').unwrap_or(clock);
+    let whole = clock.split(['.', ',']).next().unwrap_or_default();
+    if day.len() != 8 || whole.len() != 6 || !is_number(day) || !is_number(whole) {
+        return Ok(None);
+    }
+    let signs = format!("{}:{}:{}", &clock[..2], &clock[2..4], clock[4..].replace(',', "."));
+    let (day, time) = (date(day)?, clock_time(&signs, true)?);
+    Ok(match (day, time) {
+        (Some(Day::Known(day)), Some(time)) => Some(Moment::Date(day * DAY + time)),
+        _ => None,
+    })
+}
+
+/// A clock time with its half of the day, and its offset from UTC, ns.
+fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
+    let end = clock.find(|c: char| !matches!(c, '0'..='9' | ':' | '.')).unwrap_or(clock.len());
+    let (time, rest) = clock.split_at(end);
+    let is_zone = |c: char| c.is_alphanumeric() || matches!(c, '+' | '-' | '−' | ':' | '.' | ' ');
+    let begins = rest.trim_start().chars().next();
+    let fits = begins.is_none_or(|c| c.is_alphabetic() || matches!(c, '+' | '-' | '−'));
+    if rest.len() > 12 || !fits || !rest.chars().all(is_zone) {
+        return Ok(None);
+    }
+    let lower = rest.trim().replace('.', "").to_lowercase();
+    let (half, zone) = match lower.get(..2) {
+        Some(half @ ("am" | "pm")) => (half, lower[2..].trim()),
+        _ => ("", lower.as_str()),
+    };
+    let zone = zone.strip_prefix("utc").or_else(|| zone.strip_prefix("gmt")).unwrap_or(zone);
+    let offset = match zone {
+        "" | "z" => 0,
+        _ => offset(zone).ok_or_else(|| {
+            format!(
+                "ends in \"{}\", which is no offset from UTC (allowed: Z, UTC, +01:00, +0100, AM, PM)",
+                rest.trim()
+            )
+        })?,
+    };
+    Ok(Some((format!("{time}{half}"), offset)))
+}
+
+/// +01:00, +0100 or -05, ns.
+fn offset(text: &str) -> Option<i64> {
+    let (sign, size) = match text.strip_prefix('+') {
+        Some(size) => (1, size),
+        None => (-1, text.strip_prefix(['-', '−'])?),
+    };
+    let digits = size.replace(':', "");
+    let is_number = digits.bytes().all(|b| b.is_ascii_digit());
+    let (hours, minutes): (i64, i64) = match digits.len() {
+        2 if is_number => (digits.parse().ok()?, 0),
+        4 if is_number => (digits[..2].parse().ok()?, digits[2..].parse().ok()?),
+        _ => return None,
+    };
+    (hours <= 14 && minutes < 60).then_some(sign * (hours * 3600 + minutes * 60) * SECOND)
+}
+
+/// Nanoseconds since midnight of `12:00:00.020`, `12:00:00:020`, `12:00:00.020pm` and, beside a date, `12:00`.
+fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
+    let (text, half) = match (text.strip_suffix("am"), text.strip_suffix("pm")) {
+        (Some(text), _) => (text, Some(0)),
+        (_, Some(text)) => (text, Some(12)),
+        _ => (text, None),
+    };
+    let parts: Vec<&str> = text.split(':').collect();
+    let number = |text: &str, most: usize| -> Option<i64> {
+        let fits = (1..=most).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_digit());
+        text.parse().ok().filter(|_| fits)
+    };
+    let (hour, minute, seconds) = match parts[..] {
+        [hour, minute] if has_date && !minute.contains('.') => (hour, minute, "0".to_string()),
+        [minute, second] if number(minute, 2).is_some() && second.len() > 1 => {
+            return Err(
+                "has two parts: minutes and seconds, or hours and minutes? (allowed: hours, minutes and seconds; in Excel the \
+                 format hh:mm:ss.000)"
+                    .into(),
+            );
+        }
+        [hour, minute, second] => (hour, minute, second.to_string()),
+        [hour, minute, second, part] if part.bytes().all(|b| b.is_ascii_digit()) => {
+            if ![3, 6, 9].contains(&part.len()) {
+                return Err(format!(
+                    "has four parts, and the last has {} digits (allowed: 3, 6 or 9, as milli-, micro- or nanoseconds; not frames of \
+                     a film)",
+                    part.len()
+                ));
+            }
+            (hour, minute, format!("{second}.{part}"))
+        }
+        _ => return Ok(None),
+    };
+    let (second, part) = seconds.split_once('.').unwrap_or((&seconds, ""));
+    let (Some(mut hour), Some(minute), Some(second)) =
+        (number(hour, 2), number(minute, 2), number(second, 2))
+    else {
+        return Ok(None);
+    };
+    if !part.bytes().all(|b| b.is_ascii_digit()) {
+        return Ok(None);
+    }
+    let hours = if half.is_some() { 1..=12 } else { 0..=23 };
+    if !hours.contains(&hour) || minute > 59 || second > 59 {
+        return Err(format!(
+            "is no time of day (allowed: hours {} to {}, minutes and seconds up to 59; durations in seconds)",
+            hours.start(),
+            hours.end()
+        ));
+    }
+    if let Some(half) = half {
+        hour = hour % 12 + half;
+    }
+    let digits: String = part.chars().chain("000000000".chars()).take(9).collect();
+    let nanoseconds: i64 = digits.parse().unwrap_or(0);
+    Ok(Some((hour * 3600 + minute * 60 + second) * SECOND + nanoseconds))
+}
+
+/// A date.
+enum Day {
+    /// Days since 1970.
+    Known(i64),
+    Either(Ordered),
+}
+
+fn date(text: &str) -> Result<Option<Day>, String> {
+    let signs = [' ', '-', '/', '.', ','];
+    let mut parts: Vec<&str> = text.split(signs).filter(|part| !part.is_empty()).collect();
+    let starts = |part: &str, names: &[&str]| {
+        let lower = part.to_lowercase();
+        names.iter().position(|name| lower.starts_with(name))
+    };
+    if parts.len() == 4 && starts(parts[0], &WEEKDAYS).is_some() {
+        parts.remove(0);
+    }
+    let number = |text: &str| -> Option<u32> {
+        text.parse().ok().filter(|_| text.len() < 5 && text.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let year_of = |text: &str| -> Option<i32> {
+        let year = number(text)? as i32;
+        match text.len() {
+            4 => Some(year),
+            2 => Some(2000 + year),
+            _ => None,
+        }
+    };
+    let known = |year: Option<i32>, month: Option<u32>, day: Option<u32>| {
+        let (Some(year), Some(month), Some(day)) = (year, month, day) else { return Ok(None) };
+        days(year, month, day).map(|day| Some(Day::Known(day)))
+    };
+    match parts[..] {
+        [day] if day.len() == 8 => {
+            let part = |from: usize, to: usize| day.get(from..to).and_then(number);
+            known(part(0, 4).map(|year| year as i32), part(4, 6), part(6, 8))
+        }
+        [a, b, c] => match (starts(a, &MONTHS), starts(b, &MONTHS)) {
+            (Some(month), _) => known(year_of(c), Some(month as u32 + 1), number(b)),
+            (_, Some(month)) if a.len() == 4 => {
+                known(year_of(a), Some(month as u32 + 1), number(c))
+            }
+            (_, Some(month)) => known(year_of(c), Some(month as u32 + 1), number(a)),
+            _ if a.len() == 4 => known(year_of(a), number(b), number(c)),
+            _ if text.contains('.') => known(year_of(c), number(b), number(a)),
+            _ => {
+                let (Some(first), Some(second), Some(year)) = (number(a), number(b), year_of(c))
+                else {
+                    return Ok(None);
+                };
+                if first.min(second) > 12 || first.max(second) > 31 || first.min(second) == 0 {
+                    return Err(format!("has no month: neither {first} nor {second} is one"));
+                }
+                Ok(Some(Day::Either(Ordered { first, second, year, is_short: c.len() == 2 })))
+            }
+        },
+        _ => Ok(None),
+    }
+}
+
+/// Times of a column, counted from the first.
+#[derive(Default)]
+pub struct Times {
+    first: Option<(Moment, String)>,
+    /// The last clock time with the days that have passed, ns.
+    last: i64,
+    /// True for days before months, once a date shows it.
+    day_first: Option<bool>,
+}
+
+impl Times {
+    /// Returns true before the first time.
+    pub fn is_empty(&self) -> bool {
+        self.first.is_none()
+    }
+
+    /// Seconds from the first time to this one.
+    ///
+    /// # Errors
+    /// If it is of another kind, or its date can be read in two ways.
+    pub fn seconds(&mut self, moment: Moment, field: &str) -> Result<f64, String> {
+        if let Moment::Ordered(Ordered { first, second, .. }, _) = moment
+            && first.max(second) > 12
+        {
+            let day_first = first > 12;
+            if *self.day_first.get_or_insert(day_first) != day_first {
+                return Err("has day and month in another order than the lines above".into());
+            }
+        }
+        let (first, _) = self.first.get_or_insert_with(|| {
+            if let Moment::Clock(at) = moment {
+                self.last = at;
+            }
+            (moment.clone(), field.into())
+        });
+        let elapsed = match (&*first, moment) {
+            (Moment::Date(first), Moment::Date(at)) => i128::from(at) - i128::from(*first),
+            (Moment::Clock(first), Moment::Clock(at)) => {
+                // half a day back is a midnight
+                let days = (self.last - at + DAY / 2).div_euclid(DAY).max(0);
+                self.last = at + days * DAY;
+                i128::from(self.last) - i128::from(*first)
+            }
+            (Moment::Ordered(day, from), Moment::Ordered(other, to)) => {
+                let days = if *day == other {
+                    0
+                } else if day.is_short || other.is_short {
+                    return Err(
+                        "has another date than the lines above, in an order that two digits of the year do not show (allowed: years of \
+                         four digits)"
+                            .into(),
+                    );
+                } else if let Some(day_first) = self.day_first {
+                    other.day(day_first)? - day.day(day_first)?
+                } else {
+                    return Err(
+                        "may have the day first or the month, and no date of the file shows which (allowed: 2026-01-31 or 31.01.2026)"
+                            .into(),
+                    );
+                };
+                i128::from(days) * i128::from(DAY) + i128::from(to - from)
+            }
+            (Moment::Clock(_), _) => {
+                return Err("is a date, where the lines above have none".into());
+            }
+            (_, Moment::Clock(_)) => {
+                return Err("is a clock time, where the lines above have dates".into());
+            }
+            _ => return Err("is a date in another form than those above".into()),
+        };
+        Ok(elapsed as f64 * 1e-9)
+    }
+
+    /// The first one, in words.
+    pub fn origin(&self) -> Option<String> {
+        self.first.as_ref().map(|(moment, field)| match moment {
+            Moment::Date(at) => DateTime::from_timestamp_nanos(*at).to_rfc3339(),
+            _ => field.clone(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seconds from the first to each field.
+    fn column(fields: &[&str]) -> Result<Vec<f64>, String> {
+        let mut times = Times::default();
+        fields
+            .iter()
+            .map(|field| match moment(field)? {
+                Some(moment) => times.seconds(moment, field),
+                None => Err("is not a time".into()),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn dates_and_clocks_of_all_kinds_are_seconds() {
+        for fields in [
+            ["2026-01-31T23:59:59.990Z", "2026-02-01T00:00:00.010Z"],
+            ["2026-01-31T23:59:59.990+0100", "2026-02-01T00:00:00.010+0100"],
+            ["2026-01-31 23:59:59.990 +01", "2026-01-31 23:00:00.010Z"],
+            ["2026-01-31 23:59:59,990 UTC", "2026-02-01 00:00:00,010 UTC"],
+            ["20260131T235959.990", "20260201T000000.010"],
+            ["2026/01/31 23:59:59.99", "2026/02/01 0:00:00.01"],
+            ["31.01.26 23:59:59.99", "1.2.26 00:00:00.01"],
+            ["31/01/2026 23:59:59:990", "01/02/2026 00:00:00:010"],
+            ["1/31/2026 11:59:59.990 PM", "2/1/2026 12:00:00.010 AM"],
+            ["12/01/2026 23:59:59.99", "13/01/2026 00:00:00.01"],
+            ["31-Jan-2026 11:59:59.99 p.m.", "01-Feb-2026 12:00:00.01 a.m."],
+            ["Sat, Jan 31, 2026 23:59:59.99", "Sun, Feb 1, 2026 00:00:00.01"],
+            ["01/02/2026 12:00:00.00", "01/02/2026 12:00:00.02"],
+            ["12:59:59.990 PM", "1:00:00.010 PM"],
+            ["11:59:59.990pm", "12:00:00.010am"],
+            ["23:59:59:990", "00:00:00:010"],
+            ["0 days 23:59:59.990000", "1 days 00:00:00.010000"],
+            ["23:59:59.99", "1 day, 0:00:00.010000"],
+        ] {
+            let found = column(&fields);
+            assert!(
+                found.as_ref().is_ok_and(|t| (t[1] - 0.02).abs() < 1e-9),
+                "{fields:?}: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_can_be_read_in_two_ways_or_in_none_is_refused_with_its_cause() {
+        for (fields, words) in [
+            (&["01/02/2026 23:59:59", "02/02/2026 00:00:01"][..], "the day first or the month"),
+            (&["26/01/31 23:59:59", "26/02/01 00:00:01"], "two digits of the year"),
+            (&["31/01/2026 1:00:00", "01/31/2026 1:00:01"], "in another order"),
+            (&["31/31/2026 1:00:00"], "neither 31 nor 31 is one"),
+            (&["30.02.2026 1:00:00"], "there is no day 30 of month 2"),
+            (&["24:00:00.010"], "is no time of day (allowed: hours 0 to 23"),
+            (&["13:00:00 PM"], "hours 1 to 12"),
+            (&["12:00:00:05"], "the last has 2 digits"),
+            (&["00:20.0"], "minutes and seconds, or hours and minutes?"),
+            (&["2026-01-31 12:00:00 CET"], "ends in \"CET\", which is no offset"),
+            (&["12:00:00", "2026-01-31 12:00:01"], "is a date, where the lines above have none"),
+            (&["1/2/2026 12:00:00", "2026-01-31 12:00:01"], "in another form"),
+            (&["ab:cd"], "is not a time"),
+        ] {
+            let error = column(fields).unwrap_err();
+            assert!(error.contains(words), "{fields:?}: {error}");
+        }
+    }
+}
