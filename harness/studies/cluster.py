@@ -81,8 +81,10 @@ class Harness:
         """Return a run's torque: time (s), ``tau_cmd`` (N·m), its slope until the next row."""
         with tempfile.TemporaryDirectory() as directory:
             path = Path(directory) / "torque.parquet"
-            numbers = ["--step", repr(run["step"]), "--stop", repr(run["stop"])]
-            self._say("torque", "--profile", run["profile"], *numbers, "--out", str(path))
+            times = ("step", "sample", "stop")
+            numbers = [text for name in times for text in (f"--{name}", repr(run[name]))]
+            hold = ["--hold"] if run["hold"] else []
+            self._say("torque", "--profile", run["profile"], *numbers, *hold, "--out", str(path))
             return list(hubslosh.read_table(path, TORQUE_COLUMNS).values())
 
     def analyse(self) -> bool:
@@ -212,6 +214,11 @@ def drive_here(
         )
     except hubslosh.FmuError as error:
         return None, str(error)
+    # the torque also has rows at its edges, which the result does not have
+    steps = (time - time[0]) / run["step"]
+    wanted = np.abs(steps - np.round(steps)) <= 1e-6
+    wanted[-1] = True
+    table = {name: values[wanted] for name, values in table.items()}
     return table, f"hubslosh {hubslosh.__version__}, Dask, process {os.getpid()}"
 
 
@@ -303,7 +310,7 @@ def make_runs_in(
     def futures() -> Iterator[Any]:
         torque, torque_of = [], None
         for run in missing:
-            of = (run["profile"], run["step"], run["stop"])
+            of = (run["profile"], run["step"], run["sample"], run["stop"], run["hold"])
             if of != torque_of:
                 torque, torque_of = harness.torque(run), of
             key = f"{run['name']}-{os.urandom(8).hex()}"  # the scheduler must not know it already

@@ -12,6 +12,7 @@
 pub mod allan;
 pub mod armax;
 pub mod demodulation;
+mod exponential;
 pub mod features;
 pub mod free_decay;
 pub mod gauss_markov;

@@ -9,10 +9,12 @@
 //! the sign of the slosh torque corrected. The zeros are the pendulums' own poles: the
 //! antiresonance is at the slosh frequency, the resonance above it.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 
+use crate::exponential::exponential;
 use crate::{Complex64, FrequencyResponse};
 
 /// Parameters of the linear model.
@@ -41,6 +43,11 @@ pub struct Mode {
     pub damping: f64,
 }
 
+/// Relative difference of steps that are one.
+const SAME: f64 = 1e-9;
+/// Most exponentials that are kept.
+const FLOWS: usize = 1000;
+
 impl Linear {
     /// Returns Ω/τ at a frequency in Hz, (rad/s)/(N·m).
     pub fn response(&self, frequency: f64) -> Complex64 {
@@ -62,16 +69,28 @@ impl Linear {
     pub fn simulate(&self, step: f64, torque: &[f64], start: f64) -> Vec<f64> {
         let slope = |pair: &[f64]| (pair[1] - pair[0]) / step;
         let slopes: Vec<f64> = torque.windows(2).map(slope).chain([0.0]).collect();
-        self.simulate_ramps(step, torque, &slopes, start)
+        self.propagate(&|_| step, torque, &slopes, start)
     }
 
-    /// Simulates the rate for a torque given by its value (N·m) at the beginning of each step of
-    /// `step` s and its slope (N·m/s) over the step. The matrix exponential of the state and the
-    /// input's value and slope makes it exact. The state is ω, y = l α and y' for each mode, and
-    /// the angle from the start.
+    /// Simulates the rate at the times `time` (s) for a torque given by its value (N·m) there and its slope (N·m/s)
+    /// until the next.
     pub fn simulate_ramps(
         &self,
-        step: f64,
+        time: &[f64],
+        torque: &[f64],
+        slopes: &[f64],
+        start: f64,
+    ) -> Vec<f64> {
+        let step = |k: usize| time.get(k + 1).map_or(0.0, |next| next - time[k]);
+        self.propagate(&step, torque, slopes, start)
+    }
+
+    /// Simulates the rate for a torque given by its value (N·m) at the beginning of each step and its slope (N·m/s) over
+    /// the step. `step` is the length of each, s. The matrix exponential of the state and the input's value and slope makes it
+    /// exact. The state is ω, y = l α and y' for each mode, and the angle from the start.
+    fn propagate(
+        &self,
+        step: &dyn Fn(usize) -> f64,
         torque: &[f64],
         slopes: &[f64],
         start: f64,
@@ -98,13 +117,27 @@ impl Linear {
             flow[(y + 1, y + 1)] -= 2.0 * mode.damping * w;
         }
         flow[(n, n + 1)] = 1.0;
-        let flow = (flow * step).exp();
+        // steps that differ by rounding have one exponential
+        let mut flows: BTreeMap<i64, DMatrix<f64>> = BTreeMap::new();
         let mut x = vec![0.0; n];
         x[0] = start;
         let mut next = x.clone();
         let mut rates = Vec::with_capacity(torque.len());
-        for (tau, slope) in torque.iter().zip(slopes) {
+        for (k, (tau, slope)) in torque.iter().zip(slopes).enumerate() {
             rates.push(x[0]);
+            let length = step(k);
+            if length == 0.0 {
+                continue;
+            }
+            if flows.len() > FLOWS {
+                flows.clear();
+            }
+            let place = (length.ln() / SAME).round() as i64;
+            let flow = flows.entry(place).or_insert_with(|| {
+                let flow = &flow * length;
+                let size = flow.abs().sum();
+                exponential(flow, size, DMatrix::exp)
+            });
             for (i, value) in next.iter_mut().enumerate() {
                 let state: f64 = x.iter().enumerate().map(|(j, x)| flow[(i, j)] * x).sum();
                 *value = state + flow[(i, n)] * tau + flow[(i, n + 1)] * slope;
@@ -166,9 +199,16 @@ mod tests {
                 _ => 0.0,
             })
             .collect();
-        let rates = hub.simulate_ramps(0.1, &torque, &[0.0; 40], 0.0);
+        let time: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k)).collect();
+        let rates = hub.simulate_ramps(&time, &torque, &[0.0; 40], 0.0);
         for (k, expected) in [(5, 0.25), (10, 0.5), (20, 0.5), (25, 0.25), (30, 0.0), (39, 0.0)] {
             assert!((rates[k] - expected).abs() < 1e-14, "{k}: {}", rates[k]);
+        }
+        // steps of any length, cut anywhere: 0.2 N·m for 0.25 s
+        let rates =
+            hub.simulate_ramps(&[0.0, 0.05, 0.25, 1.0], &[0.2, 0.2, 0.0, 0.0], &[0.0; 4], 0.0);
+        for (rate, expected) in rates.iter().zip([0.0, 0.025, 0.125, 0.125]) {
+            assert!((rate - expected).abs() < 1e-15, "{rates:?}");
         }
     }
 

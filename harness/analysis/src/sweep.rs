@@ -50,6 +50,15 @@ impl Sweep {
         }
     }
 
+    /// Returns the frequency at `t`, Hz: f0 e^{at}, or f0 + s t.
+    pub fn frequency_at(&self, t: f64) -> f64 {
+        let Sweep { f0, f1, duration, .. } = *self;
+        match self.law {
+            Law::Exponential => f0 * ((f1 / f0).ln() / duration * t).exp(),
+            Law::Linear => f0 + (f1 - f0) / duration * t,
+        }
+    }
+
     /// Returns the time at which the sweep passes `frequency` (Hz), s; `None` if it does not.
     pub fn time_of(&self, frequency: f64) -> Option<f64> {
         let Sweep { f0, f1, duration, .. } = *self;
@@ -96,6 +105,7 @@ mod tests {
             let t = sweep.time_of(2.4).unwrap();
             let f = (sweep.phase(t + 1e-3) - sweep.phase(t - 1e-3)) / 2e-3 / TAU;
             assert!((f - 2.4).abs() < 1e-7, "{law:?}: the frequency is the phase's derivative");
+            assert!((sweep.frequency_at(t) - 2.4).abs() < 1e-12, "{law:?}");
         }
     }
 

@@ -14,6 +14,7 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, U6, Vector3, Vector6};
 
+use crate::exponential::exponential;
 use crate::features::Features;
 use crate::least_squares;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
@@ -105,7 +106,8 @@ impl TransferFunction {
         let mut flow = Matrix5::zeros();
         (flow[(0, 1)], flow[(1, 2)], flow[(3, 4)]) = (1.0, 1.0, 1.0);
         (flow[(2, 0)], flow[(2, 1)], flow[(2, 2)], flow[(2, 3)]) = (-a0, -a1, -a2, 1.0);
-        let flow = (flow * step).exp();
+        let flow = flow * step;
+        let flow = exponential(flow, flow.abs().sum(), |flow| flow.exp());
         let a = flow.fixed_view::<3, 3>(0, 0).into_owned();
         let (value, slope): (Vector3<f64>, Vector3<f64>) =
             (flow.fixed_view::<3, 1>(0, 3).into(), flow.fixed_view::<3, 1>(0, 4).into());

@@ -142,6 +142,7 @@ fn main() {
             torque: torque.clone(),
             others: Vec::new(),
             step: STEP,
+            sample: STEP,
             stop,
             tolerance: None,
             hold: false,

@@ -146,6 +146,7 @@ pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Re
         torque,
         others,
         step: STEP,
+        sample: STEP,
         stop,
         tolerance,
         hold,

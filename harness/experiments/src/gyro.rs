@@ -120,6 +120,7 @@ impl Recording {
             torque,
             others: Vec::new(),
             step,
+            sample: step,
             stop,
             tolerance: None,
             hold: true,

@@ -1,5 +1,6 @@
 //! One run: a torque history through one instance of the FMU.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -12,6 +13,7 @@ use host::causality::Causality;
 use host::description::{ModelDescription, Type, Value, Variable};
 use host::drive::Inputs;
 use host::fmu::{Fmu, Instance};
+use host::schedule::{self, History, Schedule};
 use names::hubslosh::TAU_CMD;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::Table;
@@ -27,14 +29,15 @@ pub struct Run {
     pub torque: Torque,
     /// Further inputs by FMU name, each with its history in the input's unit.
     pub others: Vec<(String, Torque)>,
-    /// Communication step H, s.
+    /// Time between the rows of the result, s.
     pub step: f64,
+    /// Time between the commands of a profile, s; see [`Torque::history`].
+    pub sample: f64,
     /// Stop time, s.
     pub stop: f64,
     /// Relative tolerance for the FMU's solver; `None`: the FMU's own.
     pub tolerance: Option<f64>,
-    /// The torque is held over each step (else its value at t comes with the slope of the chord
-    /// to t + H).
+    /// Inputs are held from row to row, a profile from command to command (else they are straight lines).
     pub hold: bool,
 }
 
@@ -223,33 +226,51 @@ impl Run {
         self.torque.span().0
     }
 
-    /// Number of communication steps; the last may be shorter than H. None if [`Run::check`] fails.
+    /// Number of steps between rows of the result; the last may be shorter. None if [`Run::check`] fails.
     pub fn steps(&self) -> usize {
         budget::steps(self.stop - self.start(), self.step).unwrap_or(0)
     }
 
-    /// Communication point `k`, s; the last is the stop time.
-    fn time(&self, k: usize) -> f64 {
-        if k == self.steps() { self.stop } else { self.start() + k as f64 * self.step }
+    /// Bytes that the communication points and the histories of the inputs take while the run is made.
+    pub fn course_bytes(&self) -> u64 {
+        let all = [&self.torque].into_iter().chain(self.others.iter().map(|(_, other)| other));
+        let counts = all.map(|torque| torque.count(self.sample, self.stop, self.hold).unwrap_or(0));
+        // of each its time, value and slope, and its communication point; lists that grow take twice as much
+        (counts.sum::<usize>() + self.steps()) as u64 * 100
+    }
+
+    /// Histories of the torque and of the other inputs, and the communication points.
+    fn course(&self) -> Result<(Vec<Cow<'_, History>>, Schedule)> {
+        let others = self.others.iter().map(|(_, other)| other);
+        let histories = [&self.torque]
+            .into_iter()
+            .chain(others)
+            .map(|torque| torque.history(self.sample, self.stop, self.hold))
+            .collect::<Result<Vec<_>>>()?;
+        let rows = histories.iter().map(|history| history.time());
+        let schedule = Schedule::new((self.start(), self.stop), Some(self.step), rows)?;
+        Ok((histories, schedule))
     }
 
     /// The torque as a run hands it to the FMU: at every communication point `time` (s), `tau_cmd`
-    /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s).
-    pub fn torque_table(&self) -> Table {
-        let steps = self.steps();
+    /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s). Also which of the points are rows of
+    /// the result.
+    ///
+    /// # Errors
+    /// The profile takes too many commands.
+    pub fn torque_table(&self) -> Result<(Table, Schedule)> {
+        let (histories, schedule) = self.course()?;
+        let mut torque = histories[0].cursor();
         let mut columns = vec![Vec::new(); 3];
-        for k in 0..=steps {
-            let t = self.time(k);
-            let (tau, slope) = match k {
-                _ if k == steps => (self.torque.at(t), 0.0),
-                _ => self.torque.chord(t, self.time(k + 1) - t),
-            };
-            let slope = if self.hold { 0.0 } else { slope };
+        for (k, &t) in schedule.time.iter().enumerate() {
+            let (tau, slope) = torque.after(t);
+            let slope = if k + 1 == schedule.time.len() { 0.0 } else { slope };
             for (column, value) in columns.iter_mut().zip([t, tau, slope]) {
                 column.push(value);
             }
         }
-        Table::new(["time", TORQUE, "tau_slope"].map(String::from).to_vec(), columns)
+        let names = ["time", TORQUE, SLOPE].map(String::from).to_vec();
+        Ok((Table::new(names, columns), schedule))
     }
 
     /// Every driven input with its history, that of the torque first.
@@ -274,6 +295,7 @@ impl Run {
             self.stop
         );
         budget::steps(self.stop - self.start(), self.step)?;
+        self.torque.count(self.sample, self.stop, self.hold)?;
         if let Some(tolerance) = self.tolerance {
             ensure!(
                 tolerance > 0.0 && tolerance.is_finite(),
@@ -286,11 +308,6 @@ impl Run {
     /// A new instance with the start values set, ready for the first step.
     pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
         self.initialise_until(fmu, Some(self.stop))
-    }
-
-    /// The same for a host that does not know when it stops: no step is too long.
-    pub(crate) fn initialise_without_end<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
-        self.initialise_until(fmu, None)
     }
 
     fn initialise_until<'fmu>(&self, fmu: &'fmu Fmu, stop: Option<f64>) -> Result<Instance<'fmu>> {
@@ -307,6 +324,12 @@ impl Run {
                     "{name} cannot be set: it is of causality {other}, not a parameter or an input"
                 ),
             }
+        }
+        if !schedule::interpolates(fmu.description()) {
+            let (histories, _) = self.course()?;
+            let names = self.driven().into_iter().map(|(name, _)| name);
+            let inputs = names.zip(histories.iter().map(|history| &**history));
+            schedule::check_interpolation(fmu.description(), inputs, "--hold")?;
         }
         let first: Vec<f64> =
             self.driven().iter().map(|(_, history)| history.at(self.start())).collect();
@@ -340,9 +363,9 @@ impl Run {
         all
     }
 
-    /// Steps an initialised instance to the stop time. The table has `time`, the driven inputs and
-    /// the variables `columns` at every communication point. `progress` hears how many steps were
-    /// made since it was last called.
+    /// Steps an initialised instance to the stop time, with a communication point at every row of an input and of the
+    /// result. The table has `time`, the driven inputs and the variables `columns` every [`Run::step`] seconds. A row pairs
+    /// what [`schedule::ROWS`] says. `progress` hears how many rows were made since it was last called.
     pub fn drive(
         &self,
         instance: &mut Instance,
@@ -356,36 +379,39 @@ impl Run {
         );
         let steps = self.steps();
         budget::table(steps + 1, 1 + self.driven().len() + columns.len())?;
+        let (histories, schedule) = self.course()?;
         let mut recorder = Recorder::new(instance, columns, steps + 1)?;
         let driven = self.driven();
-        let points = steps + 1;
-        let mut time = Vec::with_capacity(points);
-        let mut given: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(points)).collect();
+        let rows = steps + 1;
+        let mut time = Vec::with_capacity(rows);
+        let mut given: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(rows)).collect();
         let inputs = self.inputs(instance.description())?;
+        // without an input there is no torque to follow
+        let mut cursors: Vec<_> = histories.iter().map(|history| history.cursor()).collect();
+        let mut point = 0;
         inputs.drive(instance, self.start(), |instance, t, course| {
-            let step = time.len();
-            let next = (step < steps).then(|| self.time(step + 1));
-            for (i, (_, history)) in driven.iter().enumerate() {
-                match next {
-                    Some(next) => {
-                        (course.values[i], course.slopes[i]) = history.chord(t, next - t);
-                    }
-                    None => course.values[i] = history.at(t),
+            for (i, cursor) in cursors.iter_mut().enumerate().take(driven.len()) {
+                (course.values[i], course.slopes[i]) = cursor.after(t);
+            }
+            if schedule.is_row(point) {
+                let row = time.len();
+                for (given, value) in given.iter_mut().zip(course.values.iter()) {
+                    given.push(*value);
                 }
-                given[i].push(course.values[i]);
+                time.push(t);
+                if let Some(column) = recorder.record(instance)? {
+                    bail!(
+                        "the FMU gives {} = {} at t = {t} s (allowed: finite numbers)",
+                        columns[column],
+                        recorder.columns[column][row]
+                    );
+                }
+                if row > 0 && row.is_multiple_of(REPORT_EVERY) {
+                    progress(REPORT_EVERY as u64);
+                }
             }
-            time.push(t);
-            if let Some(column) = recorder.record(instance)? {
-                bail!(
-                    "the FMU gives {} = {} at t = {t} s (allowed: finite numbers)",
-                    columns[column],
-                    recorder.columns[column][step]
-                );
-            }
-            if step > 0 && step.is_multiple_of(REPORT_EVERY) {
-                progress(REPORT_EVERY as u64);
-            }
-            Ok(next)
+            point += 1;
+            Ok(schedule.time.get(point).copied())
         })?;
         progress((steps % REPORT_EVERY) as u64);
 

@@ -15,5 +15,6 @@ pub mod fmi3;
 pub mod fmu;
 pub mod guard;
 pub mod parameter_set;
+pub mod schedule;
 pub mod symbol;
 pub mod xml;

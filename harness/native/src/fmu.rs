@@ -97,6 +97,11 @@ impl Fmu {
         Ok(place.insert(Arc::new(loaded)).clone())
     }
 
+    /// Description of the FMU.
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
     /// A variable by its name.
     pub fn variable(&self, name: &str) -> PyResult<&description::Variable> {
         match self.places.get(name) {
@@ -141,12 +146,6 @@ impl Fmu {
     fn experiment(&self) -> [Option<f64>; 3] {
         let of = &self.description.default_experiment;
         [of.start_time, of.stop_time, of.step_size]
-    }
-
-    /// True if inputs may change within a step.
-    #[getter]
-    fn interpolates(&self) -> bool {
-        self.description.co_simulation.as_ref().is_some_and(|of| of.can_interpolate_inputs)
     }
 
     /// True if the FMU has directional derivatives in Model Exchange.

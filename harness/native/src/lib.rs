@@ -12,6 +12,7 @@ mod fmu;
 mod instance;
 mod numbers;
 mod run;
+mod schedule;
 mod tanks;
 
 /// Functions of `hubslosh._native`.
@@ -25,6 +26,8 @@ mod _native {
     use crate::fmu::{Fmu, FmuError, FmuWarning, Variable};
     #[pymodule_export]
     use crate::instance::Instance;
+    #[pymodule_export]
+    use crate::schedule::{History, check_interpolation, communication_points, pairing};
     #[pymodule_export]
     use crate::tanks::{Liquid, Solved, Tank, solve, table};
 }

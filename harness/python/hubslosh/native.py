@@ -42,4 +42,7 @@ FmuWarning = _native.FmuWarning
 """Python warning that passes on a warning of an FMU or of the program ``hubslosh``."""
 Model = _native.Model
 destination, put, read_parameters = _native.destination, _native.put, _native.read_parameters
+History = _native.History
+check_interpolation = _native.check_interpolation
+communication_points, pairing = _native.communication_points, _native.pairing
 Liquid, Tank, solve, table = _native.Liquid, _native.Tank, _native.solve, _native.table

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from . import native
 from .arguments import column_of, names_of, not_numbers
 from .fmu import INTEGERS, Fmu, FmuError, Quantity, did_you_mean
 from .plant import TORQUE, Plant
@@ -29,25 +30,14 @@ class History:
     """An input over time: lines between rows, or steps. Two rows at one time are a jump."""
 
     def __init__(self, time: Real, values: Real, slopes: Real | None, hold: bool) -> None:
-        """Take rows; slopes: from each to the next, None: of the chords."""
-        self.time, self.values = time, values
-        if hold:
-            self.slopes = np.zeros(len(time))
-        elif slopes is not None:
-            self.slopes = slopes
-        else:
-            lengths = np.diff(time)
-            rises = np.diff(values) / np.where(lengths > 0, lengths, np.inf)
-            self.slopes = np.append(rises, 0.0)
+        """Take rows; slopes: from each to the next, None: of the lines between them."""
+        self.time = time
+        self.native = native.History(time, values, slopes, hold)
 
     def after(self, t: Real) -> tuple[Real, Real]:
-        """Return value and slope at ``t`` and immediately after; held before the first row."""
-        if np.array_equal(t, self.time):  # the rows themselves, as most often
-            return self.values, self.slopes
-        k = np.searchsorted(self.time, t, side="right") - 1
-        at = np.maximum(k, 0)
-        slope = np.where(k < 0, 0.0, self.slopes[at])
-        return self.values[at] + slope * (t - self.time[at]), slope
+        """Return values and slopes at ascending times ``t`` and immediately after them."""
+        values, slopes = self.native.after(np.ascontiguousarray(t, float))
+        return np.frombuffer(values).copy(), np.frombuffer(slopes).copy()
 
 
 def simulate(
@@ -85,9 +75,11 @@ def simulate(
 
     Returns a pandas table with the columns ``time``, the inputs and ``outputs``; enumerations by
     number.
-    An output that follows an input at once shows a jump in the next row. Units are in
-    ``.attrs["units"]``, what was simulated in ``.attrs["model"]`` and ``.attrs["parameters"]``;
-    ``.view()`` shows it in 3-D.
+    A row has the inputs from its time on and the outputs just before these inputs act: an output
+    that follows an input at once shows a jump of it, or the next value of a held one, in the next
+    row (``.attrs["rows"]``, ``.attrs["inputs"]``). An FMU that cannot interpolate its inputs is
+    refused unless they are constant from row to row. Units are in ``.attrs["units"]``, what was
+    simulated in ``.attrs["model"]`` and ``.attrs["parameters"]``; ``.view()`` shows it in 3-D.
 
     Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
     """
@@ -122,14 +114,16 @@ def simulate(
     if problems:
         raise FmuError("; ".join(problems))
 
-    points, wanted = communication_points(start, stop, step, rows)
+    inputs_given = [(name, history.native) for name, history in histories.items()]
+    native.check_interpolation(fmu.native, inputs_given, "hold=True")
+    times, rows_wanted = native.communication_points(start, stop, step, rows)
+    points = np.frombuffer(times).copy()
+    wanted = None if rows_wanted is None else np.frombuffer(rows_wanted, bool)
     values = {name: history.after(points) for name, history in histories.items()}
     given = {name: value for name, (value, _) in values.items()}
     # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
-    if sloped and not fmu.native.interpolates:
-        raise FmuError(f"{fmu.name} cannot interpolate its inputs; use hold=True")
     asked = [name for name in columns if name not in given]
     with Plant(
         model,
@@ -140,7 +134,9 @@ def simulate(
         inputs={name: value[0] for name, value in given.items()},
     ) as plant:
         recorded = plant.run(points, given, slopes, asked)
-    return table_of(fmu, {"time": points} | given | recorded, wanted, model, parameters)
+    table = table_of(fmu, {"time": points} | given | recorded, wanted, model, parameters)
+    table.attrs["rows"], table.attrs["inputs"] = native.pairing(hold)
+    return table
 
 
 def table_of(
@@ -213,35 +209,6 @@ def too_many_rows(start: float, stop: float, step: float) -> list[str]:
         return []
     span = f"{stop - start:g} s in steps of {step:g} s"
     return [f"{span} are {rows:.3e} rows (allowed: at most {MOST_ROWS})"]
-
-
-def communication_points(
-    start: float, stop: float, step: float | None, rows: Real | None
-) -> tuple[Real, NDArray[np.bool_] | None]:
-    """Return the times to step to, s, and which of them are wanted (None: all).
-
-    They are start, stop, the multiples of ``step`` and the inputs' rows; a multiple within 1e-6 of
-    a step of a row or of the stop time is that time.
-    """
-    if rows is not None:
-        rows = rows[(rows > start) & (rows < stop)]
-        rows = rows[np.append(np.diff(rows) > 0, True)] if len(rows) else rows
-    if step is None:
-        assert rows is not None
-        return np.concatenate([[start], rows, [stop]]), None
-    count = round((stop - start) / step)
-    grid: Real = start + np.arange(max(count, 0) + 1, dtype=np.float64) * step
-    grid = np.append(grid[grid < stop - 1e-6 * step], np.float64(stop))
-    if rows is None or not len(rows):
-        return grid, None
-    nearest = np.clip(np.searchsorted(rows, grid), 1, max(len(rows) - 1, 1))
-    left, right = rows[nearest - 1], rows[np.minimum(nearest, len(rows) - 1)]
-    near = np.where(np.abs(grid - left) < np.abs(grid - right), left, right)
-    inner = slice(1, -1)
-    grid[inner] = np.where(np.abs(grid - near) <= 1e-6 * step, near, grid)[inner]
-    points = np.union1d(grid, rows)
-    wanted = np.isin(points, grid)
-    return points, None if wanted.all() else wanted
 
 
 def histories_of(

@@ -1,15 +1,18 @@
 """The package, fmpy and the harness give one FMU the same torque: the motion is the same."""
 
 import itertools
+import subprocess
 import time as clock
+import zipfile
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from conftest import Harness
+from conftest import Harness, option
 from fmpy import extract, fmi2, read_model_description
 
-from hubslosh import COLUMNS, TORQUE, drive, read_table, write_table
+from hubslosh import COLUMNS, TORQUE, FmuError, drive, read_table, simulate, write_table
 
 MODELS = ["frozen", "linear", "planar", "spherical", "paraboloid"]
 FILLS = [0.05, 0.1]
@@ -138,3 +141,93 @@ def test_a_written_torque_history_drives_the_harness_alike(
         theirs = harness("--input", str(path))
         assert np.array_equal(theirs[TORQUE], read_table(path, [TORQUE])[TORQUE])
         assert np.abs(ours["omega"] - theirs["omega"]).max() <= 1e-12
+
+
+def pulses() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return torques that 50 rows a second do not show: time (s) and N·m."""
+    close, closer = np.arange(401) * 0.005, np.arange(2001) * 0.001
+    return {
+        "30 ms on rows of 5 ms": (close, np.where(np.arange(401) % 50 < 6, 0.2, 0.0)),
+        "8 ms at 1 kHz": (closer, np.where((closer > 0.3025) & (closer < 0.3105), 0.2, 0.0)),
+        "49 Hz": (closer, 0.2 * np.sin(2 * np.pi * 49 * closer)),
+        "uneven rows": (np.array([0, 0.0301, 0.0302, 1.0, 1.0, 1.7, 2.0]), np.eye(7)[3] - 0.2),
+    }
+
+
+@pytest.mark.parametrize("hold", [False, True])
+@pytest.mark.parametrize("step", [0.02, 0.005, 0.0333])
+@pytest.mark.parametrize("name", pulses())
+def test_a_history_acts_alike_in_both_doors_with_any_step(
+    fmu: Path, harness: Harness, tmp_path: Path, name: str, step: float, hold: bool
+) -> None:
+    """Times, inputs and outputs have the same bits, and the step only chooses rows."""
+    time, torque = pulses()[name]
+    path = tmp_path / "in.parquet"
+    write_table(path, {"time": time, TORQUE: torque})
+    flags = ["--input", str(path), "--step", str(step), *(["--hold"] if hold else [])]
+    theirs = harness(*flags)
+    table = pd.DataFrame({"time": time, TORQUE: torque})
+    ours = simulate(fmu, inputs=table, step=step, hold=hold, outputs=list(COLUMNS))
+    for column in ("time", TORQUE, *COLUMNS):
+        assert np.array_equal(theirs[column], ours[column]), column
+    assert np.abs(ours["omega"]).max() > 1e-4
+    # with the rows of the input as rows of the result the solver makes other steps
+    whole = simulate(fmu, inputs=table, hold=hold, outputs=["omega"], tolerance=1e-10)
+    fine = simulate(fmu, inputs=table, step=step, hold=hold, outputs=["omega"], tolerance=1e-10)
+    both = pd.merge_asof(fine, whole, on="time", tolerance=1e-9, direction="nearest").dropna()
+    assert len(both) > 3
+    largest = np.abs(whole["omega"]).max()
+    assert np.abs(both["omega_x"] - both["omega_y"]).max() <= 1e-8 * largest
+
+
+@pytest.mark.parametrize("step", ["0.02", "0.007"])
+@pytest.mark.parametrize(
+    "profile",
+    ["sine:frequency=50,duration=2", "pulse:start=0.005,width=0.01,duration=2",
+     "lin-sweep:f0=1,f1=60,duration=2", "sine-noise:duration=2"],
+)  # fmt: skip
+def test_the_table_of_a_profile_acts_as_the_profile(
+    fmu: Path, harness: Harness, request: pytest.FixtureRequest, tmp_path: Path,
+    profile: str, step: str,
+) -> None:  # fmt: skip
+    """What ``hubslosh torque`` writes has the bits of ``hubslosh run --profile`` in Python."""
+    path = tmp_path / "torque.parquet"
+    command = [option(request, "--hubslosh"), "torque", "--profile", profile]
+    subprocess.run([*command, "--out", path, "--step", "0.02"], check=True, capture_output=True)
+    table = pd.read_parquet(path)
+    theirs = harness("--profile", profile, "--step", step)
+    ours = simulate(fmu, inputs=table, step=float(step), outputs=list(COLUMNS))
+    assert np.array_equal(theirs["time"], ours["time"])
+    # rows of 0.02 s cut the lines elsewhere than those of 0.007 s
+    exact = step == "0.02"
+    for column in COLUMNS:
+        off = np.abs(theirs[column] - ours[column]).max()
+        assert off <= (0.0 if exact else 1e-6) * np.abs(ours[column]).max(), column
+    assert np.abs(ours["omega"]).max() > 1e-4
+
+
+def test_both_doors_refuse_slopes_for_an_fmu_that_cannot_interpolate(
+    fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    """The same sentence; each names its own way to held inputs."""
+    held = tmp_path / "held.fmu"
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                data = data.replace(b'canInterpolateInputs="true"', b'canInterpolateInputs="false"')
+            new.writestr(name, data)
+    table = pd.DataFrame({"time": [0.0, 1.0], TORQUE: [0.1, 0.2]})
+    table.to_csv(tmp_path / "in.csv", index=False)
+    command = [option(request, "--hubslosh"), "run", "--fmu", held, "--out", tmp_path / "out.csv"]
+    command += ["--input", tmp_path / "in.csv"]
+    said = subprocess.run(command, capture_output=True, text=True, check=False)
+    with pytest.raises(FmuError) as error:
+        simulate(held, inputs=table)
+    sentence = str(error.value)
+    assert "HubSlosh cannot interpolate its inputs" in sentence and "with hold=True" in sentence
+    assert sentence.replace("hold=True", "--hold") in said.stderr
+    run = simulate(held, inputs=table, hold=True, step=0.02, outputs=["omega"])
+    assert run.attrs["inputs"] == "held from row to row" and "before" in run.attrs["rows"]
+    subprocess.run([*command, "--hold"], check=True, capture_output=True)
+    assert np.array_equal(read_table(tmp_path / "out.csv", ["omega"])["omega"], run["omega"])

@@ -184,6 +184,7 @@ impl CampaignArgs {
 pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapter>) -> Result<()> {
     let cases = campaign.plan.cases(fmu.description())?;
     let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();
+    let courses = cases.iter().map(|case| case.run().course_bytes()).max().unwrap_or(0);
     drop(cases);
     let columns =
         fmu.description().variables.iter().filter(|v| v.causality == Causality::Output).count();
@@ -191,7 +192,8 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapt
     let largest = rows.iter().max().copied().unwrap_or(0) * (columns + 20) * 8;
     // tables and the spectra made of them; what the report keeps of each run
     let kept = rows.len().min(CURVES) * (4 << 20) + rows.len() * (64 << 10);
-    guard::allow((jobs.min(rows.len()) * largest * 4 + kept) as u64);
+    let jobs = jobs.min(rows.len());
+    guard::allow((jobs * largest * 4 + kept) as u64 + jobs as u64 * courses);
     let bar = progress::of_runs()?;
     let results = campaign.execute(fmu, &folder, &|news| progress::show(&bar, news))?;
     bar.finish_and_clear();

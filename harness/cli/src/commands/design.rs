@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use analysis::gauss_markov::Noise;
 use analysis::linear::{Linear, Mode};
 use anyhow::{Result, bail, ensure};
-use experiments::profile::Written;
+use experiments::profile::{self, COARSEST, Torque, Written};
 use files::budget;
 use host::fmu::Fmu;
+use host::schedule::History;
 use identify::model::bench::nominal;
 use identify::model::bench::simulate::{Intersample, Setup};
 use identify::model::bench::unknown::Unknown;
@@ -182,6 +183,7 @@ impl DesignArgs {
         if let Some(profile) = &self.profile {
             let torque = profile.parse::<Written>()?.torque()?;
             let (time, tau) = sampled(torque.span().1, &|t| torque.at(t))?;
+            check_rows(&torque, &time, &tau)?;
             return Ok((time, tau, 1.0));
         }
         let Some(peak) = self.multisine else { bail!("a plan needs --profile or --multisine") };
@@ -221,6 +223,29 @@ impl DesignArgs {
             bounds: bench.bounds(time, &sweep)?,
         })
     }
+}
+
+/// Fails unless lines between the rows `time` (s) and `tau` (N·m) of a plan follow the torque.
+fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
+    let history = torque.history(STEP, time[time.len() - 1], false)?;
+    let lines = History::new(time.to_vec(), tau.to_vec(), None, false)?;
+    let knots = history.time();
+    let wanted = |t: f64| history.after(t).0;
+    let peak = knots.iter().fold(0.0_f64, |peak, t| peak.max(wanted(*t).abs()));
+    let mut lines = lines.cursor();
+    for &t in knots.iter().filter(|t| **t <= time[time.len() - 1]) {
+        // an edge may lie an ulp before the row that it is meant to meet
+        let row = (t / STEP).round() * STEP;
+        let made = lines.after(if (t - row).abs() < 1e-6 * STEP { row } else { t }).0;
+        ensure!(
+            (made - wanted(t)).abs() <= COARSEST * peak,
+            "the torque is {:.4} N·m at {t} s; lines between the rows of a plan, {STEP} s apart, make {made:.4} of it (allowed: edges at \
+             multiples of {STEP} s, frequencies up to {:.2} Hz)",
+            wanted(t),
+            profile::cycles(COARSEST) / STEP
+        );
+    }
+    Ok(())
 }
 
 /// Bench on which a plan is tried.

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use experiments::campaign::{Range, WAVE, stored_columns};
-use experiments::profile::{self, Written};
+use experiments::profile::{self, SAMPLE, Written};
 use experiments::rest;
 use experiments::run::{self, Run, driven, histories};
 use experiments::sensors::{self, Sensor, Sensors};
 use experiments::weight::{Tanks, WATER_TENSION};
 use host::description::{ModelDescription, Type};
-use host::guard;
+use host::{guard, schedule};
 use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL};
 use report::view;
 
@@ -46,16 +46,20 @@ pub struct RunArgs {
     /// name or number. Structural parameters of FMI 3.0 are set first, whatever the order.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Communication step, s.
+    /// Time between the rows of the result, s. The FMU also steps to every row of --input, and to every edge and command of a profile.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
+    /// Time between the commands of a profile that oscillates, s: lines join them, or they are held with --hold. Lines that would
+    /// differ from the profile by more than 2.5 % of its amplitude get closer commands (0.1 %).
+    #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE, conflicts_with = "input")]
+    sample: f64,
     /// Stop time, s [default: the end of the torque history].
     #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
     #[arg(long, value_name = "NUMBER")]
     tolerance: Option<f64>,
-    /// Hold the torque between rows and over each step, instead of joining by lines.
+    /// Hold inputs from row to row, a profile from command to command, instead of joining by lines.
     #[arg(long)]
     hold: bool,
     /// Input that the profile drives [default: tau_cmd, or the FMU's only Real input].
@@ -131,6 +135,7 @@ impl RunArgs {
             torque,
             others,
             step: self.step,
+            sample: self.sample,
             tolerance: self.tolerance,
             hold: self.hold,
         };
@@ -170,7 +175,7 @@ impl RunArgs {
         let columns = run.columns_with(&columns, needs.chain(sensors.needs()));
         // the table, its copy for --columns, and what is written: 25 characters for a number
         let all = columns.len() + sensors.columns().len();
-        guard::allow((run.steps() * (all + 3) * 50) as u64);
+        guard::allow((run.steps() * (all + 3) * 50) as u64 + run.course_bytes());
         let bar = progress::of_steps()?;
         bar.set_length(run.steps() as u64);
         let table = run.drive(&mut instance, &columns, |steps| bar.inc(steps))?;
@@ -184,6 +189,8 @@ impl RunArgs {
             ("version".into(), fmu.description().version.clone()),
             ("model".into(), description.model_name.clone()),
             ("parameters".into(), serde_json::json!(parameters).to_string()),
+            ("inputs".into(), schedule::between(self.hold).into()),
+            ("rows".into(), schedule::ROWS.into()),
         ]);
         if !self.sensors.is_empty() {
             notes.insert("sensors".into(), serde_json::json!(sensors.texts()).to_string());

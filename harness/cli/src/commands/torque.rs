@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use experiments::profile::{self, Written};
+use experiments::profile::{self, SAMPLE, Written};
 use experiments::run::Run;
 
 use super::{check_out, write_out};
@@ -13,17 +13,24 @@ use crate::terminal;
 /// Writes a profile's torque alone: time (s), tau_cmd (N·m), and tau_slope (N·m/s), which is the
 /// torque's derivative until the next row.
 ///
-/// A host that sets value and slope at every row drives the FMU exactly as `hubslosh run` does, jumps included. The columns time
-/// and tau_cmd alone are a torque history for --input, a bench or Simulink.
+/// A host that sets value and slope at every row drives the FMU exactly as `hubslosh run` does, jumps included: every
+/// edge and command of the profile has its row, whatever --step is. The columns time and tau_cmd alone are a torque history for
+/// --input, a bench or Simulink.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct TorqueArgs {
     /// Torque profile, name:key=value,…
     #[arg(long, value_name = "PROFILE", required_unless_present = "profiles")]
     profile: Option<String>,
-    /// Time between rows, s.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
+    /// Largest time between rows, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
     step: f64,
+    /// Time between the commands of a profile that oscillates, s, as of `hubslosh run`.
+    #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
+    sample: f64,
+    /// Hold the profile from command to command, as of `hubslosh run`: all slopes are 0.
+    #[arg(long)]
+    hold: bool,
     /// Time of the last row, s [default: the end of the profile].
     #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
@@ -58,11 +65,12 @@ impl TorqueArgs {
             torque,
             others: Vec::new(),
             step: self.step,
+            sample: self.sample,
             tolerance: None,
-            hold: false,
+            hold: self.hold,
         };
         run.check()?;
-        let table = run.torque_table();
+        let (table, _) = run.torque_table()?;
         write_out(&table, &out, &BTreeMap::from([("profile".into(), profile)]))
     }
 }

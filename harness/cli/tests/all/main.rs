@@ -3,6 +3,7 @@
 mod campaign;
 mod check;
 mod command_line;
+mod communication;
 mod documents;
 mod folder;
 mod foreign;

@@ -106,9 +106,10 @@ fn runs_made_by_another_importer_from_the_list_give_the_same_tables() {
     std::fs::create_dir_all(directory.join("theirs/runs")).unwrap();
     for run in runs {
         let number = |key: &str| run[key].as_f64().unwrap();
-        let (step, stop) = (number("step").to_string(), number("stop").to_string());
+        let [step, sample, stop] = ["step", "sample", "stop"].map(|key| number(key).to_string());
         let profile = run["profile"].as_str().unwrap();
-        let arguments = ["--profile", profile, "--step", &step, "--stop", &stop];
+        let arguments =
+            ["--profile", profile, "--step", &step, "--sample", &sample, "--stop", &stop];
         successful(hubslosh(
             directory,
             &[&["torque", "--out", "torque.parquet"], &arguments[..]].concat(),

@@ -318,6 +318,7 @@ impl Campaign {
                 "start": run.start(),
                 "stop": run.stop,
                 "step": run.step,
+                "sample": run.sample,
                 "steps": run.steps(),
                 "tolerance": run.tolerance,
                 "hold": run.hold,

@@ -12,7 +12,7 @@ use host::fmu::Instance;
 use super::Case;
 use crate::plan::RECORDING;
 use crate::profile::{Profile, Torque};
-use crate::run::{Run, TORQUE};
+use crate::run::{Run, SLOPE, TORQUE};
 use crate::weight::Contents;
 use analysis::features::{Deviations, Features};
 use analysis::lengths::Lengths;
@@ -641,6 +641,30 @@ pub(super) fn rotary_in_time(step: f64, frequency: f64, table: &Table) -> Rotary
     Rotary::in_time(step, frequency, column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE))
 }
 
+/// Returns the rate of the linear model under the torque of a run, in the rows of the result. A recording has its own rows.
+fn modelled(
+    run: &Run,
+    case: &Case,
+    recorded: &[f64],
+    start: f64,
+    linear: &Linear,
+) -> Result<Vec<f64>> {
+    let sweeps = |profile: &Profile| profile.sweep().is_some();
+    let is_sweep = matches!(&run.torque, Torque::Profile(profile) if sweeps(profile)) && !run.hold;
+    if is_sweep && case.recording.is_some() {
+        return Ok(linear.simulate(run.step, recorded, start));
+    }
+    let (torque, schedule) = run.torque_table()?;
+    if is_sweep && schedule.rows.is_none() {
+        return Ok(linear.simulate(run.step, recorded, start));
+    }
+    // edges of the torque are no slopes
+    let column = |name| torque.column(name).unwrap_or_default();
+    let rates = linear.simulate_ramps(column("time"), column(TORQUE), column(SLOPE), start);
+    let rows = rates.into_iter().enumerate().filter(|(k, _)| schedule.is_row(*k));
+    Ok(rows.map(|(_, rate)| rate).collect())
+}
+
 impl Outcome {
     /// Computes the outcome of a stored run; an initialised instance has the parameters.
     pub(super) fn of(
@@ -684,17 +708,7 @@ impl Outcome {
         // of a recording, the true rate at the start is the measured one less the bias
         let start = column(OMEGA).first().copied().unwrap_or(0.0)
             - if is_recording { rates.bias } else { 0.0 };
-        let modelled = match &run.torque {
-            Torque::Profile(profile) if profile.sweep().is_some() && !run.hold => {
-                linear.simulate(run.step, column(TAU_CMD), start)
-            }
-            // edges of the torque stand at the steps' ends, and are no slopes
-            _ => {
-                let torque = run.torque_table();
-                let column = |name| torque.column(name).unwrap_or_default();
-                linear.simulate_ramps(run.step, column(TORQUE), column("tau_slope"), start)
-            }
-        };
+        let modelled = modelled(run, case, column(TAU_CMD), start, &linear)?;
         let residual: Vec<f64> =
             rates.about_axis.iter().zip(&modelled).map(|(y, m)| y - m).collect();
         let signals = [TAU_CMD, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, "omega_x", "omega_y"];

@@ -54,7 +54,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("slew", include_str!("../../../campaigns/slew.toml")),
 ];
 
-/// Communication step of a plan without one: the thesis's IMU at 50 Hz, s.
+/// Step of a plan without one: the thesis's IMU at 50 Hz, s.
 const STEP: f64 = 0.02;
 /// Variables of the file names `<model>_<fill>mm_<amplitude>`, which the interface fixes.
 const NAMING: [&str; 3] = [slosh::MODEL, tank::H, AMPLITUDE];
@@ -174,7 +174,7 @@ pub struct Case {
     pub input: Option<String>,
     /// Start values by FMU name.
     pub settings: Vec<(String, String)>,
-    /// Communication step, s.
+    /// Time between the rows of the result, and between the commands of the profile, s.
     pub step: f64,
     /// Stop time, s.
     pub stop: f64,
@@ -197,6 +197,7 @@ impl Case {
             torque: Torque::clone(&self.torque),
             others: Vec::new(),
             step: self.step,
+            sample: self.step,
             stop: self.stop,
             tolerance: self.tolerance,
             hold: self.hold,
@@ -608,7 +609,8 @@ impl Plan {
         let sensors = Sensors::new(&case.sensors, description, &case.settings, case.step);
         problems.take(&Lines::default(), sensors);
         let lines = self.stop.as_ref().map_or(lines, |stop| stop.lines.clone());
-        problems.take(&lines, case.run().check());
+        let run = case.run();
+        problems.take(&lines, run.check().and_then(|()| run.torque.check_rows(run.step, run.stop)));
         (problems.count() == before).then_some(case)
     }
 

@@ -4,13 +4,16 @@ mod kinds;
 mod noise;
 mod shape;
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
+use files::budget;
 use host::description::did_you_mean;
+use host::schedule::History;
 use names::hubslosh::TAU_CMD;
 use serde_json::json;
 
@@ -304,18 +307,29 @@ impl Profile {
     }
 }
 
+/// Interval at which the torque of a profile is commanded, s: 50 Hz, as on the thesis's bench.
+pub const SAMPLE: f64 = 0.02;
+/// A line between two commands differs from a sine of the frequency f by at most (2π f · interval)²/8 of its amplitude. Commands that
+/// are a given interval apart may differ by this part, so that the thesis's sweeps up to 3.5 Hz are commanded at 50 Hz.
+pub const COARSEST: f64 = 0.025;
+/// The same for commands that are closer than the given interval because of [`COARSEST`].
+const FINEST: f64 = 0.001;
+
+/// Returns the largest product of frequency and interval (cycles) for which lines differ by at most this part of the amplitude.
+pub fn cycles(error: f64) -> f64 {
+    (8.0 * error).sqrt() / std::f64::consts::TAU
+}
+
 /// Source of a run's torque.
 #[derive(Clone, Debug)]
 pub enum Torque {
     /// A formula.
     Profile(Profile),
-    /// The rows of a file: `time` (s, growing; two at one time are a jump) and torque (N·m).
+    /// Rows, torque in N·m.
     Rows {
-        /// Times, s.
-        time: Vec<f64>,
-        /// Torques, N·m.
-        tau: Vec<f64>,
-        /// Held from row to row (else linear between rows).
+        /// The rows.
+        history: History,
+        /// True if they are held from row to row, else they are linear between rows.
         held: bool,
     },
 }
@@ -334,38 +348,18 @@ impl Torque {
 
     /// Returns a torque from rows. With `slopes` the torque follows each row's slope until the next row, and may jump there.
     pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
-        ensure!(time.len() >= 2, "it has {} rows; a history needs two", time.len());
-        if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
-            bail!(
-                "row {}: time goes from {} to {} s; it must grow",
-                row + 2,
-                time[row],
-                time[row + 1]
-            );
-        }
-        let Some(slopes) = slopes else {
-            return Ok(Torque::Rows { time: time.to_vec(), tau: tau.to_vec(), held });
-        };
-        let (mut times, mut torques) = (Vec::new(), Vec::new());
-        for (k, slope) in slopes.iter().enumerate() {
-            times.push(time[k]);
-            torques.push(tau[k]);
-            let Some(next) = time.get(k + 1) else { break };
-            let end = tau[k] + slope * (next - time[k]);
-            // rounding of the slope is not a jump
-            if (end - tau[k + 1]).abs() > 1e-12 * (tau[k].abs() + tau[k + 1].abs()) {
-                times.push(*next);
-                torques.push(end);
-            }
-        }
-        Ok(Torque::Rows { time: times, tau: torques, held })
+        let slopes = slopes.map(<[f64]>::to_vec);
+        Ok(Torque::Rows { history: History::new(time.to_vec(), tau.to_vec(), slopes, held)?, held })
     }
 
     /// First and last time, s.
     pub fn span(&self) -> (f64, f64) {
         match self {
             Torque::Profile(profile) => (0.0, profile.duration()),
-            Torque::Rows { time, .. } => (time[0], time[time.len() - 1]),
+            Torque::Rows { history, .. } => {
+                let time = history.time();
+                (time[0], time[time.len() - 1])
+            }
         }
     }
 
@@ -373,41 +367,117 @@ impl Torque {
     pub fn at(&self, t: f64) -> f64 {
         match self {
             Torque::Profile(profile) => profile.shape.after(t),
-            Torque::Rows { time, tau, held } => {
-                // communication points k·H may lie an ulp before the row they are meant to meet
-                let slack = 1e-9 * (1.0 + t.abs());
-                let next = time.partition_point(|row| *row <= t + slack);
-                match next {
-                    0 => tau[0],
-                    n if n == time.len() || *held => tau[n - 1],
-                    n => {
-                        let part = (t - time[n - 1]) / (time[n] - time[n - 1]);
-                        tau[n - 1] + (tau[n] - tau[n - 1]) * part
-                    }
-                }
-            }
+            // communication points k·H may lie an ulp before the row they are meant to meet
+            Torque::Rows { history, .. } => history.near(t),
         }
     }
 
-    /// Torque at the beginning of a step and the slope of the chord to its end, N·m and N·m/s.
-    pub fn chord(&self, t: f64, step: f64) -> (f64, f64) {
-        let begin = self.at(t);
-        let end = match self {
-            Torque::Profile(profile) => profile.shape.before(t + step),
-            Torque::Rows { held: true, .. } => begin,
-            Torque::Rows { time, tau, .. } => {
-                let end = t + step;
-                let slack = 1e-9 * (1.0 + end.abs());
-                match time.partition_point(|row| *row <= end + slack) {
-                    // just before a jump at the step's end
-                    n if n > 1 && time[n - 1] == time[n - 2] && time[n - 1] > end - slack => {
-                        tau[n - 2]
-                    }
-                    _ => self.at(end),
+    /// The torque until `stop` (s) as rows that are joined by lines or held. The rows of a file are its own. Edges of a profile
+    /// are rows. A profile that oscillates has a row every `sample` seconds. If lines between those would differ from
+    /// it by more than 2.5 % of the amplitude, `sample` is divided so that they differ by at most 0.1 %. Held rows are never
+    /// divided.
+    ///
+    /// # Errors
+    /// There would be more than [`budget::ROWS`] rows, or the profile has frequencies above half of the rate of held rows.
+    pub fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<Cow<'_, History>> {
+        match self {
+            Torque::Rows { history, .. } if hold => Ok(Cow::Owned(history.held())),
+            Torque::Rows { history, .. } => Ok(Cow::Borrowed(history)),
+            Torque::Profile(profile) => profile.history(sample, stop, hold).map(Cow::Owned),
+        }
+    }
+
+    /// Returns the number of rows of [`Torque::history`], or fails as it does.
+    pub fn count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
+        Ok(match self {
+            Torque::Rows { history, .. } => history.time().len(),
+            Torque::Profile(profile) => match profile.commands(sample, stop, hold)? {
+                Some((intervals, _)) => intervals.ceil() as usize + 1,
+                None => profile.shape.edges().len() + 2,
+            },
+        })
+    }
+
+    /// Fails if rows that are `step` s apart cannot show the torque because it has frequencies of half of their rate or more.
+    pub fn check_rows(&self, step: f64, stop: f64) -> Result<()> {
+        let Torque::Profile(profile) = self else { return Ok(()) };
+        let highest = profile.shape.highest(stop);
+        ensure!(
+            highest * step < 0.5,
+            "{profile} reaches {highest} Hz, which rows {step} s apart cannot show (allowed: a step below {:.3e} s)",
+            0.5 / highest
+        );
+        Ok(())
+    }
+}
+
+impl Profile {
+    /// Number of intervals between commands until `stop`, perhaps not a whole one, and of those in `sample` s; `None`: the torque is constant between its
+    /// edges.
+    fn commands(&self, sample: f64, stop: f64, hold: bool) -> Result<Option<(f64, usize)>> {
+        let highest = self.shape.highest(stop);
+        if highest == 0.0 {
+            return Ok(None);
+        }
+        ensure!(
+            sample > 0.0 && sample.is_finite(),
+            "the interval of the torque's commands must be a positive number of seconds, not {sample}"
+        );
+        let parts = match highest * sample {
+            turns if hold => {
+                ensure!(
+                    turns < 0.5,
+                    "{self} reaches {highest} Hz, which commands held for {sample} s cannot follow (allowed: an interval below \
+                     {:.3e} s)",
+                    0.5 / highest
+                );
+                1.0
+            }
+            turns if turns <= cycles(COARSEST) => 1.0,
+            turns => (turns / cycles(FINEST)).ceil(),
+        };
+        let intervals = stop / sample * parts;
+        let most = budget::ROWS as f64;
+        ensure!(
+            intervals <= most,
+            "{self} takes {intervals:.3e} commands until {stop} s, because it reaches {highest} Hz or is commanded every {sample} s \
+             (allowed: at most {most}). Up to {:.3e} s, or up to {:.4e} Hz, are possible",
+            stop * most / intervals,
+            most / stop * cycles(FINEST)
+        );
+        Ok(Some((intervals, parts as usize)))
+    }
+
+    /// See [`Torque::history`].
+    fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<History> {
+        let (mut time, mut values) = (vec![0.0], vec![self.shape.after(0.0)]);
+        let mut row = |t: f64| {
+            time.push(t);
+            values.push(self.shape.after(t));
+        };
+        let Some((intervals, parts)) = self.commands(sample, stop, hold)? else {
+            let mut edges = self.shape.edges();
+            edges.sort_by(f64::total_cmp);
+            let mut last = 0.0;
+            for edge in edges {
+                // two edges an ulp apart are one
+                let apart = 1e-9 * (1.0 + edge.abs());
+                if edge > last + apart && edge < stop - apart {
+                    row(edge);
+                    last = edge;
                 }
             }
+            row(stop);
+            return History::new(time, values, None, true);
         };
-        (begin, (end - begin) / step)
+        let command =
+            |k: usize| (k / parts) as f64 * sample + (k % parts) as f64 * (sample / parts as f64);
+        let whole = (intervals - intervals.round()).abs() < 1e-6;
+        let last = if whole { intervals.round() } else { intervals.ceil() }.max(1.0) as usize;
+        (1..last).for_each(|k| row(command(k)));
+        // the first command after the stop time: the torque does not depend on when the run ends
+        row(if whole { stop } else { command(last) });
+        History::new(time, values, None, hold)
     }
 }
 
@@ -478,22 +548,87 @@ mod tests {
         }
     }
 
+    /// Rows of a profile, each with its value.
+    fn rows(text: &str, sample: f64, stop: f64, hold: bool) -> Vec<(f64, f64)> {
+        let torque = Torque::Profile(text.parse().unwrap());
+        let history = torque.history(sample, stop, hold).unwrap();
+        history.time().iter().map(|t| (*t, history.after(*t).0)).collect()
+    }
+
     #[test]
-    fn bang_stop_bang_takes_back_all_the_momentum_it_gave() {
+    fn edges_are_rows_wherever_they_lie() {
         let text = "bang-stop-bang:amplitude=0.1,start=0.1,bang=0.3,stop=0.5,duration=2";
         let torque = Torque::Profile(text.parse().unwrap());
-        let mut momentum: f64 = 0.0;
-        for k in 0..100 {
-            let (tau, slope) = torque.chord(k as f64 * 0.02, 0.02);
-            let expected = match k {
-                5..20 => 0.1,
-                45..60 => -0.1,
-                _ => 0.0,
-            };
-            assert_eq!((tau, slope), (expected, 0.0), "step {k}");
-            momentum += tau * 0.02;
-        }
+        let history = torque.history(0.02, 2.0, false).unwrap();
+        assert!(history.is_held());
+        let momentum: f64 = (0..history.time().len() - 1)
+            .map(|k| {
+                let t = history.time()[k];
+                history.after(t).0 * (history.time()[k + 1] - t)
+            })
+            .sum();
         assert!(momentum.abs() < 1e-15);
+        let found = rows(text, 0.02, 2.0, false);
+        assert_eq!(found.len(), 6, "{found:?}");
+        let pulse = "pulse:amplitude=2,start=0.005,width=0.01";
+        let expected = [(0.0, 0.0), (0.005, 2.0), (0.015, 0.0), (1.0, 0.0)];
+        assert_eq!(rows(pulse, 0.02, 1.0, false), expected);
+        assert_eq!(rows(pulse, 0.02, 1.0, true), expected);
+        // an edge at the start, and one at the end
+        let pulse = "pulse:amplitude=2,start=0,width=1";
+        assert_eq!(rows(pulse, 0.02, 1.0, false), [(0.0, 2.0), (1.0, 0.0)]);
+    }
+
+    /// The thesis's sweeps are commanded at 50 Hz; a line of 0.02 s differs from 3.5 Hz by (0.44)²/8 = 2.4 % of the amplitude.
+    #[test]
+    fn lines_between_commands_follow_a_profile_of_any_frequency() {
+        for (text, count, error) in [
+            ("exp-sweep:amplitude=1,duration=20", 1000, 0.025),
+            ("sine:amplitude=1,frequency=3.5", 1000, 0.025),
+            ("sine:amplitude=1,frequency=4", 6000, 0.001),
+            ("sine:amplitude=1,frequency=-50", 71_000, 0.001),
+            ("lin-sweep:amplitude=1,f0=60,f1=1,duration=20", 85_000, 0.001),
+        ] {
+            let torque = Torque::Profile(text.parse().unwrap());
+            let history = torque.history(0.02, 20.0, false).unwrap();
+            assert_eq!(history.time().len(), count + 1, "{text}");
+            let mut largest = 0.0_f64;
+            for k in 0..100_000 {
+                let t = 20.0 * (f64::from(k) + 0.5) / 100_000.0;
+                largest = largest.max((history.after(t).0 - torque.at(t)).abs());
+            }
+            assert!(largest <= error, "{text}: {largest}");
+            // every command of 50 Hz is one of them, to the last bit, and none depends on when the run ends
+            let early = torque.history(0.02, 7.333, false).unwrap();
+            for k in 0..366 {
+                let t = f64::from(k) * 0.02;
+                assert_eq!(history.after(t).0, torque.at(t));
+                assert_eq!(history.after(t + 0.007), early.after(t + 0.007), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_profile_that_takes_too_many_commands_is_refused_with_what_is_possible() {
+        let refused = |text: &str, sample: f64, hold: bool| {
+            let torque = Torque::Profile(text.parse().unwrap());
+            torque.history(sample, 60.0, hold).unwrap_err().to_string()
+        };
+        let error = refused("lin-sweep:f1=1e9", 0.02, false);
+        for word in ["4.215e12 commands", "allowed: at most 20000000", "Up to 2.847e-4 s"] {
+            assert!(error.contains(word), "{word}: {error}");
+        }
+        // 20 million rows in 60 s, 70.25 for a cycle
+        assert!(error.contains("up to 4.7451e3 Hz"), "{error}");
+        assert!(refused("sine", 1e-9, false).contains("6.000e10 commands"));
+        let error = refused("sine:frequency=25", 0.02, true);
+        assert!(error.contains("allowed: an interval below 2.000e-2 s"), "{error}");
+        assert!(
+            refused("sine", 0.0, false).contains("must be a positive number of seconds, not 0")
+        );
+        let error = Torque::Profile("lin-sweep:f0=1,f1=60".parse().unwrap());
+        let error = error.check_rows(0.02, 60.0).unwrap_err().to_string();
+        assert!(error.contains("allowed: a step below 8.333e-3 s"), "{error}");
     }
 
     #[test]
@@ -520,24 +655,12 @@ mod tests {
     }
 
     #[test]
-    fn a_pulse_has_no_ramps() {
-        let pulse = Torque::Profile("pulse:amplitude=2,start=0.1,width=0.3".parse().unwrap());
-        for k in 0..50 {
-            let (t, step) = (k as f64 * 0.02, 0.02);
-            let (tau, slope) = pulse.chord(t, step);
-            assert_eq!(slope, 0.0, "at {t}");
-            assert_eq!(tau, if (5..20).contains(&k) { 2.0 } else { 0.0 }, "at {t}");
-        }
-    }
-
-    #[test]
     fn rows_are_joined_by_lines_or_held() {
-        let rows =
-            |held| Torque::Rows { time: vec![0.0, 1.0, 3.0], tau: vec![0.0, 2.0, 0.0], held };
+        let rows = |held| Torque::rows(&[0.0, 1.0, 3.0], &[0.0, 2.0, 0.0], None, held).unwrap();
         assert_eq!((rows(false).at(0.5), rows(false).at(2.0)), (1.0, 1.0));
         assert_eq!((rows(true).at(0.5), rows(true).at(2.0)), (0.0, 2.0));
-        assert_eq!(rows(false).chord(0.0, 0.5), (0.0, 2.0));
-        assert_eq!(rows(true).chord(1.0, 2.0), (2.0, 0.0));
         assert_eq!(rows(false).at(9.0), 0.0);
+        let held = rows(false).history(0.02, 3.0, true).unwrap().into_owned();
+        assert_eq!(held, *rows(true).history(0.02, 3.0, false).unwrap());
     }
 }

@@ -78,6 +78,10 @@ impl Shape for Noise {
         sum.clamp(-self.limit, self.limit)
     }
 
+    fn highest(&self, _: f64) -> f64 {
+        self.f1
+    }
+
     /// Returns the band from the second tone on: if the band begins at 0, the first tone may be anywhere near it.
     fn band(&self) -> Option<(f64, f64)> {
         let tone = (self.f1 - self.f0) / TONES as f64;
@@ -99,6 +103,10 @@ pub struct DwellInNoise {
 impl Shape for DwellInNoise {
     fn after(&self, t: f64) -> f64 {
         (self.dwell.after(t) + self.noise.after(t)).clamp(-self.limit, self.limit)
+    }
+
+    fn highest(&self, stop: f64) -> f64 {
+        self.dwell.highest(stop).max(self.noise.highest(stop))
     }
 
     fn band(&self) -> Option<(f64, f64)> {

@@ -10,9 +10,12 @@ pub trait Shape: Debug + Send + Sync {
     /// Torque just after `t`.
     fn after(&self, t: f64) -> f64;
 
-    /// Torque just before `t`; another one where the torque jumps.
-    fn before(&self, t: f64) -> f64 {
-        self.after(t)
+    /// Highest frequency from 0 to `stop` (s), Hz. It is 0 if the torque is constant between its edges.
+    fn highest(&self, stop: f64) -> f64;
+
+    /// Times at which the torque jumps, s.
+    fn edges(&self) -> Vec<f64> {
+        Vec::new()
     }
 
     /// The frequencies it excites uniformly enough for a frequency response, from and to, Hz; `None`
@@ -30,6 +33,11 @@ pub trait Shape: Debug + Send + Sync {
 impl Shape for Sweep {
     fn after(&self, t: f64) -> f64 {
         self.torque(t)
+    }
+
+    fn highest(&self, stop: f64) -> f64 {
+        let end = if stop > self.duration { self.frequency_at(stop).abs() } else { self.f1 };
+        self.f0.max(self.f1).max(end)
     }
 
     fn band(&self) -> Option<(f64, f64)> {
@@ -53,6 +61,10 @@ pub struct Dwell {
 impl Shape for Dwell {
     fn after(&self, t: f64) -> f64 {
         self.amplitude * (TAU * self.frequency * t).sin()
+    }
+
+    fn highest(&self, _: f64) -> f64 {
+        self.frequency.abs()
     }
 }
 
@@ -88,7 +100,11 @@ impl Shape for Pieces {
         now.map_or(0.0, |piece| piece.torque)
     }
 
-    fn before(&self, t: f64) -> f64 {
-        self.after(t - 3e-9 * (1.0 + t.abs()))
+    fn highest(&self, _: f64) -> f64 {
+        0.0
+    }
+
+    fn edges(&self) -> Vec<f64> {
+        self.0.iter().flat_map(|piece| [piece.from, piece.to]).collect()
     }
 }

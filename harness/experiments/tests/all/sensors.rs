@@ -24,6 +24,7 @@ fn record(set: &[(&str, &str)], sensors: &[&str], columns: &[&str], seconds: f64
         torque: Torque::Profile(profile.parse().unwrap()),
         others: Vec::new(),
         step: STEP,
+        sample: STEP,
         stop: seconds,
         tolerance: None,
         hold: false,

@@ -42,6 +42,7 @@ fn run(settings: Vec<(String, String)>) -> Run {
         torque: Torque::Profile("sine:amplitude=5,frequency=0.5".parse().unwrap()),
         others: Vec::new(),
         step: 0.1,
+        sample: 0.1,
         stop: 5.0,
         tolerance: None,
         hold: false,

@@ -23,6 +23,7 @@ fn said(
         torque: Torque::rows(times, values, None, true).unwrap(),
         others: Vec::new(),
         step: 0.25,
+        sample: 0.25,
         stop: times[times.len() - 1],
         tolerance: None,
         hold: true,

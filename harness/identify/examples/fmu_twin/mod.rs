@@ -96,7 +96,7 @@ pub fn torque(text: &str) -> Result<Torque> {
     // rows close enough that lines between them are the curve: (2π 3.5 Hz 5 ms)²/8 = 0.15 %
     let time: Vec<f64> = (0..=(numbers[1] / 0.005) as u32).map(|k| 0.005 * f64::from(k)).collect();
     let tau = time.iter().map(|t| sine.at(*t)).collect();
-    Ok(Torque::Rows { time, tau, held: false })
+    Torque::rows(&time, &tau, None, false)
 }
 
 /// A bench that is the FMU.
@@ -164,15 +164,16 @@ impl Twin {
         let heard = if self.intersample == Intersample::BandLimited {
             torque.clone()
         } else if late == 0.0 {
-            Torque::Rows { time: time.clone(), tau: tau.clone(), held }
+            Torque::rows(&time, &tau, None, held)?
         } else {
-            let knots = std::iter::once(start).chain(time.iter().map(|t| t + late)).collect();
-            let values = std::iter::once(tau[0]).chain(tau.iter().copied()).collect();
-            Torque::Rows { time: knots, tau: values, held }
+            let knots: Vec<f64> =
+                std::iter::once(start).chain(time.iter().map(|t| t + late)).collect();
+            let values: Vec<f64> = std::iter::once(tau[0]).chain(tau.iter().copied()).collect();
+            Torque::rows(&knots, &values, None, held)?
         };
         let is = |effect: Unmodelled| self.unmodelled.contains(&effect);
         let lags = is(Unmodelled::ActuatorLag) || is(Unmodelled::GyroLag);
-        let heard = if is(Unmodelled::ActuatorLag) { behind(&heard, &time) } else { heard };
+        let heard = if is(Unmodelled::ActuatorLag) { behind(&heard, &time)? } else { heard };
         // steps that meet the knots, or are short against a smooth torque's cycle
         let parts = match (self.intersample, late == 0.0) {
             (Intersample::BandLimited, _) => (step / 1e-3).ceil() as usize,
@@ -189,6 +190,7 @@ impl Twin {
             torque: heard.clone(),
             others: Vec::new(),
             step: step / parts as f64,
+            sample: step / parts as f64,
             stop,
             tolerance: None,
             hold: false,
@@ -242,7 +244,11 @@ impl Twin {
             let shift = if self.intersample == Intersample::BandLimited { late } else { 0.0 };
             (course.values[0], course.slopes[0]) = match held {
                 true => (heard.at(t), 0.0),
-                false => heard.chord((t - shift).max(start), next - t),
+                false => {
+                    let from = (t - shift).max(start);
+                    let now = heard.at(from);
+                    (now, (heard.at(from + (next - t)) - now) / (next - t))
+                }
             };
             if drags {
                 let rate = true_rate[0];
@@ -274,7 +280,7 @@ impl Lag {
 }
 
 /// A torque behind its command, at [`LAG_PARTS`] instants from row to row.
-fn behind(torque: &Torque, rows: &[f64]) -> Torque {
+fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
     let mut lag = Lag::default();
     let (mut time, mut tau) = (vec![rows[0]], vec![0.0]);
     for ends in rows.windows(2) {
@@ -286,7 +292,7 @@ fn behind(torque: &Torque, rows: &[f64]) -> Torque {
             time.push(t);
         }
     }
-    Torque::Rows { time, tau, held: false }
+    Torque::rows(&time, &tau, None, false)
 }
 
 /// φ'' + 2ζΩφ' + Ω²φ = Ω² ∫a dt: far below Ω φ follows the hub's rate.

@@ -141,7 +141,7 @@ fn the_preferential_direction_shows_in_free_decay_and_in_the_harmonics() {
         time.push(t);
         tau.push(if within < 1.5 { 0.2 * sign } else { 0.0 });
     }
-    let torque = Torque::Rows { time, tau, held: false };
+    let torque = Torque::rows(&time, &tau, None, false).unwrap();
     let settings = [&[("slosh.model", "frozen")], &bench[..]].concat();
     let mut one =
         fmu_twin::record(&fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();

@@ -33,6 +33,7 @@ fn twin(sensor: &Sensor, column: &str) -> Record {
         torque: Torque::Profile(profile.parse().unwrap()),
         others: Vec::new(),
         step: STEP,
+        sample: STEP,
         stop: 100.0,
         tolerance: None,
         hold: false,

@@ -1,0 +1,46 @@
+//! The exponential of a matrix of any size, in bounded time.
+
+use std::ops::Mul;
+
+/// Largest sum of absolute values that nalgebra's exponential is given. It takes powers up to the 27th, and computes without end if one
+/// overflows.
+const LARGEST: f64 = 1e9;
+
+/// Returns the exponential of `matrix`, whose absolute values add up to `size`; `exp` is nalgebra's. A larger matrix is halved n times, and
+/// its exponential squared n times. NaN if the matrix is not finite.
+pub fn exponential<M>(matrix: M, size: f64, exp: impl Fn(&M) -> M) -> M
+where
+    M: Clone + Mul<M, Output = M> + Mul<f64, Output = M>,
+{
+    if !size.is_finite() {
+        return matrix * f64::NAN;
+    }
+    let halvings = (size / LARGEST).log2().ceil().max(0.0) as i32;
+    let mut power = exp(&(matrix * 0.5_f64.powi(halvings)));
+    for _ in 0..halvings {
+        power = power.clone() * power;
+    }
+    power
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix2;
+
+    use super::exponential;
+
+    fn of(matrix: Matrix2<f64>) -> Matrix2<f64> {
+        exponential(matrix, matrix.abs().sum(), |matrix| matrix.exp())
+    }
+
+    /// Of a stiff decay nothing is left.
+    #[test]
+    fn a_huge_matrix_has_an_exponential_too() {
+        assert_eq!(of(Matrix2::new(-1e300, 0.0, 0.0, 0.0)), Matrix2::new(0.0, 0.0, 0.0, 1.0));
+        assert_eq!(of(Matrix2::new(-1e12, 0.0, 0.0, -1e15)), Matrix2::zeros());
+        let small = Matrix2::new(-0.2, 1.0, -1.0, -0.2);
+        assert_eq!(of(small), small.exp());
+        assert!(of(Matrix2::new(f64::INFINITY, 0.0, 0.0, 1.0)).iter().all(|x| x.is_nan()));
+        assert!(of(Matrix2::new(1e300, 1e300, 1e300, f64::MAX)).iter().all(|x| !x.is_finite()));
+    }
+}

@@ -1,0 +1,336 @@
+//! Communication points of a run, and the inputs between them: one rule for the command and for the Python package.
+//!
+//! An input is a [`History`]: rows that are joined by lines or held. The [`Schedule`] of a run has a communication point at the
+//! start, at every row of an input, at every row of the result, and at the stop time. A line between two
+//! rows is therefore never sampled, so the rows of the result can be chosen freely.
+
+use anyhow::{Result, bail, ensure};
+use files::budget;
+
+use crate::description::ModelDescription;
+
+/// Part of the time between two rows of the result by which a row may differ from a row of an input or from the stop time,
+/// to be moved there: 3 · 0.02 is not 0.06.
+const SAME: f64 = 1e-6;
+
+/// What a row of a result pairs, for its metadata.
+pub const ROWS: &str =
+    "inputs from the row's time on; other variables at the row's time, before these inputs act";
+
+/// How inputs go on from row to row, for the metadata of a result.
+pub const fn between(hold: bool) -> &'static str {
+    if hold { "held from row to row" } else { "straight lines between rows" }
+}
+
+/// An input over time. Two rows at one time are a jump. Before its first and after its last row the input is constant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct History {
+    time: Vec<f64>,
+    values: Vec<f64>,
+    /// From each row to the next, per s; 0 in the last row.
+    slopes: Vec<f64>,
+}
+
+impl History {
+    /// A history with the value `values[k]` at `time[k]` (s). From there to the next row it has the slope `slopes[k]` (per s) and may jump
+    /// at its end; without `slopes` it is a straight line between the two rows. With `hold` it is constant.
+    ///
+    /// # Errors
+    /// There are fewer than two rows, or the time goes back.
+    pub fn new(
+        time: Vec<f64>,
+        values: Vec<f64>,
+        slopes: Option<Vec<f64>>,
+        hold: bool,
+    ) -> Result<Self> {
+        let rows = time.len();
+        ensure!(rows >= 2, "it has {rows} rows; a history needs two");
+        ensure!(
+            values.len() == rows && slopes.as_ref().is_none_or(|slopes| slopes.len() == rows),
+            "its columns have different lengths"
+        );
+        // also true of NaN
+        if let Some(row) = time.windows(2).position(|pair| !(pair[0] <= pair[1])) {
+            bail!(
+                "row {}: time goes from {} to {} s; it must not go back (two rows at one time are a jump)",
+                row + 2,
+                time[row],
+                time[row + 1]
+            );
+        }
+        let mut slopes = match slopes {
+            _ if hold => vec![0.0; rows],
+            Some(slopes) => slopes,
+            None => {
+                let slope = |k: usize| match time[k + 1] - time[k] {
+                    0.0 => 0.0,
+                    length => (values[k + 1] - values[k]) / length,
+                };
+                (0..rows - 1).map(slope).chain([0.0]).collect()
+            }
+        };
+        slopes[rows - 1] = 0.0;
+        Ok(History { time, values, slopes })
+    }
+
+    /// The same rows, each held until the next.
+    pub fn held(&self) -> History {
+        let slopes = vec![0.0; self.time.len()];
+        History { time: self.time.clone(), values: self.values.clone(), slopes }
+    }
+
+    /// Times of its rows, s.
+    pub fn time(&self) -> &[f64] {
+        &self.time
+    }
+
+    /// Returns true if it is constant from each row to the next.
+    pub fn is_held(&self) -> bool {
+        self.slopes.iter().all(|slope| *slope == 0.0)
+    }
+
+    /// Value and slope at `t` and immediately after it.
+    pub fn after(&self, t: f64) -> (f64, f64) {
+        self.at_row(self.time.partition_point(|row| *row <= t), t)
+    }
+
+    /// Value at `t` of a clock with rounding errors: a row that is at most 1e-9 (1 + |t|) s later has begun.
+    pub fn near(&self, t: f64) -> f64 {
+        let slack = 1e-9 * (1.0 + t.abs());
+        self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
+    }
+
+    /// Value and slope at `t` (s), at which so many rows have begun.
+    fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
+        let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
+        let (value, slope) = (self.values[k], self.slopes[k]);
+        (if t == self.time[k] { value } else { value + slope * (t - self.time[k]) }, slope)
+    }
+
+    /// Goes through ascending times.
+    pub fn cursor(&self) -> Cursor<'_> {
+        Cursor { history: self, begun: 0 }
+    }
+}
+
+/// A history that is followed through time.
+pub struct Cursor<'h> {
+    history: &'h History,
+    begun: usize,
+}
+
+impl Cursor<'_> {
+    /// [`History::after`]; `t` is not before that of the last call.
+    pub fn after(&mut self, t: f64) -> (f64, f64) {
+        let time = &self.history.time;
+        while time.get(self.begun).is_some_and(|row| *row <= t) {
+            self.begun += 1;
+        }
+        self.history.at_row(self.begun, t)
+    }
+}
+
+/// Communication points of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    /// Their times, ascending, s.
+    pub time: Vec<f64>,
+    /// True for those that are rows of the result; `None`: all are.
+    pub rows: Option<Vec<bool>>,
+}
+
+impl Schedule {
+    /// Communication points from `start` to `stop`, s: both ends, the times `inputs` and the rows of the result. These are `step` s
+    /// apart and end at `stop`; without a `step` they are all communication points.
+    ///
+    /// # Errors
+    /// The times make no sense, or there are more than [`budget::ROWS`].
+    pub fn new<'h>(
+        (start, stop): (f64, f64),
+        step: Option<f64>,
+        inputs: impl IntoIterator<Item = &'h [f64]>,
+    ) -> Result<Self> {
+        let mut knots: Vec<f64> = Vec::new();
+        let mut last: Option<&[f64]> = None;
+        for times in inputs {
+            // the inputs of one table have the same rows
+            if last != Some(times) {
+                let from = times.partition_point(|t| *t <= start);
+                let to = times.partition_point(|t| *t < stop);
+                knots.extend(times.get(from..to).unwrap_or_default());
+            }
+            last = Some(times);
+        }
+        knots.sort_unstable_by(f64::total_cmp);
+        knots.dedup();
+        let most = |points: usize| -> Result<()> {
+            ensure!(
+                points <= budget::ROWS + 1,
+                "{} rows of the inputs and those of the result are {points} communication points (allowed: at most {})",
+                knots.len(),
+                budget::ROWS
+            );
+            Ok(())
+        };
+        let Some(step) = step else {
+            most(knots.len() + 2)?;
+            let time = [start].into_iter().chain(knots.iter().copied()).chain([stop]).collect();
+            return Ok(Schedule { time, rows: None });
+        };
+        let steps = budget::steps(stop - start, step)?;
+        let (mut time, mut rows) = (Vec::with_capacity(steps + 1), Vec::with_capacity(steps + 1));
+        let mut next = 0;
+        for k in 0..=steps {
+            let grid = match k {
+                0 => start,
+                _ if k == steps => stop,
+                _ => start + k as f64 * step,
+            };
+            let mut row = grid;
+            while let Some(knot) = knots.get(next).filter(|knot| **knot <= grid + SAME * step) {
+                let is_row = k > 0 && k < steps && (knot - grid).abs() <= SAME * step;
+                // of two that are close the closer one is the row
+                if is_row && (row == grid || (knot - grid).abs() < (row - grid).abs()) {
+                    row = *knot;
+                }
+                time.push(*knot);
+                rows.push(false);
+                next += 1;
+            }
+            match time.iter().rposition(|t| *t <= row).filter(|at| time[*at] == row) {
+                Some(at) => rows[at] = true,
+                None => {
+                    let at = time.iter().rposition(|t| *t < row).map_or(0, |at| at + 1);
+                    time.insert(at, row);
+                    rows.insert(at, true);
+                }
+            }
+            most(time.len())?;
+        }
+        let all = rows.iter().all(|row| *row);
+        Ok(Schedule { time, rows: (!all).then_some(rows) })
+    }
+
+    /// Returns true if the communication point `k` is a row of the result.
+    pub fn is_row(&self, k: usize) -> bool {
+        self.rows.as_ref().is_none_or(|rows| rows[k])
+    }
+}
+
+/// Returns true if a host can give the FMU the slopes of its inputs. An FMU for Model Exchange alone is integrated by the host, which
+/// sets the inputs at any time.
+pub fn interpolates(description: &ModelDescription) -> bool {
+    description
+        .co_simulation
+        .as_ref()
+        .is_none_or(|co_simulation| co_simulation.can_interpolate_inputs)
+}
+
+/// Refuses inputs with slopes for an FMU that cannot interpolate: held over each step they would be late, and a row of the result would pair
+/// an input with the answer to the one before. `hold` is how the user asks for inputs that are held from row to row.
+///
+/// # Errors
+/// There is such an input.
+pub fn check_interpolation<'h>(
+    description: &ModelDescription,
+    inputs: impl IntoIterator<Item = (&'h str, &'h History)>,
+    hold: &str,
+) -> Result<()> {
+    if interpolates(description) {
+        return Ok(());
+    }
+    for (name, history) in inputs {
+        ensure!(
+            history.is_held(),
+            "{} cannot interpolate its inputs (canInterpolateInputs), and {name} is not constant between its rows; with {hold} it \
+             is held from row to row",
+            description.model_name
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{History, Schedule};
+
+    fn schedule(span: (f64, f64), step: Option<f64>, knots: &[f64]) -> Vec<(f64, bool)> {
+        let schedule = Schedule::new(span, step, [knots]).unwrap();
+        (0..schedule.time.len()).map(|k| (schedule.time[k], schedule.is_row(k))).collect()
+    }
+
+    #[test]
+    fn every_row_of_an_input_and_of_the_result_is_a_communication_point() {
+        let inputs = [0.0, 0.015, 0.02, 0.02, 0.06, 0.07];
+        assert_eq!(
+            schedule((0.0, 0.07), Some(0.02), &inputs),
+            [
+                (0.0, true),
+                (0.015, false),
+                (0.02, true),
+                (0.04, true),
+                // 3 · 0.02 is 0.06 and an ulp
+                (0.06, true),
+                (0.07, true)
+            ]
+        );
+        let rows = [0.0, 0.015, 0.02, 0.06, 0.07].map(|t| (t, true));
+        assert_eq!(schedule((0.0, 0.07), None, &inputs), rows);
+        // before the inputs begin, and after their end
+        assert_eq!(
+            schedule((-0.02, 0.01), Some(0.02), &[0.0, 0.005]),
+            [(-0.02, true), (0.0, true), (0.005, false), (0.01, true)]
+        );
+        // a row within 1e-6 of a step before a knot is moved there, not doubled
+        let near = [0.0, 0.02 + 1e-9, 0.04 - 1e-9, 0.06];
+        let found = schedule((0.0, 0.06), Some(0.02), &near);
+        assert_eq!(found, near.map(|t| (t, true)));
+    }
+
+    #[test]
+    fn a_history_is_lines_between_rows_that_may_jump() {
+        let lines = |hold| {
+            let (time, values) = (vec![0.0, 1.0, 1.0, 3.0], vec![0.0, 2.0, 5.0, 1.0]);
+            History::new(time, values, None, hold).unwrap()
+        };
+        let at = |history: &History, t| history.after(t);
+        assert_eq!(at(&lines(false), 0.5), (1.0, 2.0));
+        assert_eq!(at(&lines(false), 1.0), (5.0, -2.0));
+        assert_eq!(at(&lines(false), 9.0), (1.0, 0.0));
+        assert_eq!(at(&lines(false), -1.0), (0.0, 0.0));
+        assert_eq!(at(&lines(true), 2.9), (5.0, 0.0));
+        assert_eq!(lines(false).held(), lines(true));
+        // 3 · 0.1 lies an ulp after 0.3, 1 - 0.9 three before 0.1
+        assert_eq!(lines(true).near(1.0 - 1e-12), 5.0);
+        let given = History::new(
+            vec![0.0, 1.0, 2.0],
+            vec![1.0, 1.0, 1.0],
+            Some(vec![0.5, 0.0, 7.0]),
+            false,
+        );
+        let given = given.unwrap();
+        assert_eq!(
+            [at(&given, 0.5), at(&given, 1.0), at(&given, 3.0)],
+            [(1.25, 0.5), (1.0, 0.0), (1.0, 0.0)]
+        );
+        let mut cursor = given.cursor();
+        for t in [-1.0, 0.0, 0.7, 1.0, 2.0, 5.0] {
+            assert_eq!(cursor.after(t), given.after(t), "{t}");
+        }
+    }
+
+    #[test]
+    fn wrong_histories_and_too_many_points_are_refused() {
+        for (time, word) in [
+            (vec![0.0], "it has 1 rows; a history needs two"),
+            (vec![0.0, 1.0, 0.5], "row 3: time goes from 1 to 0.5 s; it must not go back"),
+            (vec![0.0, f64::NAN, 1.0], "row 2: time goes from 0 to NaN s"),
+        ] {
+            let values = vec![0.0; time.len()];
+            let error = History::new(time, values, None, false).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+        let error = Schedule::new((0.0, 1.0), Some(1e-9), []).unwrap_err().to_string();
+        assert!(error.contains("allowed: at most 20000000"), "{error}");
+    }
+}
