@@ -307,10 +307,6 @@ impl Run {
 
     /// A new instance with the start values set, ready for the first step.
     pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
-        self.initialise_until(fmu, Some(self.stop))
-    }
-
-    fn initialise_until<'fmu>(&self, fmu: &'fmu Fmu, stop: Option<f64>) -> Result<Instance<'fmu>> {
         self.check()?;
         let mut instance = rest::instantiate(fmu, "run")?;
         for (name, value) in &self.settings {
@@ -337,7 +333,7 @@ impl Run {
             &mut instance,
             self.tolerance,
             self.start(),
-            stop,
+            Some(self.stop),
             &first,
         )?;
         Ok(instance)

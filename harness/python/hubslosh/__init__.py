@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .loop import Law, Loop, closed_loop
     from .mcmc import posterior
     from .modes import mode_errors
+    from .operating_point import OperatingPoint
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
     from .review import Review
@@ -60,6 +61,7 @@ _MODULES = {
     "loop": ("Law", "Loop", "closed_loop"),
     "mcmc": ("posterior",),
     "modes": ("mode_errors",),
+    "operating_point": ("OperatingPoint",),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
     "review": ("Review",),
@@ -94,6 +96,7 @@ __all__ = [
     "Margins",
     "MassProperties",
     "MountedTank",
+    "OperatingPoint",
     "Plant",
     "Quantity",
     "Review",

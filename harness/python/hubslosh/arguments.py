@@ -1,10 +1,85 @@
 """Checks of arguments, with messages for wrong ones."""
 
+import sys
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .fmu import FmuError
+
+SECONDS: Mapping[str, tuple[float, float]] = {
+    "period": (1e-6, 1e6), "delay": (0.0, 1e6), "stop": (1e-9, 1e12),
+}  # fmt: skip
+"""Allowed times, s."""
+
+WHOLE: Mapping[str, tuple[int, int]] = {
+    "latency": (0, 1_000_000), "substeps": (1, 1_000_000), "draws": (0, 100_000),
+    "runs": (1, 100_000_000), "run": (0, 100_000_000), "workers": (1, 4096),
+    "seed": (0, 2**63 - 1),
+}  # fmt: skip
+"""Allowed whole numbers."""
+
+MOST_FILLS = 1000
+"""Most fills of a review."""
+
+MOST_STATES = 1000
+"""Most states of a sampled loop gain, commands on the way included: its poles take seconds."""
+
+MOST_WORK = 1e8
+"""Most points of a review times the square of its loop gain's states: minutes on two cores."""
+
+
+def caller() -> int:
+    """Return ``stacklevel`` for a warning that names the first line outside this package."""
+    folder, level = str(Path(__file__).parent), 1
+    frame = sys._getframe(1)
+    while frame.f_back and frame.f_code.co_filename.startswith(folder):
+        frame, level = frame.f_back, level + 1
+    return level
+
+
+def out_of_range(**values: Any) -> list[str]:
+    """Return which arguments are outside their allowed range, by name, in words."""
+    found = []
+    for name, value in values.items():
+        is_number = isinstance(value, int | float | np.integer | np.floating)
+        is_number &= not isinstance(value, bool)
+        if name in SECONDS:
+            low, high = SECONDS[name]
+            if not (is_number and low <= value <= high):
+                found.append(
+                    f"{name} must be a number of seconds from {low:g} to {high:g}, not {value!r}"
+                )
+        else:
+            least, most = WHOLE[name]
+            if not (is_number and least <= value <= most and value == int(value)):
+                found.append(f"{name} must be a whole number from {least} to {most}, not {value!r}")
+    return found
+
+
+def check_ranges(**values: Any) -> None:
+    """Raise FmuError if an argument is outside its allowed range."""
+    if wrong := out_of_range(**values):
+        raise FmuError("; ".join(wrong))
+
+
+def floats(values: Any) -> NDArray[np.float64]:
+    """Return values as an array of floats; a masked value is refused.
+
+    Raises FmuError for a mask, otherwise TypeError or ValueError, as NumPy does.
+    """
+    parts = values if isinstance(values, list | tuple) else [values]
+    for part in parts:
+        if isinstance(part, np.ma.MaskedArray) and np.ma.getmaskarray(part).any():
+            where = tuple(int(k) for k in np.argwhere(np.ma.getmaskarray(part))[0])
+            raise FmuError(
+                f"a masked array has no value at {', '.join(map(str, where)) or 'its place'}: fill "
+                "it (numpy.ma.filled) or drop it first"
+            )
+    return np.asarray(values, float)
 
 
 def names_of(names: Any, what: str, problems: list[str]) -> list[str]:
@@ -61,7 +136,9 @@ def column_of(table: Any, name: Any, what: str, problems: list[str]) -> np.ndarr
 def vector(values: Any, length: int, what: str) -> np.ndarray:
     """Return so many finite numbers as an array."""
     try:
-        found = np.asarray(values, float)
+        found = floats(values)
+    except FmuError as error:
+        raise FmuError(f"{what}: {error}") from None
     except (TypeError, ValueError):
         found = np.empty(0)
     if found.shape != (length,) or not np.isfinite(found).all():

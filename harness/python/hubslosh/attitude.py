@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import check_numbers, vector
+from .arguments import check_numbers, floats, vector
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def _of(q: Any) -> Real:
             raise FmuError(f"the table has no column {', '.join(missing)}")
         q = q[list(NAMES)].to_numpy(float)
     try:
-        rows = np.asarray(q, float)
+        rows = floats(q)
     except (TypeError, ValueError):
         rows = np.empty(0)
     if rows.ndim not in (1, 2) or rows.shape[-1] != 4:
@@ -96,7 +96,7 @@ def about(axis: ArrayLike, angle: ArrayLike) -> Real:
     if not length > 0:
         raise FmuError("an axis must not be 0")
     try:
-        half = np.asarray(angle, float)[..., None] / 2
+        half = floats(angle)[..., None] / 2
     except (TypeError, ValueError):
         raise FmuError(f"angle must be numbers, rad, not {angle!r}") from None
     return np.asarray(np.concatenate([np.cos(half), np.sin(half) * unit / length], axis=-1))
@@ -145,7 +145,7 @@ def slew(
     time = np.append(np.arange(0.0, stop - 1e-9 * step, step), stop)
     t, w = np.clip(time - start, 0.0, duration), 2 * np.pi / duration
     about(axis, 0.0)  # checks it
-    unit = np.asarray(axis, float) / np.linalg.norm(axis)
+    unit = floats(axis) / np.linalg.norm(axis)
     turned = angle * (t - np.sin(w * t) / w) / duration
     rate = angle * (1 - np.cos(w * t)) / duration
     acceleration = angle * w * np.sin(w * t) / duration
@@ -154,7 +154,7 @@ def slew(
     units = {"time": "s"} | {f"omega[{i + 1}]": "rad/s" for i in range(3)}
     if inertia is not None:
         try:
-            J = np.asarray(inertia, float)
+            J = floats(inertia)
         except (TypeError, ValueError):
             J = np.empty(0)
         if J.shape not in ((), (3, 3)):

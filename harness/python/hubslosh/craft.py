@@ -3,7 +3,7 @@
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import native, temporary
-from .arguments import vector
+from .arguments import caller, floats, vector
 from .fmu import Fmu, FmuError, FmuWarning, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
-from .simulation import outputs_of
+from .operating_point import OperatingPoint, rotation, trim
+from .quantities import DELAY, changed, full_names, of_mode
+from .simulation import outputs_of, parameters_of
 from .tanks import (
     Question,
     Tank,
@@ -93,7 +95,10 @@ class MountedTank:
         found = []
         for name, lengths in (("position", (3,)), ("axis", (3, 4))):
             try:
-                numbers = np.asarray(getattr(self, name), float)
+                numbers = floats(getattr(self, name))
+            except FmuError as error:
+                found.append(f"{name}: {error}")
+                continue
             except (TypeError, ValueError):
                 numbers = np.empty(0)
             right = numbers.shape in [(length,) for length in lengths]
@@ -229,7 +234,7 @@ class Craft:
 
     def _inertia(self) -> Vector:
         try:
-            J = np.asarray(self.inertia, float)
+            J = floats(self.inertia)
         except (TypeError, ValueError):
             J = np.empty(0)
         J = np.diag(J) if J.shape == (3,) else J
@@ -369,7 +374,7 @@ class Craft:
         """Issue the warnings of tanks that were solved."""
         said, self._said[:] = self._said[:], []
         for text in dict.fromkeys(said):
-            warnings.warn(text, FmuWarning, stacklevel=5)
+            warnings.warn(text, FmuWarning, stacklevel=caller())
 
     def mass_properties(self, fill: Fill, liquid: Liquid = "effective") -> MassProperties:
         """Return mass, centre of mass and inertia at a fill, every surface at rest.
@@ -397,17 +402,103 @@ class Craft:
         self,
         fill: Fill,
         *,
+        parameters: Mapping[str, Quantity] | None = None,
+        trimmed: bool = True,
         rigid: bool = False,
         detach: bool = False,
         mass_flow: Any = None,
         between: Sequence[float | str] = ("2%", "98%"),
     ) -> dict[str, Quantity]:
-        """Return the parameters of Spacecraft at a fill.
+        """Return the parameters of Spacecraft at a fill, its thrust through the centre of mass.
 
+        * ``parameters``: Further parameters, which override those of the craft, with the same
+          names in every method: a tank by its name or number, ``NTO.frequency[1]`` or
+          ``tank[1].frequency[1]`` (Hz, under the thrust that acts; the bob stays), ``zeta[1]``,
+          ``mass[1]`` and ``bob[1]`` (its height, m; mass, centre and inertia of the liquid stay);
+          ``craft.Jxx``, … and every other parameter of the FMU.
+        * ``trimmed``: See `trim`. False leaves the thrust at O, with a warning if it turns the
+          craft.
         * ``rigid``: Liquid without slosh, with its effective inertia.
-        * ``detach``: Liquid may leave the bottom, by `travel`.
+        * ``detach``: Liquid may leave the bottom, by `travel`; it then sloshes as a pendulum,
+          without the coefficients of finite amplitude.
         * ``mass_flow``: Tanks drain, see `drain`.
         """
+        options: dict[str, Any] = {
+            "rigid": rigid, "detach": detach, "mass_flow": mass_flow, "between": between,
+        }  # fmt: skip
+        point, late = self._point(fill, parameters, trimmed=trimmed, **options)
+        if late is not None:
+            raise FmuError(f"{DELAY} is a quantity of a loop; the parameters have none")
+        if not trimmed and (text := rotation(f"{self!r}, untrimmed,", point.left)):
+            warnings.warn(text, FmuWarning, stacklevel=2)
+        return point.parameters
+
+    def trim(self, fill: Fill, parameters: Mapping[str, Quantity] | None = None) -> OperatingPoint:
+        """Return the operating point at a fill; ``print`` says which accelerations are left.
+
+        The thrust acts through the centre of mass, as after trimming: O, and with it the thrust,
+        moves across the thrust, while its direction stays. Every method of a craft uses this
+        point. What further ``parameters`` do, such as a constant torque, is left; so is a
+        specific force across the axis of a tank that leans.
+        """
+        return self._point(fill, parameters)[0]
+
+    def _point(
+        self,
+        fill: Fill,
+        parameters: Mapping[str, Quantity] | None,
+        *,
+        trimmed: bool = True,
+        **options: Any,
+    ) -> tuple[OperatingPoint, float | None]:
+        """Return the operating point at a fill, and the delay if the parameters have it."""
+        every, modes, late = self._given(fill, parameters, **options)
+        return self._realised(every, modes, trimmed=trimmed), late
+
+    def _given(
+        self, fill: Fill, parameters: Mapping[str, Quantity] | None, **options: Any
+    ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
+        """Return untrimmed parameters, quantities of slosh modes and the delay, or None."""
+        every = self._untrimmed(fill, **options)
+        given = full_names(parameters_of(parameters), self.tanks)
+        late = given.pop(DELAY, None)
+        modes = {name: given.pop(name) for name in list(given) if of_mode(name)}
+        return every | given, modes, late
+
+    def _realised(
+        self,
+        every: Mapping[str, Quantity],
+        modes: Mapping[str, Quantity],
+        factors: Mapping[str, float] | None = None,
+        *,
+        trimmed: bool = True,
+    ) -> OperatingPoint:
+        """Return the operating point of parameters, of whose modes then single quantities change.
+
+        factors: frequencies by their ratio to those of the point.
+        """
+        model = self.variant(every)
+        if trimmed:
+            point = trim(model, every, list(self.tanks))
+        else:
+            none = np.zeros(3)
+            point = OperatingPoint(model, dict(every), none, none, tuple(self.tanks))
+        # they leave the centre of mass where it is
+        if modes or factors:
+            every = changed(model, point.parameters, modes, factors)
+            point = replace(point, parameters=every)
+        return point
+
+    def _untrimmed(
+        self,
+        fill: Fill,
+        *,
+        rigid: bool = False,
+        detach: bool = False,
+        mass_flow: Any = None,
+        between: Sequence[float | str] = ("2%", "98%"),
+    ) -> dict[str, Quantity]:
+        """Return the parameters of Spacecraft at a fill, with O where the craft has it."""
         if detach and (rigid or mass_flow is not None):
             raise FmuError("detach is for sloshing liquid in tanks that do not drain")
         if rigid and mass_flow is not None:
@@ -435,7 +526,11 @@ class Craft:
             numbers = {name: number for number, name in enumerate(self.tanks, 1)}
             for name, travel in self.travel(fill).items():
                 if tanks[name].all["modes"]:
-                    found[f"tank[{numbers[name]}].ball.travel"] = travel
+                    prefix = f"tank[{numbers[name]}]"
+                    found[f"{prefix}.ball.travel"] = travel
+                    # liquid detaches from pendulums only
+                    third = re.compile(rf"{re.escape(prefix)}\.nonlinear_(inertia|stiffness)\[")
+                    found |= {key: 1.0 for key in found if third.match(key)}
         if mass_flow is not None:
             tables = self._draining(mass_flow, tanks, between)
             # the FMU warns of values that the table replaces
@@ -511,12 +606,15 @@ class Craft:
         parameters: Mapping[str, Quantity] | None = None,
         rigid: bool = False,
     ) -> LinearModel:
-        """Return the linear model at a fill, at rest under thrust; see `hubslosh.linearize`.
+        """Return the linear model at a fill, at rest under thrust, trimmed; see `trim`.
 
-        * ``parameters``: Further parameters of the FMU, which override those of the craft.
+        * ``inputs``, ``outputs``: See `hubslosh.linearize`.
+        * ``parameters``: Further parameters, which override those of the craft; see `parameters`.
         """
-        every = self.parameters(fill, rigid=rigid) | dict(parameters or {})
-        return linearize(self.variant(every), every, inputs, outputs)
+        point, late = self._point(fill, parameters, rigid=rigid)
+        if late is not None:
+            raise FmuError(f"{DELAY} is a quantity of a loop; a linear model of the craft has none")
+        return linearize(point.model, point.parameters, inputs, outputs)
 
     def loop(
         self,
@@ -533,16 +631,20 @@ class Craft:
         mass_flow: Any = None,
         between: Sequence[float | str] = ("2%", "98%"),
     ) -> Loop:
-        """Return the loop of a sampled controller around the craft at a fill; see `Loop`.
+        """Return the loop of a sampled controller around the craft at a fill, trimmed; see `Loop`.
 
         Small angles: ``q[2]``, ``q[3]``, ``q[4]`` are half the angles about the body axes.
-        * ``parameters``: Further parameters of the FMU, which override those of the craft.
+        * ``parameters``: Further parameters, which override those of the craft; see `parameters`.
+          ``"delay"`` among them replaces ``delay``.
         * ``mass_flow``, ``between``: Tanks drain during the simulation, see `drain`.
         """
-        every = self.parameters(fill, rigid=rigid, mass_flow=mass_flow, between=between)
-        every |= dict(parameters or {})
-        model = self.variant(every)
-        return Loop(controller, period, model, every, measured, command, latency, delay)
+        point, late = self._point(
+            fill, parameters, rigid=rigid, mass_flow=mass_flow, between=between
+        )
+        delay = delay if late is None else late
+        return Loop(
+            controller, period, point.model, point.parameters, measured, command, latency, delay
+        )
 
     def review(
         self,
@@ -551,6 +653,7 @@ class Craft:
         fills: Sequence[Fill] = tuple(f"{fill}%" for fill in range(5, 100, 10)),
         *,
         damping: Literal["interval", "nominal"] = "interval",
+        frequency: str = "10%",
         uncertain: Mapping[str, Any] | None = None,
         draws: int = 200,
         seed: int = 1,
@@ -567,23 +670,25 @@ class Craft:
         * ``fills``: List of fills.
         * ``damping``: "interval" varies the damping of each tank over the interval of its
           correlation; "nominal" does not.
-        * ``uncertain``: Ranges by name, for parameters of the FMU and for "delay": (low, high) in
-          SI units, or a share of the nominal value such as "5%". A slosh mode's mass changes the
-          mass of the craft.
+        * ``frequency``: Range of the slosh frequencies of each tank, all its modes together, as a
+          share of the nominal ones; "nominal" does not vary them. A frequency changes alone: the
+          bob stays.
+        * ``uncertain``: Ranges by name: (low, high) in SI units, or a share of the nominal value
+          such as "5%". Names as for `parameters`, and "delay". A mode that is named here leaves
+          ``damping`` or ``frequency`` of its tank. ``craft.mass`` changes the acceleration.
         * ``draws``: Number of random points over all fills, uniform within the ranges.
         * ``seed``: Seed of the draws.
 
-        The thrust acts through the centre of mass, as after trimming, so that each point is a
-        steady state. `loop` leaves the thrust at O.
+        Each point is trimmed as in `trim`, so that it is a steady state.
         The worst case is found by search. There the nonlinear FMU is simulated at the gain margin,
         or as it is if it is unstable.
         """
         from .review import review
 
         return review(
-            self, controller, period, fills, damping=damping, uncertain=uncertain, draws=draws,
-            seed=seed, measured=measured, command=command, latency=latency, delay=delay,
-            parameters=parameters,
+            self, controller, period, fills, damping=damping, frequency=frequency,
+            uncertain=uncertain, draws=draws, seed=seed, measured=measured, command=command,
+            latency=latency, delay=delay, parameters=parameters,
         )  # fmt: skip
 
     def uncertain(
@@ -597,26 +702,31 @@ class Craft:
     ) -> "UncertainModel":
         """Return the craft at a fill with uncertain parameters, (M, Δ); see `hubslosh.uncertain`.
 
-        ranges: a tank goes by its name, ``NTO.frequency[1]``. The range of a damping ratio may be
-        ``"interval"``, that of its correlation, if the tank has ``nu``.
+        The craft is trimmed, see `trim`. ranges: names as for `parameters`. The range of a damping
+        ratio may be ``"interval"``, that of its correlation, if the tank has ``nu``.
         """
         from .uncertainty import uncertain
 
-        tanks, numbers = self.tank_at(fill), {name: k for k, name in enumerate(self.tanks, 1)}
-        named: dict[str, Sequence[float] | str] = {}
-        for name, of in ranges.items():
-            tank, _, rest = name.rpartition(".")
-            full = f"tank[{numbers[tank]}].{rest}" if tank in numbers else name
-            if of == "interval":
-                mode = re.fullmatch(r"zeta\[(\d)\]", rest)
-                table = tanks[tank].modes if tank in tanks else None
-                if table is None or mode is None or "zeta_low" not in table:
+        tanks, order = self.tank_at(fill), list(self.tanks)
+        named: dict[str, Any] = full_names(ranges, order)  # type: ignore[arg-type]
+        if DELAY in named:
+            raise FmuError(
+                "delay is a quantity of a loop, and the craft's (M, Δ) has none: give it to loop, "
+                "or let review vary it"
+            )
+        for name, of in named.items():
+            if isinstance(of, str) and of == "interval":
+                mode = of_mode(name)
+                tank = tanks.get(order[mode.tank - 1]) if mode and mode.tank <= len(order) else None
+                table = None if tank is None or mode is None else tank.modes
+                if table is None or mode is None or mode.kind != "zeta" or "zeta_low" not in table:
                     raise FmuError(f'{name}: "interval" is for zeta[n] of a tank with nu=')
-                row = table.iloc[int(mode[1]) - 1]
-                of = (float(row["zeta_low"]), float(row["zeta_high"]))
-            named[full] = of
-        every = self.parameters(fill) | dict(parameters or {})
-        return uncertain(every, named, outputs=outputs, model=self.variant(every), **options)
+                row = table.iloc[mode.mode - 1]
+                named[name] = (float(row["zeta_low"]), float(row["zeta_high"]))
+        point, late = self._point(fill, parameters)
+        if late is not None:
+            raise FmuError("delay is a quantity of a loop; an uncertain model has none")
+        return uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
 
     def columns(self, fill: Fill) -> list[str]:
         """Return the columns by which `view` draws craft and liquid, for ``outputs``."""
@@ -642,6 +752,10 @@ class Craft:
                     text = f"name = {_toml(name)}\n{text}"
                 files[number].write_text(text, encoding="utf-8")
             return view(run, out, tanks=files, **options)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made from, without what is computed again on demand."""
+        return {**self.__dict__, "_known": {}, "_said": []}
 
     def __repr__(self) -> str:
         """Return the craft in a line."""

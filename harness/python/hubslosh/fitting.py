@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import check_table
+from .arguments import check_table, floats
 from .fmu import FmuError
 from .linearization import control_package
 
@@ -38,7 +38,7 @@ class TransferFunction:
 
     def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return H at frequencies in Hz."""
-        s = 2j * np.pi * np.atleast_1d(np.asarray(frequency, float))
+        s = 2j * np.pi * np.atleast_1d(floats(frequency))
         return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
     def to_control(self) -> Any:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .arguments import floats
 from .fmu import FmuError
 
 SHAPES = {
@@ -21,7 +22,7 @@ SHAPES = {
 
 def _own(shape: str, mass: float, size: Any) -> float:
     """Return a part's inertia about its own centre, parallel to the bearing axis."""
-    numbers = np.atleast_1d(np.asarray(size, dtype=float))
+    numbers = np.atleast_1d(floats(size))
     count = {"box": 2, "tube": 2, "rod": 2}.get(shape, 1)
     if numbers.shape != (count,) or not np.isfinite(numbers).all() or (numbers < 0).any():
         raise FmuError(f"{shape}={size!r} (allowed: {SHAPES[shape]}; 0 or more)")
@@ -64,7 +65,7 @@ def bottom_up(parts: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any
             mass = float(part.get("mass", 0.0 if shape == "inertia" else np.nan))
             if not (np.isfinite(mass) and mass >= 0):
                 raise FmuError(f"mass={part.get('mass')!r} (allowed: 0 or more, kg)")
-            at = np.asarray(part.get("position", (0.0, 0.0)), dtype=float)
+            at = floats(part.get("position", (0.0, 0.0)))
             if at.shape != (2,) or not np.isfinite(at).all():
                 raise FmuError(f"position={part['position']!r} (allowed: (x, y), m)")
             own = 0.0 if shape == "point" else _own(shape, mass, part[shape])

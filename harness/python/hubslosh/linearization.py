@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import names_of
+from .arguments import MOST_STATES, check_ranges, floats, names_of
 from .fmu import Fmu, FmuError, Quantity
+from .operating_point import warn_of_rotation
 from .plant import Instance
 from .simulation import parameters_of
 
@@ -21,29 +22,19 @@ if TYPE_CHECKING:
 Matrix = NDArray[np.float64]
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.integer | np.floating)
-
-
-def check_seconds(**values: Any) -> None:
-    """Refuse what is not a positive number of seconds, by name."""
-    if problems := wrong_seconds(**values):
-        raise FmuError("; ".join(problems))
-
-
-def wrong_seconds(**values: Any) -> list[str]:
-    """Return what is wrong with numbers of seconds, by name."""
-    return [
-        f"{name} must be a positive number of seconds, not {value!r}"
-        for name, value in values.items()
-        if not (_is_number(value) and np.isfinite(value) and value > 0)
-    ]
+def _check_states(states: int, cycles: int, period: float) -> None:
+    """Refuse a sampled model with too many commands on the way."""
+    if states > MOST_STATES:
+        raise FmuError(
+            f"a delay of {cycles * period:g} s is {cycles} cycles of {period:g} s, and the "
+            f"commands on the way make {states} states (allowed: {MOST_STATES}): give a shorter "
+            "delay or latency, or a longer period"
+        )
 
 
 def split_delay(delay: float, period: float) -> tuple[int, float]:
     """Return a delay as whole cycles and a rest in seconds; 1e-9 of a cycle is rounding."""
-    if not (_is_number(delay) and np.isfinite(delay) and delay >= 0):
-        raise FmuError(f"delay must be a number of seconds from 0 on, not {delay!r}")
+    check_ranges(delay=delay)
     cycles = int(np.floor(delay / period + 1e-9))
     rest = round(float(delay / period - cycles), 12)
     return cycles, rest * period if rest > 1e-9 else 0.0
@@ -110,7 +101,7 @@ class LinearModel:
         s = jω, or z = exp(jωT) in its place if the model is sampled.
         """
         try:
-            s: NDArray[np.complex128] = 2j * np.pi * np.atleast_1d(np.asarray(frequency, float))
+            s: NDArray[np.complex128] = 2j * np.pi * np.atleast_1d(floats(frequency))
         except (TypeError, ValueError):
             raise FmuError(f"frequency must be numbers, Hz, not {frequency!r}") from None
         if self.period is not None:
@@ -130,11 +121,10 @@ class LinearModel:
 
         if self.period is not None:
             raise FmuError("the model is sampled already")
-        check_seconds(period=period)
-        if not _is_number(latency) or latency < 0 or latency != int(latency):
-            raise FmuError(f"latency must be a whole number of cycles, not {latency!r}")
+        check_ranges(period=period, latency=latency)
         cycles, rest = split_delay(delay, period)
         cycles += int(latency)
+        _check_states(len(self.A) + self.B.shape[1] * (cycles + 1), cycles, period)
         if rest:
             return self._delayed(period, cycles, rest)
         A, B, C, D, _ = cont2discrete((*self,), period, "zoh")
@@ -155,7 +145,14 @@ class LinearModel:
         input at once is that just before a new command, which a controller measures.
         """
         n, m = self.B.shape
+        _check_states(n + m * (cycles + 1), cycles, period)
         (step, full), (_, later) = _held(self, period), _held(self, period - rest)
+        if not np.isfinite(step).all():
+            fastest = float(np.linalg.eigvals(self.A).real.max())
+            raise FmuError(
+                f"the model cannot be sampled with a period of {period:g} s: a mode grows by "
+                f"{fastest:.3g} 1/s"
+            )
         on_the_way = m * (cycles + 1)  # the oldest command first: it acts as the cycle begins
         A, B = np.zeros((n + on_the_way, n + on_the_way)), np.zeros((n + on_the_way, m))
         A[:n, :n], A[:n, n : n + m] = step, full - later
@@ -298,7 +295,8 @@ def linearize(
       work done.
 
     Warns if no output depends on any input; a hub that dry friction holds does not move. Linearise
-    with ``friction.model`` none or viscous, or in motion.
+    with ``friction.model`` none or viscous, or in motion. Warns also if Spacecraft turns faster and
+    faster at the point, with its angular acceleration.
     """
     fmu = Fmu.open(model)
     if not fmu.native.differentiates:
@@ -318,6 +316,9 @@ def linearize(
         for name, value in parameters.items():
             instance.set(name, value)
         columns = instance.native.jacobian(unknown, known)
+        turning = [f"omega_dot[{i}]" for i in (1, 2, 3)]
+        if turning[0] in fmu.variables:
+            warn_of_rotation(f"this point of {fmu.name}", instance.get(turning))
     jacobian = np.array(columns, float).reshape(len(known), len(unknown)).T
     n = len(states)
     A, B, C, D = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]

@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .arguments import floats
 from .fmu import FmuError
 from .tanks import SIX_AXES
 
@@ -252,7 +253,7 @@ def liquid_modes(
     import pandas as pd
 
     name, size = _check_shape(shape)
-    force = np.atleast_1d(np.asarray(specific_force, float))
+    force = np.atleast_1d(floats(specific_force))
     force = np.array([0.0, 0.0, force[0]]) if force.shape == (1,) else force
     if force.shape != (3,) or not np.isfinite(force).all() or not np.linalg.norm(force) > 0:
         raise FmuError("specific_force is a number or three, m/s², and not 0")

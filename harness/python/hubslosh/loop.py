@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import column_of, names_of, not_numbers
+from .arguments import column_of, floats, names_of, not_numbers, out_of_range
 from .feedback import Feedback, Linear
 from .fmu import Fmu, FmuError, Quantity, did_you_mean
-from .linearization import LinearModel, linearize, split_delay, wrong_seconds
+from .linearization import LinearModel, linearize, split_delay
 from .plant import TORQUE, Plant
 from .run import Run
 from .short import names
@@ -88,13 +88,7 @@ class Loop:
     def _examined(self) -> tuple[list[str], LinearModel | None]:
         """Return everything that is wrong with it, and the controller if it is linear."""
         controller = None
-        found = wrong_seconds(period=self.period)
-        if not _is_whole(self.latency, 0):
-            found.append(f"latency must be a whole number from 0 on, not {self.latency!r}")
-        try:
-            split_delay(self.delay, 1.0)
-        except FmuError as error:
-            found.append(str(error))
+        found = out_of_range(period=self.period, latency=self.latency, delay=self.delay)
         fmu = Fmu.open(self.model)
         for name in (commands := fmu.components(names_of(self.command, "command", found))):
             if name not in fmu.names("input"):
@@ -207,9 +201,7 @@ class Loop:
         * ``parameters``: Further parameters, which override those of the loop.
         """
         fmu = Fmu.open(self.model)
-        problems = wrong_seconds(period=self.period, stop=stop)
-        if not _is_whole(substeps, 1):
-            problems.append(f"substeps must be a whole number from 1 on, not {substeps!r}")
+        problems = out_of_range(period=self.period, stop=stop, substeps=substeps)
         problems += [p for p in self.problems() if p not in problems]
         problems += not_numbers(tolerance=tolerance)
         histories = histories_of(fmu, inputs, False, problems)
@@ -352,15 +344,6 @@ def closed_loop(
     )  # fmt: skip
 
 
-def _is_whole(value: Any, least: int) -> bool:
-    return (
-        isinstance(value, int | float | np.integer | np.floating)
-        and np.isfinite(value)
-        and value >= least
-        and value == int(value)
-    )
-
-
 def _twice(names: list[str]) -> list[str]:
     return [name for name in dict.fromkeys(names) if names.count(name) > 1]
 
@@ -390,7 +373,7 @@ def _called(law: Law, command: list[str]) -> Callable[[int, float, list[float]],
     def call(cycle: int, time: float, measured: list[float]) -> list[float]:
         returned = law(time, np.array(measured))
         try:
-            values = np.atleast_1d(np.asarray(returned, float))
+            values = np.atleast_1d(floats(returned))
         except (TypeError, ValueError):
             values = np.array([np.nan])
         if values.shape != (len(command),) or not np.isfinite(values).all():
@@ -448,7 +431,7 @@ def _linear(
         return None
     else:
         try:
-            gains = np.atleast_2d(np.asarray(controller, float))
+            gains = np.atleast_2d(floats(controller))
         except (TypeError, ValueError):
             gains = np.empty(0)
         if gains.ndim != 2:
@@ -465,7 +448,7 @@ def _linear(
             f"the controller has {found[1]} inputs and {found[0]} outputs; it needs "
             f"{len(measured)} ({', '.join(measured)}) and {len(command)} ({', '.join(command)})"
         )
-    if not all(np.isfinite(m).all() for m in model):
+    if not all(np.isfinite(floats(m)).all() for m in model):
         raise FmuError("the controller has numbers that are not finite")
     if model.period is None:
         return _tustin(model, period)

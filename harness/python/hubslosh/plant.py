@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from . import native
+from .arguments import floats
 from .feedback import Feedback
 from .fmu import Fmu, FmuError, Quantity
 
@@ -236,7 +237,7 @@ def drive(
     Returns the columns ``time``, ``tau_cmd`` and ``columns`` as floats, one row per communication
     point.
     """
-    t, tau = np.asarray(time, float), np.asarray(torque, float)
+    t, tau = floats(time), floats(torque)
     if len(t) != len(tau) or len(t) < 2:
         raise FmuError(f"a torque history needs two rows or more, not {len(t)} and {len(tau)}")
     if hold:
@@ -244,7 +245,7 @@ def drive(
     elif slope is None:
         slopes = {TORQUE: np.append(np.diff(tau) / np.diff(t), 0.0)}
     else:
-        slopes = {TORQUE: np.asarray(slope, float)}
+        slopes = {TORQUE: floats(slope)}
         if len(slopes[TORQUE]) != len(t):
             raise FmuError(f"a slope for each of the {len(t)} rows is needed, not {len(slope)}")
     start, stop = float(t[0]), float(t[-1])

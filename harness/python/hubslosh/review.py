@@ -1,13 +1,9 @@
-"""A design review of a loop around a `Craft` over its fills: margins, slosh, worst case.
-
-Each point is linearised in steady thrust: the thrust acts through the centre of mass, as after
-trimming. Otherwise the craft would turn faster and faster.
-"""
+"""A design review of a loop around a `Craft` over its fills: margins, slosh, worst case."""
 
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -18,11 +14,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from .arguments import MOST_FILLS, MOST_WORK, check_ranges
 from .files import write_file
 from .fmu import Fmu, FmuError, FmuWarning, Quantity, did_you_mean
 from .linearization import LinearModel, linearize
 from .loop import Loop
-from .sampling import _not_whole, draw
+from .operating_point import rotation
+from .quantities import DELAY, Modes, OfMode, full_name, moves_the_bob, of_mode
+from .sampling import draw
 from .short import ShortTable
 from .stabilisation import resonances
 from .stability import Margins, _largest, margins_and_gain
@@ -34,11 +33,12 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-_PLACE = re.compile(r"(?:craft\.r|tank\[\d\]\.position)\[(\d)\]$")
-"""Coordinates from O."""
-
 OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
 """Parameters that a tank without this mode does not have."""
+
+
+SEVERITY = ("unstable", "phase", "gain", "gain and phase")
+"""Ways in which a slosh mode is stabilised, worst first."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,18 @@ class Uncertain:
     """A quantity of the review with its range."""
 
     name: str
-    """Name of a parameter of the FMU, "delay", or "damping of" a tank."""
+    """Its name as it was given, or "damping of" or "frequency of" a tank."""
     text: str
     """Its range in words."""
-    values: Callable[[int, float], dict[str, float]]
-    """Parameters at the fill of an index, from a share: -1 low end, 0 nominal, 1 high end."""
+    ends: tuple[dict[str, tuple[float, float, float]], ...]
+    """At each fill low end, nominal value and high end by full name; empty without this mode."""
+
+    def values(self, fill: int, share: float) -> dict[str, float]:
+        """Return values at the fill of an index, from a share: -1 low end, 0 nominal, 1 high."""
+        return {
+            name: nominal + abs(share) * ((high if share > 0 else low) - nominal)
+            for name, (low, nominal, high) in self.ends[fill].items()
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +111,8 @@ class Review:
     (index), ``stable``, ``modulus_margin``, ``phase_margin`` (deg), ``gain_up`` and ``gain_down``
     (dB), ``delay_margin`` (s), ``growth`` (1/s, of the closed loop's least stable pole),
     ``distance`` (modulus margin, or minus the growth rate of an unstable loop), and the share of
-    each uncertain quantity: -1 low end, 0 nominal, 1 high end."""
+    each uncertain quantity: -1 low end, 0 nominal, 1 high end. An unstable point has no margins:
+    NaN."""
     slosh: pd.DataFrame
     """A row for each nominal fill, loop and slosh mode that shows in the loop gain: see
     `hubslosh.stabilisation.resonances`."""
@@ -118,14 +126,17 @@ class Review:
     """Warnings about the tanks, each for one of the fills where it applies."""
 
     def bands(self) -> pd.DataFrame:
-        """Return the least and largest value of each margin at each fill, over all points.
+        """Return the least and largest value of each margin at each fill, over all stable points.
 
-        Columns: ``fill`` (index), ``at`` (see `at`), and for each margin ``…_low``, ``…_nominal``
-        and ``…_high``.
+        Columns: ``fill`` (index), ``at`` (see `at`), ``unstable`` (number of unstable points),
+        ``points`` (number of all), and for each margin ``…_low``, ``…_nominal`` and ``…_high``; NaN
+        where no point, or for ``…_nominal`` the nominal one, is stable.
         """
         names = ["modulus_margin", "phase_margin", "gain_up", "gain_down", "delay_margin"]
         groups = self.points.groupby("fill")
         table = pd.DataFrame({"fill": range(len(self.fills)), "at": self.at})
+        table["points"] = groups.size()
+        table["unstable"] = table["points"] - groups["stable"].sum()
         nominal = self.points[self.points["kind"] == "nominal"].set_index("fill")
         for name in names:
             table[f"{name}_low"] = groups[name].min()
@@ -133,29 +144,52 @@ class Review:
             table[f"{name}_high"] = groups[name].max()
         return table
 
+    def unstable(self) -> pd.DataFrame:
+        """Return the rows of `points` that are unstable, the fastest growth first."""
+        rows = self.points[~self.points["stable"]]
+        return rows.sort_values("growth", ascending=False, kind="stable")
+
     def modes(self) -> dict[str, str]:
-        """Return how each slosh mode is stabilised, in words, by its name."""
-        found = {}
+        """Return how each slosh mode is stabilised, in words, by its name; unstable ones first.
+
+        At a fill the worst verdict of all commands counts.
+        """
+        found = []
         for mode, rows in self.slosh.groupby("mode", sort=False):
-            counts = rows["stabilised"].value_counts()
-            if len(counts) == 1:
-                found[str(mode)] = _stabilised(counts.index[0])
-                continue
-            parts = []
-            for how in counts.index:
-                chosen = rows[rows["stabilised"] == how]
-                fills = [self.fills[k] for k in sorted(set(chosen["fill"]))]
-                where = fills[0] if len(fills) == 1 else f"{fills[0]} to {fills[-1]}"
-                parts.append(f"{_stabilised(how)} (fills {where})")
-            found[str(mode)] = ", ".join(parts)
-        return found
+            verdicts: dict[str, list[int]] = {}
+            for fill, of in rows.groupby("fill"):
+                worst = min(of["stabilised"], key=SEVERITY.index)
+                verdicts.setdefault(worst, []).append(int(fill))
+            hows = sorted(verdicts, key=SEVERITY.index)
+            if len(hows) == 1 and (hows[0] != "unstable" or len(self.fills) == 1):
+                words = _stabilised(hows[0])
+            else:
+                words = ", ".join(f"{_stabilised(how)} at {self._at(verdicts[how])}"
+                                  for how in hows)  # fmt: skip
+            found.append((SEVERITY.index(hows[0]), str(mode), words))
+        return {mode: words for _, mode, words in sorted(found, key=lambda row: row[0])}
+
+    def _at(self, fills: Sequence[int]) -> str:
+        """Return fills in words; those that follow one another as a span."""
+        spans: list[list[int]] = []
+        for fill in fills:
+            if spans and fill == spans[-1][-1] + 1:
+                spans[-1].append(fill)
+            else:
+                spans.append([fill])
+        words = [
+            self.fills[of[0]] + (f" to {self.fills[of[-1]]}" if len(of) > 1 else "") for of in spans
+        ]
+        return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
     def stabilisation(self) -> list[str]:
         """Return how the slosh modes are stabilised, a line for modes with the same words."""
         modes: dict[str, list[str]] = {}
         for mode, how in self.modes().items():
             modes.setdefault(how, []).append(mode)
-        return [f"{', '.join(of)}: {how}." for how, of in modes.items()]
+        others = (self.points["kind"] != "nominal") & ~self.points["stable"]
+        where = " (nominal points)" if others.any() else ""
+        return [f"{', '.join(of)}: {how}{where}." for how, of in modes.items()]
 
     @property
     def answer(self) -> str:
@@ -190,6 +224,19 @@ class Review:
                 found |= quantity.values(self.worst.fill, float(share))
         return found
 
+    def _where(self, point: Point) -> str:
+        """Return fill and quantities of a point that are not nominal, in words."""
+        words = [f"fill {self.fills[point.fill]}"]
+        for quantity, share in zip(self.uncertain, point.shares, strict=True):
+            values = quantity.values(point.fill, float(share)) if share else {}
+            if quantity.name.startswith("frequency of") and values:
+                name, value = next(iter(values.items()))
+                change = value / quantity.ends[point.fill][name][1] - 1
+                words.append(f"{quantity.name} {100 * change:+.3g} %")
+            else:
+                words += [f"{name} = {value:.4g}" for name, value in values.items()]
+        return ", ".join(words)
+
     def html(self) -> str:
         """Return the page: answer, figures, tables. It needs no network, and prints on paper."""
         from .review_page import page
@@ -204,12 +251,19 @@ class Review:
         """Return the answer, then what it rests on."""
         table = self.points
         lines = [self.answer, *self.stabilisation()[:8]]
+        stable = table[table["stable"]]
+        if len(stable) < len(table):
+            first = self.unstable().iloc[0]
+            lines.append(
+                f"unstable: {len(table) - len(stable)} of {_count(len(table), 'point')}, fastest "
+                f"{first['growth']:.3g} 1/s at fill {self.fills[int(first['fill'])]}"
+            )
         for name, unit in (("phase_margin", "°"), ("gain_up", " dB"), ("delay_margin", " s")):
-            low, high = table[name].min(), table[name].max()
-            lines.append(f"{name.replace('_', ' ')}: {low:.3g} to {high:.3g}{unit}")
-        values = ", ".join(f"{name} = {x:.4g}" for name, x in self.worst_values().items())
-        where = f"fill {self.fills[self.worst.fill]}" + (f", {values}" if values else "")
-        lines += [f"worst case: {where}; {self.confirmation}"]
+            low, high = stable[name].min(), stable[name].max()
+            of = "" if len(stable) == len(table) else " of stable points"
+            if len(stable):
+                lines.append(f"{name.replace('_', ' ')}{of}: {low:.3g} to {high:.3g}{unit}")
+        lines += [f"worst case: {self._where(self.worst)}", f"there {self.confirmation}"]
         lines.append(self.suggestion.text)
         if self.uncertain:
             lines += ["uncertain: " + "; ".join(f"{u.name} {u.text}" for u in self.uncertain)]
@@ -237,6 +291,7 @@ def review(
     fills: "Sequence[Fill]",
     *,
     damping: Literal["interval", "nominal"],
+    frequency: str,
     uncertain: Mapping[str, Any] | None,
     draws: int,
     seed: int,
@@ -244,17 +299,19 @@ def review(
     **options: Any,
 ) -> Review:
     """Return the review of a loop; see `Craft.review`."""
-    if wrong := _not_whole(draws=(draws, 0), seed=(seed, 0)):
-        raise FmuError("; ".join(wrong))
-    space = _Space.of(craft, controller, period, fills, damping, uncertain, parameters, options)
+    check_ranges(draws=draws, seed=seed, period=period)
+    space = _Space.of(
+        craft, controller, period, fills, damping, frequency, uncertain, parameters, options
+    )
     count = len(space.uncertain)
+    _check_work(len(space.loops) * (1 + 2 * count) + draws, space.loops[0])
     none = np.zeros(count)
     planned = [("nominal", k, none) for k in range(len(space.loops))]
-    ends = [sign * row for row in np.eye(count) for sign in (-1.0, 1.0)]
+    ends = [sign * row + 0.0 for row in np.eye(count) for sign in (-1.0, 1.0)]  # no -0
     planned += [("one at a time", k, x) for k in range(len(space.loops)) for x in ends]
     if count:
         ranges = {u.name: (-1.0, 1.0) for u in space.uncertain}
-        for run in range(draws):
+        for run in range(int(draws)):
             shares = draw(ranges, run, seed).values()
             planned.append(("draw", run % len(space.loops), np.array([*shares])))
     points = space.evaluate((k, x) for _, k, x in planned)
@@ -291,10 +348,14 @@ def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
     """Return the numbers of a point."""
     found = point.margins
     down, up = found.gain_margins
-    return {
-        "fill": point.fill, "stable": found.stable, "modulus_margin": found.modulus_margin,
-        "phase_margin": found.phase_margin, "gain_up": up, "gain_down": down,
-        "delay_margin": found.delay_margin, "growth": point.growth, "distance": point.distance,
+    margins = {
+        "modulus_margin": found.modulus_margin, "phase_margin": found.phase_margin, "gain_up": up,
+        "gain_down": down, "delay_margin": found.delay_margin,
+    }  # fmt: skip
+    if not found.stable:
+        margins = dict.fromkeys(margins, np.nan)
+    return {"fill": point.fill, "stable": found.stable} | margins | {
+        "growth": point.growth, "distance": point.distance,
     } | {u.name: x for u, x in zip(uncertain, point.shares, strict=True)}  # fmt: skip
 
 
@@ -316,14 +377,28 @@ def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
     )
 
 
+def _check_work(points: int, loop: Loop) -> None:
+    """Refuse a review that would take hours."""
+    states = len(loop.gain().A)
+    if points * states**3 > MOST_WORK:
+        raise FmuError(
+            f"the review has {points} points of {states} states, which would take hours (allowed: "
+            f"{MOST_WORK / states**3:.0f} points of this size): give fewer fills, quantities or "
+            "draws, a shorter delay, or a longer period"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class _Space:
     """Fills and uncertain quantities of a review."""
 
+    craft: "Craft"
     names: tuple[str, ...]
     at: Vector
     unit: str
     loops: tuple[Loop, ...]
+    given: tuple[tuple[dict[str, Quantity], dict[str, Quantity]], ...]
+    """Untrimmed parameters, and quantities of slosh modes, at each fill."""
     uncertain: tuple[Uncertain, ...]
     warnings: tuple[str, ...]
 
@@ -335,6 +410,7 @@ class _Space:
         period: float,
         fills: Any,
         damping: str,
+        frequency: str,
         uncertain: Any,
         parameters: Mapping[str, Quantity] | None,
         options: dict[str, Any],
@@ -343,7 +419,7 @@ class _Space:
         fills = _list_of(fills)
         if damping not in ("interval", "nominal"):
             raise FmuError(f'damping must be "interval" or "nominal", not {damping!r}')
-        loops, tanks, problems = [], [], []
+        loops, tanks, given, problems, turns = [], [], [], [], ""
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             with suppress(FmuError):  # the loop below names the fill
@@ -353,20 +429,26 @@ class _Space:
                     loop = craft.loop(controller, period, fill, parameters=parameters, **options)
                     if not loops:
                         loop._must_be_linear()
+                    every, modes, _ = craft._given(fill, parameters)
                     loops.append(loop)
+                    given.append((every, modes))
                     tanks.append(craft.tank_at(fill))
                 except FmuError as error:
                     problems.append(f"fills[{k}] = {fill!r}: {error}" if loops else str(error))
                     break
+                if not turns:
+                    turns = rotation("the nominal point", craft.trim(fill, parameters).left)
         if problems:
             raise FmuError("; ".join(problems))
-        said = tuple(dict.fromkeys(str(w.message) for w in caught))
+        said = tuple(dict.fromkeys([*(str(w.message) for w in caught), *filter(None, [turns])]))
         # the same warning with another number at another fill
         said = tuple({re.sub(r"= [\d.e+-]+", "", text): text for text in said}.values())
         for text in said:
             warnings.warn(text, FmuWarning, stacklevel=4)
-        found = _damping(craft, tanks) if damping == "interval" else []
-        found += _given(loops, uncertain or {})
+        ranges = _named(craft, uncertain or {})
+        found = _damping(craft, tanks, ranges) if damping == "interval" else []
+        found += _frequencies(craft, loops, frequency, ranges)
+        found += _quantities(loops, [every for every, _ in given], ranges)
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
         if percent:
             at = [float(fill.strip()[:-1]) for fill in fills]
@@ -374,25 +456,34 @@ class _Space:
             at = [sum(tank.mass for tank in of.values()) for of in tanks]
         unit = "%" if percent else "kg"
         words = tuple(f"{x:.3g}%" if percent else f"{x:.4g} kg" for x in at)
-        return cls(words, np.array(at), unit, tuple(loops), tuple(found), said)
+        return cls(craft, words, np.array(at), unit, tuple(loops), tuple(given), tuple(found), said)
 
     def point(self, fill: int, shares: Vector) -> Point:
         """Evaluate a point."""
-        loop, delay = self.loops[fill], self.loops[fill].delay
-        values: dict[str, Any] = {}
+        loop, (every, modes) = self.loops[fill], self.given[fill]
+        plain: dict[str, Any] = {}
+        factors: dict[str, float] = {}
+        modes = dict(modes)
         for quantity, share in zip(self.uncertain, shares, strict=True):
-            if share:
-                values |= quantity.values(fill, float(share))
-        delay = values.pop("delay", delay)
-        every = {**loop.parameters, **values}  # type: ignore[dict-item]
-        loop = trimmed(replace(loop, parameters=every, delay=delay))
+            for name, value in quantity.values(fill, float(share)).items() if share else ():
+                of = of_mode(name)
+                if of is None:
+                    plain[name] = value
+                elif of.kind == "frequency":  # a mass that changes too moves it further
+                    factors[name] = value / quantity.ends[fill][name][1]
+                else:
+                    modes[name] = value
+        late = plain.pop(DELAY, loop.delay)
+        there = self.craft._realised(every | plain, modes, factors)
+        loop = replace(loop, model=there.model, parameters=there.parameters, delay=late)
         margins, gain = margins_and_gain(loop)
         return Point(fill, np.array(shares, float), loop, margins, gain)
 
     def evaluate(self, which: Iterable[tuple[int, Vector]]) -> list[Point]:
         """Evaluate points on all cores."""
         count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
-        with ThreadPoolExecutor(count or os.cpu_count()) as pool:
+        with warnings.catch_warnings(), ThreadPoolExecutor(count or os.cpu_count()) as pool:
+            warnings.simplefilter("ignore", FmuWarning)  # those of the nominal points are told
             return list(pool.map(lambda job: self.point(*job), which))
 
 
@@ -402,57 +493,43 @@ def _list_of(fills: Any) -> list[Any]:
     found = list(fills)
     if not found:
         raise FmuError('fills is empty: give at least one fill, such as ["50%"]')
+    if len(found) > MOST_FILLS:
+        raise FmuError(f"fills has {len(found)} fills (allowed: {MOST_FILLS})")
     return found
 
 
-def trimmed(loop: Loop) -> Loop:
-    """Return the loop with the thrust through the centre of mass: O moves across the thrust."""
-    from .plant import Plant
-
-    every: dict[str, Any] = dict(loop.parameters)  # type: ignore[arg-type]
-    if "craft.r[1]" not in Fmu.open(loop.model).variables:
-        return loop
-    with Plant(loop.model, every) as plant:
-        center = np.array(plant.get([f"center_of_mass[{i}]" for i in (1, 2, 3)]))
-        force = np.array(plant.get([f"force[{i}]" for i in (1, 2, 3)]))
-    if not force.any():
-        return loop
-    shift = center - force * (force @ center) / (force @ force)
-    for name, value in every.items():
-        if match := _PLACE.match(name):
-            every[name] = float(value) - float(shift[int(match[1]) - 1])
-    return replace(loop, parameters=every)
+def _named(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
+    """Return ranges with the names as they were given, by full names."""
+    if not isinstance(given, Mapping):
+        raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
+                       f"not {given!r}")  # fmt: skip
+    found: dict[str, tuple[str, Any]] = {}
+    for name, range_ in given.items():
+        full = full_name(str(name), craft.tanks)
+        if full in found:
+            raise FmuError(f"uncertain: {name} and {found[full][0]} are the same: give it once")
+        found[full] = (str(name), range_)
+    return found
 
 
-def _between(low: float, nominal: float, high: float, share: float) -> float:
-    end = high if share > 0 else low
-    return nominal + abs(share) * (end - nominal)
-
-
-def _damping(craft: "Craft", tanks: list[dict[str, Any]]) -> list[Uncertain]:
+def _damping(
+    craft: "Craft", tanks: list[dict[str, Any]], ranges: Mapping[str, Any]
+) -> list[Uncertain]:
     """Return the damping of each tank, all of whose modes share the error of one correlation."""
-    found = []
+    found, known = [], False
     for number, name in enumerate(craft.tanks, 1):
         tables = [of[name].modes if name in of else None for of in tanks]
-        ends = [
-            table[["zeta_low", "zeta", "zeta_high"]].to_numpy().tolist()
-            if table is not None and "zeta_low" in table
-            else []
-            for table in tables
-        ]
-        if not any(ends):
-            continue
-
-        def values(
-            fill: int, share: float, number: int = number, ends: list[Any] = ends
-        ) -> dict[str, float]:
-            return {
-                f"tank[{number}].zeta[{n}]": _between(*row, share)
-                for n, row in enumerate(ends[fill], 1)
-            }
-
-        found.append(Uncertain(f"damping of {name}", "over its interval", values))
-    if craft.tanks and not found:
+        ends: list[dict[str, tuple[float, float, float]]] = []
+        for table in tables:
+            rows = []
+            if table is not None and "zeta_low" in table:
+                rows = table[["zeta_low", "zeta", "zeta_high"]].to_numpy().tolist()
+            known |= bool(rows)
+            here = {f"tank[{number}].zeta[{n}]": tuple(row) for n, row in enumerate(rows, 1)}
+            ends.append({name: row for name, row in here.items() if name not in ranges})
+        if any(ends):
+            found.append(Uncertain(f"damping of {name}", "over its interval", tuple(ends)))
+    if craft.tanks and not known:
         raise FmuError(
             'damping="interval" needs the viscosity of a liquid: MountedTank(…, nu=…), m²/s; '
             'damping="nominal" takes damping ratios as they are'
@@ -460,61 +537,111 @@ def _damping(craft: "Craft", tanks: list[dict[str, Any]]) -> list[Uncertain]:
     return found
 
 
-def _given(loops: Sequence[Loop], given: Any) -> list[Uncertain]:
-    """Return the uncertain parameters of the FMU, and the delay."""
-    if not isinstance(given, Mapping):
-        raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
-                       f"not {given!r}")  # fmt: skip
+def _frequencies(
+    craft: "Craft", loops: Sequence[Loop], share: Any, ranges: Mapping[str, Any]
+) -> list[Uncertain]:
+    """Return the slosh frequencies of each tank, whose modes vary together."""
+    if share == "nominal":
+        return []
+    part = _share(share)
+    if part is None or part >= 1:
+        raise FmuError(
+            'frequency must be a share of the nominal frequencies, such as "10%", or "nominal", '
+            f"not {share!r}"
+        )
+    found = []
+    for number, name in enumerate(craft.tanks, 1):
+        ends = []
+        for loop in loops:
+            modes = Modes(loop.model, loop.parameters)  # type: ignore[arg-type]
+            every = [OfMode(number, "frequency", n) for n in (1, 2, 3)]
+            every = [of for of in every if of.of("frequency") not in ranges]
+            here = {of.of("frequency"): modes.value(of) for of in every if not modes.problem(of)}
+            ends.append({of: ((1 - part) * f, f, (1 + part) * f) for of, f in here.items()})
+        if any(ends):
+            found.append(Uncertain(f"frequency of {name}", f"± {100 * part:g}%", tuple(ends)))
+    return found
+
+
+def _quantities(
+    loops: Sequence[Loop],
+    given: Sequence[Mapping[str, Quantity]],
+    ranges: Mapping[str, tuple[str, Any]],
+) -> list[Uncertain]:
+    """Return the quantities whose ranges were given, by full names; given: untrimmed parameters."""
     fmu = Fmu.open(loops[0].model)
-    allowed = ["delay"]
+    allowed = [DELAY]
     allowed += [n for n in fmu.names("parameter", "structuralParameter") if fmu.kind(n) == "Real"]
     problems, found = [], []
-    for name, range_ in given.items():
-        if name not in allowed:
+    for full, (name, range_) in ranges.items():
+        if instead := moves_the_bob(full):
+            problems.append(f"uncertain: {name} {instead}")
+            continue
+        if of_mode(full) is None and full not in allowed:
             problems.append(
                 f"uncertain has {name}, which is not a Real parameter of {fmu.name}, nor delay"
-                f"{did_you_mean(str(name), allowed)}"
+                f"{did_you_mean(name, allowed)}"
             )
             continue
-        nominals = [_nominal(fmu, loop, name) for loop in loops]
+        if (of := of_mode(full)) and "no such mode" not in (bad := _problem(loops[0], of)) and bad:
+            problems.append(f"uncertain: {name} {bad}")
+            continue
+        nominals = [
+            _nominal(fmu, loop, every, full) for loop, every in zip(loops, given, strict=True)
+        ]
         ends, problem = _ends(range_, nominals)
         if problem:
             problems.append(f"uncertain: {name} {problem}")
             continue
-
-        def values(
-            fill: int, share: float, name: str = name, nominals: Any = nominals, ends: Any = ends
-        ) -> dict[str, float]:
-            nominal = nominals[fill]
-            if nominal is None:
-                return {}
-            return {name: _between(ends[fill][0], nominal, ends[fill][1], share)}
-
         if isinstance(range_, str):
             text = f"± {range_.strip().lstrip('±').strip()}"
         else:
-            text = f"{float(range_[0]):g} to {float(range_[1]):g} {_unit(fmu, name)}".rstrip()
-        found.append(Uncertain(name, text, values))
+            text = f"{float(range_[0]):g} to {float(range_[1]):g} {_unit(fmu, full)}".rstrip()
+        rows = tuple(
+            {} if nominal is None else {full: (low, nominal, high)}
+            for (low, high), nominal in zip(ends, nominals, strict=True)
+        )
+        found.append(Uncertain(name, text, rows))
     if problems:
         raise FmuError("; ".join(problems))
     return found
 
 
 def _unit(fmu: Fmu, name: str) -> str:
-    return "s" if name == "delay" else fmu.unit(name).replace("1", "").replace(".", "·")
+    if of := of_mode(name):
+        return {"frequency": "Hz", "zeta": "", "mass": "kg", "bob": "m"}[of.kind]
+    return "s" if name == DELAY else fmu.unit(name).replace("1", "").replace(".", "·")
 
 
-def _nominal(fmu: Fmu, loop: Loop, name: str) -> float | None:
+def _problem(loop: Loop, of: OfMode) -> str:
+    return Modes(loop.model, loop.parameters).problem(of)  # type: ignore[arg-type]
+
+
+def _nominal(fmu: Fmu, loop: Loop, untrimmed: Mapping[str, Quantity], name: str) -> float | None:
     """Return the nominal value; None if this fill does not have the mode."""
-    if name == "delay":
+    if name == DELAY:
         return float(loop.delay)
-    every: Mapping[str, Any] = loop.parameters  # type: ignore[assignment]
-    if name in every:
-        return float(fmu.convert(name, every[name]))  # type: ignore[arg-type]
+    if of := of_mode(name):
+        modes = Modes(loop.model, loop.parameters)  # type: ignore[arg-type]
+        return None if modes.problem(of) else modes.value(of)
+    if name in untrimmed:
+        return float(fmu.convert(name, untrimmed[name]))
     if OF_A_MODE.match(name):
         return None
     start = fmu.variable(name).start
     return float(start) if start is not None else None
+
+
+def _share(text: Any) -> float | None:
+    """Return the number that "5%" or "± 5%" stands for, if it is above 0."""
+    if not isinstance(text, str):
+        return None
+    text = text.strip().lstrip("±").strip()
+    try:
+        share = float(text.removesuffix("%")) / 100
+    except ValueError:
+        return None
+    return share if text.endswith("%") and 0 < share < np.inf else None
 
 
 Ends = list[tuple[float, float]]
@@ -527,12 +654,7 @@ def _ends(given: Any, nominals: list[float | None]) -> tuple[Ends, str]:
     if not known:
         return [], "exists at no fill: its tank does not have this mode"
     if isinstance(given, str):
-        text = given.strip().lstrip("±").strip()
-        try:
-            share = float(text.removesuffix("%")) / 100
-        except ValueError:
-            share = np.nan
-        if not text.endswith("%") or not 0 < share < np.inf:
+        if (share := _share(given)) is None:
             return [], f"cannot be {given!r} ({allowed})"
         if 0 in known:
             return [], f"is 0, of which {given} is nothing: give (low, high)"

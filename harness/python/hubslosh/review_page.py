@@ -20,15 +20,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .review import Review
+    from .worst_case import Confirmation
 
 WIDTH = 4.8
 """Width of a figure, inches; it fits a telephone without shrinking much."""
 
-INK, SOFT, LINE = "#010203", "#595a5b", "#cfd0d1"
+INK, SOFT, LINE, BAD = "#010203", "#595a5b", "#cfd0d1", "#b30102"
 """Colours in figures that the page replaces by those of its light or dark mode."""
 
 MOST_CURVES = 12
 """Number of fills that are drawn in Nichols and Bode diagrams."""
+
+MOST_UNSTABLE = 12
+"""Number of unstable points in their table."""
 
 GAINS = (-50.0, 40.0)
 """Range of loop gain in diagrams, dB."""
@@ -64,6 +68,7 @@ th, td { text-align: right; padding: .2rem .6rem; border-bottom: 1px solid var(-
   white-space: nowrap; }
 th:first-child, td:first-child, td.text { text-align: left; }
 td.text { white-space: normal; min-width: 9rem; }
+tr.bad td { color: var(--bad); font-weight: 600; }
 @page { margin: 14mm; }
 @media print { .figures { grid-template-columns: 1fr 1fr; gap: 4mm; } .scroll { overflow: visible; }
   table { font-size: 7.5pt; } th, td { padding: .1rem .25rem; } td.text { min-width: 0; } }
@@ -105,19 +110,21 @@ def _figures(review: "Review") -> Iterator[str]:
     unit = "fill (% of the volume)" if review.unit == "%" else "liquid (kg)"
     yield _figure(
         "How do the margins change as the tanks empty?",
-        "Line: nominal. Band: all points within the uncertainty.",
+        "Line: nominal. Band: all points within the uncertainty." + _marked(review),
         5.6, lambda figure: _margins(figure, review, unit),
     )  # fmt: skip
     if len(review.slosh):
         yield _figure(
             "Is each slosh mode stabilised by phase or by gain?",
             "A dot per nominal fill and command. Below 0 dB gain stabilises the mode; within ±90° "
-            "closing the loop adds damping. In the upper outer parts neither does.",
+            "closing the loop adds damping. In the upper outer parts neither does. Large crosses: "
+            "the mode is unstable with all loops closed.",
             3.6, lambda figure: _stabilisation(figure, review),
         )  # fmt: skip
         yield _figure(
             "Where are the slosh modes, and what does the loop do to their damping?",
-            "Dots: pole with this loop open. Crosses: damping ratio with all loops closed.",
+            "Dots: pole with this loop open. Crosses: damping ratio with all loops closed; large "
+            "ones are unstable.",
             4.4, lambda figure: _modes(figure, review, unit),
         )  # fmt: skip
     commands = review.nominal[0].gain.inputs
@@ -137,14 +144,15 @@ def _figures(review: "Review") -> Iterator[str]:
     if len(drawn) > 1:
         yield _figure(
             "How likely is a small margin?",
-            f"{len(drawn)} random points, uniform within the ranges, over all fills.",
+            f"{len(drawn)} random points, uniform within the ranges, over all fills; an unstable "
+            "one has the margin 0.",
             3.6, lambda figure: _draws(figure, drawn),
         )  # fmt: skip
     found = review.confirmation
     unit_of = Fmu.open(review.craft.model).unit(commands[0]).replace(".", "·")
     yield _figure(
         "Does the nonlinear craft agree at the worst case?",
-        f"Largest command in each period of the oscillation, from a small rotation on. "
+        f"{_what_is_drawn(found)}, from a small rotation on. "
         f"{str(found)[0].upper()}{str(found)[1:]}.",
         3.0, lambda figure: _simulated(figure, review, unit_of),
     )  # fmt: skip
@@ -178,7 +186,7 @@ def _figure(title: str, caption: str, height: float, draw: "Callable[[Figure], N
     svg = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
                  rf'<svg viewBox="\1" role="img" aria-label="{html.escape(title)}" '
                  'xmlns:xlink="http://www.w3.org/1999/xlink">', svg, count=1)  # fmt: skip
-    names = {INK: "ink", SOFT: "soft", LINE: "line"}
+    names = {INK: "ink", SOFT: "soft", LINE: "line", BAD: "bad"}
     names |= {color.lower(): f"c{k}" for k, color in enumerate(COLORS)}
     for color, name in names.items():
         svg = svg.replace(color, f"var(--{name})")
@@ -202,6 +210,7 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
             )
             ax.fill_between(bands["at"], low, high, color=COLORS[0], alpha=0.25, linewidth=0)
             ax.plot(bands["at"], nominal, ".-", color=COLORS[0], markersize=4)
+        _mark_unstable(ax, bands)
         ax.set_ylabel(label)
         ax.margins(y=0.15)
         low, high = _widened(*ax.get_ylim())
@@ -210,6 +219,30 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
             ax.set_ylim(min(low, 0), max(high, 0))
     axes[-1].set_xlabel(unit)
     figure.align_ylabels(axes)
+    _legend(figure)
+
+
+def _marked(review: "Review") -> str:
+    """Return how unstable fills are marked, if there are any."""
+    bands = review.bands()
+    if not bands["unstable"].any():
+        return ""
+    return (
+        " Of stable points only: an unstable one has no margin. Red lines: fills whose nominal "
+        "point (solid), or others within the uncertainty (dashed), are unstable."
+    )
+
+
+def _mark_unstable(ax: "Axes", bands: pd.DataFrame) -> None:
+    """Draw a line at each fill with unstable points: solid if its nominal point is one."""
+    nominal = bands["modulus_margin_nominal"].isna()
+    for chosen, style, label in (
+        (nominal, "-", "nominal loop unstable"),
+        ((bands["unstable"] > 0) & ~nominal, "--", "unstable within the uncertainty"),
+    ):
+        for k, at in enumerate(bands.loc[chosen, "at"]):
+            ax.axvline(at, color=BAD, linestyle=style, linewidth=1.4, alpha=0.8,
+                       label=label if k == 0 else None)  # fmt: skip
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:
@@ -238,6 +271,8 @@ def _stabilisation(figure: "Figure", review: "Review") -> None:
     for color, mode, rows in _by_mode(review):
         y = rows["peak"].clip(low + 1, high - 1)
         ax.plot(rows["phase"], y, "o", color=color, markersize=3.5, alpha=0.8, label=mode)
+        grows = rows["stabilised"] == "unstable"
+        ax.plot(rows["phase"][grows], y[grows], "x", color=BAD, markersize=7)
     words = {"phase": (0, 34), "gain and phase": (0, -46)}
     words |= {"gain alone": (135, -46), "neither": (135, 34)}
     places = [(x * sign, y, text) for text, (x, y) in words.items() for sign in {1, -1 if x else 1}]
@@ -251,7 +286,8 @@ def _stabilisation(figure: "Figure", review: "Review") -> None:
 def _legend(figure: "Figure") -> None:
     """Put the legend below the axes, where it hides nothing."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    if handles:
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
 
 
 def _modes(figure: "Figure", review: "Review", unit: str) -> None:
@@ -261,6 +297,8 @@ def _modes(figure: "Figure", review: "Review", unit: str) -> None:
         axes[0].plot(at, rows["frequency"], "o", color=color, markersize=3, label=mode)
         axes[1].plot(at, 100 * rows["zeta"], "o", color=color, markersize=3)
         axes[1].plot(at, 100 * rows["zeta_closed"], "x", color=color, markersize=5)
+        grows = (rows["stabilised"] == "unstable").to_numpy()
+        axes[1].plot(at[grows], 100 * rows["zeta_closed"][grows], "x", color=BAD, markersize=8)
     axes[0].set_ylabel("frequency (Hz)")
     axes[1].set(ylabel="damping ratio (%)", xlabel=unit)
     zetas = review.slosh[["zeta", "zeta_closed"]].to_numpy(float)
@@ -280,8 +318,15 @@ def _curves(review: "Review") -> list[list[Curve]]:
     """Return the loop gains to draw, by command: at fills in equal steps, and at the worst case."""
     count = len(review.fills)
     chosen = sorted(set(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int)))
-    points = [(review.fills[k], _shade(k / max(count - 1, 1)), review.nominal[k]) for k in chosen]
-    points.append(("worst case", INK, review.worst))
+    unstable = [k for k, point in enumerate(review.nominal) if not point.margins.stable]
+    chosen = sorted({*chosen, *unstable[:MOST_CURVES]})
+    points = [
+        (review.fills[k] + (" unstable" if k in unstable else ""), _shade(k / max(count - 1, 1)),
+         review.nominal[k])
+        for k in chosen
+    ]  # fmt: skip
+    worst = "worst case" + ("" if review.worst.margins.stable else ", unstable")
+    points.append((worst, INK, review.worst))
     table = pd.concat([point.margins.crossings for _, _, point in points])
     known = table.loc[table["frequency"] > 0, "frequency"]
     period = review.worst.loop.period
@@ -320,17 +365,19 @@ def _phase(curve: Curve) -> NDArray[np.float64]:
 
 
 def _draw(ax: "Axes", x: Any, y: Any, curve: Curve, first: Curve) -> None:
-    worst = curve[0] == "worst case"
+    worst = curve[0].startswith("worst case")
     style: dict[str, Any] = {"linestyle": "--", "linewidth": 1.0} if worst else {"linewidth": 0.9}
     ax.plot(x, y, color=curve[1], label=curve[0], **style)
 
 
 def _key(figure: "Figure", curves: list[Curve]) -> None:
-    """Name the first and the last fill, and the worst case."""
+    """Name the first and the last fill, unstable ones, and the worst case."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    shown = sorted({0, (len(curves) - 2) // 2, len(curves) - 2, len(curves) - 1})
+    unstable = [k for k, label in enumerate(labels[:-1]) if label.endswith("unstable")]
+    shown = sorted({0, (len(curves) - 2) // 2, len(curves) - 2, len(curves) - 1, *unstable[:4]})
     figure.legend([handles[k] for k in shown], [labels[k] for k in shown],
-                  loc="outside lower center", ncols=4)  # fmt: skip
+                  loc="outside lower center",
+                  ncols=2 if any("unstable" in label for label in labels) else 4)  # fmt: skip
 
 
 def _nichols(figure: "Figure", curves: list[Curve]) -> None:
@@ -381,53 +428,70 @@ def _draws(figure: "Figure", drawn: pd.DataFrame) -> None:
     axes: Any = figure.subplots(2)
     labels = {"modulus_margin": "modulus margin (1)", "delay_margin": "delay margin (s)"}
     for ax, (name, label) in zip(axes, labels.items(), strict=True):
-        values = np.sort(drawn[name].replace(np.inf, np.nan).dropna().to_numpy(float))
+        margin = drawn[name].where(drawn["stable"], 0.0)
+        values = np.sort(margin.replace(np.inf, np.nan).dropna().to_numpy(float))
         share = 100 * np.arange(1, len(values) + 1) / len(drawn)
         ax.step(values, share, where="post", color=COLORS[0])
         ax.set(xlabel=label, ylabel="points below (%)", ylim=(0, 102))
         ax.set_xlim(*_widened(*ax.get_xlim()))
 
 
+def _what_is_drawn(found: "Confirmation") -> str:
+    what = "Largest command" if found.command else "Largest value of each command"
+    each = "period of the oscillation" if found.frequency else "fortieth of the run"
+    return f"{what} in each {each}"
+
+
 def _simulated(figure: "Figure", review: "Review", unit: str) -> None:
+    """Draw the size of the command at the limit; of an unstable loop all commands."""
     found = review.confirmation
     ax = figure.subplots()
-    for k, (factor, run) in enumerate(found.runs.items()):
-        name = found.command or review.worst.gain.inputs[0]
-        period = 1 / max(found.frequency, 1e-6)
+    commands = [found.command] if found.command else list(review.worst.gain.inputs)
+    lines = [(factor, run, name) for factor, run in found.runs.items() for name in commands]
+    last = max(run[name].abs().iloc[len(run) // 2 :].max() for _, run, name in lines)
+    for k, (factor, run, name) in enumerate(lines):
         time, signal = run["time"].to_numpy(), run[name].abs().to_numpy()
-        window = (time / period).astype(int)
-        peaks = pd.Series(signal).groupby(window).max().iloc[:-1]
-        times = pd.Series(time).groupby(window).mean().iloc[:-1]
-        text = f"gain × {factor:.4g}" if found.command else "as it is"
-        ax.plot(times, peaks, "-", color=COLORS[k], label=text)
+        window = 1 / found.frequency if found.frequency else time[-1] / 40
+        groups = (time / window).astype(int)
+        peaks = pd.Series(signal).groupby(groups).max().iloc[:-1]
+        times = pd.Series(time).groupby(groups).mean().iloc[:-1]
+        if peaks.iloc[len(peaks) // 2 :].max() > 1e-6 * last:  # another axis is at rest
+            text = f"gain × {factor:.4g}" if found.command else name
+            ax.plot(times, peaks, "-", color=COLORS[k % len(COLORS)], label=text)
+    name = found.command or "size of the command"
     ax.set(yscale="log", xlabel="time (s)", ylabel=f"{name} ({unit})")
     _legend(figure)
 
 
 def _tables(review: "Review") -> str:
     bands = review.bands()
-    head = ("fill", "modulus", "phase, deg", "gain up, dB", "gain down, dB", "delay, s")
+    head = ("fill", "unstable", "modulus", "phase, deg", "gain up, dB", "gain down, dB", "delay, s")
     names = ("modulus_margin", "phase_margin", "gain_up", "gain_down", "delay_margin")
+    # unstable fills first, the nominal ones before the others
+    first = np.isnan(bands["modulus_margin_nominal"]) * 2 + (bands["unstable"] > 0)
+    bands = bands.loc[first.sort_values(ascending=False, kind="stable").index]
     rows = [
-        [fill, *(_range(row, name) for name in names)]
-        for fill, (_, row) in zip(review.fills, bands.iterrows(), strict=True)
+        [review.fills[int(row["fill"])], _unstable(row), *(_range(row, name) for name in names)]
+        for _, row in bands.iterrows()
     ]
-    parts = [_table("What are the margins at each fill? Nominal (least to largest)", head, rows)]
+    bad = sum(row["unstable"] > 0 for _, row in bands.iterrows())
+    title = "What are the margins at each fill? Nominal (least to largest)"
+    parts = [_unstable_points(review), _table(title, head, rows, bad)]
     if len(review.slosh):
         head = ("mode", "frequency, Hz", "ζ open, %", "ζ closed, %", "peak, dB", "stabilised by")
-        rows = []
-        words = review.modes()
-        for mode, of in review.slosh.groupby("mode", sort=False):
+        rows, words = [], review.modes()
+        for mode in words:  # unstable ones first
+            of = review.slosh[review.slosh["mode"] == mode]
             columns = (of["frequency"], 100 * of["zeta"], 100 * of["zeta_closed"], of["peak"])
             spans = [f"{c.min():.3g} to {c.max():.3g}" for c in columns]
-            rows.append([str(mode), *spans, words[str(mode)]])
-        parts.append(_table("What do the slosh modes look like over all fills?", head, rows))
-    values = review.worst_values()
-    given: Any = review.nominal[review.worst.fill].loop
-    rows = [["fill", review.fills[review.worst.fill], ""]]
-    for name, value in values.items():
-        nominal = given.delay if name == "delay" else given.parameters.get(name)
-        rows.append([name, f"{value:.5g}", "" if nominal is None else f"{nominal:.5g}"])
+            rows.append([mode, *spans, words[mode]])
+        bad = sum(how.startswith("unstable") for how in words.values())
+        parts.append(_table("What do the slosh modes look like over all fills?", head, rows, bad))
+    worst = review.worst
+    rows = [["fill", review.fills[worst.fill], ""]]
+    for quantity, share in zip(review.uncertain, worst.shares, strict=True):
+        for name, value in quantity.values(worst.fill, float(share)).items() if share else ():
+            rows.append([name, f"{value:.5g}", f"{quantity.ends[worst.fill][name][1]:.5g}"])
     parts.append(_table("Where is the worst case?", ("quantity", "worst", "nominal"), rows))
     if review.warnings:
         items = "".join(f"<li>{html.escape(text)}</li>" for text in review.warnings[:8])
@@ -435,24 +499,56 @@ def _tables(review: "Review") -> str:
     return f'<div class="tables">{"".join(parts)}</div>'
 
 
+def _unstable(row: Any) -> str:
+    """Return which points of a fill are unstable."""
+    if not row["unstable"]:
+        return "no"
+    nominal = "nominal, " if np.isnan(row["modulus_margin_nominal"]) else ""
+    return f"{nominal}{int(row['unstable'])} of {int(row['points'])} points"
+
+
+def _unstable_points(review: "Review") -> str:
+    """Return the table of unstable points; nothing if all are stable."""
+    table = review.unstable()
+    if table.empty:
+        return ""
+    rows = []
+    for _, row in table.head(MOST_UNSTABLE).iterrows():
+        fill = int(row["fill"])
+        values: dict[str, float] = {}
+        for quantity in review.uncertain:
+            if share := float(row[quantity.name]):
+                values |= quantity.values(fill, share)
+        where = ", ".join(f"{name} = {value:.4g}" for name, value in values.items()) or "nominal"
+        twice = f"{np.log(2) / row['growth']:.3g}" if row["growth"] > 0 else "never"
+        rows.append([review.fills[fill], f"{row['growth']:.3g}", twice, where])
+    count = f"{len(table)} of {len(review.points)}"
+    shown = f", the {MOST_UNSTABLE} fastest" if len(table) > MOST_UNSTABLE else ""
+    title = f"Which points are unstable? {count}{shown}"
+    return _table(title, ("fill", "growth, 1/s", "doubles in, s", "where"), rows, len(rows))
+
+
 def _range(row: Any, name: str) -> str:
     nominal, low, high = (row[f"{name}_{end}"] for end in ("nominal", "low", "high"))
+    if np.isnan(nominal):
+        return "none" if np.isnan(low) else f"– ({low:.3g} to {high:.3g})"
     if not np.isfinite([low, high]).all():
         return f"{nominal:.3g}" if np.isfinite(nominal) else "none"
     return f"{nominal:.3g} ({low:.3g} to {high:.3g})"
 
 
-def _table(title: str, head: tuple[str, ...], rows: list[list[str]]) -> str:
+def _table(title: str, head: tuple[str, ...], rows: list[list[str]], bad: int = 0) -> str:
+    """Return a table as HTML; its first ``bad`` rows are marked."""
     names = "".join(f"<th>{html.escape(name)}</th>" for name in head)
-    text = ' class="text"'
+    text, marked = ' class="text"', ' class="bad"'
     body = "".join(
-        "<tr>"
+        f"<tr{marked if number < bad else ''}>"
         + "".join(
             f"<td{text if k == len(row) - 1 and len(value) > 40 else ''}>{html.escape(value)}</td>"
             for k, value in enumerate(row)
         )
         + "</tr>"
-        for row in rows
+        for number, row in enumerate(rows)
     )
     return (
         f'<section><h2>{html.escape(title)}</h2><div class="scroll"><table><thead><tr>{names}'

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .arguments import check_numbers, check_table, names_of
+from .arguments import check_numbers, check_table, floats, names_of, out_of_range
 from .fmu import FmuError
 from .progress import Line, Progress
 from .store import Store, encoded
@@ -34,9 +34,9 @@ def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]
 
     They depend only on the seed, the run and the names up to each value, not on the number of runs.
     """
-    if wrong := _wrong(ranges) + _not_whole(run=(run, 0), seed=(seed, 0)):
+    if wrong := _wrong(ranges) + out_of_range(run=run, seed=seed):
         raise FmuError("; ".join(wrong))
-    random = np.random.default_rng([seed, run])
+    random = np.random.default_rng([int(seed), int(run)])
     return {name: _value(name, of, random.random()) for name, of in ranges.items()}
 
 
@@ -73,15 +73,6 @@ def _wrong(ranges: Any) -> list[str]:
     return found
 
 
-def _not_whole(**values: tuple[Any, int]) -> list[str]:
-    """Return which arguments are no whole numbers from a least one on."""
-    return [
-        f"{name} must be a whole number from {least} on, not {value!r}"
-        for name, (value, least) in values.items()
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least
-    ]
-
-
 def monte_carlo(
     ranges: Mapping[str, Range],
     runs: int,
@@ -99,7 +90,8 @@ def monte_carlo(
       frozen distribution of ``scipy.stats``. A run's values depend only on seed and number: 400
       runs begin with the same 200. Items of a list keep their type.
     * ``outcome``: A function of the values (by name) that makes the run and returns numbers by
-      name. Without it the table has only the draws.
+      name. Without it the table has only the draws. Of a `Craft` the names of its methods hold:
+      ``craft.loop(law, period, fill, parameters=values)`` takes ``NTO.frequency[1]``, ``delay``, ….
     * ``folder``: Makes the study resumable. Each run is stored as soon as it is done, and the same
       call continues a stopped study, even after kill -9. Stored runs are verified by their SHA-256
       in ``manifest.sha256`` and by the seed. A run that was changed from outside raises FmuError
@@ -114,12 +106,13 @@ def monte_carlo(
 
     Returns a table with the columns ``run``, the names of the ranges, and the names of the
     outcomes. If the FMU refuses a run, its outcomes are NaN, and the column ``refused`` has the
-    reason. Any other exception ends the study; stored runs stay. `quantiles` summarises the table.
+    reason. Any other exception ends the study; stored runs stay. ``.attrs["drawn"]`` names the
+    drawn columns. `quantiles` summarises the table.
     """
     from .short import ShortTable
 
-    problems = _wrong(ranges) + _not_whole(runs=(runs, 1), seed=(seed, 0))
-    problems += [] if workers is None else _not_whole(workers=(workers, 1))
+    problems = _wrong(ranges) + out_of_range(runs=runs, seed=seed)
+    problems += [] if workers is None else out_of_range(workers=workers)
     if not isinstance(folder, str | Path | None):
         problems.append(f"folder must be a path, not {folder!r}")
     if client is not None and not hasattr(client, "submit"):
@@ -131,7 +124,9 @@ def monte_carlo(
     runs, seed = int(runs), int(seed)  # numpy's integers too
     draws = [draw(ranges, run, seed) for run in range(runs)]
     if outcome is None:
-        return ShortTable([{"run": run} | values for run, values in enumerate(draws)])
+        table = ShortTable([{"run": run} | values for run, values in enumerate(draws)])
+        table.attrs["drawn"] = list(ranges)
+        return table
     with _opened(folder, seed, ranges) as store:
         rows = {run: {"run": run} | draws[run] | row for run, row in store.rows(draws).items()}
         missing = [run for run in range(runs) if run not in rows]
@@ -149,6 +144,7 @@ def monte_carlo(
             left.line.close()
             made.close()
         table = ShortTable([rows[run] for run in sorted(rows)])
+        table.attrs["drawn"] = list(ranges)
         if FAILED in table:
             table[FAILED] = table[FAILED].fillna("")
         store.finish(table.to_csv(index=False, lineterminator="\n"))
@@ -330,7 +326,7 @@ def quantiles(
     if missing := [name for name in names if name not in table.columns]:
         raise FmuError(f"the table has no column {', '.join(missing)}")
     try:
-        shares = [float(share) for share in np.atleast_1d(np.asarray(at, float))]
+        shares = [float(share) for share in np.atleast_1d(floats(at))]
     except (TypeError, ValueError):
         raise FmuError(f"at must be numbers between 0 and 1, not {at!r}") from None
     if not all(0 < share < 1 for share in shares) or not 0 < confidence < 1:

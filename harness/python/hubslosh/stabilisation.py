@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .linearization import LinearModel
-from .stability import LIGHT, MOVED, _broken_at
+from .stability import LIGHT, MOVED, _broken_at, _closed
 
 SHOWN = 1e-2
 """Size of a resonance circle in the loop gain below which a mode is left out (-40 dB)."""
@@ -35,15 +35,16 @@ def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, A
     pole. ``order``: "zero first" if the zero has the lower frequency, otherwise "pole first".
     ``peak`` (dB): loop gain at the pole's frequency. ``phase`` (deg): of R/(1 + L0), the direction
     of the resonance circle; 0° is away from -1.
-    ``stabilised``: "unstable" if the closed loop's pole grows; "gain" if the peak is below 0 dB;
+    ``stabilised``: "unstable" if the closed loop's pole, all commands closed, grows (such a mode is
+    here even if it hardly shows in the loop gain); "gain" if the peak is below 0 dB;
     "gain and phase" if moreover the phase is within ±90°, so that the loop adds damping; otherwise
     "phase".
     """
-    found = []
+    found, closed = [], _closed(gain)
     for i in range(len(gain.D)):
         one = _broken_at(gain, i)
         for poles, residue, names in _groups(one):
-            row = _row(one, poles, residue)
+            row = _row(one, poles, residue, closed)
             if row:
                 mode = _name(names, tanks)
                 found.append({"loop": gain.inputs[i], "mode": mode} | row)
@@ -80,7 +81,10 @@ def _groups(one: LinearModel) -> list[tuple[complex, complex, set[str]]]:
     return found
 
 
-def _row(one: LinearModel, pole: complex, residue: complex) -> dict[str, Any] | None:
+def _row(
+    one: LinearModel, pole: complex, residue: complex, poles: Complex
+) -> dict[str, Any] | None:
+    """Return the row of a mode in one loop; poles: those of the closed loop."""
     T = one.period
     assert T is not None
     A, b, c, d = one.A, one.B[:, 0], one.C[0], one.D[0, 0]
@@ -93,10 +97,11 @@ def _row(one: LinearModel, pole: complex, residue: complex) -> dict[str, Any] | 
     rest = value(near) - residue / (near - pole)
     height = np.exp(1j * s.imag * T) - pole
     own = residue / height if abs(height) > 1e-12 else complex(np.inf)
-    if abs(own) < SHOWN:
+    near = _solved(value, pole, pole - residue / (1 + rest), 1.0)
+    closed = np.log(poles[np.argmin(np.abs(poles - near))]) / T
+    if abs(own) < SHOWN and not closed.real > 0:
         return None
     zero = np.log(_solved(value, pole, pole - residue / rest, 0.0)) / T
-    closed = np.log(_solved(value, pole, pole - residue / (1 + rest), 1.0)) / T
     # R of the s plane is that of the z plane over T z
     phase = float(np.degrees(np.angle(residue / (T * pole * (1 + rest)))))
     peak = 20 * np.log10(abs(own + rest))

@@ -13,8 +13,9 @@ lacks at the bob (SP-106). Compared with rigid liquid a mode is then, with s = m
     s'' = -m α - ν - γ w_e S s,    ν = ω (ω s + 2 ζ s')    w_e = e·w_0', γ: factor of X_0
     M_tot δX = [δf; δτ - δw × h_w] + Σ [E R + e p; d × (E R + e p) + E S (b R + g γ s)]
     R   = m α + ν                                       force of the bob beyond rigid liquid
-    p   = (ω² - k/m)(β + b κ)·s/g + γ κ·s               from the rod's tension T = m γ g
+    p   = (1 - ρ) ω² (β + b κ)·s/g + γ κ·s              from the rod's tension T = m γ g
     β   = E^T (a_0 + w_0' × d),  κ = S^T E^T w_0'       both 0 if the surface is at rest
+    ρ   = k/(m ω²): share of a centring stiffness, which a change of ω leaves as it is
 
 It is Newton's law of the bob with the rod eliminated, linearised (book, Spacecraft: equations); m
 scales the state, so it multiplies α alone. M_tot X = m_b [A; r_b × A] + [0; J w'] + liquid, with
@@ -34,11 +35,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import names_of
+from .arguments import floats, names_of
 from .fmu import FmuError, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
+from .operating_point import warn_of_rotation
 from .plant import Plant
+from .quantities import KINDS, TURN, moves_the_bob, rigid_rest
 from .short import MOST, names
 from .simulation import parameters_of
 from .stability import _closed, minimal
@@ -50,13 +53,10 @@ if TYPE_CHECKING:
 
 Matrix = NDArray[np.float64]
 
-TURN = 2 * np.pi
 S = np.array([[0.0, -1.0], [1.0, 0.0]])
 OUTPUTS = (*(f"q[{i}]" for i in (2, 3, 4)), *(f"omega[{i}]" for i in (1, 2, 3)))
 INPUTS = (*(f"force[{i}]" for i in (1, 2, 3)), *(f"torque[{i}]" for i in (1, 2, 3)))
 AXES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-KINDS = ("frequency", "zeta", "mass", "bob")
-"""Parameters of a mode: Hz, 1, kg, and height of the bob on the tank's axis, m."""
 FACTOR = "acceleration"
 """Factor of the acceleration at the point; 1 is that of the parameters."""
 UNITS = {"frequency": "Hz", "zeta": "1", "mass": "kg", "bob": "m", FACTOR: "1"}
@@ -387,8 +387,8 @@ def _partitioned(
         if g > 0 and max(np.abs(beta).max(), np.abs(kappa).max()) > ALONE * g:
             along, tilt = beta[None] / g, kappa[None] / g
             bend = along @ first + eq.times(height, tilt @ first)
-            tension = TURN * eq.times(frequency, bend) + kappa[None] @ scaled
-            tension -= bob.stiffness * (along @ s + eq.times(height, tilt @ s))
+            by_gravity = 1 - bob.stiffness / (TURN * craft.values[frequency]) ** 2
+            tension = TURN * eq.times(frequency, by_gravity * bend) + kappa[None] @ scaled
         force = E @ R + e[:, None] @ tension
         load[:3] += force
         load[3:] += d @ force + E @ S @ (eq.times(height, R) + g * scaled)
@@ -532,7 +532,7 @@ class UncertainModel:
                 hint = did_you_mean(unknown[0], self.deltas)
                 raise FmuError(f"Δ has no {', '.join(unknown)}{hint}")
             return np.array([float(delta.get(name, 0.0)) for name in self.deltas])
-        found = np.asarray(delta, float)
+        found = floats(delta)
         if found.shape != (len(self.counts),) or not np.isfinite(found).all():
             raise FmuError(f"Δ must be {len(self.counts)} finite numbers, not {delta!r}")
         return found
@@ -567,25 +567,20 @@ class UncertainModel:
         """Return the states of M over those of the FMU: m l of the bobs."""
         values = self._values | self.values(delta)
         sizes = {
-            (bob.tank, bob.mode): values[bob.name("mass")] * length
-            for bob, length in zip(self._craft.bobs, self._lengths(values), strict=True)
+            (bob.tank, bob.mode): values[bob.name("mass")] * self._length(bob, values)
+            for bob in self._craft.bobs
         }
         found = [re.fullmatch(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]", state)
                  for state in self.M.states]  # fmt: skip
         return np.array([sizes[int(of[1]), int(of[2])] if of else 1.0 for of in found])
 
-    def _lengths(self, values: Mapping[str, float]) -> list[float]:
-        """Return the lengths of the pendulums, m."""
-        found = []
-        for bob in self._craft.bobs:
-            tank = self._craft.tanks[bob.tank]
-            at_origin = self._X_0[:3] + np.cross(self._X_0[3:], tank.origin)
-            g = values[FACTOR] * float(tank.axes[:, 2] @ at_origin)
-            by_gravity = (TURN * values[bob.name("frequency")]) ** 2 - bob.stiffness
-            if g > ALONE * tank.g_ref and not by_gravity > 0:
-                raise FmuError(f"{bob.name('frequency')} is below that of its stiffness alone")
-            found.append(g / by_gravity if g > ALONE * tank.g_ref else bob.length)
-        return found
+    def _ratio(self, bob: _Bob, values: Mapping[str, float]) -> float:
+        """Return a mode's frequency over that of the craft as it was given."""
+        return values[bob.name("frequency")] / self._craft.values[bob.name("frequency")]
+
+    def _length(self, bob: _Bob, values: Mapping[str, float]) -> float:
+        """Return the length of a pendulum, m; gravity's share of ω² stays."""
+        return bob.length * values[FACTOR] / self._ratio(bob, values) ** 2
 
     def parameters(
         self, delta: Mapping[str, float] | ArrayLike, *, commanded: bool = False
@@ -607,25 +602,21 @@ class UncertainModel:
             new = {name: x for name, x in new.items() if not name.startswith("torque[")}
         for number, tank in craft.tanks.items():
             of = f"tank[{number}]"
-            m_0, moment = tank.m_0, tank.m_0 * tank.H_0
-            inertia = tank.I_0 + moment * tank.H_0
-            for bob in (bob for bob in craft.bobs if bob.tank == number):
-                for sign, known in ((1, craft.values), (-1, values)):
-                    m, b = known[bob.name("mass")], known[bob.name("bob")]
-                    m_0, moment = m_0 + sign * m, moment + sign * m * b
-                    inertia += sign * m * b * b
-            H_0 = moment / m_0 if m_0 > 0 else 0.0
-            I_0 = inertia - moment * H_0
-            lent = min(0.0, I_0, I_0 + tank.more_y)  # of the dry craft: both are rigid
+            points = [
+                (sign * known[bob.name("mass")], known[bob.name("bob")])
+                for bob in craft.bobs if bob.tank == number
+                for sign, known in ((1, craft.values), (-1, values))
+            ]  # fmt: skip
+            m_0, H_0, I_0, lent = rigid_rest(tank.m_0, tank.H_0, tank.I_0, tank.more_y, points)
             J += lent * tank.axes[:, :2] @ tank.axes[:, :2].T
-            new |= {f"{of}.m_0": m_0, f"{of}.H_0": H_0, f"{of}.I_0": I_0 - lent}
+            new |= {f"{of}.m_0": m_0, f"{of}.H_0": H_0, f"{of}.I_0": I_0}
             new |= {f"{of}.damping_law": "constant", f"{of}.damping_law_kind": 0}
         new |= {f"craft.J{axes}": float(J[at]) for axes, at in AXES.items()}
-        for bob, length in zip(craft.bobs, self._lengths(values), strict=True):
+        for bob in craft.bobs:
             tank, m = craft.tanks[bob.tank], values[bob.name("mass")]
+            length = self._length(bob, values)
             w = TURN * values[bob.name("frequency")]
-            hangs = tank.axes[:, 2] @ (self._X_0[:3] + np.cross(self._X_0[3:], tank.origin))
-            k = bob.stiffness if hangs > ALONE * tank.g_ref else w * w
+            k = bob.stiffness * self._ratio(bob, values) ** 2
             zeta = values[bob.name("zeta")] * w / np.sqrt(tank.g_ref / length + k)
             new |= {
                 bob.name("mass"): m, bob.name("length"): length, bob.name("frequency"): 0.0,
@@ -647,7 +638,7 @@ class UncertainModel:
         The hold's images around the sampling rate are left out.
         """
         K = self._controller(loop)
-        w = TURN * np.atleast_1d(np.asarray(frequency, float))
+        w = TURN * np.atleast_1d(floats(frequency))
         late = loop.delay + loop.latency * loop.period
         hold = np.sinc(w * loop.period / TURN) * np.exp(-1j * w * (loop.period / 2 + late))
         gains = K.response(w / TURN) * hold[:, None, None]
@@ -662,7 +653,10 @@ class UncertainModel:
         """Return an upper bound of µ of the closed loop at each frequency in Hz.
 
         By D and G scalings (Fan, Tits and Doyle 1991), diagonal, with each copy as a real number
-        of its own: a superset of Δ. A grid may miss a narrow peak.
+        of its own: a superset of Δ. With several copies the bound may be several times µ: 2.37 for
+        0.67 in the book's example. A bound below 1 shows that no Δ within the ranges destabilises
+        the loop at this frequency; a bound above 1 certifies nothing, see `worst_case`. A grid may
+        miss a narrow peak.
         """
         return np.array([mu_upper(N) for N in self.closed(loop, frequency)])
 
@@ -830,6 +824,13 @@ def mu_upper(N: NDArray[np.complex128]) -> float:
     return size * float(np.sqrt(max(best.fun, 0.0)))
 
 
+def _unknown(name: str, values: Mapping[str, float]) -> str:
+    """Return what to do about a name that is not that of an uncertain parameter."""
+    if instead := moves_the_bob(name):
+        return f"{name} {instead}"
+    return f"there is no uncertain {name}{did_you_mean(name, values)}"
+
+
 def uncertain(
     parameters: Mapping[str, Quantity] | str | Path | None,
     ranges: Mapping[str, Sequence[float] | str] | None = None,
@@ -845,11 +846,13 @@ def uncertain(
     * ``parameters``: Those of the FMU, as for `linearize`: craft, tanks, force. The craft must be
       free and at rest, its tanks axially symmetric.
     * ``ranges``: (low, high) in SI units, or ``"5%"`` of the value on both sides, by name:
-      ``tank[1].frequency[1]`` (Hz, tank held, under the thrust that acts; the bob's height stays),
+      ``tank[1].frequency[1]`` (Hz, tank held, under the thrust that acts; the bob's height and the
+      share of a centring stiffness stay),
       ``.zeta[1]``, ``.mass[1]`` and ``.bob[1]`` (its height on the axis; the liquid's mass, centre
       and inertia stay), ``craft.mass``, ``craft.Jxx``, … and ``craft.r[1]``, … of the dry craft,
       and ``acceleration``, a factor of the acceleration at which force and torque hold the craft,
-      1 as it is. Dry mass and inertia change at that acceleration.
+      1 as it is. Dry mass and inertia change at that acceleration. Warns if the craft turns faster
+      and faster at it; `Craft.uncertain` trims it.
     * ``covariance``: A table with the names of ``ranges`` as index and columns, or what `identify`
       found with ``free=``. Δ then has the principal axes of its correlations, ±``sigmas`` standard
       deviations long. Parameters of the FMU (``tank[1].length[1]``, ``hinge``, ``m_0``, …) are
@@ -865,8 +868,7 @@ def uncertain(
     craft = _read(model, given)
     values = dict(craft.values)
     ranges = dict(ranges or {})
-    problems = [f"there is no uncertain {name}{did_you_mean(name, values)}"
-                for name in ranges if name not in values]  # fmt: skip
+    problems = [_unknown(name, values) for name in ranges if name not in values]
     of_axes, root = [], np.zeros((0, 0))
     if covariance is not None:
         is_fit = isinstance(covariance, Identification)
@@ -894,8 +896,7 @@ def uncertain(
             # the liquid's rigid part moves the dry craft's properties, which may have ranges
             twice |= {name for name in of_axes if not name.startswith("craft.")}
         else:
-            problems += [f"there is no uncertain {name}{did_you_mean(name, values)}"
-                         for name in of_axes if name not in values]  # fmt: skip
+            problems += [_unknown(name, values) for name in of_axes if name not in values]
         problems += [f"{name} has a range and a covariance" for name in ranges if name in twice]
     columns: dict[str, Matrix] = {}
     every = list(dict.fromkeys([*ranges, *of_axes]))
@@ -937,7 +938,8 @@ def uncertain(
     if problems:
         raise FmuError("; ".join(problems))
     spread = pd.DataFrame(columns, index=every)
-    X_0 = np.linalg.solve(craft.mass_matrix(values), craft.wrench)
+    _, X_0 = craft.accelerations()
+    warn_of_rotation("the point of an uncertain Spacecraft", X_0[3:])
     M, counts, states = _partitioned(craft, values, spread, X_0)
     n = len(states)
     rows = [*range(n + sum(counts)), *(n + sum(counts) + OUTPUTS.index(name) for name in chosen[1])]

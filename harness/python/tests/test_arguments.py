@@ -146,3 +146,32 @@ def test_one_name_and_a_file_of_parameters_are_taken(
     assert list(one) == ["time", "tau_cmd", "omega"]
     model = hubslosh.linearize(given.fmu, file, "tau_cmd", "omega")
     assert (model.A == hubslosh.linearize(given.fmu, values, ["tau_cmd"], ["omega"]).A).all()
+
+
+def test_a_mask_is_not_ignored(given: SimpleNamespace) -> None:
+    """NumPy would take what lies under the mask."""
+    one = np.ma.array([1.0, 99.0, 3.0], mask=[False, True, False])
+    matrix = np.ma.array(np.diag([3.0, 3.0, 3.0]), mask=np.eye(3) > 0)
+    calls = [
+        lambda: hubslosh.drive(given.fmu, one, np.zeros(3)),
+        lambda: hubslosh.drive(given.fmu, np.arange(3.0), one),
+        lambda: hubslosh.closed_loop(one[1:], 0.1, 1, given.fmu),
+        lambda: hubslosh.closed_loop(lambda t, y: one[1:2], 0.1, 1, given.fmu),
+        lambda: hubslosh.margins(Loop([one[:2]], 0.1, given.fmu, VISCOUS)),
+        lambda: given.model.response(one),
+        lambda: hubslosh.Craft(1.0, matrix),
+        lambda: hubslosh.Craft(1.0, (1.0, 1.0, 1.0), one),
+        lambda: hubslosh.Craft(1.0, (1.0, 1.0, 1.0), thrust=one),
+        lambda: hubslosh.Craft(
+            1.0, (1.0, 1.0, 1.0), tanks={"a": hubslosh.MountedTank({"density": 1.0}, one)}
+        ),
+        lambda: attitude.about(one, 1.0),
+        lambda: attitude.slew(1, 1, inertia=matrix),
+        lambda: hubslosh.quantiles(TABLE, at=one / 100),
+    ]
+    for k, call in enumerate(calls):
+        with pytest.raises(FmuError, match="a masked array has no value at"):
+            pytest.fail(f"call {k} returned {call()!r}")
+    # a mask that hides nothing is an array
+    free = np.ma.array([0.1, 0.2], mask=False)
+    assert given.model.response(free) == pytest.approx(given.model.response([0.1, 0.2]))

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 import hubslosh
-from hubslosh import Craft, FmuError, MountedTank
+from hubslosh import Craft, FmuError, FmuWarning, MountedTank
 from hubslosh.review_plan import main, review_plan
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
@@ -122,9 +122,9 @@ def test_bands_hold_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
     uncertain = {"craft.Jxx": "10%", "delay": (0.0, 0.2)}
     found = craft.review(gains(), PERIOD, ["30%", "70%"], uncertain=uncertain, draws=6, delay=0.1)
     names = [quantity.name for quantity in found.uncertain]
-    assert names == ["damping of ox", "craft.Jxx", "delay"]
+    assert names == ["damping of ox", "frequency of ox", "craft.Jxx", "delay"]
     kinds = dict(found.points["kind"].value_counts())
-    assert kinds.pop("search") > 0 and kinds == {"one at a time": 12, "draw": 6, "nominal": 2}
+    assert kinds.pop("search") > 0 and kinds == {"one at a time": 16, "draw": 6, "nominal": 2}
     late = found.points.query("kind == 'one at a time' and delay == 1 and fill == 0").iloc[0]
     there = craft.loop(gains(), PERIOD, "30%", delay=0.2)
     assert late["modulus_margin"] == pytest.approx(hubslosh.margins(there).modulus_margin, rel=1e-9)
@@ -141,8 +141,11 @@ def test_thrust_off_the_centre_of_mass_is_trimmed(craft: Craft) -> None:
     found = craft.review(gains(), PERIOD, ["50%"], damping="nominal")
     center = craft.mass_properties("50%").center_of_mass
     balance = {"torque[1]": 400 * center[1], "torque[2]": -400 * center[0]}
-    by_torque = hubslosh.margins(craft.loop(gains(), PERIOD, "50%"), balance)
     mine = found.nominal[0].margins
+    with pytest.warns(FmuWarning, match="untrimmed, is no steady state: an angular acceleration"):
+        beside = craft.parameters("50%", trimmed=False)
+    loop = replace(found.nominal[0].loop, parameters=beside | balance)
+    by_torque = hubslosh.margins(loop)
     columns = ["frequency", "gain_margin", "phase_margin"]
     assert mine.crossings[columns].to_numpy() == pytest.approx(
         by_torque.crossings[columns].to_numpy(), rel=1e-6, nan_ok=True
@@ -156,7 +159,7 @@ def test_the_search_finds_the_worst_corner(craft: Craft) -> None:
     """No corner of the ranges is worse, and the simulation confirms the margin to 1 %."""
     craft = replace(craft, inertia=(INERTIA, INERTIA, 1200.0))
     uncertain = {"craft.Jxx": "20%", "craft.Jyy": "10%", "delay": (0.0, 0.3)}
-    options = {"damping": "nominal", "delay": 0.1, "uncertain": uncertain}
+    options = {"damping": "nominal", "frequency": "nominal", "delay": 0.1, "uncertain": uncertain}
     found = craft.review(gains(), PERIOD, ["30%", "70%"], draws=4, **options)
     corners = []
     for point in found.nominal:
@@ -177,8 +180,9 @@ def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
     tank = replace(craft.tanks["ox"], position=(0, 0, 0.62), nu=None)
     craft = replace(craft, tanks={"ox": tank})
     found = craft.review(
-        gains(4, 40), PERIOD, ["50%"], damping="nominal", parameters={"tank[1].zeta[1]": 0.0}
-    )
+        gains(4, 40), PERIOD, ["50%"], damping="nominal", frequency="nominal",
+        parameters={"tank[1].zeta[1]": 0.0},
+    )  # fmt: skip
     assert "UNSTABLE at 1 of 1 fill: 50%" in found.answer
     compared = found.confirmation
     assert compared.agrees and compared.growth > 0
@@ -218,7 +222,8 @@ def test_the_suggested_filter_does_what_it_says(craft: Craft) -> None:
     """Slosh between hinge and bob: stable with the filter, as `margins` of its controller says."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     lightly = {"tank[1].zeta[1]": 5e-4}
-    found = craft.review(gains(25, 300), PERIOD, ["50%"], damping="nominal", parameters=lightly)
+    still = {"damping": "nominal", "frequency": "nominal"}
+    found = craft.review(gains(25, 300), PERIOD, ["50%"], parameters=lightly, **still)
     of = found.suggestion
     assert found.worst.distance == of.before < 0 < of.after
     loop = found.nominal[0].loop
@@ -264,7 +269,7 @@ def test_a_plan_is_the_same_call(craft: Craft, tmp_path: Path, capsys, monkeypat
     )
     (tmp_path / "law.py").write_text(law)
     rows = gains().tolist()
-    matrices = f"{{ A = [[0.0]], B = [{[0.0] * 6}], C = [[0.0], [0.0], [0.0]], D = {rows} }}"
+    matrices = f"{{ A = [[-1.0]], B = [{[0.0] * 6}], C = [[0.0], [0.0], [0.0]], D = {rows} }}"
     options = {"damping": "nominal", "uncertain": {"craft.Jxx": (850, 950)}, "draws": 2}
     direct = craft.review(gains(), PERIOD, ["50%"], **options)
 
@@ -336,3 +341,92 @@ def test_a_review_names_what_is_wrong(craft: Craft) -> None:
         review(draws=-1)
     with pytest.raises(FmuError, match='"interval" or "nominal"'):
         review(damping="low")
+
+
+def test_a_frequency_that_is_lower_makes_the_loop_unstable(craft: Craft) -> None:
+    """Stable at each nominal frequency, unstable at -10 %, which is varied by default."""
+    craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
+    options = {"damping": "nominal", "draws": 0, "parameters": {"ox.zeta[1]": 8e-4}}
+    still = craft.review(gains(25, 300), PERIOD, ["30%"], frequency="nominal", **options)
+    assert still.points["stable"].all() and still.uncertain == ()
+    found = craft.review(gains(25, 300), PERIOD, ["30%"], **options)
+    assert "UNSTABLE at" in found.answer and "within the uncertainty" in found.answer
+    low = found.points.query("kind == 'one at a time' and `frequency of ox` == -1").iloc[0]
+    assert not low["stable"] and low["growth"] > 0
+    # an unstable point has no margins, and counts in no band
+    assert np.isnan(low["phase_margin"]) and np.isnan(low["modulus_margin"])
+    (band,) = found.bands().to_dict("records")
+    stable = found.points[found.points["stable"]]
+    assert band["unstable"] == len(found.points) - len(stable) > 0
+    assert band["modulus_margin_low"] == stable["modulus_margin"].min()
+    assert found.confirmation.agrees and found.confirmation.growth > 0
+
+
+def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
+    """Positive attitude feedback about z: J s² + kd s + kp = 0 with kp < 0, and no oscillation."""
+    law, J = gains(), craft.mass_properties("50%").inertia[2, 2]
+    law[2] = 0
+    law[2, 2], law[2, 5] = -2 * 200.0, 300.0
+    found = craft.review(law, 0.01, ["50%"], damping="nominal", frequency="nominal")
+    expected = (-300 + np.sqrt(300**2 + 4 * J * 200)) / (2 * J)
+    assert found.worst.growth == pytest.approx(expected, rel=0.01)
+    compared = found.confirmation
+    assert compared.agrees and compared.frequency == compared.simulated_frequency == 0
+    assert compared.growth == pytest.approx(found.worst.growth, rel=1e-9)
+    assert compared.simulated_growth == pytest.approx(compared.growth, rel=1e-3)
+    assert "confirms its growth" in str(compared) and "without oscillation" in str(compared)
+    # the command that grows is drawn, not only the first
+    page = found.html()
+    drawn = page[page.index("Does the nonlinear craft agree") :]
+    assert "torque[3]" in drawn[: drawn.index("</figure>")]
+
+
+def test_the_page_shows_what_is_unstable_first(craft: Craft) -> None:
+    """Fills, points and modes: marked, and ahead of the stable ones; one verdict at a fill."""
+    craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
+    fills = ["10%", "30%", "50%"]
+    found = craft.review(gains(25, 300), PERIOD, fills, damping="nominal", draws=0,
+                         parameters={"ox.zeta[1]": 4.5e-4})  # fmt: skip
+    nominal = [point.margins.stable for point in found.nominal]
+    assert True in nominal and False in nominal
+    table = found.bands()
+    assert (np.isnan(table["modulus_margin_nominal"]) == ~np.array(nominal)).all()
+    (words,) = found.modes().values()
+    assert words.startswith("unstable at ") and words.count("unstable") == 1
+    for stable, fill in zip(nominal, found.fills, strict=True):
+        rows = found.slosh[found.slosh["fill"] == found.fills.index(fill)]
+        assert ("unstable" in set(rows["stabilised"])) is not stable
+    page = found.html()
+    tables = page[page.index('<div class="tables">') :]
+    assert tables.index("Which points are unstable?") < tables.index("What are the margins")
+    rows = re.findall(r"<tr( class=\"bad\")?><td>([^<]*)</td><td>([^<]*)</td>", tables)
+    margins = [row for row in rows if row[2] == "no" or "points" in row[2]]
+    assert [bool(bad) for bad, _, _ in margins] == sorted(
+        (bool(bad) for bad, _, _ in margins), reverse=True
+    )
+    first = margins[0]
+    assert first[2].startswith("nominal, ") and not nominal[found.fills.index(first[1])]
+    assert "nominal loop unstable" in page
+    # growth of the points: the fastest first
+    growth = found.unstable()["growth"].to_numpy()
+    assert (np.diff(growth) <= 0).all() and found.worst.growth == growth[0]
+
+
+def test_a_review_has_a_budget(craft: Craft) -> None:
+    """Times, counts and sizes outside their ranges are refused in words, at once."""
+    for (name, value), words in {
+        ("period", 1e-9): "period must be a number of seconds from 1e-06 to 1e.06, not 1e-09",
+        ("delay", 1e9): "delay must be a number of seconds from 0 to 1e.06",
+        ("delay", 1e3): r"1000 s is 20000 cycles of 0\.05 s.*give a shorter delay",
+        ("period", 1e-6): "cycles of 1e-06 s",
+        ("latency", 10**7): "latency must be a whole number from 0 to 1000000",
+        ("draws", 10**9): "draws must be a whole number from 0 to 100000",
+        ("fills", ("50%",) * 2000): "fills has 2000 fills",
+        ("seed", -1): "seed must be a whole number",
+        ("delay", 10.0): r"review has \d+ points of \d+ states, which would take hours",
+    }.items():
+        given = {"period": PERIOD, "fills": ["50%"], "damping": "nominal", "delay": 0.1}
+        given |= {"draws": 100_000} if words.startswith("review") else {}
+        given[name] = value
+        with pytest.raises(FmuError, match=words):
+            craft.review(gains(), **given)

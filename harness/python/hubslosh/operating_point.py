@@ -1,0 +1,133 @@
+"""The operating point of Spacecraft: its thrust acts through the centre of mass, as after trimming.
+
+Otherwise the craft would turn faster and faster, and a linear model would hold only at its start.
+"""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import caller
+from .fmu import Fmu, FmuWarning, Quantity
+from .plant import Plant
+
+Vector = NDArray[np.float64]
+
+LEFT = 1e-7
+"""Angular acceleration that counts as none, rad/s²: 0.03° in 100 s. Rounding leaves 1e-17."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OperatingPoint:
+    """Spacecraft with its thrust through the centre of mass, and what accelerations are left."""
+
+    model: str | Path
+    """The FMU."""
+    parameters: dict[str, Quantity]
+    """Parameters of the FMU at this point."""
+    shift: Vector
+    """Way of O, where the thrust acts, across the thrust to the centre of mass, body axes, m."""
+    before: Vector
+    """Angular acceleration before trimming, body axes, rad/s²."""
+    tanks: tuple[str, ...]
+    """Names of the tanks in the FMU's order."""
+
+    @cached_property
+    def _left(self) -> tuple[Vector, dict[str, float]]:
+        with Plant(self.model, self.parameters) as plant:
+
+            def get(name: str, count: int = 3) -> Vector:
+                return np.array(plant.get([f"{name}[{i}]" for i in range(1, count + 1)]))
+
+            turning, force, across = get("omega_dot"), get("specific_force"), {}
+            for number, name in enumerate(self.tanks, 1):
+                w, x, y, z = (q := get(f"tank[{number}].q", 4)) / np.linalg.norm(q)
+                axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+                here = force + np.cross(turning, get(f"tank[{number}].position"))
+                across[name] = float(np.linalg.norm(here - axis * (axis @ here)))
+        return turning, across
+
+    @property
+    def left(self) -> Vector:
+        """Angular acceleration that is left, body axes, rad/s²."""
+        return self._left[0]
+
+    @property
+    def across(self) -> dict[str, float]:
+        """Acceleration that is left across each tank's axis, m/s²; it moves liquid at rest."""
+        return self._left[1]
+
+    def __repr__(self) -> str:
+        """Return the angular acceleration that is left."""
+        return f"OperatingPoint({np.linalg.norm(self.left):.2g} rad/s² left)"
+
+    def __str__(self) -> str:
+        """Return what trimming changed, and what is left, in a line each."""
+        lines = [
+            f"O, where the thrust acts, moves by {_row(self.shift)} m to the centre of mass",
+            f"angular acceleration: {np.linalg.norm(self.before):.4g} rad/s² before, "
+            f"{np.linalg.norm(self.left):.2g} rad/s² left",
+        ]
+        if self.across:
+            rest = ", ".join(f"{name} {value:.2g} m/s²" for name, value in self.across.items())
+            lines.append(f"left across the axis of each tank: {rest}")
+        return "\n".join(lines)
+
+
+def _row(values: Vector) -> str:
+    return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
+
+
+def trim(
+    model: str | Path, parameters: Mapping[str, Quantity], tanks: Sequence[str] = ()
+) -> OperatingPoint:
+    """Return Spacecraft with O moved across the thrust, until that acts through the centre of mass.
+
+    A craft without thrust, or on a pivot, stays as it is.
+    """
+    every, none = dict(parameters), np.zeros(3)
+    fmu = Fmu.open(model)
+    forces = [every.get(f"force[{i}]", 0.0) for i in (1, 2, 3)]
+    if "omega_dot[1]" not in fmu.variables or not any(forces):
+        return OperatingPoint(model, every, none, none, tuple(tanks))
+    with Plant(model, every) as plant:
+
+        def get(name: str) -> Vector:
+            return np.array(plant.get([f"{name}[{i}]" for i in (1, 2, 3)]))
+
+        force, center, before = get("force"), get("center_of_mass"), get("omega_dot")
+        kind, mount, count = plant.get(["mount_kind", "mount", "tanks"])
+        if (kind or mount) != 1 or not force.any():
+            return OperatingPoint(model, every, none, before, tuple(tanks))
+        shift = center - force * (force @ center) / (force @ force)
+        places = ["craft.r", *(f"tank[{number}].position" for number in range(1, int(count) + 1))]
+        for place in places:
+            moved = get(place) - shift
+            every |= {f"{place}[{i + 1}]": float(x) for i, x in enumerate(moved)}
+    return OperatingPoint(model, every, shift, before, tuple(tanks))
+
+
+def warn_of_rotation(what: str, turning: Any) -> None:
+    """Warn if the craft of a linear model turns faster and faster, with its acceleration."""
+    if text := rotation(what, turning):
+        warnings.warn(text, FmuWarning, stacklevel=caller())
+
+
+def rotation(what: str, turning: Any) -> str:
+    """Return what is wrong with a point at which the craft turns faster; "" if it does not."""
+    size = float(np.linalg.norm(turning))
+    if size <= LEFT:
+        return ""
+    return (
+        f"{what} is no steady state: an angular acceleration of {size:.4g} rad/s² is left, "
+        f"{_row(np.asarray(turning, float))} about the body axes, so that linear models and "
+        "margins hold at its start only. Causes are a thrust beside the centre of mass, which "
+        "Craft.trim moves there, a constant torque, and liquid off its rest, as in a tank that "
+        "leans against the thrust"
+    )

@@ -1,0 +1,183 @@
+"""One operating point and one set of names in every method of a craft."""
+
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hubslosh
+from hubslosh import Craft, FmuError, FmuWarning, MountedTank
+from hubslosh.quantities import KINDS, Modes, OfMode
+
+SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
+CYLINDER = {"density": 875.0, "shape": {"cylinder": {"radius": 0.4, "height": 1.1}}}
+GAINS = np.hstack([80 * np.eye(3), 400 * np.eye(3)])
+PERIOD = 0.05
+MEASURED = ["q[2]", "q[3]", "q[4]", "omega[1]", "omega[2]", "omega[3]"]
+
+pytestmark = pytest.mark.filterwarnings("ignore:tank.*outside the measured")
+
+
+@pytest.fixture
+def craft(fmu: Path) -> Craft:
+    """Return a craft of two tanks whose thrust passes 0.1 m beside its centre of mass."""
+    tanks = {
+        "NTO": MountedTank(SPHERE, (0.1, 0.5, -0.2), modes=1, nu=3e-7),
+        "MMH": MountedTank(CYLINDER, (0.1, -0.6, -0.4), modes=2, nu=9e-7, sigma=0.03),
+    }
+    return Craft(
+        1000.0, (900.0, 850.0, 700.0), (0.1, 0.02, 1.0), tanks, 400.0,
+        model=fmu.with_name("Spacecraft.fmu"),
+    )  # fmt: skip
+
+
+def numbers(found: hubslosh.Margins) -> np.ndarray:
+    """Return all crossings with their margins."""
+    return found.crossings[["frequency", "gain_margin", "phase_margin"]].to_numpy()
+
+
+def test_every_method_linearises_at_the_same_trimmed_point(craft: Craft) -> None:
+    """Thrust 0.1 m beside the centre of mass: loop, review, linearize and uncertain agree to 1e-9.
+
+    Without trimming the delay margin is another one, and a warning says how fast the craft turns.
+    """
+    by_loop = hubslosh.margins(loop := craft.loop(GAINS, PERIOD, "50%", delay=0.1))
+    review = craft.review(GAINS, PERIOD, ["50%"], delay=0.1, damping="nominal", frequency="nominal")
+    by_review = review.nominal[0].margins
+    assert numbers(by_loop) == pytest.approx(numbers(by_review), rel=1e-9, nan_ok=True)
+    assert by_loop.delay_margin == pytest.approx(by_review.delay_margin, rel=1e-9)
+    f = np.array([0.003, 0.13, 0.3])
+    plant = craft.linearize("50%", outputs=MEASURED).response(f)
+    assert loop.plant().response(f) == pytest.approx(plant, rel=1e-12)
+    model = craft.uncertain("50%", {"craft.Jxx": "5%"})
+    # an LFT has no states that only scale others: rounding
+    size = np.abs(plant).max()
+    assert model.at([0.0]).response(f) == pytest.approx(plant, rel=1e-9, abs=1e-12 * size)
+    with pytest.warns(FmuWarning, match="untrimmed, is no steady state"):
+        beside = craft.parameters("50%", trimmed=False)
+    with pytest.warns(FmuWarning, match=r"angular acceleration of 0\.0\d+ rad/s² is left, \("):
+        untrimmed = hubslosh.margins(replace(loop, parameters=beside))
+    assert abs(untrimmed.delay_margin / by_loop.delay_margin - 1) > 0.01
+
+
+def test_trimming_leaves_no_rotation_and_says_what_is_left(craft: Craft) -> None:
+    """The moment of the thrust over the inertia before, by hand; 0 after, also in a run."""
+    point = craft.trim("50%")
+    at = craft.mass_properties("50%")
+    assert point.shift == pytest.approx(at.center_of_mass * (1, 1, 0), abs=1e-12)
+    # liquid under a lid does not take part in the first moment of a rotation as rigid does
+    moment = np.cross(-at.center_of_mass, [0, 0, 400.0])
+    rigid = craft.parameters("50%", rigid=True, trimmed=True)
+    with hubslosh.Plant(craft.model, rigid | {
+        f"{place}[{i + 1}]": float(x)
+        for place, r in {
+            "craft.r": craft.center_of_mass,
+            **{f"tank[{k}].position": t.position for k, t in enumerate(craft.tanks.values(), 1)},
+        }.items()
+        for i, x in enumerate(r)
+    }) as plant:  # fmt: skip
+        turning = plant.get([f"omega_dot[{i}]" for i in (1, 2, 3)])
+    assert turning == pytest.approx(np.linalg.solve(at.inertia, moment), rel=1e-9, abs=1e-12)
+    assert np.linalg.norm(point.before) > 0.01 and np.linalg.norm(point.left) < 1e-12
+    assert point.across == pytest.approx({"NTO": 0, "MMH": 0}, abs=1e-12)
+    assert "rad/s² before" in str(point) and "rad/s² left" in str(point)
+    run = hubslosh.simulate(craft.model, craft.parameters("50%"), stop=20, outputs=["omega"])
+    assert run[["omega[1]", "omega[2]", "omega[3]"]].abs().to_numpy().max() < 1e-12
+    # what further parameters do is left, in numbers
+    pushed = craft.trim("50%", {"torque[1]": 3.0})
+    assert np.linalg.norm(pushed.left) > 1e-3
+    with pytest.warns(FmuWarning, match=f"of {np.linalg.norm(pushed.left):.4g} rad/s² is left"):
+        craft.linearize("50%", parameters={"torque[1]": 3.0})
+    leaning = replace(craft.tanks["NTO"], axis=(np.sin(0.1), 0, np.cos(0.1)))
+    tilted = replace(craft, tanks={"NTO": leaning}).trim("50%")
+    # liquid on the axis of a tank that leans is not at rest, and turns the craft
+    assert tilted.across["NTO"] > 0.02 and np.linalg.norm(tilted.left) > 1e-4
+
+
+@pytest.mark.parametrize("name", ["NTO", "tank[1]"])
+def test_every_method_takes_the_same_names(craft: Craft, name: str) -> None:
+    """A tank by name and by number: loop, linearize, review, uncertain and a study's draw agree."""
+    nominal = craft.uncertain("50%", {f"{name}.frequency[1]": "1%"})
+    f = 0.8 * nominal.center["tank[1].frequency[1]"]
+    zeta = 2 * craft.tank_at("50%")["NTO"].modes["zeta"][0]
+    ranges = {f"{name}.frequency[1]": (f, f * 1.0001), f"{name}.zeta[1]": (zeta, 1.0001 * zeta)}
+    model = craft.uncertain("50%", ranges).at([-1.0, -1.0])
+    values = {f"{name}.frequency[1]": f, f"{name}.zeta[1]": zeta, "craft.Jxx": 910.0, "delay": 0.12}
+    (drawn,) = (
+        hubslosh.monte_carlo({key: [value] for key, value in values.items()}, 1, progress=False)
+        .drop(columns="run")
+        .to_dict("records")
+    )
+    at = np.array([0.01, 0.11, 0.14, 0.2])
+    of_modes = {key: drawn[key] for key in ranges}
+    plant = craft.linearize("50%", outputs=MEASURED, parameters=of_modes)
+    size = np.abs(plant.response(at)).max()
+    assert model.response(at) == pytest.approx(plant.response(at), rel=1e-7, abs=1e-10 * size)
+    loop = craft.loop(GAINS, PERIOD, "50%", parameters=drawn)
+    assert loop.delay == 0.12 and loop.parameters["craft.Jxx"] == 910.0
+    shares = {key: (0.9 * value, value) for key, value in values.items() if "freq" in key}
+    found = craft.review(
+        GAINS, PERIOD, ["50%"], damping="nominal", parameters=drawn, uncertain=shares, draws=2,
+        frequency="nominal",
+    )  # fmt: skip
+    assert numbers(found.nominal[0].margins) == pytest.approx(
+        numbers(hubslosh.margins(loop)), rel=1e-9, nan_ok=True
+    )
+    assert [u.name for u in found.uncertain] == list(shares)
+    for call, words in {
+        lambda: craft.linearize("50%", parameters={"delay": 0.1}): "delay is a quantity of a loop",
+        lambda: craft.uncertain("50%", {"delay": (0, 1)}): "delay is a quantity of a loop",
+        lambda: craft.linearize("50%", parameters={"NTO.zeta[1]": 0.1, "tank[1].zeta[1]": 0.1}):
+            "are the same quantity",
+        lambda: craft.loop(GAINS, PERIOD, "50%", parameters={"NTO.zeta[2]": 0.1}): "no such mode",
+        lambda: craft.uncertain("50%", {"NTO.length[1]": "5%"}):
+            r"moves the bob and changes the frequency: give tank\[1\]\.frequency\[1\]",
+        lambda: craft.review(GAINS, PERIOD, ["50%"], uncertain={f"{name}.hinge[1]": "5%"}):
+            r"moves the bob: give tank\[1\]\.frequency\[1\]",
+    }.items():  # fmt: skip
+        with pytest.raises(FmuError, match=words):
+            call()
+
+
+def test_a_quantity_of_a_mode_changes_alone(craft: Craft) -> None:
+    """Frequency, mass, bob: the others, and the liquid at rest, stay; with surface tension too."""
+    nominal, of = craft.parameters("50%"), OfMode(2, "frequency", 1)
+    assert nominal[of.of("k")] > 0
+
+    def state(parameters: dict) -> dict[str, float]:
+        modes = Modes(craft.model, parameters)
+        found = {kind: modes.value(OfMode(2, kind, 1)) for kind in KINDS}
+        names = ["mass", *(f"center_of_mass[{i}]" for i in (1, 2, 3))]
+        names += [f"inertia[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]
+        with hubslosh.Plant(craft.model, parameters) as plant:
+            values = plant.get(names)
+        return found | {f"whole {name}": x for name, x in zip(names, values, strict=True)}
+
+    before = state(nominal)
+    for kind, value in {"frequency": 0.8 * before["frequency"], "mass": 1.2 * before["mass"],
+                        "bob": before["bob"] + 0.05}.items():  # fmt: skip
+        after = state(craft.parameters("50%", parameters={f"MMH.{kind}[1]": value}))
+        assert after == pytest.approx(before | {kind: value}, rel=1e-9, abs=1e-9), kind
+
+
+def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
+    """All modes of a tank together, by 10 %; "nominal" and other shares are arguments."""
+    found = craft.review(GAINS, PERIOD, ["50%"], damping="nominal", draws=0)
+    assert [u.name for u in found.uncertain] == ["frequency of NTO", "frequency of MMH"]
+    ends = found.uncertain[0].ends[0]["tank[1].frequency[1]"]
+    assert ends == pytest.approx((0.9 * ends[1], ends[1], 1.1 * ends[1]), rel=1e-12)
+    with pytest.raises(FmuError, match=r'frequency must be a share .* such as "10%"'):
+        craft.review(GAINS, PERIOD, ["50%"], frequency="10")
+
+
+def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
+    """For processes of a study: the copy computes the same."""
+    loop = craft.loop(GAINS, PERIOD, "50%", delay=0.1)
+    review = craft.review(GAINS, PERIOD, ["50%"], damping="nominal", draws=0)
+    craft.uncertain("50%", {"NTO.zeta[1]": "interval"})
+    again = pickle.loads(pickle.dumps(craft))
+    assert again.parameters("50%") == craft.parameters("50%")
+    for thing in (loop, review, craft.trim("50%"), craft.uncertain("50%", {"craft.Jxx": "5%"})):
+        assert str(pickle.loads(pickle.dumps(thing))) == str(thing)
