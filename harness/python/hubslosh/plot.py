@@ -3,6 +3,7 @@
 Each function draws into the axes it is given, or into a new figure, and returns the axes.
 """
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 # Okabe and Ito's palette: distinct for colour-blind readers
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of series, in turn."""
+
+FLOOR = 80.0
+"""Attenuation down to which `margins` draws the loop gain, dB."""
 
 
 def _subplots(rows: int, **options: Any) -> "Sequence[Axes]":
@@ -184,7 +188,7 @@ def margins(
 
     Each loop is drawn with the others closed, as `hubslosh.margins` takes it, which this calls.
     Gain crossings are dots, phase crossings squares. Labels give the smallest margins and those
-    near slosh.
+    near slosh. The gain is drawn down to -80 dB, or to the smallest gain margin.
     """
     from .stability import _broken_at, margins_and_gain
 
@@ -199,7 +203,7 @@ def margins(
     high = max(known.max() * 2 if len(known) else 0, min(highs))
     if loop_gain.period is not None:
         high = min(high, 0.5 / loop_gain.period)
-    lowest = 0.0
+    lowest, labels = 0.0, list[_Label]()
     for i in range(len(loop_gain.D)):
         one = _broken_at(loop_gain, i)
         name = one.inputs[0] if one.inputs else "loop gain"
@@ -209,7 +213,6 @@ def margins(
         angle -= 360 * np.round((np.median(angle[: max(len(angle) // 4, 1)]) + 90) / 360)
         lowest = min(lowest, angle.min())
         style: dict[str, Any] = {"color": COLORS[i % len(COLORS)], "linewidth": 1.1}
-        small = {"textcoords": "offset points", "fontsize": 7, "color": style["color"]}
         gain.plot(line, 20 * np.log10(np.abs(h)), label=name, **style)
         phase.plot(line, angle, **style)
         for row in table[table["loop"] == name].itertuples():
@@ -221,19 +224,23 @@ def margins(
                 if row.phase_margin != found.phase_margin and "slosh" not in row.near:
                     continue
                 text = f"{row.phase_margin:.0f}°" + (" slosh" if "slosh" in row.near else "")
-                phase.annotate(text, (row.frequency, level), (4, 4), **small)
+                labels.append((phase, row.frequency, level, text, style["color"]))
             else:
                 gain.plot(row.frequency, -row.gain_margin, "s", color=style["color"], markersize=4)
                 if row.gain_margin not in found.gain_margins:
                     continue
-                place = (row.frequency, -row.gain_margin)
-                gain.annotate(f"{row.gain_margin:.1f} dB", place, (4, 4), **small)
+                text = f"{row.gain_margin:.1f} dB"
+                labels.append((gain, row.frequency, -row.gain_margin, text, style["color"]))
     gain.axhline(0, color="black", linewidth=0.8)
     for turn in (-180, -540):
         if turn == -180 or lowest < turn:
             phase.axhline(turn, color="black", linewidth=0.8)
     gain.set_xscale("log")
     gain.set_xlim(low, high)
+    finite = [abs(margin) for margin in found.gain_margins if np.isfinite(margin)]
+    floor = -max(FLOOR, 1.2 * min(finite, default=0.0))
+    bottom, top = gain.get_ylim()
+    gain.set_ylim(max(bottom, floor), top)
     phase.margins(y=0.15)
     gain.set_ylabel("loop gain (dB)")
     phase.set_ylabel("phase (deg)")
@@ -242,16 +249,46 @@ def margins(
     crossed = table.loc[
         (table["crossing"] == "gain") & table["near"].str.contains("slosh"), "frequency"
     ]
-    slosh = ", ".join(f"{f:.3g}" for f in crossed)
+    values = list(dict.fromkeys(f"{f:.3g}" for f in crossed))
+    more = f" and {len(values) - 4} more" if len(values) > 4 else ""
+    slosh = ", ".join(values[:4]) + more
     margin = f"{found.phase_margin:.0f}°" if np.isfinite(found.phase_margin) else "none"
     answer = f"phase margin {margin}, {delay}"
     answer += f"; slosh crosses 0 dB at {slosh} Hz" if slosh else ""
-    gain.set_title(answer, fontsize=10)
+    gain.set_title("\n".join(textwrap.wrap(answer, 80)), fontsize=10)
     for ax in (gain, phase):
         ax.grid(alpha=0.3, which="both")
     if len(loop_gain.D) > 1:
         gain.legend()
+    _annotate(labels)
     return gain, phase
+
+
+_Label = tuple[Any, float, float, str, str]
+"""Axes, place, text and colour of a label."""
+
+
+def _annotate(labels: list[_Label]) -> None:
+    """Write labels beside their places where they cover no other one; else leave them out."""
+    if not labels:
+        return
+    labels[0][0].figure.draw_without_rendering()  # the layout moves the axes
+    taken: list[tuple[float, float, float, float]] = []
+    for ax, x, y, text, color in labels:
+        at, unit = ax.transData.transform((x, y)), ax.figure.dpi / 72
+        width, height, box = 4.8 * len(text), 11.0, ax.bbox
+        for dx, dy in ((4, 4), (4, -12), (-width - 4, 4), (-width - 4, -12), (4, 14), (4, -22)):
+            left, low = at[0] + dx * unit, at[1] + dy * unit
+            right, high = left + width * unit, low + height * unit
+            inside = left >= box.x0 and right <= box.x1 and low >= box.y0 and high <= box.y1
+            if inside and all(
+                right < other[0] or left > other[2] or high < other[1] or low > other[3]
+                for other in taken
+            ):
+                taken.append((left, low, right, high))
+                ax.annotate(text, (x, y), (dx, dy), textcoords="offset points", fontsize=7,
+                            color=color)  # fmt: skip
+                break
 
 
 def closed_loop(
@@ -318,14 +355,18 @@ def monte_carlo(
 ) -> "Sequence[Axes]":
     """Draw the share of runs below each value, of each result of `hubslosh.monte_carlo`.
 
-    * ``columns``: Results to draw; by default all numbers except drawn parameters (names with a dot
-      or bracket). A vertical line and a band show the quantile ``at`` with its 95 % interval.
+    * ``columns``: Results to draw; by default all numbers that the function ``outcome`` returned,
+      not the drawn values; of a table that was read from a file, all without dot and bracket in
+      their names. A vertical line and a band show the quantile ``at`` with its 95 % interval.
     """
     from .sampling import quantiles
 
     check_table(table, "what is drawn")
+    drawn = table.attrs.get("drawn")
+    if drawn is None:  # a table from elsewhere, such as runs.csv
+        drawn = [c for c in table.columns if "." in str(c) or "[" in str(c)]
     numbers = [str(c) for c in table.select_dtypes("number").columns if c != "run"]
-    names = list(columns) or [n for n in numbers if "." not in n and "[" not in n]
+    names = list(columns) or [n for n in numbers if n not in drawn]
     _check(table, names)
     if not names:
         raise FmuError("the table has no results to draw")

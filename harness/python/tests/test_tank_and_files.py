@@ -170,6 +170,11 @@ def test_every_plot_has_what_it_promises(fmu: Path) -> None:
     (ax,) = plot.monte_carlo(table)
     assert ax.get_xlabel() == "rate (deg/s)"
     assert ax.lines[0].get_ydata()[-1] == 100
+    study = hubslosh.monte_carlo(
+        {"mass": (1, 2)}, 20, outcome=lambda drawn: {"error[1]": drawn["mass"]}, progress=False
+    )
+    (ax,) = plot.monte_carlo(study)
+    assert ax.get_xlabel() == "error[1]"
     for call, sentence in (
         (lambda: plot.bode(3), "bode draws tables"),
         (lambda: plot.monte_carlo(table[["run", "hub.I"]]), "no results to draw"),
@@ -177,6 +182,36 @@ def test_every_plot_has_what_it_promises(fmu: Path) -> None:
     ):
         with pytest.raises(FmuError, match=sentence):
             call()
+
+
+def test_margins_of_three_axes_can_be_read(fmu: Path) -> None:
+    """The title fits, a zero does not set the scale, and no label covers another."""
+    sphere = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
+    tanks = {
+        "ox": hubslosh.MountedTank(sphere, (0, 0.6, 0.22)),
+        "fuel": hubslosh.MountedTank(sphere, (0.02, -0.7, -0.4)),
+    }
+    craft = hubslosh.Craft(
+        1000.0, (900.0, 800.0, 700.0), (0, 0, 1.0), tanks, 400.0,
+        model=fmu.with_name("Spacecraft.fmu"),
+    )  # fmt: skip
+    undamped = {f"{tank}.zeta[{n}]": 0.0 for tank in tanks for n in (1, 2)}
+    # a lag by Tustin's rule has a zero at half the sampling rate
+    gains = np.hstack([400 * np.eye(3), 1000 * np.eye(3)])
+    lag = hubslosh.LinearModel(
+        -9.0 * np.eye(3), 9 * gains, np.eye(3), np.zeros((3, 6)), ("a", "b", "c"), (), ()
+    )
+    gain, phase = plot.margins(craft.loop(lag, 0.1, "60%", delay=0.2, parameters=undamped))
+    figure = gain.figure
+    figure.draw_without_rendering()
+    drawn = min(np.min(line.get_ydata()) for line in gain.lines)
+    assert drawn < -90 and gain.get_ylim()[0] >= -80
+    title = gain.title.get_window_extent()
+    assert title.x0 >= 0 and title.x1 <= figure.bbox.width
+    assert "slosh crosses 0 dB" in gain.get_title() and " more Hz" in gain.get_title()
+    labels = [text.get_window_extent() for ax in (gain, phase) for text in ax.texts]
+    assert len(labels) > 5
+    assert not any(a.overlaps(b) for k, a in enumerate(labels) for b in labels[:k])
 
 
 SSV = """<?xml version="1.0" encoding="UTF-8"?>
