@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import hubslosh
 
 LARGE = {"numpy", "pandas", "scipy", "fmpy", "lxml", "matplotlib", "control", "pyarrow"}
@@ -48,3 +50,18 @@ def test_what_comes_on_first_use_is_what_type_checkers_see() -> None:
     for name in hubslosh.__all__:
         assert getattr(hubslosh, name) is not None and name in dir(hubslosh)
     assert isinstance(hubslosh.__version__, str)
+
+
+def test_a_misspelt_name_is_an_error_to_type_checkers() -> None:
+    """A module `__getattr__` that they see would make every name of the type Any (PEP 562)."""
+    tree = ast.parse(Path(hubslosh.__file__).read_text())
+    named = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    assert "__getattr__" not in {node.name for node in named}
+    (hidden,) = (
+        block
+        for block in tree.body
+        if isinstance(block, ast.If) and ast.unparse(block.test) == "not TYPE_CHECKING"
+    )
+    assert [node.name for node in hidden.body] == ["__getattr__"]
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        _ = hubslosh.simulat
