@@ -37,7 +37,7 @@ OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
 """Parameters that a tank without this mode does not have."""
 
 
-SEVERITY = ("unstable", "phase", "gain", "gain and phase")
+SEVERITY = ("unstable", "neither", "phase", "gain", "gain and phase")
 """Ways in which a slosh mode is stabilised, worst first."""
 
 
@@ -281,7 +281,8 @@ def _count(number: int, what: str) -> str:
 
 
 def _stabilised(how: str) -> str:
-    return how if how == "unstable" else f"{how.replace(' and', '- and')}-stabilised"
+    words = {"unstable": "unstable", "neither": "stabilised by neither gain nor phase"}
+    return words.get(how, f"{how.replace(' and', '- and')}-stabilised")
 
 
 def review(

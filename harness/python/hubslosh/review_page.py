@@ -219,7 +219,7 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
             ax.set_ylim(min(low, 0), max(high, 0))
     axes[-1].set_xlabel(unit)
     figure.align_ylabels(axes)
-    _legend(figure)
+    _legend(figure, 1)
 
 
 def _marked(review: "Review") -> str:
@@ -283,11 +283,11 @@ def _stabilisation(figure: "Figure", review: "Review") -> None:
     _legend(figure)
 
 
-def _legend(figure: "Figure") -> None:
+def _legend(figure: "Figure", columns: int = 2) -> None:
     """Put the legend below the axes, where it hides nothing."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
     if handles:
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 def _modes(figure: "Figure", review: "Review", unit: str) -> None:

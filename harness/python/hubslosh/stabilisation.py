@@ -37,8 +37,8 @@ def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, A
     of the resonance circle; 0° is away from -1.
     ``stabilised``: "unstable" if the closed loop's pole, all commands closed, grows (such a mode is
     here even if it hardly shows in the loop gain); "gain" if the peak is below 0 dB;
-    "gain and phase" if moreover the phase is within ±90°, so that the loop adds damping; otherwise
-    "phase".
+    "gain and phase" if moreover the phase is within ±90°, so that the loop adds damping; "phase" if
+    only that holds; "neither" if the mode is stable without either.
     """
     found, closed = [], _closed(gain)
     for i in range(len(gain.D)):
@@ -111,7 +111,7 @@ def _row(
     elif peak < 0:
         how = "gain and phase" if adds else "gain"
     else:
-        how = "phase"
+        how = "phase" if adds else "neither"
     hertz = abs(zero) / (2 * np.pi)
     frequency = abs(s) / (2 * np.pi)
     return {

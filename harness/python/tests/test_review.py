@@ -391,6 +391,13 @@ def test_the_page_shows_what_is_unstable_first(craft: Craft) -> None:
     assert True in nominal and False in nominal
     table = found.bands()
     assert (np.isnan(table["modulus_margin_nominal"]) == ~np.array(nominal)).all()
+    by_phase = found.slosh["phase"].abs() < 90
+    by_gain = found.slosh["peak"] < 0
+    for how, expected in {
+        "phase": by_phase & ~by_gain, "gain": by_gain & ~by_phase, "neither": ~by_phase & ~by_gain,
+    }.items():  # fmt: skip
+        assert expected[found.slosh["stabilised"] == how].all(), how
+    assert "neither" in set(found.slosh["stabilised"])
     (words,) = found.modes().values()
     assert words.startswith("unstable at ") and words.count("unstable") == 1
     for stable, fill in zip(nominal, found.fills, strict=True):
