@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arguments import MOST_STATES, check_ranges, floats, names_of
 from .fmu import Fmu, FmuError, Quantity
-from .operating_point import warn_of_rotation
+from .operating_point import is_spacecraft, warn_of_rotation
 from .plant import Instance
 from .simulation import parameters_of
 
@@ -316,9 +316,9 @@ def linearize(
         for name, value in parameters.items():
             instance.set(name, value)
         columns = instance.native.jacobian(unknown, known)
-        turning = [f"omega_dot[{i}]" for i in (1, 2, 3)]
-        if turning[0] in fmu.variables:
-            warn_of_rotation(f"this point of {fmu.name}", instance.get(turning))
+        if is_spacecraft(fmu):
+            turning = instance.get([f"omega_dot[{i}]" for i in (1, 2, 3)])
+            warn_of_rotation(f"this point of {fmu.name}", turning)
     jacobian = np.array(columns, float).reshape(len(known), len(unknown)).T
     n = len(states)
     A, B, C, D = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]

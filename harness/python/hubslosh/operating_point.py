@@ -94,7 +94,7 @@ def trim(
     every, none = dict(parameters), np.zeros(3)
     fmu = Fmu.open(model)
     forces = [every.get(f"force[{i}]", 0.0) for i in (1, 2, 3)]
-    if "omega_dot[1]" not in fmu.variables or not any(forces):
+    if not is_spacecraft(fmu) or not any(forces):
         return OperatingPoint(model, every, none, none, tuple(tanks))
     with Plant(model, every) as plant:
 
@@ -111,6 +111,11 @@ def trim(
             moved = get(place) - shift
             every |= {f"{place}[{i + 1}]": float(x) for i, x in enumerate(moved)}
     return OperatingPoint(model, every, shift, before, tuple(tanks))
+
+
+def is_spacecraft(fmu: Fmu) -> bool:
+    """Return whether an FMU is Spacecraft, in any size."""
+    return "craft.r[1]" in fmu.variables
 
 
 def warn_of_rotation(what: str, turning: Any) -> None:
