@@ -1,5 +1,5 @@
 //! The FMU 3.0 with arrays is the FMU 3.0 with scalars: the same library, the same variables, the same bits. What sizes
-//! its arrays can be set before it initialises.
+//! its arrays can be set before it initialises. So is an FMU with a part of the variables.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,6 +8,7 @@ use host::archive::Archive;
 use host::c_abi::{CallError, Status};
 use host::description::{CType, Value};
 use host::fmi3::{Fmu, Instance, Instantiation, Interface};
+use host::part::Limit;
 use host::xml::Element;
 use pack::{Fmi, MODELS, Model, packed_version_for_tests};
 
@@ -89,7 +90,10 @@ struct Opened {
 
 impl Opened {
     fn new(model: &'static Model, fmi: Fmi) -> Opened {
-        let path: &Path = packed_version_for_tests(model, fmi);
+        Opened::from(packed_version_for_tests(model, fmi))
+    }
+
+    fn from(path: &Path) -> Opened {
         let archive = Archive::open(path).unwrap();
         let folder = tempfile::tempdir().unwrap();
         archive.unpack(folder.path()).unwrap();
@@ -646,4 +650,139 @@ fn each_element_of_an_array_says_of_itself_what_the_scalar_says() {
         let token = |root: &Element| root.get("instantiationToken").map(String::from);
         assert_ne!(token(&with_arrays), token(&with_scalars));
     }
+}
+
+/// Spacecraft for FMI 3.0 with the variables of two tanks of one mode.
+fn part_of_spacecraft(starts: &[(&str, &str)]) -> (Opened, tempfile::TempDir) {
+    let size = |size: &'static names::Size| Limit {
+        parameter: size.parameter,
+        size: if size.parameter == "tanks" { 2 } else { 1 },
+        most: size.most,
+        has_indicators: size.has_indicators,
+        arrays: size.arrays,
+    };
+    let limits: Vec<_> = names::spacecraft::SIZES.iter().map(size).collect();
+    let starts = starts.iter().map(|(name, text)| (name.to_string(), text.to_string())).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("part.fmu");
+    let whole = packed_version_for_tests(pack::model("Spacecraft").unwrap(), Fmi::V3);
+    pack::part::pack(whole, &limits, &starts, &out).unwrap();
+    (Opened::from(&out), folder)
+}
+
+/// Start values of a part, and the same as settings of the whole.
+const STARTS: [(&str, f64); 5] = [
+    ("tanks", 2.0),
+    ("tank[2].position[1]", 0.4),
+    ("tank[1].p_0[1,2]", 0.1),
+    ("craft.mass", 900.25),
+    ("solver.max_steps", 5000.0),
+];
+
+#[test]
+fn a_part_of_the_variables_starts_and_moves_as_the_whole_where_that_is_set() {
+    let text = STARTS.map(|(name, x)| (name, x.to_string()));
+    let (part, _folder) = part_of_spacecraft(&text.each_ref().map(|(n, x)| (*n, &**x)));
+    let whole = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3);
+    assert_eq!(part.fmu.binary_hash(), whole.fmu.binary_hash(), "one library");
+    assert!(part.variables.len() < whole.variables.len() / 3);
+    for interface in [Interface::CoSimulation, Interface::ModelExchange] {
+        let mut two = [part.instance(interface), whole.instance(interface)];
+        let setting = |wanted: &Key| STARTS.iter().find(|(name, _)| key(name) == *wanted);
+        two[1].set(|key| {
+            let (name, x) = setting(key)?;
+            let is_whole = ["tanks", "solver.max_steps"].contains(name);
+            Some(if is_whole { Value::Integer(*x as i64) } else { Value::Real(*x) })
+        });
+        let names = inputs(&whole);
+        for run in &mut two {
+            run.initialise();
+        }
+        let steps = interface == Interface::CoSimulation;
+        if !steps {
+            for run in &mut two {
+                run.instance.update_discrete_states().unwrap();
+                run.instance.enter_continuous_time_mode().unwrap();
+            }
+            // Attitude to dissipation, drained; per tank one mode, liquid and ball.
+            let counts = two.each_mut().map(|run| run.instance.number_of_states().unwrap());
+            assert_eq!(counts, [15 + 1 + 2 * (6 + 1 + 6), 116]);
+            let counts = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());
+            assert_eq!(counts, [4, 8]);
+        }
+        let h = if steps { 0.02 } else { 1e-3 };
+        for n in 0..100 {
+            let time = f64::from(n) * h;
+            let all = two.each_mut().map(|run| {
+                let model = pack::model("Spacecraft").unwrap();
+                run.set(|key| input(model, &names, key, time));
+                if steps {
+                    run.instance.do_step(time, h).unwrap();
+                } else {
+                    let mut x = vec![0.0; run.instance.number_of_states().unwrap()];
+                    let mut x_dot = x.clone();
+                    run.instance.continuous_states(&mut x).unwrap();
+                    run.instance.derivatives(&mut x_dot).unwrap();
+                    for (x, x_dot) in x.iter_mut().zip(&x_dot) {
+                        *x += h * x_dot;
+                    }
+                    run.instance.nominals(&mut x_dot).unwrap();
+                    run.instance.set_time(time + h).unwrap();
+                    run.instance.set_continuous_states(&x).unwrap();
+                    let mut z = vec![0.0; run.instance.number_of_indicators().unwrap()];
+                    run.instance.event_indicators(&mut z).unwrap();
+                }
+                run.everything()
+            });
+            assert_same(&all[0], &all[1], &format!("at {time} s"));
+        }
+    }
+}
+
+#[test]
+fn a_part_of_the_variables_refuses_more_tanks_and_states_of_the_whole() {
+    let (part, _folder) = part_of_spacecraft(&[]);
+    let mut run = part.instance(Interface::CoSimulation);
+    let tanks = part.variable("tanks").reference;
+    run.instance.set_values(CType::Int32, tanks, &[Value::Integer(3)]).unwrap();
+    run.instance.enter_initialization_mode(None, 0.0, None).unwrap();
+    let (_, text) = refusal(run.instance.exit_initialization_mode());
+    assert!(text.contains("tanks = 3 (allowed: at most 2"), "{text}");
+    let whole = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3);
+    let mut other = whole.instance(Interface::CoSimulation);
+    let state = other.instance.get_state().unwrap();
+    let bytes = other.instance.serialize(&state).unwrap();
+    let mut run = part.instance(Interface::CoSimulation);
+    let (_, text) = refusal(run.instance.deserialize(&bytes));
+    assert!(text.contains("another part of the variables"), "{text}");
+    let own = run.instance.get_state().unwrap();
+    let bytes = run.instance.serialize(&own).unwrap();
+    let again = run.instance.deserialize(&bytes).unwrap();
+    run.instance.set_state(&again).unwrap();
+}
+
+#[test]
+fn start_values_that_are_not_those_of_the_description_are_refused() {
+    let (part, folder) = part_of_spacecraft(&[("craft.mass", "900.0")]);
+    let archive = Archive::open(&folder.path().join("part.fmu")).unwrap();
+    let resources = folder.path().join("resources");
+    archive.unpack(folder.path()).unwrap();
+    let file = resources.join("start_values.txt");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "craft.mass = 900.0\n");
+    let made = |path: Option<&Path>| {
+        let resources = path.map(|path| path.display().to_string());
+        let with = Instantiation {
+            resources: resources.as_deref(),
+            interface: Interface::CoSimulation,
+            intermediate_update: false,
+            required: Vec::new(),
+            ..part.fmu.instantiation("one")
+        };
+        refusal(part.fmu.instantiate_with(&with)).1
+    };
+    assert!(made(None).contains("names no folder of resources"));
+    std::fs::write(&file, "craft.mass = 901.0\n").unwrap();
+    assert!(made(Some(&resources)).contains("its checksum differs"));
+    std::fs::remove_file(&file).unwrap();
+    assert!(made(Some(&resources)).contains("start_values.txt"));
 }

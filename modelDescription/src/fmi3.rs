@@ -117,7 +117,7 @@ fn array<M: Model>(v: &'static Variable<M>) -> Element {
     let size = |dimension: &Dimension| {
         let element = Element::new("Dimension");
         match dimension {
-            Dimension::Fixed(length) => element.with("start", length),
+            Dimension::Fixed(length) | Dimension::Used(_, length) => element.with("start", length),
             Dimension::Sized(name, _) => {
                 element.with_some("valueReference", entry::<M>(name).map(arrays::reference))
             }
@@ -230,5 +230,5 @@ fn event_indicators<M: Model>(layout: Layout) -> impl Iterator<Item = Element> {
         Layout::Scalars => time_reference::<M>() + 1..=time_reference::<M>() + count,
         Layout::Arrays => arrays::time::<M>() + 1..=arrays::time::<M>() + count.min(1),
     };
-    references.map(move |n| unknown("EventIndicator", "valueReference", n, &known))
+    references.map(move |n| unknown("EventIndicator", "valueReference", n, Some(&known)))
 }

@@ -268,35 +268,55 @@ impl List {
     }
 }
 
+/// Longest list of dependencies of an initial value that is written. The values that depend on the accelerations depend on nearly
+/// all parameters, and their lists would be most of the file.
+const LONGEST: usize = 100;
+
 /// The scalars of a list in the order of their numbers, each with the numbers of those it depends on. An array depends on
 /// what any of its elements does. `element` and `attribute` are what the version calls them.
+///
+/// Dependencies of an initial value are left out if they are more than [`LONGEST`]: a host then takes it that the value depends on
+/// everything. The list of an output stays if the output does not depend on all inputs, so that no host sees a loop that there is
+/// not.
 fn unknowns<M: Model>(
     list: List,
     element: &'static str,
     attribute: &'static str,
     number: impl Fn(&Scalar<M>) -> u32,
 ) -> Vec<Element> {
-    let mut unknowns: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    let inputs: BTreeSet<u32> = M::table().inputs().iter().map(&number).collect();
+    let mut unknowns: BTreeMap<u32, (bool, BTreeSet<u32>)> = BTreeMap::new();
     for scalar in M::table().scalars.iter().filter(|scalar| list.holds(scalar)) {
         let known: Vec<_> = match list {
             List::Initial => scalar.initial_depends_on().collect(),
             List::Outputs | List::Derivatives => scalar.depends_on().collect(),
         };
-        unknowns.entry(number(scalar)).or_default().extend(known.into_iter().map(&number));
+        let (is_output, all) = unknowns.entry(number(scalar)).or_default();
+        *is_output = scalar.variable.causality == Causality::Output;
+        all.extend(known.into_iter().map(&number));
     }
-    let one = |(n, known): (u32, BTreeSet<u32>)| unknown(element, attribute, n, &known);
+    let is_left_out = |is_output: bool, known: &BTreeSet<u32>| {
+        let by_inputs = !is_output || inputs.is_subset(known);
+        list == List::Initial && known.len() > LONGEST && by_inputs
+    };
+    let one = |(n, (is_output, known)): (u32, (bool, BTreeSet<u32>))| {
+        let known = (!is_left_out(is_output, &known)).then_some(known);
+        unknown(element, attribute, n, known.as_ref())
+    };
     unknowns.into_iter().map(one).collect()
 }
 
+/// An entry of ModelStructure. Without `known` it depends on everything.
 fn unknown(
     element: &'static str,
     attribute: &'static str,
     number: u32,
-    known: &BTreeSet<u32>,
+    known: Option<&BTreeSet<u32>>,
 ) -> Element {
+    let element = Element::new(element).with(attribute, number);
+    let Some(known) = known else { return element };
     let numbers: Vec<_> = known.iter().map(u32::to_string).collect();
-    Element::new(element)
-        .with(attribute, number)
+    element
         .with("dependencies", numbers.join(" "))
         .with("dependenciesKind", vec!["dependent"; numbers.len()].join(" "))
 }

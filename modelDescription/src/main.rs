@@ -1,29 +1,12 @@
 //! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml,
 //! page of variables and names for the harness from its variable table; with the feature `icon`, the icon's pixels from
-//! its drawing. With `--print-spacecraft`, `--print-spacecraft-fmi3` or `--print-spacecraft-fmi3-arrays` it prints the XML of Spacecraft.fmu as
-//! compiled, for `hubslosh pack --tanks`.
+//! its drawing.
 
 use model_description::{fmi3, names, path, variables, xml};
 use runtime::Model;
 use runtime::table::Layout;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // of a variant, which is not committed
-    match std::env::args().nth(1).as_deref() {
-        Some("--print-spacecraft") => {
-            print!("{}", xml::<Spacecraft::Model>()?);
-            return Ok(());
-        }
-        Some("--print-spacecraft-fmi3") => {
-            print!("{}", fmi3::xml::<Spacecraft::Model>(Layout::Scalars)?);
-            return Ok(());
-        }
-        Some("--print-spacecraft-fmi3-arrays") => {
-            print!("{}", fmi3::xml::<Spacecraft::Model>(Layout::Arrays)?);
-            return Ok(());
-        }
-        _ => {}
-    }
     write::<HubSlosh::HubSlosh>()?;
     write::<Spacecraft::Model>()?;
     write::<SloshTank::Model>()?;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use runtime::Model;
-use runtime::variable::{Access, Causality, Kind, Variable};
+use runtime::variable::{Access, Causality, Dimension, Kind, Variable};
 
 /// Path of the committed module.
 pub fn path<M: Model>() -> PathBuf {
@@ -70,6 +70,7 @@ pub fn module<M: Model>() -> String {
         table.about.model
     );
     root.write("", &mut text);
+    text += &sizes::<M>();
     for of in table.enumerations() {
         let items = of.items.iter().zip(1..);
         let items: Vec<_> = items
@@ -87,6 +88,30 @@ fn size<M: Model>(variable: &Variable<M>) -> Option<i32> {
     let lengths = |v: &Variable<M>| v.shape.iter().any(|d| i32::try_from(d.most()) == Ok(max));
     let counts = variable.causality == Causality::Parameter && !variable.name.ends_with("kind");
     (counts && M::table().variables.iter().any(lengths)).then_some(max)
+}
+
+/// Returns the constant with the parameters that size arrays, and the arrays with the place of the index.
+fn sizes<M: Model>() -> String {
+    let mut text = String::new();
+    for (parameter, most) in M::table().sizes() {
+        let _ = write!(
+            text,
+            "    crate::Size {{\n        parameter: {parameter:?},\n        most: {most},\n        \
+             has_indicators: {},\n        arrays: &[\n",
+            M::INDICATORS_OF == Some(parameter)
+        );
+        for variable in M::table().variables {
+            let at = |d: &Dimension| match d {
+                Dimension::Sized(name, _) | Dimension::Used(name, _) => *name == parameter,
+                Dimension::Fixed(_) => false,
+            };
+            if let Some(place) = variable.shape.iter().position(at) {
+                let _ = writeln!(text, "            ({:?}, {place}),", variable.name);
+            }
+        }
+        text += "        ],\n    },\n";
+    }
+    format!("\n/// Parameters that size arrays.\npub const SIZES: &[crate::Size] = &[\n{text}];\n")
 }
 
 /// Returns a name with underscores as Rust writes the name of a variant.

@@ -410,8 +410,9 @@ pub unsafe fn deserialize<M: Model, V: Version>(
     }
     unsafe {
         let bytes = array(call, "serializedState", bytes, size)?;
-        let saved = snapshot::from_bytes::<M, V>(bytes).map_err(|why| call.error(why))?;
+        let mut saved = snapshot::from_bytes::<M, V>(bytes).map_err(|why| call.error(why))?;
         like.check_layout(call, &saved)?;
+        saved.extent = like.extent.clone(); // bytes do not have its start values
         ptr::write(handle, new_state(saved));
     }
     Ok(())

@@ -7,9 +7,11 @@
 //! ([`Events::ByHost`]), what is discrete changes in [`Instance::new_discrete_states`] alone.
 
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 use crate::call::{CType, Call, Events, Fault, InstanceState, Interface};
 use crate::clock::Clock;
+use crate::extent::Extent;
 use crate::model::{Model, StepEnd, StepFailure};
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Causality, Value, Variable, is_finite, text};
@@ -33,6 +35,8 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) events: Events,
     /// Form in which the host sees the variables.
     pub(crate) layout: Layout,
+    /// Part of the variables that the host sees, if it does not see them all.
+    pub(crate) extent: Option<Arc<Extent>>,
     pub(crate) state: InstanceState,
     pub(crate) clock: Clock,
     pub(crate) tolerance: f64,
@@ -55,6 +59,41 @@ pub struct Instance<M: Model, V: Version> {
     /// Room for the continuous states in the model's order, for directions and derivatives.
     scratch: [Vec<f64>; 2],
 }
+
+/// Places of the continuous states, in the host's order.
+struct Places<M: Model> {
+    extent: Option<Arc<Extent>>,
+    next: usize,
+    model: PhantomData<M>,
+}
+
+impl<M: Model> Iterator for Places<M> {
+    type Item = usize;
+
+    #[inline]
+    fn next(&mut self) -> Option<usize> {
+        let n = self.next;
+        self.next += 1;
+        match &self.extent {
+            Some(extent) => extent.places().get(n).copied(),
+            None => match M::table().derivatives().get(n)?.access {
+                Access::Derivative(place) => Some(place(M::table().derivatives()[n].element)),
+                _ => Some(0),
+            },
+        }
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let all = match &self.extent {
+            Some(extent) => extent.places().len(),
+            None => M::table().derivatives().len(),
+        };
+        let left = all.saturating_sub(self.next);
+        (left, Some(left))
+    }
+}
+
+impl<M: Model> ExactSizeIterator for Places<M> {}
 
 /// Result of a step that may stop at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +121,7 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
             model: self.model.clone(),
             scratch: self.scratch.clone(),
             shown: self.shown.clone(),
+            extent: self.extent.clone(),
             ..*self
         }
     }
@@ -95,7 +135,8 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
         let scratch = std::mem::take(&mut self.scratch);
         let mut shown = std::mem::take(&mut self.shown);
         shown.clone_from(&other.shown);
-        *self = Instance { parameters, model, scratch, shown, ..*other };
+        let extent = other.extent.clone();
+        *self = Instance { parameters, model, scratch, shown, extent, ..*other };
     }
 }
 
@@ -113,6 +154,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             interface,
             events,
             layout: Layout::Scalars,
+            extent: None,
             state: InstanceState::Instantiated,
             clock: Clock::new(interface, 0.0, None),
             tolerance: DEFAULT_TOLERANCE,
@@ -125,6 +167,28 @@ impl<M: Model, V: Version> Instance<M, V> {
             shown: Vec::new(),
             scratch: [vec![0.0; states], vec![0.0; states]],
         }
+    }
+
+    /// The same for a host that has read the description of a part of the variables.
+    pub fn with_extent(mut self, extent: Option<Arc<Extent>>) -> Self {
+        if let Some(extent) = &extent {
+            self.parameters = extent.starts().to_vec();
+        }
+        self.extent = extent;
+        self
+    }
+
+    /// GUID or token of the description that the host has read.
+    pub(crate) fn token(&self) -> &str {
+        match &self.extent {
+            Some(extent) => extent.token(),
+            None => V::token::<M>(self.layout),
+        }
+    }
+
+    /// The places in the model of the continuous states, in the host's order.
+    fn places(&self) -> Places<M> {
+        Places { extent: self.extent.clone(), next: 0, model: PhantomData }
     }
 
     /// Interface type of the instance.
@@ -215,6 +279,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
+    /// Start values of the parameters in the description that the host has read.
+    fn starts(&self) -> Vec<Value> {
+        self.extent.as_ref().map_or_else(|| M::table().starts(), |extent| extent.starts().to_vec())
+    }
+
     /// Warnings about the motion that begins: those of [`Model::warnings`], and one for each reason for which parameters that
     /// differ from their start values have no effect ([`Model::overridden`]).
     pub fn warnings(&self) -> Vec<String> {
@@ -222,7 +291,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         let parameters = self.given_parameters();
         let mut warnings = model.warnings(&parameters, &self.inputs);
         let mut reasons: Vec<(String, Vec<String>)> = Vec::new();
-        let (table, starts) = (M::table(), M::table().starts());
+        let (table, starts) = (M::table(), self.starts());
         for ((scalar, value), start) in table.parameters().iter().zip(&self.parameters).zip(&starts)
         {
             let Scalar { variable, element, .. } = scalar;
@@ -270,8 +339,9 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Resets the instance to its state after instantiation.
     pub fn reset(&mut self) -> Result<(), Fault> {
         self.check(V::RESET)?;
-        let layout = self.layout;
-        *self = Instance { layout, ..Instance::with_events(self.interface, self.events) };
+        let (layout, extent) = (self.layout, self.extent.take());
+        let instance = Instance::with_events(self.interface, self.events).with_extent(extent);
+        *self = Instance { layout, ..instance };
         Ok(())
     }
 
@@ -1072,7 +1142,10 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// discarded: the integrator should try a shorter step.
     pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
         let call = self.check(V::SET_CONTINUOUS_STATES)?;
-        let places = M::table().places();
+        if let (Some(_), Some(model)) = (&self.extent, &self.model) {
+            self.scratch[0].copy_from_slice(model.continuous_states()); // the host does not know all
+        }
+        let places = self.places();
         check_length(call, "nx", states.len(), places.len())?;
         for (place, x) in places.zip(states) {
             let is_state = x.abs() < MAX_STATE; // NaN is not
@@ -1097,7 +1170,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// The continuous states, in the host's order.
     pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_CONTINUOUS_STATES)?;
-        let places = M::table().places();
+        let places = self.places();
         check_length(call, "nx", states.len(), places.len())?;
         let all = self.model(call)?.continuous_states();
         for (place, x) in places.zip(states) {
@@ -1109,7 +1182,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// The states' derivatives. NaN and infinity are discarded, as above.
     pub fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_DERIVATIVES)?;
-        let places = M::table().places();
+        let places = self.places();
         check_length(call, "nx", derivatives.len(), places.len())?;
         let mut x_dot = std::mem::take(&mut self.scratch[0]);
         let done = self.query(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
@@ -1118,9 +1191,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
         self.scratch[0] = x_dot;
         done?;
-        for (x, scalar) in derivatives.iter().zip(M::table().derivatives()) {
+        for (x, place) in derivatives.iter().zip(self.places()) {
             if !x.is_finite() {
-                return Err(call.discard(format_args!("{} = {}", scalar.name(), text(*x))));
+                let name = M::table().state_at(place).map_or("a state".into(), Scalar::name);
+                return Err(call.discard(format_args!("der({name}) = {}", text(*x))));
             }
         }
         Ok(())
@@ -1129,7 +1203,11 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Functions that cross zero at events.
     pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_EVENT_INDICATORS)?;
-        check_length(call, "ni", indicators.len(), M::table().about.event_indicators)?;
+        let count = match &self.extent {
+            Some(extent) => extent.indicators(),
+            None => M::table().about.event_indicators,
+        };
+        check_length(call, "ni", indicators.len(), count)?;
         self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
     }
 
@@ -1152,7 +1230,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// The states' orders of magnitude.
     pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_NOMINALS)?;
-        let places = M::table().places();
+        let places = self.places();
         check_length(call, "nx", nominals.len(), places.len())?;
         for (place, x) in places.zip(nominals) {
             *x = M::table().state_at(place).map_or(1.0, |s| s.variable.nominal_value());
@@ -1184,12 +1262,19 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     /// Refuses a saved state of an instance whose host sees other variables.
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
-        if saved.layout == self.layout {
-            return Ok(());
+        if saved.layout != self.layout {
+            return Err(call.error(
+                "the state is of this library's other FMU 3.0: variables are scalars in one, arrays in the other",
+            ));
         }
-        Err(call.error(
-            "the state is of this library's other FMU 3.0: variables are scalars in one, arrays in the other",
-        ))
+        if saved.token() != self.token() {
+            return Err(call.error(format_args!(
+                "the state is of an FMU with another part of the variables, {}; this one is {}",
+                saved.token(),
+                self.token()
+            )));
+        }
+        Ok(())
     }
 
     /// The model; it is made when it is first asked for.
@@ -1215,8 +1300,11 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// The parameters as the model takes them, or all that is wrong with them.
     pub(crate) fn model_parameters(&self) -> Result<M::Parameters, Vec<String>> {
         let all = M::table().parameters().iter().zip(&self.parameters);
-        let problems: Vec<String> =
-            all.filter_map(|(scalar, value)| scalar.problem(*value)).collect();
+        let problem = |(scalar, value): (&Scalar<M>, &Value)| {
+            let beyond = |extent: &Arc<Extent>| extent.problem(scalar, *value);
+            scalar.problem(*value).or_else(|| self.extent.as_ref().and_then(beyond))
+        };
+        let problems: Vec<String> = all.filter_map(problem).collect();
         if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
     }
 

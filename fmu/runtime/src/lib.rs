@@ -12,6 +12,7 @@
 pub mod c_abi;
 pub mod call;
 pub mod clock;
+pub mod extent;
 pub mod hash;
 pub mod instance;
 pub mod log;

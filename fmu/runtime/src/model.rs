@@ -51,6 +51,9 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// True if outputs depend on the inputs' slopes, not only on their values.
     const OUTPUTS_USE_SLOPES: bool = false;
 
+    /// The parameter that counts what the event indicators belong to, the same number to each, in order.
+    const INDICATORS_OF: Option<&'static str> = None;
+
     /// The variables and what else the model description says.
     fn table() -> &'static Table<Self>;
 
@@ -160,7 +163,8 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Ok(())
     }
 
-    /// Functions of the states that cross zero at events, [`About::event_indicators`](crate::table::About::event_indicators) of them.
+    /// Functions of the states that cross zero at events, [`About::event_indicators`](crate::table::About::event_indicators) of them;
+    /// of a part of the variables the first ones ([`Model::INDICATORS_OF`]).
     fn event_indicators(&mut self, inputs: &Self::Inputs, indicators: &mut [f64]) {
         let _ = (inputs, indicators);
     }

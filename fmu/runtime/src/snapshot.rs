@@ -20,8 +20,11 @@
 //!
 //! Everything else about a model follows from its parameters.
 
+use std::sync::Arc;
+
 use crate::call::{Events, InstanceState, Interface};
 use crate::clock::Clock;
+use crate::extent::Extent;
 use crate::hash::Hash;
 use crate::instance::{Instance, TOLERANCES};
 use crate::model::Model;
@@ -53,7 +56,7 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     bytes.extend(MAGIC);
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend((size as u32).to_le_bytes());
-    bytes.extend(V::token::<M>(saved.layout).as_bytes());
+    bytes.extend(saved.token().as_bytes());
     let flag = |is: bool, flag: u8| if is { flag } else { 0 };
     let flags = flag(saved.clock.stop.is_some(), HAS_STOP)
         | flag(saved.model.is_some(), HAS_MODEL)
@@ -117,8 +120,14 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     }
     let guid = rest.take::<38>()?;
     let of = |layout: &Layout| guid == V::token::<M>(*layout).as_bytes();
-    let Some(layout) = Layout::ALL.into_iter().find(of) else {
-        let guid = String::from_utf8_lossy(&guid);
+    let layout = Layout::ALL.into_iter().find(of);
+    let text = String::from_utf8_lossy(&guid);
+    let extent = match layout {
+        Some(_) => None,
+        None => Extent::of_token::<M>(&text, V::token::<M>(Layout::Scalars)).map(Arc::new),
+    };
+    let Some(layout) = layout.or(extent.is_some().then_some(Layout::Scalars)) else {
+        let guid = text;
         return Err(format!(
             "the saved state is of another FMU or of another version of {model}, {guid}"
         ));
@@ -140,7 +149,7 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     let events = Events::ALL.get(usize::from(events)).copied();
     let events = events.filter(|events| V::allows(interface, *events));
     let events = events.ok_or("the saved state is damaged: who handles events")?;
-    let mut saved = Instance::with_events(interface, events);
+    let mut saved = Instance::with_events(interface, events).with_extent(extent);
     saved.layout = layout;
     let possible =
         |s: &InstanceState| *s != InstanceState::Fatal && s.is_reachable(interface, saved.events);

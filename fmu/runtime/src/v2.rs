@@ -15,6 +15,7 @@
 use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::panic::catch_unwind;
 use std::ptr;
+use std::sync::Arc;
 
 use crate::c_abi::{
     self, Log, Logger, array, array_mut, c_string, deserialize, free_component, free_state,
@@ -22,6 +23,7 @@ use crate::c_abi::{
 };
 use crate::call::states::*;
 use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity};
+use crate::extent::{Extent, folder_of_uri};
 use crate::instance::Instance;
 use crate::log::Filter;
 use crate::model::Model;
@@ -281,7 +283,7 @@ pub unsafe fn fmi2Instantiate<M: Model>(
     instanceName: fmi2String,
     fmuType: fmi2Type,
     fmuGUID: fmi2String,
-    _fmuResourceLocation: fmi2String,
+    fmuResourceLocation: fmi2String,
     functions: *const fmi2CallbackFunctions,
     _visible: fmi2Boolean,
     _loggingOn: fmi2Boolean,
@@ -293,8 +295,11 @@ pub unsafe fn fmi2Instantiate<M: Model>(
     let made = catch_unwind(|| unsafe {
         let name = text(instanceName);
         let log = Log::new(logger(&*functions, name.as_deref()));
-        match interface::<M>(name, fmuType, text(fmuGUID)) {
-            Ok(interface) => new_component(Instance::<M, Fmi2>::new(interface), log, ()),
+        match interface::<M>(name, fmuType, text(fmuGUID), text(fmuResourceLocation)) {
+            Ok((interface, extent)) => {
+                let instance = Instance::<M, Fmi2>::new(interface).with_extent(extent);
+                new_component(instance, log, ())
+            }
             Err(why) => {
                 let text = format!("fmi2Instantiate: {why}");
                 log.report(&Fault { severity: Severity::Error, text });
@@ -317,12 +322,13 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
     }))
 }
 
-/// Interface of the requested instance, or the reason why it cannot be created.
+/// Interface of the requested instance and the part of the variables that the host knows, or the reason why it cannot be created.
 fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,
     guid: Option<String>,
-) -> Result<Interface, String> {
+    resources: Option<String>,
+) -> Result<(Interface, Option<Arc<Extent>>), String> {
     let expected = M::table().guid();
     if name.is_none_or(|name| name.trim().is_empty()) {
         return Err("instanceName is NULL or empty".into());
@@ -334,10 +340,17 @@ fn interface<M: Model>(
     };
     match guid {
         None => Err(format!("fmuGUID is NULL; expected {expected}")),
-        Some(guid) if guid != expected => Err(format!(
-            "fmuGUID is {guid}; expected {expected}: model description and binary do not belong together"
-        )),
-        Some(_) => Ok(interface),
+        Some(guid) if guid == expected => Ok((interface, None)),
+        Some(guid) => {
+            let Some(mut extent) = Extent::of_token::<M>(&guid, expected) else {
+                return Err(format!(
+                    "fmuGUID is {guid}; expected {expected}: model description and binary do not belong together"
+                ));
+            };
+            let folder = resources.as_deref().and_then(folder_of_uri);
+            extent.read_starts::<M>(folder.as_deref())?;
+            Ok((interface, Some(Arc::new(extent))))
+        }
     }
 }
 
@@ -1080,7 +1093,9 @@ mod tests {
     fn instance_is_refused_without_name_or_guid_and_of_an_unknown_type() {
         let guid = Some(Spring::table().guid().to_string());
         let name = Some("one".to_string());
-        let made = |name, kind, guid| interface::<Spring>(name, kind, guid);
+        let made = |name, kind, guid| {
+            interface::<Spring>(name, kind, guid, None).map(|(interface, _)| interface)
+        };
         assert_eq!(made(name.clone(), 0, guid.clone()), Ok(Interface::ModelExchange));
         assert_eq!(made(name.clone(), 1, guid.clone()), Ok(Interface::CoSimulation));
         assert!(made(None, fmi2CoSimulation, guid.clone()).is_err());

@@ -131,13 +131,18 @@ pub enum Dimension {
     /// Size from the integer parameter of this name, and the largest size. If every element is a variable of its own, the largest
     /// size always applies; if the array is one variable, the parameter is structural (see [`Layout`](crate::table::Layout)).
     Sized(&'static str, usize),
+    /// Always of the largest size, of which the integer parameter of this name says how many elements are used. A description
+    /// with a part of the variables leaves the others out (see [`extent`](crate::extent)).
+    Used(&'static str, usize),
 }
 
 impl Dimension {
     /// The most that it can be.
     pub const fn most(self) -> usize {
         match self {
-            Dimension::Fixed(length) | Dimension::Sized(_, length) => length,
+            Dimension::Fixed(length) | Dimension::Sized(_, length) | Dimension::Used(_, length) => {
+                length
+            }
         }
     }
 }

@@ -149,6 +149,7 @@ impl runtime::Model for Model {
 
     // h_wheels turns the craft by its slope.
     const OUTPUTS_USE_SLOPES: bool = true;
+    const INDICATORS_OF: Option<&'static str> = Some("tanks");
 
     fn table() -> &'static Table<Self> {
         &TABLE

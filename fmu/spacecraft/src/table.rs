@@ -1,14 +1,12 @@
 //! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`:
 //! the craft is at rest.
 //!
-//! A variant for fewer tanks and modes uses the same table with shorter arrays.
-//!
 //! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, … with
 //! the indices tank, mode, axis.
 
 use craft::{BallState, DampingLaw, MODES, POINTS, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
-use runtime::variable::Dimension::{Fixed, Sized};
+use runtime::variable::Dimension::{Fixed, Sized, Used};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
 use crate::Model;
@@ -17,7 +15,7 @@ use crate::model::Parameters;
 /// Table of the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
     About {
-        model: NAME,
+        model: "Spacecraft",
         version: env!("CARGO_PKG_VERSION"),
         description: DESCRIPTION,
         events: "",
@@ -28,36 +26,7 @@ pub static TABLE: Table<Model> = Table::new(
     &SCALARS,
 );
 
-const DESCRIPTION: &str = match TANKS {
-    1 => {
-        "A rigid spacecraft in six degrees of freedom with a tank of sloshing liquid, free or on an air bearing"
-    }
-    2 => {
-        "A rigid spacecraft in six degrees of freedom with up to two tanks of sloshing liquid, free or on an air bearing"
-    }
-    3 => {
-        "A rigid spacecraft in six degrees of freedom with up to three tanks of sloshing liquid, free or on an air bearing"
-    }
-    _ => {
-        "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing liquid, free or on an air bearing"
-    }
-};
-
-/// Each variant has its own name, so that a host does not confuse the variants' libraries.
-const NAME: &str = match (TANKS, MODES) {
-    (1, 1) => "Spacecraft_1x1",
-    (1, 2) => "Spacecraft_1x2",
-    (1, 3) => "Spacecraft_1x3",
-    (2, 1) => "Spacecraft_2x1",
-    (2, 2) => "Spacecraft_2x2",
-    (2, 3) => "Spacecraft_2x3",
-    (3, 1) => "Spacecraft_3x1",
-    (3, 2) => "Spacecraft_3x2",
-    (3, 3) => "Spacecraft_3x3",
-    (4, 1) => "Spacecraft_4x1",
-    (4, 2) => "Spacecraft_4x2",
-    _ => "Spacecraft",
-};
+const DESCRIPTION: &str = "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing liquid, free or on an air bearing";
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
@@ -122,17 +91,18 @@ const EVERYTHING: &[&str] = &[
 const BOBS: &[&str] = &["tanks", "tank[]."];
 
 const TANK: Dimension = Sized("tanks", TANKS);
+const MODE: Dimension = Used("tank[].modes", MODES);
 const VECTOR: &[Dimension] = &[Fixed(3)];
 const QUATERNION: &[Dimension] = &[Fixed(4)];
 const MATRIX: &[Dimension] = &[Fixed(3), Fixed(3)];
 const PER_TANK: &[Dimension] = &[TANK];
 const TANK_VECTOR: &[Dimension] = &[TANK, Fixed(3)];
-const PER_MODE: &[Dimension] = &[TANK, Fixed(MODES)];
-const MODE_VECTOR: &[Dimension] = &[TANK, Fixed(MODES), Fixed(3)];
-const MODE_PAIR: &[Dimension] = &[TANK, Fixed(MODES), Fixed(2)];
+const PER_MODE: &[Dimension] = &[TANK, MODE];
+const MODE_VECTOR: &[Dimension] = &[TANK, MODE, Fixed(3)];
+const MODE_PAIR: &[Dimension] = &[TANK, MODE, Fixed(2)];
 
 const TABLE_OF_TANK: &[Dimension] = &[TANK, Fixed(POINTS)];
-const TABLE_OF_MODE: &[Dimension] = &[TANK, Fixed(MODES), Fixed(POINTS)];
+const TABLE_OF_MODE: &[Dimension] = &[TANK, MODE, Fixed(POINTS)];
 
 /// Returns tank, mode and point of element `n` of the shape [`TABLE_OF_MODE`].
 const fn point(n: usize) -> (usize, usize, usize) {

@@ -12,7 +12,7 @@ use pack::Fmi;
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
 
-/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs, also of a variant of Spacecraft. The search
+/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs. The search
 /// order is `dist`, where `hubslosh pack` puts it, the folder of this command, then `dist` of the source that the command was built
 /// from. There the command packs the FMU if necessary.
 ///
@@ -20,7 +20,7 @@ const INSTALLED: [&str; 5] =
 /// If there is none; the error says what to do.
 pub fn find(name: &Path) -> Result<PathBuf> {
     let Some((model, fmi)) = name.to_str().and_then(pack::named) else {
-        let all: Vec<_> = pack::in_wheels().map(|model| model.identifier()).collect();
+        let all: Vec<_> = pack::MODELS.iter().map(|model| model.name).collect();
         ensure!(
             name.is_file(),
             "there is no FMU at {} (allowed: a file, or {}, for FMI 3.0 with -fmi3 or -fmi3-arrays)",
@@ -29,7 +29,7 @@ pub fn find(name: &Path) -> Result<PathBuf> {
         );
         return Ok(name.into());
     };
-    let packed = fmi.path("dist".as_ref(), &model.identifier());
+    let packed = fmi.path("dist".as_ref(), model.name);
     let file = packed.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if packed.is_file() {
         return Ok(packed);
@@ -43,7 +43,7 @@ pub fn find(name: &Path) -> Result<PathBuf> {
             all().iter().filter_map(|fmu| Some(fmu.file_stem()?.display().to_string())).collect();
         bail!(
             "{file} was not found in dist or in this command's folder ({}; FMUs: {}). In the project's source, with Rust, \
-             `cargo run --release -- pack` builds it and other variants; --fmu FILE takes a file",
+             `cargo run --release -- pack` builds it; --fmu FILE takes a file",
             places.join(", "),
             if there.is_empty() { "none".into() } else { there.join(", ") }
         );
@@ -61,8 +61,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
 pub fn all() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = Vec::new();
     for folder in ["dist".into()].into_iter().chain(folders()) {
-        for model in pack::in_wheels() {
-            let paths = Fmi::ALL.map(|fmi| fmi.path(&folder, &model.identifier()));
+        for model in pack::MODELS {
+            let paths = Fmi::ALL.map(|fmi| fmi.path(&folder, model.name));
             found.extend(paths.into_iter().filter(|path| path.is_file()));
         }
     }

@@ -15,6 +15,7 @@ pub mod fmi3;
 pub mod fmu;
 pub mod guard;
 pub mod parameter_set;
+pub mod part;
 pub mod schedule;
 pub mod symbol;
 pub mod xml;

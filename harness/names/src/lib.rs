@@ -23,6 +23,19 @@ impl<const D: usize> Array<D> {
     }
 }
 
+/// A parameter that says how many elements of arrays are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Name of the parameter.
+    pub parameter: &'static str,
+    /// Its largest value.
+    pub most: usize,
+    /// True if each element has its event indicators.
+    pub has_indicators: bool,
+    /// The arrays, each with the place among its indices of the one that the parameter limits.
+    pub arrays: &'static [(&'static str, usize)],
+}
+
 macro_rules! enumeration {
     ($name:ident: $($item:ident = $value:literal $text:literal),+) => {
         /// Enumeration of the FMU.

@@ -116,6 +116,43 @@ pub mod solver {
     pub const MAX_STEPS: &str = "solver.max_steps";
 }
 
+/// Parameters that size arrays.
+pub const SIZES: &[crate::Size] = &[crate::Size {
+    parameter: "tank.modes",
+    most: 3,
+    has_indicators: false,
+    arrays: &[
+        ("tank.angle_x", 0),
+        ("tank.angle_y", 0),
+        ("tank.p", 0),
+        ("tank.p_dot", 0),
+        ("der(tank.p)", 0),
+        ("der(tank.p_dot)", 0),
+        ("tank.mass", 0),
+        ("tank.length", 0),
+        ("tank.frequency", 0),
+        ("tank.hinge", 0),
+        ("tank.direction", 0),
+        ("tank.arm", 0),
+        ("tank.k", 0),
+        ("tank.zeta", 0),
+        ("tank.zeta_amplitude", 0),
+        ("tank.zeta_breaking", 0),
+        ("tank.breaking_steepness", 0),
+        ("tank.nonlinear_inertia", 0),
+        ("tank.nonlinear_stiffness", 0),
+        ("tank.wave", 0),
+        ("tank.fill.mass", 0),
+        ("tank.fill.length", 0),
+        ("tank.fill.hinge", 0),
+        ("tank.fill.zeta", 0),
+        ("tank.fill.nonlinear_inertia", 0),
+        ("tank.fill.nonlinear_stiffness", 0),
+        ("tank.p_0", 0),
+        ("tank.p_dot_0", 0),
+    ],
+}];
+
 enumeration! {
     Regime: Linear = 1 "linear", Transitional = 2 "transitional", Nonlinear = 3 "nonlinear"
 }

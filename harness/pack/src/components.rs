@@ -369,9 +369,8 @@ pub fn sbom(
     binaries: &[Packed],
     components: &[Component],
 ) -> String {
-    let identifier = model.identifier();
     let files = binaries.iter().flat_map(|binary| {
-        binary.files(&identifier, fmi).map(|(name, bytes)| (name, sha256(bytes)))
+        binary.files(model.name, fmi).map(|(name, bytes)| (name, sha256(bytes)))
     });
     let product = Product {
         kind: "library",

@@ -7,6 +7,7 @@ pub mod documentation;
 pub mod fmi;
 pub mod metadata;
 pub mod models;
+pub mod part;
 pub mod platforms;
 mod project;
 pub mod release;
@@ -22,14 +23,13 @@ use host::description::ModelDescription;
 
 use crate::archive::{Files, Packed, below, read};
 pub use crate::fmi::Fmi;
-pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, Sizes, in_wheels, model, named};
+pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, model, named};
 pub use crate::platforms::Built;
-use crate::project::build_in;
 pub use crate::project::{build, build_native, has_source, needs_source, root};
 
 /// Builds the binary of an FMU for the platform this program runs on and packs it to `out`.
 pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
-    let binary = Packed::native(&build_in(model.package, &model.environment(), false)?)?;
+    let binary = Packed::native(&build(model.package, false)?)?;
     archive::write(&files(model, fmi, &[binary])?, out)
 }
 
@@ -113,9 +113,8 @@ fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
     let description = ModelDescription::from_xml(&String::from_utf8_lossy(&first))?;
     let icon = read(&root().join("modelDescription/icon/icon.png"))?;
     let mut files = vec![("modelDescription.xml".into(), xml), (fmi.icon().into(), icon)];
-    let identifier = model.identifier();
     for binary in binaries {
-        let placed = binary.files(&identifier, fmi);
+        let placed = binary.files(model.name, fmi);
         files.extend(placed.map(|(name, bytes)| (name, bytes.to_vec())));
     }
 

@@ -347,9 +347,8 @@ impl Toolchain {
         command.env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", linker);
         let name = match product {
             Product::Fmu(model) => {
-                command.envs(model.environment());
                 project::arguments(&mut command, model.package);
-                Some(model.identifier())
+                Some(model.name.to_string())
             }
             Product::Native => {
                 project::native_arguments(&mut command);

@@ -1,6 +1,5 @@
 //! The project as Cargo builds it: where its source is, and how an FMU's binary is made from it.
 
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
@@ -45,38 +44,10 @@ const PROFILE: &str = "fmu";
 /// # Errors
 /// If there is no source or no Cargo, or if it does not compile.
 pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
-    build_in(package, &[], quiet)
-}
-
-/// The same with more in Cargo's environment.
-pub(crate) fn build_in(
-    package: &str,
-    environment: &[(&'static str, OsString)],
-    quiet: bool,
-) -> Result<PathBuf> {
     let mut command = cargo();
-    command.envs(environment.iter().cloned());
     command.arg("rustc");
     arguments(&mut command, package);
     cargo_build(command, quiet)
-}
-
-/// Runs a program of this workspace and returns its output.
-pub(crate) fn output(
-    cargo_arguments: &[&str],
-    arguments: &[&str],
-    environment: &[(&'static str, OsString)],
-) -> Result<Vec<u8>> {
-    needs_source("this")?;
-    let mut command = cargo();
-    command.current_dir(root()).args(cargo_arguments).arg("--").args(arguments);
-    let done = command
-        .envs(environment.iter().cloned())
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cargo cannot be run")?;
-    ensure!(done.status.success(), "cargo {} failed", cargo_arguments.join(" "));
-    Ok(done.stdout)
 }
 
 /// Cargo, the one that runs this program if there is one.

@@ -18,8 +18,7 @@ use crate::archive::{self, Files, Packed, below, read};
 use crate::documentation::book;
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::platforms::{self, Platform, Product, Target, Toolchain};
-use crate::project::build_in;
-use crate::{Fmi, build_native, components, files as files_of_fmu, in_wheels, pack, root};
+use crate::{Fmi, MODELS, build, build_native, components, files as files_of_fmu, pack, root};
 
 /// Tags of the oldest Python, and of the stable ABI.
 const ABI: &str = "cp311-abi3";
@@ -95,13 +94,13 @@ fn native() -> Result<Binaries> {
     let made = tempfile::tempdir().context("there is no place for temporary files")?;
     let mut fmus = Files::new();
     let mut all = Vec::new();
-    for model in in_wheels() {
+    for model in MODELS {
         for fmi in Fmi::RELEASED {
-            let fmu = fmi.path(made.path(), &model.identifier());
+            let fmu = fmi.path(made.path(), model.name);
             pack(&model, fmi, &fmu)?;
             fmus.push((file_name(&fmu), read(&fmu)?));
         }
-        all.push(Binary::read(&read(&build_in(model.package, &model.environment(), true)?)?)?);
+        all.push(Binary::read(&read(&build(model.package, true)?)?)?);
     }
     let library = read(&build_native(true)?)?;
     let command = read(&std::env::current_exe().context("this program cannot find itself")?)?;
@@ -153,11 +152,11 @@ fn cross_one(
         Ok(bytes)
     };
     let mut fmus = Files::new();
-    for model in in_wheels() {
+    for model in MODELS {
         let bytes = built(&Product::Fmu(&model))?;
         let binary = [Packed { folder: platform.folder, ending: platform.ending, bytes }];
         for fmi in Fmi::RELEASED {
-            let fmu = fmi.path(made.path(), &model.identifier());
+            let fmu = fmi.path(made.path(), model.name);
             archive::write_small(&files_of_fmu(&model, fmi, &binary)?, &fmu)?;
             fmus.push((file_name(&fmu), archive::read(&fmu)?));
         }

@@ -46,9 +46,6 @@ volume; ``(120, "kg")``; 0 if it is empty."""
 MOST_TANKS = 4
 """Number of tanks that Spacecraft has."""
 
-VARIANTS = ((1, 1), (2, 2))
-"""Tanks and modes of the variants of Spacecraft in this package, smallest first."""
-
 
 @dataclass(frozen=True, eq=False)
 class MountedTank:
@@ -181,8 +178,7 @@ class Craft:
     """Specific force along the tanks' axes for frequencies and damping, m/s²; by default thrust
     over mass at the fill."""
     model: str | Path = "Spacecraft"
-    """The FMU, by name or file, as for `simulate`; of "Spacecraft" the smallest variant that has
-    the tanks and modes, see `variant`."""
+    """The FMU, by name or file, as for `simulate`."""
     _known: dict[Any, Any] = field(default_factory=dict, init=False)
     _said: list[str] = field(default_factory=list, init=False)
 
@@ -213,24 +209,6 @@ class Craft:
                 problems += [f"tank {name}: {problem}" for problem in tank.problems()]
         if problems:
             raise FmuError("; ".join(problems))
-
-    def variant(self, parameters: Mapping[str, Quantity] | None = None) -> str | Path:
-        """Return the smallest variant of Spacecraft here that has the tanks, modes and parameters.
-
-        Its results are bit-identical, and its steps cheaper. Another ``model`` is returned as is.
-        """
-        if self.model != "Spacecraft":
-            return self.model
-        modes = [self._drawing(name).modes(of.modes) for name, of in self.tanks.items()]
-        for tanks, most in VARIANTS:
-            if len(modes) <= tanks and max(modes, default=0) <= most:
-                try:
-                    fmu = Fmu.open(f"Spacecraft_{tanks}x{most}")
-                except FmuError:  # it is not packed here
-                    continue
-                if all(name in fmu.variables for name in parameters or ()):
-                    return f"Spacecraft_{tanks}x{most}"
-        return self.model
 
     def _inertia(self) -> Vector:
         try:
@@ -477,7 +455,7 @@ class Craft:
 
         factors: frequencies by their ratio to those of the point.
         """
-        model = self.variant(every)
+        model = self.model
         if trimmed:
             point = trim(model, every, list(self.tanks))
         else:

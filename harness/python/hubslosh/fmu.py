@@ -62,8 +62,8 @@ class DefinedUnit(str):
 def fmu_path(model: str | Path) -> Path:
     """Return the file of an FMU by its name, for other simulators and tools.
 
-    This package contains ``HubSlosh``, ``SloshTank``, ``Spacecraft`` (four tanks of three modes),
-    ``Spacecraft_1x1`` and ``Spacecraft_2x2``, each for FMI 2.0 and, with ``-fmi3``, for FMI 3.0.
+    This package contains ``HubSlosh``, ``SloshTank`` and ``Spacecraft``, each for FMI 2.0 and, with
+    ``-fmi3``, for FMI 3.0.
     A file ``….fmu`` is returned as an absolute path.
 
     Raises FmuError with the names of the FMUs that exist.
@@ -81,17 +81,11 @@ def fmu_path(model: str | Path) -> Path:
     if root := source_tree():
         folders.append(root / "dist")
     for folder in folders:
-        path = folder / f"{model.replace('_4x3', '')}.fmu"
+        path = folder / f"{model}.fmu"
         if path.is_file():
             return path
     names = sorted({path.stem for folder in folders for path in folder.glob("*.fmu")})
     there = f'there is no FMU "{model}" here (there are: {", ".join(names) or "none"})'
-    if sizes := re.fullmatch(r"Spacecraft_(\d+)x(\d+)(-fmi3)?", model):
-        raise FmuError(
-            f"{there}; other variants are packed from the project's source, with Rust: hubslosh "
-            f"pack --model Spacecraft --tanks {sizes[1]} --modes {sizes[2]}"
-            f"{' --fmi 3' if sizes[3] else ''}"
-        )
     if own := re.fullmatch(r"(HubSlosh|SloshTank|Spacecraft)(-fmi3)?", model):
         raise FmuError(
             f"{there}; in the project's source, with Rust, this makes it: "

@@ -1,13 +1,11 @@
 """A craft's mass properties, parameters and loops against sums by hand and against the FMU."""
 
 import pickle
-import re
 import signal
 import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +14,6 @@ from fmpy import simulate_fmu
 
 import hubslosh
 from hubslosh import Craft, FmuError, FmuWarning, MountedTank, attitude
-from hubslosh.fmu import Fmu
 from hubslosh.tanks import Question, drawing, solve
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
@@ -213,40 +210,6 @@ def test_a_craft_names_everything_that_is_wrong_with_it(craft: Craft) -> None:
         replace(craft, thrust=0.0).parameters("50%")
     assert replace(craft, thrust=0.0, gravity=0.1).parameters("50%")["tank[1].g_ref"] == 0.1
     assert len(str(craft).splitlines()) <= 10
-
-
-def test_a_craft_takes_the_smallest_variant_that_carries_it(
-    craft: Craft, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of those packed, with every parameter that is set; `.ci/check_wheel.py` runs them."""
-    whole = Fmu.open(craft.model)
-    packed = {"Spacecraft_1x1": "1x1", "Spacecraft_2x2": "2x2"}
-
-    def opened(name: str) -> SimpleNamespace:
-        if name not in packed:
-            raise FmuError("not packed")
-        tanks, modes = map(int, packed[name].split("x"))
-        beyond = re.compile(rf"tank\[[{tanks + 1}-4]\]|tank.*\[[{modes + 1}-3](,\d)?\]$")
-        return SimpleNamespace(variables={n for n in whole.variables if not beyond.match(n)})
-
-    monkeypatch.setattr(Fmu, "open", opened)
-    of_one = {"ox": replace(craft.tanks["ox"], modes=1)}
-    # a mode along each side
-    box = MountedTank({"density": 1.0, "box": [0.5, 0.8]}, (0, 0, 0), modes=1)
-    for size, wanted in {
-        "1x1": of_one,
-        "2x2": craft.tanks,
-        "4x3": {"ox": replace(craft.tanks["ox"], modes=3)},
-    }.items():
-        small = replace(craft, model="Spacecraft", tanks=wanted)
-        assert small.variant() == {"4x3": "Spacecraft"}.get(size, f"Spacecraft_{size}")
-    assert replace(small, tanks={"box": box}).variant() == "Spacecraft_2x2"
-    small = replace(small, tanks=of_one)
-    assert small.variant({"tank[2].zeta[2]": 0.1}) == "Spacecraft_2x2"
-    assert small.variant({"tank[4].mass[1]": 1.0}) == "Spacecraft"
-    assert craft.variant() == craft.model
-    packed.clear()
-    assert small.variant() == "Spacecraft"
 
 
 def test_many_fills_are_solved_as_each_is(craft: Craft) -> None:

@@ -239,11 +239,11 @@ def test_python_goes_on_during_a_run(fmu: Path) -> None:
     assert count > 1000
 
 
-def test_a_variant_that_is_not_in_the_package_is_refused_with_the_way_to_it(
+def test_an_fmu_that_is_not_in_the_package_is_refused_with_the_way_to_it(
     fmu: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The message names the FMUs that exist and the command; 4 × 3 is Spacecraft itself."""
-    names = ("HubSlosh", "Spacecraft", "Spacecraft_2x2", "Spacecraft_2x2-fmi3")
+    """The message names the FMUs that exist and the command."""
+    names = ("HubSlosh", "Spacecraft", "Spacecraft-fmi3")
     (tmp_path / "fmus").mkdir()
     for name in names:
         (tmp_path / "fmus" / f"{name}.fmu").touch()
@@ -251,12 +251,8 @@ def test_a_variant_that_is_not_in_the_package_is_refused_with_the_way_to_it(
     monkeypatch.setattr(hubslosh.fmu, "source_tree", lambda: None)
     for name in names:
         assert hubslosh.fmu_path(name) == tmp_path / "fmus" / f"{name}.fmu"
-    assert hubslosh.fmu_path("Spacecraft_4x3").name == "Spacecraft.fmu"
-    with pytest.raises(FmuError) as error:
-        hubslosh.simulate("Spacecraft_3x2-fmi3")
-    said = str(error.value)
-    assert ", ".join(names) in said
-    assert said.endswith("hubslosh pack --model Spacecraft --tanks 3 --modes 2 --fmi 3")
+    with pytest.raises(FmuError, match=", ".join(names)):
+        hubslosh.simulate("Spacecraft_3x2")
     with pytest.raises(FmuError, match="did you mean HubSlosh"):
         hubslosh.fmu_path("Hubslosh")
     with pytest.raises(FmuError, match=r"pack --model SloshTank --fmi 3$"):

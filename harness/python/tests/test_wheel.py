@@ -176,6 +176,28 @@ def test_every_fmu_of_the_wheel_runs(
     assert done.returncode == 0, done.stderr
 
 
+def test_a_craft_of_one_or_two_tanks_is_made_uncertain(installed: Path, tmp_path: Path) -> None:
+    """By the FMU of the wheel, which is the same for every craft."""
+    code = """
+import numpy as np
+import hubslosh
+sphere = {"density": 1000.0, "shape": {"sphere": {"radius": 0.3}}}
+for places in ({"a": (0, 0, 0.2)}, {"a": (0.4, 0, 0.2), "b": (-0.4, 0, 0.2)}):
+    for modes in (1, 2):
+        tanks = {name: hubslosh.MountedTank(sphere, at, modes=modes, nu=1e-6)
+                 for name, at in places.items()}
+        craft = hubslosh.Craft(900.0, (300, 400, 500), tanks=tanks, thrust=200.0)
+        model = craft.uncertain("50%", {"a.frequency[1]": "10%", "a.zeta[1]": "interval"})
+        loop = craft.loop(np.hstack([40 * np.eye(3), 300 * np.eye(3)]), 0.1, "50%")
+        assert model.model == loop.model == craft.model == "Spacecraft"
+        assert len(model.at({}).states) and hubslosh.margins(loop).phase_margin
+"""
+    done = subprocess.run(
+        [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
 def test_what_needs_another_package_says_which(installed: Path, tmp_path: Path) -> None:
     """Plots and control are extras."""
     code = (

@@ -115,7 +115,7 @@ fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
 /// Lengths of a variable along its dimensions for these values of the structural parameters.
 pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -> Vec<usize> {
     let length = |dimension: &Dimension| match dimension {
-        Dimension::Fixed(length) => *length,
+        Dimension::Fixed(length) | Dimension::Used(_, length) => *length,
         Dimension::Sized(name, most) => size(name).min(*most),
     };
     variable.shape.iter().map(length).collect()

@@ -3,7 +3,9 @@
 #![allow(unsafe_code)]
 
 use std::panic::catch_unwind;
+use std::path::Path;
 use std::ptr;
+use std::sync::Arc;
 
 use super::arrays::{self, Arrays};
 use super::calls::*;
@@ -16,6 +18,7 @@ use crate::c_abi::{
     on_start, place, text,
 };
 use crate::call::{CType, Events, Fault, InstanceState, Interface, Severity};
+use crate::extent::Extent;
 use crate::instance::Instance;
 use crate::log::Filter;
 use crate::model::Model;
@@ -64,17 +67,21 @@ fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) 
 /// Makes an instance. On failure it returns NULL and logs the reason.
 unsafe fn instantiate<M: Model>(
     function: &str,
-    (name, token): (fmi3String, fmi3String),
+    (name, token, resources): (fmi3String, fmi3String, fmi3String),
     (environment, log_message): (fmi3InstanceEnvironment, fmi3LogMessageCallback),
     make: impl FnOnce(Option<&Arrays>) -> Result<(Instance<M, Fmi3>, Host<M>), String>,
 ) -> fmi3Instance {
     c_abi::silence_panics();
     let made = catch_unwind(std::panic::AssertUnwindSafe(|| unsafe {
         let log = Log::new(logger(environment, log_message));
-        let made = check_token::<M>(text(name), text(token)).and_then(|layout| {
+        let made = check_token::<M>(text(name), text(token)).and_then(|(layout, mut extent)| {
+            if let Some(extent) = &mut extent {
+                extent.read_starts::<M>(text(resources).as_deref().map(Path::new))?;
+            }
             let arrays = arrays::for_layout::<M>(layout, &M::table().starts());
             let (mut instance, mut host) = make(arrays.as_deref())?;
             instance.layout = layout;
+            instance = instance.with_extent(extent.map(Arc::new));
             host.arrays = arrays;
             Ok((instance, host))
         });
@@ -90,9 +97,12 @@ unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Returns the layout of the variables, scalars or arrays, in the model description with this token. Fails if the
-/// token or the instance's name is not acceptable.
-fn check_token<M: Model>(name: Option<String>, token: Option<String>) -> Result<Layout, String> {
+/// Returns the layout of the variables, scalars or arrays, in the model description with this token, and the part of the
+/// variables that it has. Fails if the token or the instance's name is not acceptable.
+fn check_token<M: Model>(
+    name: Option<String>,
+    token: Option<String>,
+) -> Result<(Layout, Option<Extent>), String> {
     let [scalars, with_arrays] = Layout::ALL.map(|layout| M::table().token(layout));
     if name.is_none_or(|name| name.trim().is_empty()) {
         return Err("instanceName is NULL or empty".into());
@@ -100,12 +110,15 @@ fn check_token<M: Model>(name: Option<String>, token: Option<String>) -> Result<
     let expected = || format!("expected {scalars}, or {with_arrays} with arrays");
     match token {
         None => Err(format!("instantiationToken is NULL; {}", expected())),
-        Some(token) if token == scalars => Ok(Layout::Scalars),
-        Some(token) if token == with_arrays => Ok(Layout::Arrays),
-        Some(token) => Err(format!(
-            "instantiationToken is {token}; {}: model description and binary do not belong together",
-            expected()
-        )),
+        Some(token) if token == scalars => Ok((Layout::Scalars, None)),
+        Some(token) if token == with_arrays => Ok((Layout::Arrays, None)),
+        Some(token) => match Extent::of_token::<M>(&token, scalars) {
+            Some(extent) => Ok((Layout::Scalars, Some(extent))),
+            None => Err(format!(
+                "instantiationToken is {token}; {}: model description and binary do not belong together",
+                expected()
+            )),
+        },
     }
 }
 
@@ -113,7 +126,7 @@ fn check_token<M: Model>(name: Option<String>, token: Option<String>) -> Result<
 pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
     instanceName: fmi3String,
     instantiationToken: fmi3String,
-    _resourcePath: fmi3String,
+    resourcePath: fmi3String,
     _visible: fmi3Boolean,
     _loggingOn: fmi3Boolean,
     instanceEnvironment: fmi3InstanceEnvironment,
@@ -122,7 +135,7 @@ pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
     unsafe {
         instantiate::<M>(
             "fmi3InstantiateModelExchange",
-            (instanceName, instantiationToken),
+            (instanceName, instantiationToken, resourcePath),
             (instanceEnvironment, logMessage),
             |_| {
                 let instance = Instance::new(Interface::ModelExchange);
@@ -136,7 +149,7 @@ pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
 pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     instanceName: fmi3String,
     instantiationToken: fmi3String,
-    _resourcePath: fmi3String,
+    resourcePath: fmi3String,
     _visible: fmi3Boolean,
     _loggingOn: fmi3Boolean,
     eventModeUsed: fmi3Boolean,
@@ -151,7 +164,7 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     unsafe {
         instantiate::<M>(
             function,
-            (instanceName, instantiationToken),
+            (instanceName, instantiationToken, resourcePath),
             (instanceEnvironment, logMessage),
             |arrays| {
                 let call = &both("fmi3InstantiateCoSimulation", 0);
@@ -198,7 +211,7 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
 pub unsafe fn fmi3InstantiateScheduledExecution<M: Model>(
     instanceName: fmi3String,
     instantiationToken: fmi3String,
-    _resourcePath: fmi3String,
+    resourcePath: fmi3String,
     _visible: fmi3Boolean,
     _loggingOn: fmi3Boolean,
     instanceEnvironment: fmi3InstanceEnvironment,
@@ -210,7 +223,7 @@ pub unsafe fn fmi3InstantiateScheduledExecution<M: Model>(
     unsafe {
         instantiate::<M>(
             "fmi3InstantiateScheduledExecution",
-            (instanceName, instantiationToken),
+            (instanceName, instantiationToken, resourcePath),
             (instanceEnvironment, logMessage),
             |_| Err("this FMU has Model Exchange and Co-Simulation, no Scheduled Execution".into()),
         )

@@ -4,7 +4,6 @@
 
 use super::calls::*;
 use super::elements::check_numbers;
-use super::host::Host;
 use super::types::*;
 use crate::c_abi::{Component, array, array_mut, on, on_allowed, place};
 use crate::call::{Call, Fault};
@@ -157,11 +156,11 @@ unsafe fn tell<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
     (name, pointer): (&str, *mut usize),
-    count: impl FnOnce(&Host<M>) -> usize,
+    count: impl FnOnce(&Component<M, Fmi3>) -> usize,
 ) -> fmi3Status {
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
-            *place(call, name, pointer)? = count(&component.host);
+            *place(call, name, pointer)? = count(component);
             Ok(())
         })
     }
@@ -173,7 +172,10 @@ pub unsafe fn fmi3GetNumberOfEventIndicators<M: Model>(
     nEventIndicators: *mut usize,
 ) -> fmi3Status {
     let into = ("nEventIndicators", nEventIndicators);
-    let count = |_: &Host<M>| M::table().about.event_indicators;
+    let count = |component: &Component<M, Fmi3>| match &component.instance.extent {
+        None => M::table().about.event_indicators,
+        Some(extent) => extent.indicators(),
+    };
     unsafe { tell::<M>(instance, &NUMBER_OF_INDICATORS, into, count) }
 }
 
@@ -183,9 +185,12 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Model>(
     nContinuousStates: *mut usize,
 ) -> fmi3Status {
     let into = ("nContinuousStates", nContinuousStates);
-    let count = |host: &Host<M>| match &host.arrays {
-        None => M::table().derivatives().len(),
-        Some(arrays) => arrays.states().len(),
-    };
+    let count =
+        |component: &Component<M, Fmi3>| match (&component.host.arrays, &component.instance.extent)
+        {
+            (Some(arrays), _) => arrays.states().len(),
+            (None, Some(extent)) => extent.places().len(),
+            (None, None) => M::table().derivatives().len(),
+        };
     unsafe { tell::<M>(instance, &NUMBER_OF_STATES, into, count) }
 }

@@ -6,8 +6,7 @@ use crate::fmu;
 
 /// Lists the files of the FMUs that came with this command, and of those in dist.
 ///
-/// Options --fmu take their names: `Spacecraft_2x2-fmi3` is Spacecraft with two tanks of two modes for FMI 3.0. `Spacecraft` has
-/// four tanks of three modes. Other variants need the project's source and Rust: `hubslosh pack --model Spacecraft --tanks 3`.
+/// Options --fmu take their names: `Spacecraft-fmi3` is Spacecraft for FMI 3.0.
 #[derive(clap::Args)]
 pub struct FmusArgs {}
 

@@ -1,10 +1,15 @@
 //! `hubslosh pack`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
+use host::description::{ModelDescription, Value};
+use host::part::Limit;
 use pack::platforms::{self, PLATFORMS, Platform};
 use pack::{Fmi, Model, sdist, wheel};
+
+use crate::set_file;
 
 /// Builds the binary of an FMU and packs it, or the Python package with all FMUs and this command inside.
 #[derive(clap::Args)]
@@ -37,13 +42,15 @@ pub struct PackArgs {
     /// File for the FMU, or folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist/NAME-fmi3-arrays.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// Spacecraft only: packs a variant with this many tanks, 1 to 4, and no variables for further ones. With one tank of one
-    /// mode its name is Spacecraft_1x1.
-    #[arg(long, value_name = "NUMBER", conflicts_with = "python")]
+    /// Variables of this many tanks alone, for hosts that show every variable; the binary is the same. Spacecraft has 4.
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     tanks: Option<usize>,
-    /// Spacecraft only: packs a variant with this many slosh modes of each tank, 1 to 3.
-    #[arg(long, value_name = "NUMBER", conflicts_with = "python")]
+    /// Variables of this many slosh modes of each tank alone; the binary is the same. Spacecraft and SloshTank have 3, HubSlosh 10.
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     modes: Option<usize>,
+    /// Makes the parameters of this file (.toml, .ssv, .json) the start values of the FMU. With --tanks or --modes.
+    #[arg(long, value_name = "FILE")]
+    parameters: Option<PathBuf>,
     /// Builds for Linux, Windows and macOS instead of this machine's platform: one FMU for all, one wheel for each. On Debian,
     /// harness/platforms/setup installs the tools.
     #[arg(long)]
@@ -67,28 +74,94 @@ impl PackArgs {
             }
             return Ok(());
         }
-        let variant;
-        let model = match (self.tanks, self.modes) {
-            (None, None) => self.model,
-            (tanks, modes) => {
-                variant = self.model.variant(tanks, modes)?;
-                &variant
-            }
-        };
+        let model = self.model;
         let fmi = match (self.fmi, self.arrays) {
             (fmi, false) => fmi,
             (Fmi::V2, true) => bail!("FMI 2.0 has no arrays (allowed with --arrays: --fmi 3)"),
             _ => Fmi::V3Arrays,
         };
-        let out = self.out.unwrap_or_else(|| fmi.path("dist".as_ref(), &model.identifier()));
+        let limits = self.limits()?;
+        let name =
+            limits.iter().fold(model.name.to_string(), |name, limit| match limit.parameter {
+                "tanks" => format!("{name}_{}", limit.size),
+                _ if limits.len() > 1 => format!("{name}x{}", limit.size),
+                _ => format!("{name}_{}", limit.size),
+            });
+        let out = self.out.clone().unwrap_or_else(|| fmi.path("dist".as_ref(), &name));
         if !self.all_platforms {
-            return native(model, fmi, &out);
+            pack::pack(model, fmi, &out)?;
+            self.reduce(&limits, &out)?;
+            done!("packed {}", out.display());
+            return Ok(());
         }
         for built in pack::pack_all(model, fmi, &out)? {
             done!("{}: {}", built.folder, built.binary);
         }
+        self.reduce(&limits, &out)?;
         done!("packed {} ({} bytes)", out.display(), out.metadata()?.len());
         Ok(())
+    }
+}
+
+impl PackArgs {
+    /// The sizes of --tanks and --modes, all of the FMU's; none without these options.
+    fn limits(&self) -> Result<Vec<Limit<'static>>> {
+        let sizes = match self.model.name {
+            "HubSlosh" => names::hubslosh::SIZES,
+            "Spacecraft" => names::spacecraft::SIZES,
+            "SloshTank" => names::sloshtank::SIZES,
+            _ => &[],
+        };
+        let has_tanks = sizes.iter().any(|size| size.parameter == "tanks");
+        ensure!(
+            self.tanks.is_none() || has_tanks,
+            "{} has one tank: --tanks is for Spacecraft",
+            self.model.name
+        );
+        if self.tanks.is_none() && self.modes.is_none() {
+            ensure!(self.parameters.is_none(), "--parameters needs --tanks or --modes");
+            return Ok(Vec::new());
+        }
+        let limit = |size: &'static names::Size| {
+            let given = if size.parameter == "tanks" { self.tanks } else { self.modes };
+            Limit {
+                parameter: size.parameter,
+                size: given.unwrap_or(size.most),
+                most: size.most,
+                has_indicators: size.has_indicators,
+                arrays: size.arrays,
+            }
+        };
+        let limits: Vec<_> = sizes.iter().map(limit).collect();
+        for Limit { parameter, size, most, .. } in &limits {
+            let option = if *parameter == "tanks" { "--tanks" } else { "--modes" };
+            ensure!((1..=*most).contains(size), "{option} {size} (allowed: 1 to {most})");
+        }
+        Ok(limits)
+    }
+
+    /// Leaves the variables within the limits in a packed FMU.
+    fn reduce(&self, limits: &[Limit], fmu: &Path) -> Result<()> {
+        if limits.is_empty() {
+            return Ok(());
+        }
+        let mut starts = BTreeMap::new();
+        if let Some(path) = &self.parameters {
+            let description = || ModelDescription::of_packed(fmu);
+            let settings = set_file::read(path, &description)?;
+            let description = description()?;
+            for (name, text) in settings {
+                let variable = description.variable(&name)?;
+                let value = match description.value(variable, &text)? {
+                    Value::Real(x) => format!("{x:?}"),
+                    Value::Integer(n) => n.to_string(),
+                    Value::Boolean(b) => b.to_string(),
+                    Value::String(text) => text,
+                };
+                starts.insert(name, value);
+            }
+        }
+        pack::part::pack(fmu, limits, &starts, fmu)
     }
 }
 

@@ -1,0 +1,277 @@
+//! Model descriptions with a part of the variables, for hosts that show every variable: those that few tanks and modes use. The
+//! binary is the same.
+//!
+//! The GUID (in FMI 3.0 the instantiationToken) of such a description is that of the whole one but for its last eight
+//! hexadecimal digits, so that the binary knows which states and event indicators the host has read of:
+//!
+//! ```text
+//! {........-....-....-....-....tmsscccc}   t, m   largest values of the parameters in `Table::sizes`
+//!                                          ss     number of continuous states
+//!                                          cccc   checksum of resources/start_values.txt, 0000 without the file
+//! ```
+//!
+//! The file has the start values that the description states instead of the table's, a line `name = value` for each, in the
+//! table's order.
+
+use std::path::Path;
+
+use crate::hash::Hash;
+use crate::model::Model;
+use crate::table::{GUID_LENGTH, Scalar, Table};
+use crate::variable::{Dimension, Value};
+
+/// The file of start values, in the folder of resources.
+pub const START_VALUES: &str = "start_values.txt";
+
+/// Digits of a token that say what the description has, before its closing brace.
+const DIGITS: usize = 8;
+
+/// The part of the table that a description has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extent {
+    token: String,
+    /// Names and largest values of the parameters that size arrays.
+    sizes: Vec<(&'static str, usize)>,
+    /// Places in the model of the continuous states, in the host's order.
+    places: Vec<usize>,
+    indicators: usize,
+    starts: Vec<Value>,
+}
+
+impl Extent {
+    /// Returns the part of the table in the description with this token, with the table's start values. `whole` is the token of the
+    /// whole description. `None` if the token is of no such description.
+    pub fn of_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
+        let kept = GUID_LENGTH - 1 - DIGITS;
+        if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
+            return None;
+        }
+        let digits = token[kept..].strip_suffix('}')?;
+        let table = M::table();
+        if table.sizes().is_empty() {
+            return None;
+        }
+        let mut sizes = Vec::new();
+        let mut given = digits[..2].chars().map(|digit| digit.to_digit(16));
+        for (name, most) in table.sizes() {
+            let size = given.next()?? as usize;
+            sizes.push((name, size));
+            if !(1..=most).contains(&size) {
+                return None;
+            }
+        }
+        if given.any(|rest| rest != Some(0)) {
+            return None;
+        }
+        let within = |scalar: &Scalar<M>| scalar.is_within(&sizes);
+        let kept_states = table.derivatives().iter().zip(table.places());
+        let places: Vec<usize> =
+            kept_states.filter(|(scalar, _)| within(scalar)).map(|(_, place)| place).collect();
+        if usize::from_str_radix(&digits[2..4], 16) != Ok(places.len()) {
+            return None;
+        }
+        let indicators = share(table, M::INDICATORS_OF, &sizes);
+        let mut starts = table.starts();
+        for scalar in table.parameters() {
+            let size = sizes.iter().find(|(name, _)| *name == scalar.variable.name);
+            if let (Some((_, size)), Value::Integer(start)) = (size, &mut starts[scalar.slot]) {
+                *start = (*start).min(*size as i32);
+            }
+        }
+        Some(Extent { token: token.into(), sizes, places, indicators, starts })
+    }
+
+    /// Reads the start values of the description from the folder of resources, if it has others than the table.
+    ///
+    /// # Errors
+    /// If the file is not there, or is not the one of the description, or does not suit the table.
+    pub fn read_starts<M: Model>(&mut self, resources: Option<&Path>) -> Result<(), String> {
+        let expected = &self.token[GUID_LENGTH - 5..GUID_LENGTH - 1];
+        if expected == "0000" {
+            return Ok(());
+        }
+        let Some(folder) = resources else {
+            return Err(format!(
+                "the start values of this model description are in resources/{START_VALUES}, and the host names no folder of \
+                 resources"
+            ));
+        };
+        let file = folder.join(START_VALUES);
+        let text = std::fs::read_to_string(&file).map_err(|why| {
+            format!("start values of the model description: {}: {why}", file.display())
+        })?;
+        if checksum(&text) != expected {
+            return Err(format!(
+                "{} is not the file of this model description: its checksum differs from the one in the GUID",
+                file.display()
+            ));
+        }
+        let wrong = |n: usize, line: &str| {
+            format!("{}, line {}: {line:?} is no start value here", file.display(), n + 1)
+        };
+        let mut scalars = M::table().parameters().iter();
+        for (n, line) in text.lines().enumerate() {
+            let (name, value) = line.split_once(" = ").ok_or_else(|| wrong(n, line))?;
+            let scalar = scalars.find(|scalar| scalar.name() == name);
+            let start = scalar.and_then(|scalar| self.starts.get_mut(scalar.slot));
+            let start = start.ok_or_else(|| wrong(n, line))?;
+            let read = match start {
+                Value::Real(_) => value.parse().ok().map(Value::Real),
+                Value::Integer(_) => value.parse().ok().map(Value::Integer),
+                Value::Boolean(_) => value.parse().ok().map(Value::Boolean),
+            };
+            *start = read.ok_or_else(|| wrong(n, line))?;
+        }
+        Ok(())
+    }
+
+    /// GUID or instantiationToken.
+    pub fn token(&self) -> &str {
+        &self.token
+    }
+
+    /// Places in the model of the continuous states, in the host's order.
+    pub fn places(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Number of event indicators.
+    pub fn indicators(&self) -> usize {
+        self.indicators
+    }
+
+    /// The parameters' start values, in the table's order.
+    pub fn starts(&self) -> &[Value] {
+        &self.starts
+    }
+
+    /// Error in the value of a parameter that sizes arrays: the description has no variables for more.
+    pub fn problem<M: Model>(&self, scalar: &Scalar<M>, value: Value) -> Option<String> {
+        let (_, most) = self.sizes.iter().find(|(name, _)| *name == scalar.variable.name)?;
+        match value {
+            Value::Integer(n) if n > *most as i32 => Some(format!(
+                "{} = {n} (allowed: at most {most}, for which this model description has variables)",
+                scalar.name()
+            )),
+            _ => None,
+        }
+    }
+}
+
+/// The event indicators that belong to the elements within the sizes.
+fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) -> usize {
+    let all = table.about.event_indicators;
+    let size = sizes.iter().find(|(name, _)| Some(*name) == of);
+    let most = table.sizes().into_iter().find(|(name, _)| Some(*name) == of);
+    match (size, most) {
+        (Some((_, size)), Some((_, most))) => all / most * size,
+        _ => all,
+    }
+}
+
+/// The checksum in a token of a file of start values.
+pub fn checksum(text: &str) -> String {
+    // 0 is for no file.
+    let sum = (Hash::new().bytes(text.as_bytes()).value() & 0xffff).max(1);
+    format!("{sum:04x}")
+}
+
+impl<M: Model> Table<M> {
+    /// Names and largest values of the parameters that size arrays, in the order of their first array.
+    pub fn sizes(&self) -> Vec<(&'static str, usize)> {
+        let mut sizes: Vec<(&'static str, usize)> = Vec::new();
+        for dimension in self.variables.iter().flat_map(|variable| variable.shape) {
+            if let Dimension::Sized(name, most) | Dimension::Used(name, most) = dimension
+                && !sizes.iter().any(|(known, _)| known == name)
+            {
+                sizes.push((name, *most));
+            }
+        }
+        sizes
+    }
+}
+
+impl<M: Model> Scalar<M> {
+    /// Returns true if its indices are within these sizes of the parameters.
+    pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
+        let indices = self.variable.indices(self.element);
+        self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {
+            Dimension::Sized(name, _) | Dimension::Used(name, _) => {
+                sizes.iter().all(|(sized, size)| sized != name || index < *size)
+            }
+            Dimension::Fixed(_) => true,
+        })
+    }
+}
+
+/// Returns the folder that a URI names, as FMI 2.0 passes that of the resources: `file:///a%20b`, on Windows `file:///C:/a`. A
+/// path that is no URI is taken as it is.
+pub fn folder_of_uri(uri: &str) -> Option<std::path::PathBuf> {
+    let Some(rest) = uri.strip_prefix("file:") else {
+        return (!uri.is_empty() && !uri.contains("://")).then(|| uri.into());
+    };
+    let path = match rest.strip_prefix("//") {
+        Some(after) => &after[after.find('/')?..],
+        None => rest,
+    };
+    let mut bytes = Vec::with_capacity(path.len());
+    let mut left = path.bytes();
+    while let Some(byte) = left.next() {
+        let byte = match byte {
+            b'%' => {
+                let digits = [left.next()?, left.next()?];
+                u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()?
+            }
+            other => other,
+        };
+        bytes.push(byte);
+    }
+    let path = String::from_utf8(bytes).ok()?;
+    let is_drive = path.as_bytes().get(2) == Some(&b':');
+    Some(if is_drive { path[1..].into() } else { path.into() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::trays::Trays;
+
+    fn of(digits: &str) -> Option<Extent> {
+        let whole = Trays::table().guid();
+        let token = format!("{}{digits}}}", &whole[..GUID_LENGTH - 1 - DIGITS]);
+        Extent::of_token::<Trays>(&token, whole)
+    }
+
+    /// Three trays at most: levels are states, one each; the table's start value of the number is 2.
+    #[test]
+    fn a_token_says_how_many_states_there_are() {
+        assert_eq!(Trays::table().sizes(), [("rows", 3)]);
+        let extent = of("10010000").unwrap();
+        assert_eq!((extent.places(), &extent.starts()[0]), (&[0][..], &Value::Integer(1)));
+        assert_eq!(of("20020000").unwrap().places(), [0, 1]);
+        assert_eq!(of("20020000").unwrap().starts()[0], Value::Integer(2));
+        for wrong in ["10020000", "40030000", "00000000", "11010000", "g0010000", "1001000"] {
+            assert_eq!(of(wrong), None, "{wrong}");
+        }
+        let whole = Trays::table().guid();
+        assert_eq!(Extent::of_token::<Trays>("", whole), None);
+        assert_eq!(Extent::of_token::<Trays>("{é}", whole), None);
+    }
+
+    #[test]
+    fn a_uri_names_a_folder() {
+        let of = |uri: &str| folder_of_uri(uri).map(|path| path.to_string_lossy().into_owned());
+        for (uri, path) in [
+            ("file:///tmp/a%20b/resources", "/tmp/a b/resources"),
+            ("file:/tmp/a", "/tmp/a"),
+            ("file://localhost/tmp/%C3%A4", "/tmp/ä"),
+            ("file:///C:/a/b", "C:/a/b"),
+            ("/tmp/a", "/tmp/a"),
+        ] {
+            assert_eq!(of(uri).as_deref(), Some(path));
+        }
+        for wrong in ["", "http://a/b", "file:///%4", "file:///%zz", "file://host", "file:///%ff"] {
+            assert_eq!(of(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! A model description with a part of the variables, for hosts that show every variable. The FMU's binary is the same: it reads the
+//! sizes from the GUID, and start values that differ from its own from a file among the resources.
+//!
+//! `fmu/runtime/src/extent.rs` has the other half: the form of the GUID and of the file.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use anyhow::{Context, Result, bail, ensure};
+use roxmltree::{Document, Node};
+
+/// Name of the file of start values in the FMU.
+pub const START_VALUES: &str = "resources/start_values.txt";
+
+/// Largest value that is left to a parameter that sizes arrays.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit<'a> {
+    /// Name of the parameter.
+    pub parameter: &'a str,
+    /// Its largest value in the part.
+    pub size: usize,
+    /// Its largest value in the whole description.
+    pub most: usize,
+    /// True if each element has its event indicators.
+    pub has_indicators: bool,
+    /// The arrays, each with the place among its indices of the one that the parameter limits.
+    pub arrays: &'a [(&'a str, usize)],
+}
+
+/// A model description with a part of the variables.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Text of modelDescription.xml.
+    pub xml: String,
+    /// Content of [`START_VALUES`], if start values differ from those of the binary.
+    pub start_values: Option<String>,
+}
+
+/// Returns the description with the variables within the limits, and other start values of parameters: by name, as FMI writes
+/// them.
+///
+/// # Errors
+/// A limit that is 0 or above the largest value, a start value of a parameter that the part does not have, or XML that is no
+/// description of scalars from this project.
+pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) -> Result<Part> {
+    for limit in limits {
+        let Limit { parameter, size, most, .. } = limit;
+        ensure!((1..=*most).contains(size), "{parameter} = {size} (allowed: 1 to {most})");
+    }
+    let document = Document::parse(xml).context("modelDescription.xml")?;
+    let root = document.root_element();
+    let fmi2 = root.attribute("fmiVersion").is_some_and(|version| version.starts_with('2'));
+    let mut edits = Edits(Vec::new());
+    let indicators = indicators(&root, limits);
+    let mut renumbered: BTreeMap<String, String> = BTreeMap::new();
+    let (mut states, mut written) = (0, String::new());
+    let mut left: BTreeMap<&String, &String> = starts.iter().collect();
+    let variables = child(&root, "ModelVariables")?;
+    for (old, variable) in (1_usize..).zip(variables.children().filter(Node::is_element)) {
+        let name = variable.attribute("name").unwrap_or_default();
+        if !(is_within(name, limits) && is_indicator(name).is_none_or(|n| n <= indicators)) {
+            edits.remove(xml, &variable);
+            continue;
+        }
+        let number = if fmi2 {
+            (old.to_string(), (renumbered.len() + 1).to_string())
+        } else {
+            let reference = variable.attribute("valueReference").unwrap_or_default();
+            (reference.to_string(), reference.to_string())
+        };
+        renumbered.insert(number.0, number.1);
+        let typed =
+            if fmi2 { variable.first_element_child().unwrap_or(variable) } else { variable };
+        states += usize::from(typed.has_attribute("derivative"));
+        let limit = limits.iter().find(|limit| pattern(name).0 == limit.parameter);
+        if let Some(limit) = limit {
+            edits.set(&typed, "max", &limit.size.to_string());
+        }
+        let now = typed.attribute("start").unwrap_or_default();
+        let clipped = limit.and_then(|limit| Some(now.parse::<usize>().ok()?.min(limit.size)));
+        match left.remove_entry(&name.to_string()) {
+            Some((_, start)) => {
+                edits.set(&typed, "start", start);
+                written += &format!("{name} = {start}\n");
+            }
+            None if limit.is_some() => {
+                edits.set(&typed, "start", &clipped.unwrap_or_default().to_string());
+            }
+            None => {}
+        }
+    }
+    if let Some(name) = left.keys().next() {
+        bail!("the description has no parameter {name} (allowed: those within the sizes)");
+    }
+    // A state may stand behind its derivative.
+    for node in variables.descendants().filter(|node| node.has_attribute("derivative")) {
+        if let Some(new) = renumbered.get(node.attribute("derivative").unwrap_or_default()) {
+            edits.set(&node, "derivative", new);
+        }
+    }
+    let key = if fmi2 { "index" } else { "valueReference" };
+    for unknown in child(&root, "ModelStructure")?.descendants().filter(|n| n.has_attribute(key)) {
+        match renumbered.get(unknown.attribute(key).unwrap_or_default()) {
+            None => edits.remove(xml, &unknown),
+            Some(new) => {
+                edits.set(&unknown, key, new);
+                let listed = |name| unknown.attribute(name).unwrap_or_default().split_whitespace();
+                let kept = listed("dependencies").zip(listed("dependenciesKind"));
+                let kept = kept.filter_map(|(known, kind)| Some((renumbered.get(known)?, kind)));
+                let (known, kinds): (Vec<_>, Vec<_>) =
+                    kept.map(|(known, kind)| (known.as_str(), kind)).unzip();
+                edits.set(&unknown, "dependencies", &known.join(" "));
+                edits.set(&unknown, "dependenciesKind", &kinds.join(" "));
+            }
+        }
+    }
+    let key = if fmi2 { "guid" } else { "instantiationToken" };
+    let token = root.attribute(key).context("modelDescription.xml has no GUID")?;
+    let start_values = (!written.is_empty()).then_some(written);
+    edits.set(&root, key, &token_of_part(token, limits, states, start_values.as_deref())?);
+    edits.set(&root, "numberOfEventIndicators", &indicators.to_string());
+    Ok(Part { xml: edits.applied(xml), start_values })
+}
+
+/// The GUID of the part: see `fmu/runtime/src/extent.rs`.
+fn token_of_part(
+    whole: &str,
+    limits: &[Limit],
+    states: usize,
+    start_values: Option<&str>,
+) -> Result<String> {
+    ensure!(
+        whole.len() == 38 && whole.is_ascii() && (1..=2).contains(&limits.len()) && states < 256,
+        "this FMU cannot be described in part"
+    );
+    let sizes: String = limits.iter().map(|limit| format!("{:x}", limit.size)).collect();
+    let sum = start_values.map_or(0, |text| (fnv(text.as_bytes()) & 0xffff).max(1));
+    Ok(format!("{}{sizes:0<2}{states:02x}{sum:04x}}}", &whole[..29]))
+}
+
+/// FNV-1a with 128 bits.
+fn fnv(bytes: &[u8]) -> u128 {
+    bytes.iter().fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash: u128, byte| {
+        (hash ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
+    })
+}
+
+/// Returns a name without its indices, as the table has it, and the indices: `tank[1].p[2,3]` is `tank[].p` with 1, 2, 3.
+fn pattern(name: &str) -> (String, Vec<usize>) {
+    let (mut text, mut indices, mut rest) = (String::new(), Vec::new(), name);
+    while let Some((before, after)) = rest.split_once('[') {
+        let Some((inside, behind)) = after.split_once(']') else { break };
+        indices.extend(inside.split(',').map(|index| index.parse().unwrap_or(0)));
+        text += before;
+        let ends = behind.is_empty() || behind == ")";
+        text += if ends { "" } else { "[]" };
+        rest = behind;
+    }
+    (text + rest, indices)
+}
+
+fn is_within(name: &str, limits: &[Limit]) -> bool {
+    let (pattern, indices) = pattern(name);
+    limits.iter().all(|limit| {
+        let place =
+            limit.arrays.iter().find(|(array, _)| *array == pattern).map(|(_, place)| place);
+        place.and_then(|place| indices.get(*place)).is_none_or(|index| *index <= limit.size)
+    })
+}
+
+/// The number of an event indicator of FMI 3.0, from its variable's name.
+fn is_indicator(name: &str) -> Option<usize> {
+    name.strip_prefix("event_indicator[")?.strip_suffix(']')?.parse().ok()
+}
+
+/// Number of event indicators within the limits.
+fn indicators(root: &Node, limits: &[Limit]) -> usize {
+    let named = |node: &Node| node.attribute("name").and_then(is_indicator).is_some();
+    let all = match root.attribute("numberOfEventIndicators") {
+        Some(count) => count.parse().unwrap_or(0),
+        None => root.descendants().filter(named).count(),
+    };
+    let of = limits.iter().find(|limit| limit.has_indicators);
+    of.map_or(all, |limit| all / limit.most * limit.size)
+}
+
+fn child<'a>(root: &Node<'a, 'a>, name: &str) -> Result<Node<'a, 'a>> {
+    let found = root.children().find(|child| child.has_tag_name(name));
+    found.with_context(|| format!("modelDescription.xml has no {name}"))
+}
+
+/// Replacements of ranges of a text.
+struct Edits(Vec<(Range<usize>, String)>);
+
+impl Edits {
+    /// Removes an element and the space before it.
+    fn remove(&mut self, xml: &str, node: &Node) {
+        let range = node.range();
+        let begin = xml[..range.start].trim_end().len();
+        self.0.push((begin..range.end, String::new()));
+    }
+
+    /// Sets an attribute, if the element has it.
+    fn set(&mut self, node: &Node, name: &str, value: &str) {
+        if let Some(attribute) = node.attribute_node(name) {
+            self.0.push((attribute.range_value(), value.into()));
+        }
+    }
+
+    fn applied(mut self, xml: &str) -> String {
+        self.0.sort_by_key(|(range, _)| range.start);
+        let (mut text, mut at) = (String::with_capacity(xml.len()), 0);
+        for (range, value) in self.0 {
+            // An attribute of an element that is removed.
+            if range.start < at {
+                continue;
+            }
+            text += &xml[at..range.start];
+            text += &value;
+            at = range.end;
+        }
+        text + &xml[at..]
+    }
+}

@@ -1,0 +1,35 @@
+//! FMUs with a part of the variables for the same binary: see [`host::part`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use host::archive::{Archive, DESCRIPTION};
+use host::part::{Limit, START_VALUES, describe};
+
+use crate::archive::{self, Files};
+
+/// Writes to `out` the packed FMU with the variables within the limits, and with other start values by name.
+///
+/// # Errors
+/// Those of [`describe`]; if the FMU cannot be read or `out` not written.
+pub fn pack(
+    fmu: &Path,
+    limits: &[Limit],
+    starts: &BTreeMap<String, String>,
+    out: &Path,
+) -> Result<()> {
+    let whole = Archive::open(fmu)?;
+    whole.check()?;
+    let mut files = Files::new();
+    for entry in whole.entries.iter().filter(|entry| !entry.is_folder()) {
+        files.push((entry.name.clone(), whole.content(entry)?));
+    }
+    let description = files.iter_mut().find(|(name, _)| name == DESCRIPTION);
+    let (_, xml) = description.with_context(|| format!("{} has no description", fmu.display()))?;
+    let part = describe(&String::from_utf8_lossy(xml), limits, starts)
+        .with_context(|| fmu.display().to_string())?;
+    *xml = part.xml.into_bytes();
+    files.extend(part.start_values.map(|text| (START_VALUES.to_string(), text.into_bytes())));
+    archive::write(&files, out)
+}
