@@ -234,7 +234,18 @@ impl CraftMotion {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
         let [q, dq] = [self.q.get(0), self.q.get(1)];
-        let mut tanks = [(); TANKS].map(|()| None);
+        let mut instant = Now {
+            a,
+            w,
+            w_d,
+            velocity: of(&self.drift),
+            h_wheels: of(&self.h),
+            axes: rotation(&[0, 1, 2, 3].map(|i| T::of(q[i], dq[i]))),
+            mount: self.mount,
+            pivot: self.pivot,
+            craft: self.craft,
+            tanks: [const { None }; TANKS],
+        };
         for (i, liquid) in self.liquids.iter().enumerate() {
             let lump = self.lumps.iter().find(|lump| lump.tank == i && lump.is_loose());
             let rigid = lump.map_or_else(|| liquid.lift(), |lump| liquid.along(&lump.shape_slope));
@@ -259,20 +270,9 @@ impl CraftMotion {
                 now.wrench = [add(now.wrench[0], f), add(now.wrench[1], tau)];
                 (now.lump, now.ball_state) = (Some(lump.now()), lump.state);
             }
-            tanks[i] = Some(now);
+            instant.tanks[i] = Some(now);
         }
-        Now {
-            a,
-            w,
-            w_d,
-            velocity: of(&self.drift),
-            h_wheels: of(&self.h),
-            axes: rotation(&[0, 1, 2, 3].map(|i| T::of(q[i], dq[i]))),
-            mount: self.mount,
-            pivot: self.pivot,
-            craft: self.craft,
-            tanks,
-        }
+        instant
     }
 }
 

@@ -144,10 +144,17 @@ impl Spacecraft {
     /// Returns the outputs under the inputs' current values, after the effect of a jump of
     /// `h_wheels` or `mass_flow` since the last step.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
-        let before = self.motion.state;
-        self.take_jumps(inputs);
+        // The state is large, and most calls find no jump.
+        let may_jump =
+            self.draining.is_some() || inputs.h_wheels.value != self.motion.state.h_wheels;
+        let before = may_jump.then_some(self.motion.state);
+        if may_jump {
+            self.take_jumps(inputs);
+        }
         let mut outputs = self.outputs_held(inputs);
-        self.motion.state = before;
+        if let Some(before) = before {
+            self.motion.state = before;
+        }
         self.update_ranges(&mut outputs);
         outputs
     }

@@ -233,14 +233,19 @@ impl<'fmu> Instance<'fmu> {
         }
     }
 
-    /// Derivatives of unknowns by one known, all of them scalars of the FMU.
-    pub fn directional_derivative(&mut self, unknowns: &[u32], known: u32) -> Called<Vec<f64>> {
+    /// Derivatives of unknowns in a direction of knowns, all of them scalars of the FMU.
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        direction: &[f64],
+    ) -> Called<Vec<f64>> {
         match self {
             Instance::V2(instance) => {
-                instance.get_directional_derivative(unknowns, &[known], &[1.0])
+                instance.get_directional_derivative(unknowns, knowns, direction)
             }
             Instance::V3(instance) => {
-                instance.directional_derivative(unknowns, &[known], &[1.0], unknowns.len())
+                instance.directional_derivative(unknowns, knowns, direction, unknowns.len())
             }
         }
     }
