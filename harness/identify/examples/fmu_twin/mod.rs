@@ -95,7 +95,7 @@ pub fn torque(text: &str) -> Result<Torque> {
     let sine = Multisine::new(100.0, (1.25, 3.5), numbers[0], 1)?;
     // rows close enough that lines between them are the curve: (2π 3.5 Hz 5 ms)²/8 = 0.15 %
     let time: Vec<f64> = (0..=(numbers[1] / 0.005) as u32).map(|k| 0.005 * f64::from(k)).collect();
-    let tau = time.iter().map(|t| sine.at(*t)).collect();
+    let tau: Vec<f64> = time.iter().map(|t| sine.at(*t)).collect();
     Torque::rows(&time, &tau, None, false)
 }
 
