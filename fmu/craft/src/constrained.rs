@@ -432,6 +432,21 @@ impl ConstrainedBob {
         largest(self.r_d[0]) + libm::sqrt(stiffness) * f64::max(x.abs(), y.abs())
     }
 
+    /// Returns the time over which the series of the drag converge reliably, s, from coefficients 0 to 2.
+    pub fn convergence_radius(&self) -> f64 {
+        if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
+    }
+
+    /// Returns the error of V, 1/s, that the series of the drag cause up to order n and `h` after the start of the expansion.
+    pub fn defect(&self, n: usize, h: f64) -> f64 {
+        if !self.follows {
+            return 0.0;
+        }
+        let end = largest(space::value(&self.r_d, n - 1, h));
+        let rate = f64::max(largest(self.r_d[0]) + largest(self.r_d[1]) * h, end);
+        self.drag.defect(n - 1, h) * rate * h
+    }
+
     /// Magnitude of coefficient n of V.
     pub fn coefficient_norm(&self, n: usize) -> f64 {
         largest(self.v[n])

@@ -33,7 +33,7 @@
 
 use taylor::angle::{self, SquaredAngle};
 use taylor::number::Number;
-use taylor::series::{Series, ZERO, constant, mul, mul_tail, sqrt};
+use taylor::series::{Series, ZERO, constant, mul, mul_tail, sqrt, time_within, values};
 
 use crate::parameters::{DampingLaw, Tank};
 use formulas::cylinder::XI;
@@ -68,6 +68,9 @@ impl Breaking {
         })
     }
 }
+
+/// Largest step as a share of the time to the nearest singularity of a power series.
+const SHARE_OF_RADIUS: f64 = 0.5;
 
 /// The power series of w f(k a).
 #[derive(Clone, Debug)]
@@ -109,6 +112,14 @@ impl Excess {
         }
         0.5 * (self.steep[n] + mul(n, &self.steep, &self.quotient))
     }
+
+    /// Returns the time over which the series converges, s, from coefficients 0 to 2: w d = +-i w delta is a
+    /// singularity.
+    fn convergence_radius(&self) -> f64 {
+        let Excess { root, above, w, .. } = self;
+        let [slope, bend] = [1, 2].map(|n| above[n].abs() + CORNER * w[n].abs());
+        time_within(root[0], slope, bend)
+    }
 }
 
 /// Data of one mode's drag in a tank with constant contents.
@@ -137,6 +148,8 @@ pub struct Drag {
     tilt2: Series,
     speed2: Series,
     speed: Series,
+    /// The same at an instant, with m and l.
+    instant: (Law, [f64; 2]),
     /// 2 m zeta_b w f(k a), if waves break; 2 m.
     excess: Option<Excess>,
     twice_m: f64,
@@ -178,6 +191,7 @@ impl Drag {
             tilt2: ZERO,
             speed2: ZERO,
             speed: ZERO,
+            instant: (Law::new(tank, n), [m, l]),
             excess: Breaking::new(tank, n).map(Excess::new),
             twice_m: 2.0 * m,
             grows: tank.zeta_amplitude[n] > 0.0 || tank.zeta_breaking[n] > 0.0,
@@ -225,6 +239,111 @@ impl Drag {
         }
         self.c[n]
     }
+
+    /// Returns the time over which the series of c converge reliably, s, from coefficients 0 to 2.
+    ///
+    /// The roots in a_+ and in A have singularities where x = +-i a_f and where w^2 A^2 = 0. Thrust that crosses zero
+    /// passes close by the first. On both sides a_+ is almost linear in x, or almost 0, so its coefficients do not show
+    /// the singularity.
+    pub fn convergence_radius(&self) -> f64 {
+        let [_, slope, bend] = [0, 1, 2].map(|n| self.x[n].abs());
+        let mut time = time_within(self.root[0], slope, bend);
+        if self.grows {
+            let [distance, slope, bend] = [0, 1, 2].map(|n| self.speed2[n].abs());
+            time = time.min(time_within(distance, slope, bend));
+        }
+        let excess = self.excess.as_ref().map_or(f64::INFINITY, Excess::convergence_radius);
+        SHARE_OF_RADIUS * time.min(excess)
+    }
+
+    /// Returns the difference, 1/s, that c/m by its series up to order n has from c/m at that instant, `h` after the
+    /// start of the expansion.
+    pub fn defect(&self, n: usize, h: f64) -> f64 {
+        let (law, size) = self.instant;
+        let [x, c] = values([&self.x, &self.c], n, h);
+        let [mut tilt2, mut rate2] = [0.0; 2];
+        if self.grows {
+            let [w2, speed2, tilt] = values([&self.w2, &self.speed2, &self.tilt2], n, h);
+            (tilt2, rate2) = (tilt.max(0.0), (speed2 - w2 * tilt).max(0.0));
+        }
+        (law.coefficient(size, None, x, || [tilt2, rate2]) - c).abs() / size[0]
+    }
+}
+
+/// The law of one mode at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Law {
+    law: DampingLaw,
+    zeta: f64,
+    zeta_amplitude: f64,
+    breaking: Option<Breaking>,
+    k: f64,
+    g_ref: f64,
+    /// a_f
+    floor: f64,
+    follows: bool,
+}
+
+impl Law {
+    /// Creates the law of mode `n` of a tank.
+    pub fn new(tank: &Tank, n: usize) -> Law {
+        Law {
+            law: tank.damping_law,
+            zeta: tank.zeta[n],
+            zeta_amplitude: tank.zeta_amplitude[n],
+            breaking: Breaking::new(tank, n),
+            k: tank.k[n],
+            g_ref: tank.g_ref,
+            floor: tank.smallest_acceleration(),
+            follows: tank.follows(n),
+        }
+    }
+
+    /// Returns c at mass m and length l, from x and from [angle^2 + A_0^2, |p'|^2]. `zeta` replaces the mode's own damping
+    /// ratio.
+    #[inline(always)]
+    fn coefficient<T: Number>(
+        &self,
+        [m, l]: [T; 2],
+        zeta: Option<T>,
+        x: T,
+        motion: impl FnOnce() -> [T; 2],
+    ) -> T {
+        let stiffness = m.recip() * self.k;
+        let reference = (l.recip() * self.g_ref + stiffness).sqrt();
+        // Evaluated in the order of `Tank::drag`, so that a constant c is bit-identical.
+        let viscous = match zeta {
+            Some(zeta) => m * reference * (zeta * 2.0),
+            None => m * reference * (2.0 * self.zeta),
+        };
+        if !self.follows {
+            return viscous;
+        }
+        let floor = self.floor;
+        let root = (x * x + T::constant(floor * floor)).sqrt();
+        let above = if x.value() >= 0.0 {
+            (x + root) * 0.5
+        } else {
+            T::constant(0.5 * floor * floor) / (root - x)
+        };
+        let w = (above / l + stiffness).sqrt();
+        let viscous = match self.law {
+            DampingLaw::Laminar => viscous * (w / reference).sqrt(),
+            DampingLaw::ConstantRatio => viscous * (w / reference),
+            DampingLaw::Constant => viscous,
+        };
+        if self.zeta_amplitude == 0.0 && self.breaking.is_none() {
+            return viscous;
+        }
+        let [amplitude2, rate2] = motion();
+        let speed = (w * w * amplitude2 + rate2).sqrt();
+        let c = viscous + m * speed * (2.0 * self.zeta_amplitude);
+        let Some(Breaking { zeta, begins, root, steepness }) = self.breaking else { return c };
+        let steep = speed * steepness;
+        let above = steep - w * begins;
+        let divisor = (above * above + w * w * (CORNER * CORNER)).sqrt() + w * root;
+        c + m * steep * (T::constant(1.0) + (above - w * begins) / divisor) * zeta
+    }
 }
 
 /// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and |p'|^2. `zeta` replaces
@@ -232,44 +351,11 @@ impl Drag {
 pub fn coefficient<T: Number>(
     tank: &Tank,
     n: usize,
-    [m, l]: [T; 2],
+    size: [T; 2],
     zeta: Option<T>,
     x: T,
     [chord2, rate2]: [T; 2],
 ) -> T {
-    let stiffness = m.recip() * tank.k[n];
-    let reference = (l.recip() * tank.g_ref + stiffness).sqrt();
-    // Evaluated in the order of `Tank::drag`, so that a constant c is bit-identical.
-    let viscous = match zeta {
-        Some(zeta) => m * reference * (zeta * 2.0),
-        None => m * reference * (2.0 * tank.zeta[n]),
-    };
-    if !tank.follows(n) {
-        return viscous;
-    }
-    let floor = tank.smallest_acceleration();
-    let root = (x * x + T::constant(floor * floor)).sqrt();
-    let above = if x.value() >= 0.0 {
-        (x + root) * 0.5
-    } else {
-        T::constant(0.5 * floor * floor) / (root - x)
-    };
-    let w = (above / l + stiffness).sqrt();
-    let viscous = match tank.damping_law {
-        DampingLaw::Laminar => viscous * (w / reference).sqrt(),
-        DampingLaw::ConstantRatio => viscous * (w / reference),
-        DampingLaw::Constant => viscous,
-    };
-    let breaking = Breaking::new(tank, n);
-    if tank.zeta_amplitude[n] == 0.0 && breaking.is_none() {
-        return viscous;
-    }
-    let amplitude2 = angle::squared(chord2) + T::constant(SMALLEST * SMALLEST);
-    let speed = (w * w * amplitude2 + rate2).sqrt();
-    let c = viscous + m * speed * (2.0 * tank.zeta_amplitude[n]);
-    let Some(Breaking { zeta, begins, root, steepness }) = breaking else { return c };
-    let steep = speed * steepness;
-    let above = steep - w * begins;
-    let divisor = (above * above + w * w * (CORNER * CORNER)).sqrt() + w * root;
-    c + m * steep * (T::constant(1.0) + (above - w * begins) / divisor) * zeta
+    let motion = || [angle::squared(chord2) + T::constant(SMALLEST * SMALLEST), rate2];
+    Law::new(tank, n).coefficient(size, zeta, x, motion)
 }

@@ -526,6 +526,25 @@ impl CraftMotion {
         }
     }
 
+    /// Time over which the series of the bobs' drag are valid, s.
+    #[inline(never)]
+    fn drag_convergence_radius(&self) -> f64 {
+        let constrained = self.constrained.iter().map(ConstrainedBob::convergence_radius);
+        self.bobs
+            .iter()
+            .map(Bob::convergence_radius)
+            .chain(constrained)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Error of the bobs' v by the series of their drag, relative to the allowed error.
+    #[inline(never)]
+    fn drag_defect(&self, n: usize, h: f64) -> f64 {
+        let constrained = self.constrained.iter().map(|bob| bob.defect(n, h));
+        let all = self.bobs.iter().map(|bob| bob.defect(n, h)).chain(constrained);
+        all.fold(0.0, f64::max) * self.inv_allowed[2]
+    }
+
     /// Time over which the series of the pivot's dry friction are valid, s.
     #[inline(never)]
     fn friction_convergence_radius(&self) -> f64 {
@@ -612,6 +631,7 @@ impl Motion for CraftMotion {
         if self.any_apart {
             self.set_error_scale_apart(time, allowed, rate);
         }
+        let h = if self.follows { h.min(self.drag_convergence_radius()) } else { h };
         if self.rubbing.is_empty() { h } else { h.min(self.friction_convergence_radius()) }
     }
 
@@ -632,6 +652,11 @@ impl Motion for CraftMotion {
         let body = larger(q * attitude, largest(self.w[n]) * rate);
         let norm = larger(body, larger(v * swing, largest(self.gain[n]) * speed));
         if self.any_apart { larger(norm, self.coefficient_norm_apart(n)) } else { norm }
+    }
+
+    #[inline(always)]
+    fn defect(&self, n: usize, h: f64) -> f64 {
+        if self.follows { self.drag_defect(n, h) } else { 0.0 }
     }
 
     #[inline(always)]

@@ -500,7 +500,8 @@ impl Motion for TankMotion {
         if self.is_apart {
             self.set_error_scale_apart(h.min(SCALE_TIME), allowed);
         }
-        h
+        let constrained = self.constrained.iter().map(ConstrainedBob::convergence_radius);
+        self.bobs.iter().map(Bob::convergence_radius).chain(constrained).fold(h, f64::min)
     }
 
     #[inline(always)]
@@ -509,6 +510,13 @@ impl Motion for TankMotion {
         let norm = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger)
             * self.inv_allowed;
         if self.is_apart { larger(norm, self.coefficient_norm_apart(n)) } else { norm }
+    }
+
+    #[inline(always)]
+    fn defect(&self, n: usize, h: f64) -> f64 {
+        let constrained = self.constrained.iter().map(|bob| bob.defect(n, h));
+        let all = self.bobs.iter().map(|bob| bob.defect(n, h)).chain(constrained);
+        all.fold(0.0, f64::max) * self.inv_allowed
     }
 
     #[inline(always)]

@@ -30,7 +30,7 @@
 //!
 //! A_0, far below any motion of interest, keeps u away from 0, where the root has no power series.
 
-use taylor::series::{Series, ZERO, mul_ramp, sqrt, square};
+use taylor::series::{Series, ZERO, mul_ramp, sqrt, square, time_within, values};
 
 /// A_0, rad.
 const FLOOR: f64 = 1e-4;
@@ -141,6 +141,37 @@ impl Growth {
             return drag + self.gain_breaking * self.expand_breaking(n);
         }
         drag
+    }
+
+    /// Returns the time over which the series converge, s, from coefficients 0 to 2: u = 0, W = 0 and y = +-i delta W^(1/2)
+    /// are singularities.
+    pub fn convergence_radius(&self) -> f64 {
+        let of = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
+        let time = of(self.u[0], &self.u);
+        if self.breaking.zeta == 0.0 {
+            return time;
+        }
+        let [slope, bend] = [1, 2].map(|n| self.excess[n].abs() + ROUNDED * self.omega[n].abs());
+        let corner = time_within(self.rounded[0], slope, bend);
+        time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
+    }
+
+    /// Returns the relative drag `h` after the start of the expansion, from u by its series up to order n and from the
+    /// relative other drag, and the square of the rate W^(1/2) A.
+    pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
+        let u = values([&self.u], n, h)[0].max(0.0);
+        let root = libm::sqrt(u);
+        let mut drag = self.share * other + self.gain * root;
+        let Breaking { onset, steepness, zeta } = self.breaking;
+        if zeta > 0.0 {
+            let w = f64::max(self.w[0] + self.w[1] * h, 0.0);
+            let omega = libm::sqrt(w);
+            let excess = steepness * root - onset * omega;
+            let rounded = libm::sqrt(excess * excess + ROUNDED * ROUNDED * w);
+            let at_rest = libm::hypot(onset, ROUNDED) - onset;
+            drag += self.gain_breaking * (excess + rounded - at_rest * omega);
+        }
+        [drag, u]
     }
 
     /// Returns coefficient n of c_b/(m zeta_b) from that of u^(1/2).

@@ -27,7 +27,7 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use formulas::damping::{covered, miles_ring, motion_at_ring};
 use taylor::number::Number;
-use taylor::series::{Series, ZERO, mul_ramp};
+use taylor::series::{Series, ZERO, mul_ramp, time_within, values};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
 
@@ -204,5 +204,21 @@ impl Baffle {
             (1..=n).map(term).sum::<f64>() / (n as f64 * self.u[0])
         };
         self.share * self.viscous[n] + self.gain * self.root[n]
+    }
+
+    /// Returns the time over which the series converge, s, from coefficients 0 to 2: W = 0 and a bracket of 0 are
+    /// singularities.
+    pub fn convergence_radius(&self) -> f64 {
+        let sum = time_within(self.sum[0], self.sum[1].abs(), self.sum[2].abs());
+        sum.min(time_within(self.w[0], self.w[1].abs(), 0.0))
+    }
+
+    /// Returns the relative drag `h` after the start of the expansion, from the bracket and the viscous drag by their
+    /// series up to order n, and the bracket.
+    pub fn drag_at(&self, n: usize, h: f64) -> [f64; 2] {
+        let [sum, viscous] = values([&self.sum, &self.viscous], n, h);
+        let (sum, w) = (sum.max(0.0), f64::max(self.w[0] + self.w[1] * h, 0.0));
+        let root = libm::sqrt(libm::sqrt(w * sum));
+        [self.share * viscous + self.gain * root, sum]
     }
 }

@@ -469,6 +469,11 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         let motion = &self.motion;
         let h = h.min(motion.law.convergence_radius(&motion.hub.omega));
         let h = if self.varies() { h.min(motion.hub.damping_reach) } else { h };
+        let h = if self.varies() && motion.with_amplitude {
+            self.modes.iter().map(|mode| mode.pendulum().convergence_radius()).fold(h, f64::min)
+        } else {
+            h
+        };
         // The hub's rate passes zero many times; its error scale must not.
         let [w, w_d] = [motion.hub.omega[0], motion.hub.omega[1]].map(f64::abs);
         let hub = RATE_FLOOR + w + w_d * h.min(0.1);
@@ -502,6 +507,15 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     #[inline(always)]
     fn highest_order(&self) -> usize {
         if self.varies() { RAMP_ORDER } else { ORDER }
+    }
+
+    #[inline(always)]
+    fn defect(&self, n: usize, h: f64) -> f64 {
+        if !(self.varies() && self.motion.with_amplitude) {
+            return 0.0;
+        }
+        let all = self.modes.iter().map(|mode| mode.pendulum().defect(n - 1, h));
+        all.fold(0.0, larger) / self.allowed[1]
     }
 
     /// The hub comes to rest or breaks away.

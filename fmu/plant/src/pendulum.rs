@@ -4,7 +4,7 @@ use alloc::format;
 use alloc::string::String;
 
 use taylor::number::Number;
-use taylor::series::{Series, ZERO, mul, mul_ramp};
+use taylor::series::{Series, ZERO, mul, mul_ramp, values};
 
 use crate::amplitude::Growth;
 use crate::baffle::Baffle;
@@ -13,6 +13,9 @@ use crate::parameters::Init;
 /// Largest angle between the start of mode 1 and its direction, rad, as rounding of decimals causes
 /// it.
 const ALONG: f64 = 1e-6;
+
+/// Largest step as a share of the time to the nearest singularity of the drag's power series.
+const SHARE_OF_RADIUS: f64 = 0.5;
 
 /// One slosh mode as a pendulum with its hinge on the tank's axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,6 +123,32 @@ impl Pendulum {
         let Pendulum { baffle, growth, .. } = self;
         let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
         self.course[n] = if growth.acts { growth.expand(n, at, other) } else { other };
+    }
+
+    /// Returns the time over which the series of the amplitude-dependent drag converge reliably, s, from coefficients 0 to
+    /// 2.
+    pub fn convergence_radius(&self) -> f64 {
+        let baffle =
+            if self.baffle.zeta > 0.0 { self.baffle.convergence_radius() } else { f64::INFINITY };
+        let growth =
+            if self.growth.acts { self.growth.convergence_radius() } else { f64::INFINITY };
+        SHARE_OF_RADIUS * baffle.min(growth)
+    }
+
+    /// Returns the error of the bob's rate, rad/s, that the series of its amplitude-dependent drag cause up to order n and
+    /// `h` after the start of the expansion.
+    pub fn defect(&self, n: usize, h: f64) -> f64 {
+        let Pendulum { baffle, growth, course, .. } = self;
+        let [mut drag, mut rate2] = [0.0; 2];
+        if baffle.zeta > 0.0 {
+            [drag, rate2] = baffle.drag_at(n, h);
+        }
+        if growth.acts {
+            let other = if baffle.zeta > 0.0 { drag } else { values([&growth.viscous], n, h)[0] };
+            [drag, rate2] = growth.drag_at(n, h, other);
+        }
+        let off = (drag - values([course], n, h)[0]).abs();
+        self.c_m * off * libm::sqrt(rate2) * h
     }
 
     /// Returns true if the bob moves in another direction than the tangent.

@@ -37,6 +37,10 @@ const DECAY: f64 = 0.1;
 /// Tolerance of a predicted term over that of a computed term.
 const PREDICTED_SHARE: f64 = 0.25;
 
+/// Largest defect of a step over the allowed error of its terms. A step with a larger one is repeated with half the
+/// length.
+const DEFECT: f64 = 10.0;
+
 /// Number of internal steps that one call may take, and number taken.
 #[derive(Clone, Copy, Debug)]
 pub struct Steps {
@@ -133,6 +137,13 @@ pub trait Motion {
     #[inline(always)]
     fn highest_order(&self) -> usize {
         ORDER
+    }
+
+    /// Returns the error at `h` after the start of the expansion, relative to the allowed error, that functions with
+    /// rounded corners have by their series up to order n: the difference from their values at the motion's end.
+    #[inline(always)]
+    fn defect(&self, _n: usize, _h: f64) -> f64 {
+        0.0
     }
 
     /// Returns the time of the first event within `h` after the start of the expansion, from the
@@ -256,7 +267,11 @@ pub fn advance<M: Motion>(
         steps.count(1, begin + t)?;
         motion.start(t);
         let left = h - t;
-        let (n, length) = expand(motion, left, tolerance);
+        let (n, mut length) = expand(motion, left, tolerance);
+        while motion.defect(n, length) > DEFECT {
+            length /= 2.0;
+            steps.count(1, begin + t)?;
+        }
         // An event may be due immediately.
         let (length, moves) = match motion.event(n, length) {
             Some(event) => (event, event.is_finite()),

@@ -381,6 +381,24 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
     Solution { a, w_d, p_dd, wrench }
 }
 
+/// Rates of attitude, angular velocity, directions and their rates; the others are 0.
+pub(super) fn newton_rates(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [f64; STATES] {
+    let (now, mut rate) = (solve(p, x, u), [0.0; STATES]);
+    let w = &x[index::OMEGA..];
+    let turned = Quaternion::new(x[0], x[1], x[2], x[3]) * Quaternion::new(0.0, w[0], w[1], w[2]);
+    rate[..4].copy_from_slice(&[turned.w, turned.i, turned.j, turned.k].map(|x| x / 2.0));
+    rate[index::OMEGA..][..3].copy_from_slice(now.w_d.as_slice());
+    let mut bobs = now.p_dd.iter();
+    for i in 0..p.tanks {
+        for n in 0..p.tank[i].modes {
+            let at = index::bob(i, n);
+            rate[at..at + 3].copy_from_slice(&x[at + 3..at + 6]);
+            rate[at + 3..at + 6].copy_from_slice(bobs.next().unwrap().as_slice());
+        }
+    }
+    rate
+}
+
 /// A random craft at a random state with bobs anywhere on their spheres.
 fn anywhere(seed: u64) -> (Random, Parameters, [f64; STATES], Inputs) {
     anywhere_with(seed, |_, _| {})

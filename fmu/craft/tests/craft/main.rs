@@ -7,6 +7,7 @@ mod balances;
 mod ball;
 mod ball_on_host;
 mod component;
+mod corners;
 mod decays;
 mod draining;
 mod equations;

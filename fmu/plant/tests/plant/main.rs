@@ -3,6 +3,7 @@
 mod balances;
 mod changing_g;
 mod common;
+mod corners;
 mod decays;
 mod directions;
 mod errata;
