@@ -54,7 +54,7 @@
 
 use taylor::number::Number;
 use taylor::root::first_root;
-use taylor::series::{Series, ZERO};
+use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{self, Vector, ZERO_VECTOR};
 use taylor::vector::{
     Mat3, Vec3, add, constant, cross, dot, largest, part, rotation, scale, sub, times,
@@ -77,6 +77,11 @@ const RESTING: f64 = 1e-9;
 /// Value of f'' below which nothing presses the lump to the wall, 1/s2, relative to the terms of
 /// f''.
 const PRESSING: f64 = 1e-9;
+/// Distance over which the slope of an event function at an event is taken, relative to the event's time.
+const NEAR: f64 = 1e-6;
+/// Largest change of an event's time in an iteration, relative to it, and number of iterations.
+const FAR: f64 = 0.1;
+const ITERATIONS: usize = 4;
 /// Square of the sine of 30 degrees, the largest swing at which the pendulums take over the liquid.
 const SWING: f64 = 0.25;
 
@@ -95,6 +100,23 @@ pub(crate) enum Due {
     Settle,
     /// A condition has changed that is not sufficient alone.
     Look,
+}
+
+/// Function that crosses zero at an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Crossing {
+    /// A function whose series is as exact as the motion's: the wall force, the bobs' mean cosine, or none.
+    Exact,
+    /// f
+    Contact,
+    /// Specific force along the axis over its lower limit.
+    Axial,
+    /// Half of the derivative of the square of the distance from the axis.
+    Passage,
+    /// Wall force over that for drag.
+    Excess,
+    /// A condition of [`Lump::settling`].
+    Settling(usize),
 }
 
 /// The directions of a tank's bobs, tank axes.
@@ -660,38 +682,124 @@ impl Lump {
         &self,
         n: usize,
         h: f64,
-        [a, w, w_d]: [&Vector; 3],
+        motion: [&Vector; 3],
         bobs: impl Iterator<Item = &'a Bob>,
     ) -> Option<(f64, Due)> {
+        let (t, due, crossing) = self.next_crossing(n, h, motion, bobs)?;
+        Some((self.polish(t, n, h, motion, crossing), due))
+    }
+
+    /// Returns time, event and event function of [`Lump::next`], with products of series up to order n.
+    fn next_crossing<'a>(
+        &self,
+        n: usize,
+        h: f64,
+        [a, w, w_d]: [&Vector; 3],
+        bobs: impl Iterator<Item = &'a Bob>,
+    ) -> Option<(f64, Due, Crossing)> {
         match self.state {
             BallState::Settled => {
                 let mut above = self.axial(n, a, w, w_d);
                 above[0] -= self.lowest;
                 let first = first_root(&above[..n], h);
                 let upright = self.upright(bobs, n);
-                let leave = earlier(first, first_root(&upright[..=n], first.unwrap_or(h)));
-                leave.map(|t| (t, Due::Leave))
+                let second = first_root(&upright[..=n], first.unwrap_or(h));
+                match (first, second) {
+                    (_, Some(t)) => Some((t, Due::Leave, Crossing::Exact)),
+                    (first, None) => first.map(|t| (t, Due::Leave, Crossing::Axial)),
+                }
             }
-            BallState::Flying => self.next_contact(n, h).map(|t| (t, Due::Impact)),
+            BallState::Flying => {
+                self.next_contact(n, h).map(|t| (t, Due::Impact, Crossing::Contact))
+            }
             BallState::Sliding | BallState::Light | BallState::Held => {
-                let mut first = first_root(&self.pull[..n], h).map(|t| (t, Due::Release));
-                let mut sooner = |due: Option<(f64, Due)>| {
-                    if let Some((t, _)) = due
-                        && first.is_none_or(|(first, _)| t < first)
+                let mut first =
+                    first_root(&self.pull[..n], h).map(|t| (t, Due::Release, Crossing::Exact));
+                let mut sooner = |due: Option<(f64, Due, Crossing)>| {
+                    if let Some((t, ..)) = due
+                        && first.is_none_or(|(first, ..)| t < first)
                     {
                         first = due;
                     }
                 };
                 match self.state {
-                    BallState::Held => sooner(self.next_passage(n, h).map(|t| (t, Due::Settle))),
+                    BallState::Held => {
+                        sooner(self.next_passage(n, h).map(|t| (t, Due::Settle, Crossing::Passage)))
+                    }
                     _ => sooner(self.next_settling(n, h, [a, w, w_d])),
                 }
                 if self.state == BallState::Light {
                     let rise = rise(&self.excess(n), n, h);
-                    sooner(rise.map(|t| (t, Due::Drag)));
+                    sooner(rise.map(|t| (t, Due::Drag, Crossing::Excess)));
                 }
                 first
             }
+        }
+    }
+
+    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of series is up
+    /// to 2^k times those of its factors, so the series up to order n is less exact than the motion, from whose values
+    /// at the event this time comes.
+    fn polish(
+        &self,
+        mut t: f64,
+        n: usize,
+        h: f64,
+        motion: [&Vector; 3],
+        crossing: Crossing,
+    ) -> f64 {
+        if crossing == Crossing::Exact || t <= 0.0 {
+            return t;
+        }
+        let value = |t: f64| {
+            let motion = motion.map(|a| space::value(a, n - 1, t));
+            self.after(n, t).crossing(motion, crossing)
+        };
+        let root = t;
+        for _ in 0..ITERATIONS {
+            let (now, before) = (value(t), value(t * (1.0 - NEAR)));
+            // Where the function only touches zero its slope tells nothing.
+            let change = t * NEAR * now;
+            if change.abs() > FAR * t * (before - now).abs() || before == now {
+                return root;
+            }
+            let change = change / (before - now);
+            t = (t + change).min(h);
+            if change.abs() <= NEAR * NEAR * t {
+                break;
+            }
+        }
+        t
+    }
+
+    /// Returns the lump with its motion at `t` as coefficients 0, from the series up to order n.
+    fn after(&self, n: usize, t: f64) -> Lump {
+        let mut then = self.clone();
+        then.rho[0] = space::value(&self.rho, n, t);
+        then.x_0 = add(self.x_0, sub(then.rho[0], self.rho[0]));
+        then.x_d[0] = space::value(&self.x_d, n - 1, t);
+        then.pull[0] = series::values([&self.pull], n - 1, t)[0];
+        let normal = times(&self.d, then.x_0);
+        then.squared[0] = dot(normal, normal);
+        then
+    }
+
+    /// Returns the value of an event function at a, w and w'.
+    fn crossing(&self, motion: [Vec3; 3], crossing: Crossing) -> f64 {
+        let [a, w, w_d] = motion.map(|x| {
+            let mut vector = ZERO_VECTOR;
+            vector[0] = x;
+            vector
+        });
+        match crossing {
+            Crossing::Exact => 0.0,
+            Crossing::Axial => self.axial(1, &a, &w, &w_d)[0] - self.lowest,
+            Crossing::Contact => 1.0 - dot(self.x_0, times(&self.d, self.x_0)),
+            Crossing::Passage => {
+                dot(sub(self.x_0, scale(dot(self.e, self.x_0), self.e)), self.x_d[0])
+            }
+            Crossing::Excess => self.excess(1)[0],
+            Crossing::Settling(i) => self.settling(1, &a, &w, &w_d)[i].0[0],
         }
     }
 
@@ -710,23 +818,25 @@ impl Lump {
 
     fn next_contact(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
-        let mut f = ZERO;
-        for (k, f) in f.iter_mut().enumerate().take(n + 1) {
-            *f = -(0..=k).map(|i| dot(x(i), times(&self.d, x(k - i)))).sum::<f64>();
+        // f is exact for the series of x up to order n. Cut at order n, it could miss an impact.
+        let mut f = [0.0; 2 * ORDER + 1];
+        for (k, f) in f.iter_mut().enumerate().take(2 * n + 1) {
+            let term = |i: usize| dot(x(i), times(&self.d, x(k - i)));
+            *f = -(k.saturating_sub(n)..=k.min(n)).map(term).sum::<f64>();
         }
         f[0] += 1.0;
         if f[0] > TOUCHING {
-            return first_root(&f[..=n], h);
+            return first_root(&f[..=2 * n], h);
         }
         if f[1] > RESTING {
-            // The root at 0 is in the past.
-            return first_root(&f[1..=n], h);
+            // The root near 0 is in the past.
+            return first_root(&f[1..=2 * n], h);
         }
         if self.meets_wall([f[0], f[1], f[2]], self.rho[2]) {
             return Some(0.0);
         }
         f[0] = TOUCHING;
-        first_root(&f[..=n], h)
+        first_root(&f[..=2 * n], h)
     }
 
     /// Returns true if a lump on or outside the wall moves or is pressed outwards. `f` has coefficients 0 to 2 of f,
@@ -801,18 +911,28 @@ impl Lump {
         rise(&outwards, n, h)
     }
 
-    fn next_settling(&self, n: usize, h: f64, motion: [&Vector; 3]) -> Option<(f64, Due)> {
-        let [a, w, w_d] = motion;
+    fn next_settling(
+        &self,
+        n: usize,
+        h: f64,
+        [a, w, w_d]: [&Vector; 3],
+    ) -> Option<(f64, Due, Crossing)> {
         let conditions = self.settling(n, a, w, w_d);
-        let lacking = || conditions.iter().filter(|(x, fine)| x[0] <= -fine);
         let (mut first, mut many) = (None, 0);
-        for (x, _) in lacking() {
+        for (i, (x, _)) in conditions.iter().enumerate().filter(|(_, (x, fine))| x[0] <= -fine) {
             many += 1;
             let below = x.map(|x| -x);
-            first = earlier(first, first_root(&below[..n], h));
+            if let Some(t) = first_root(&below[..n], h)
+                && first.is_none_or(|(first, _)| t < first)
+            {
+                first = Some((t, Crossing::Settling(i)));
+            }
         }
         let due = if many == 1 { Due::Settle } else { Due::Look };
-        if many == 0 { Some((0.0, Due::Settle)) } else { first.map(|t| (t, due)) }
+        match many {
+            0 => Some((0.0, Due::Settle, Crossing::Exact)),
+            _ => first.map(|(t, crossing)| (t, due, crossing)),
+        }
     }
 
     /// Returns true if the pendulums may take over the liquid at the start of the expansion.
@@ -862,14 +982,6 @@ fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
     if below[0] > 1e-10 * size { first_root(&below[..n], h) } else { None }
 }
 
-/// Returns the earlier of two optional times.
-fn earlier(a: Option<f64>, b: Option<f64>) -> Option<f64> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if b < a { b } else { a }),
-        (a, b) => a.or(b),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -894,19 +1006,6 @@ mod tests {
         }
         // a host at an event: value above zero or not
         assert_eq!([1e-9, -1e-9].map(|a| rise(&of(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
-    }
-
-    #[test]
-    fn the_earlier_of_two_times_is_the_one_there_is_or_the_smaller() {
-        for (a, b, first) in [
-            (Some(1.0), Some(2.0), Some(1.0)),
-            (Some(2.0), Some(1.0), Some(1.0)),
-            (Some(1.0), None, Some(1.0)),
-            (None, Some(2.0), Some(2.0)),
-            (None, None, None),
-        ] {
-            assert_eq!(earlier(a, b), first);
-        }
     }
 
     /// Detached liquid of the default tank at the bottom, in a surface 2 m high and 2 m wide.

@@ -7,7 +7,8 @@ use crate::series::ORDER;
 const COARSE_STEPS: usize = 200;
 
 /// Returns the first t in (0, h] at which the polynomial `a`, positive at t = 0, has
-/// fallen to zero, and `None` if it stays positive. `a` has at most [`ORDER`] + 1 coefficients.
+/// fallen to zero, and `None` if it stays positive. `a` has at most 2 [`ORDER`] + 1 coefficients, as the product of two
+/// series.
 ///
 /// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t +
 /// s) >= f + f' s - M s^2 / 2. The root of that parabola is a step that cannot pass the first zero.
@@ -68,7 +69,7 @@ fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
         return None;
     }
     loop {
-        let mut about = [0.0; ORDER + 1];
+        let mut about = [0.0; 2 * ORDER + 1];
         let about = &mut about[..a.len()];
         about.copy_from_slice(a);
         // Coefficients of f(t + s) in powers of s.

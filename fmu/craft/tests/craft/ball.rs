@@ -304,6 +304,76 @@ fn the_choice_of_communication_step_does_not_matter() {
     }
 }
 
+/// Thrust of any direction for 20 s and reversed thrust for 20 s, on liquid that bounces and slides. Returns attitude, rate and
+/// liquid every 2 s.
+fn detached(seed: u64, tolerance: f64, step: f64, shift: f64) -> Vec<f64> {
+    let (mut r, mut p) = (Random::new(seed), craft());
+    let (m, ball) = (p.craft.mass, &mut p.tank[0].ball);
+    (ball.restitution, ball.drag) = (r.between(0.0, 0.9), r.between(0.0, 0.5));
+    let mut r = Random::new(seed + 5000);
+    let [x, y] = r.vector(0.05 * m);
+    let force = [x, y, r.between(-0.3, 0.3) * m];
+    let torque = Ramp::held(r.vector(0.01 * m));
+    let inputs = |force| Inputs { force: Ramp::held(force), torque, ..Inputs::default() };
+    let mut craft = Spacecraft::new(&p, &inputs(force), 0.0, tolerance).unwrap();
+    let mut x = craft.continuous_states();
+    x[index::bob(0, 0)] += shift;
+    craft.set_continuous_states(&x);
+    let mut all = Vec::new();
+    for inputs in [inputs(force), inputs(force.map(|f| -f))] {
+        for _ in 0..10 {
+            for _ in 0..(2.0 / step).round() as usize {
+                craft.step(&inputs, step).unwrap();
+            }
+            let x = craft.continuous_states();
+            all.extend_from_slice(&x[index::Q..index::Q + 7]);
+            all.extend_from_slice(&x[index::ball(0)..index::ball(0) + 6]);
+        }
+    }
+    all
+}
+
+/// Returns the largest difference of a value, m, rad, m/s or rad/s.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Compares communication steps of 0.5, 1 and 2 s with steps of 10 ms. Bounces multiply errors: a start that is 1e-9 rad off ends
+/// up to 50,000 times as far away. The difference is a tenth of the tolerance times this growth.
+fn move_alike(seeds: impl Iterator<Item = u64>) {
+    let mut worst: (f64, u64, f64) = (0.0, 0, 0.0);
+    for seed in seeds {
+        let run = |tolerance, step, shift| detached(seed, tolerance, step, shift);
+        let near = apart(&run(1e-12, 1e-2, 1e-9), &run(1e-12, 1e-2, 0.0)) / 1e-9;
+        for tolerance in [1e-6, 1e-9, 1e-12] {
+            let short = run(tolerance, 1e-2, 0.0);
+            for step in [0.5, 1.0, 2.0] {
+                let off = apart(&run(tolerance, step, 0.0), &short);
+                // Rounding.
+                let allowed = (0.1 * tolerance + 1e-12) * near.max(1.0);
+                assert!(off < allowed, "{seed} {tolerance:e} {step} s: {off:e} of {allowed:e}");
+                if off / allowed > worst.0 {
+                    worst = (off / allowed, seed, tolerance);
+                }
+            }
+        }
+    }
+    println!("worst {:.3} of what is allowed: case {} at {:e}", worst.0, worst.1, worst.2);
+}
+
+/// Impact times came from a product of two series that was cut at their order, and left out how far inside its wall the liquid
+/// starts. Runs with these seeds were off by up to 2e-2 m.
+#[test]
+fn detached_liquid_moves_alike_for_every_communication_step() {
+    move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
+}
+
+#[test]
+#[ignore = "minutes: .ci/run --nightly"]
+fn detached_liquid_of_two_hundred_random_thrusts_moves_alike_for_every_communication_step() {
+    move_alike(0..200);
+}
+
 #[test]
 fn a_ball_regime_whose_liquid_stays_changes_no_bit() {
     let forward = Inputs { torque: Ramp::held([3.0, -2.0, 1.0]), ..thrust(700.0) };
