@@ -53,7 +53,7 @@ static size_t states, indicators;
 
 enum { FINE = 0, FAILED = 2, REFUSED = 3, NOT_A_NUMBER = 4, SILENT = 5, ACCEPTED = 6, TRAP = 10 };
 /* Where in the run it is, for the report. */
-static const char *const stages[] = {"set", "initialise", "read", "step", "differentiate", "integrate"};
+static const char *const stages[] = {"set", "initialise", "read", "step", "differentiate", "integrate", "diverge"};
 static volatile int stage;
 
 /* Ends the process with the kind of the exception and the stage. */
@@ -110,6 +110,43 @@ static void stepping(Instance c, const struct trial *trials, int n)
     }
 }
 
+/* Runs with what is allowed, of these refused; with what is forbidden; with faults. */
+static int runs, refused, others, ended;
+
+/* Whether the FMU has taken a call of a host that diverges; a refusal needs a reason. */
+static int taken(Status status)
+{
+    if (status != OK && !reasons)
+        _exit(SILENT);
+    return status == OK;
+}
+
+/* The host's integration diverges: states grow from any size on until the FMU refuses them. Nothing overflows before, and
+ * what can be read is a number. */
+static void diverge(Instance c, double *x)
+{
+    static double rate[MOST], z[MOST], y[MOST];
+    double size = pow(10, runs % 30);
+    for (;; size *= 3e7) {
+        int event;
+        for (size_t i = 0; i < states; i++)
+            x[i] = (fabs(x[i]) > 1e-3 ? x[i] / fabs(x[i]) : i % 2 ? 1 : -1) * size * (1 + 0.1 * (i % 7));
+        stage = 6;
+        if (!taken(set_states(c, x, states)) || !taken(get_rates(c, rate, states)) ||
+            !taken(get_indicators(c, z, indicators)) || !taken(get_reals(c, references[0], counts[0], y)))
+            return;
+        for (size_t i = 0; i < counts[0]; i++)
+            if (!isfinite(y[i]))
+                _exit(NOT_A_NUMBER);
+        for (int type = 1; type < 4; type++)
+            if (!taken(read_others(c, types[type], references[type], counts[type])))
+                return;
+        if (!taken(derivative(c, unknown, known, y)) || !taken(completed_step(c, &event)) ||
+            !taken(enter_event_mode(c)) || !taken(to_continuous_time(c)))
+            return;
+    }
+}
+
 /* Explicit Euler steps, so short that they do not diverge for long; the host's own sums are not trapped. A state
  * that has grown beyond 1e9 has been made so by the host. */
 static void exchange(Instance c)
@@ -141,6 +178,8 @@ static void exchange(Instance c)
         differentiate(c, MODEL_EXCHANGE);
         stage = 5;
     }
+    stage = 6;
+    diverge(c, x);
 }
 
 static Instance initialised(int kind, int scene, const struct trial *trials, int n)
@@ -172,6 +211,9 @@ static void allowed(int kind, int scene, const struct trial *trials, int n)
         stepping(c, trials, n);
     else
         exchange(c);
+    /* what has diverged may not be ended */
+    if (kind == MODEL_EXCHANGE && reasons)
+        _exit(FINE);
     accepted(terminate(c));
     free_instance(c);
     _exit(FINE);
@@ -194,9 +236,6 @@ static void forbidden(int kind, int scene, const struct trial *trials, int n)
     initialised(kind, scene, trials, n);
     _exit(ACCEPTED);
 }
-
-/* Runs with what is allowed, of these refused; with what is forbidden; with faults. */
-static int runs, refused, others, ended;
 
 /* One run in a process of its own. */
 static void run(void (*what)(int, int, const struct trial *, int), int scene, const struct trial *trials, int n)

@@ -21,8 +21,9 @@ use crate::version::Version;
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 /// The tolerances that a host can ask for.
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
-/// The size that a continuous state may not reach.
-pub const MAX_STATE: f64 = 1e100;
+/// The size that a continuous state may not reach: powers and products of states overflow beyond it, although no such motion is
+/// one.
+pub const MAX_STATE: f64 = 1e30;
 
 /// An instance of an FMU, for hosts that speak a version of FMI.
 ///
@@ -361,10 +362,10 @@ impl<M: Model, V: Version> Instance<M, V> {
                 Ok(Value::Real(model.continuous_states()[place(scalar.element)]))
             }
             (None, Access::Output(get), _, Some(outputs)) => {
-                Ok(Value::Real(get(outputs, scalar.element)))
+                finite(call, scalar, get(outputs, scalar.element))
             }
             (None, Access::Output(get), Some(_), None) => {
-                Ok(Value::Real(get(self.outputs(call)?, scalar.element)))
+                finite(call, scalar, get(self.outputs(call)?, scalar.element))
             }
             _ => self.get_any(call, scalar),
         }
@@ -391,20 +392,20 @@ impl<M: Model, V: Version> Instance<M, V> {
             return Ok(Value::Real(self.model(call)?.continuous_states()[place]));
         }
         Ok(match scalar.access {
-            Access::Calculated(get) => Value::Real(get(self.model(call)?, element)),
+            Access::Calculated(get) => finite(call, scalar, get(self.model(call)?, element))?,
             Access::Derivative(place) => {
                 let mut x_dot = std::mem::take(&mut self.scratch[0]);
                 let done = self.query(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
                 let value = x_dot[place(element)];
                 self.scratch[0] = x_dot;
                 done?;
-                Value::Real(value)
+                finite(call, scalar, value)?
             }
             Access::OfInputs(get) => {
                 let inputs = self.inputs;
-                Value::Real(get(self.model(call)?, &inputs, element)[0])
+                finite(call, scalar, get(self.model(call)?, &inputs, element)[0])?
             }
-            Access::Output(get) => Value::Real(get(self.outputs(call)?, element)),
+            Access::Output(get) => finite(call, scalar, get(self.outputs(call)?, element))?,
             Access::OutputInteger(_) | Access::OutputBoolean(_)
                 if let Some(shown) = self.shown.get(scalar.slot)
                     && self.is_running() =>
@@ -547,7 +548,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         let is_input = matches!(scalar.access, Access::Input(_));
         if V::SETS_STATES && scalar.state.is_some() && self.takes_states() {
             return match value {
-                Value::Real(x) if x.abs() < MAX_STATE => Ok(scalar),
+                Value::Real(x) if is_finite(x) && x.abs() < MAX_STATE => Ok(scalar),
                 _ => Err(call.discard(state_refusal(scalar, value))),
             };
         }
@@ -739,6 +740,12 @@ impl<M: Model, V: Version> Instance<M, V> {
                         )));
                     }
                 };
+                if !is_finite(*answer) {
+                    let (name, answer) = (scalar.name(), text(*answer));
+                    return Err(call.error(format_args!(
+                        "the derivative of {name} is {answer}: states, inputs or the direction are too large"
+                    )));
+                }
             }
             Ok(())
         });
@@ -1148,7 +1155,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         let places = self.places();
         check_length(call, "nx", states.len(), places.len())?;
         for (place, x) in places.zip(states) {
-            let is_state = x.abs() < MAX_STATE; // NaN is not
+            let is_state = is_finite(*x) && x.abs() < MAX_STATE;
             if !is_state {
                 let name = M::table().state_at(place).map_or("a state".into(), Scalar::name);
                 return Err(call.discard(format_args!(
@@ -1192,9 +1199,12 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.scratch[0] = x_dot;
         done?;
         for (x, place) in derivatives.iter().zip(self.places()) {
-            if !x.is_finite() {
-                let name = M::table().state_at(place).map_or("a state".into(), Scalar::name);
-                return Err(call.discard(format_args!("der({name}) = {}", text(*x))));
+            if !is_finite(*x) {
+                let mut all = M::table().places().zip(M::table().derivatives());
+                let name = all
+                    .find(|(of, _)| *of == place)
+                    .map_or("a derivative".into(), |(_, d)| d.name());
+                return Err(call.discard(format_args!("{name} = {}", text(*x))));
             }
         }
         Ok(())
@@ -1208,7 +1218,15 @@ impl<M: Model, V: Version> Instance<M, V> {
             None => M::table().about.event_indicators,
         };
         check_length(call, "ni", indicators.len(), count)?;
-        self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
+        self.query(call, |model, inputs| model.event_indicators(inputs, indicators))?;
+        match indicators.iter().position(|z| !is_finite(*z)) {
+            Some(n) => Err(call.discard(format_args!(
+                "event indicator {} = {}: states or inputs are too large",
+                n + 1,
+                text(indicators[n])
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Functions that cross zero at events, for a call that reads variables.
@@ -1293,6 +1311,15 @@ impl<M: Model, V: Version> Instance<M, V> {
         });
         let mut model = made.map_err(|problems| call.error(problems.join("; ")))?;
         model.set_time(self.clock.now());
+        let problems: Vec<String> = M::table()
+            .places()
+            .filter_map(|place| {
+                start_problem(M::table().state_at(place)?, model.continuous_states()[place])
+            })
+            .collect();
+        if !problems.is_empty() {
+            return Err(call.error(problems.join("; ")));
+        }
         self.model = Some(model);
         Ok(())
     }
@@ -1393,6 +1420,25 @@ fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
     }
 }
 
+/// Returns a computed number as a value, if it is one.
+#[inline(always)]
+fn finite<M: Model>(call: &Call, scalar: &Scalar<M>, x: f64) -> Result<Value, Fault> {
+    if is_finite(x) { Ok(Value::Real(x)) } else { Err(not_finite(call, scalar, x)) }
+}
+
+#[cold]
+fn not_finite<M: Model>(call: &Call, scalar: &Scalar<M>, x: f64) -> Fault {
+    let known: Vec<String> = scalar.depends_on().take(6).map(Scalar::name).collect();
+    let more = if scalar.depends_on().count() > known.len() { ", ..." } else { "" };
+    call.error(format_args!(
+        "{} = {}: what it is computed from is too large ({}{more}). Check initial values, inputs and parameters; in Model \
+         Exchange take shorter steps",
+        scalar.name(),
+        text(x),
+        known.join(", ")
+    ))
+}
+
 #[cold]
 fn state_refusal<M: Model>(scalar: &Scalar<M>, value: Value) -> String {
     let value = match value {
@@ -1400,6 +1446,20 @@ fn state_refusal<M: Model>(scalar: &Scalar<M>, value: Value) -> String {
         other => format!("{other:?}"),
     };
     format!("{} = {value} (allowed: magnitudes below {MAX_STATE:e})", scalar.name())
+}
+
+/// Why a state cannot have this value at the start.
+fn start_problem<M: Model>(scalar: &Scalar<M>, x: f64) -> Option<String> {
+    if is_finite(x) && x.abs() < MAX_STATE {
+        return None;
+    }
+    let known: Vec<String> = scalar.initial_depends_on().map(Scalar::name).collect();
+    Some(format!(
+        "{} = {} at the start (allowed: magnitudes below {MAX_STATE:e}); it follows from {}",
+        scalar.name(),
+        text(x),
+        known.join(", ")
+    ))
 }
 
 /// Takes the inputs to where their slopes lead in `h`, which is in their ranges. The host knows `h` to the `resolution` of time.

@@ -23,7 +23,7 @@ pub const RATE_FLOOR: f64 = 1e-6;
 
 /// Largest magnitude of a state. Above it energies and forces may overflow although the states do
 /// not.
-pub const MAX_MAGNITUDE: f64 = 1e100;
+pub const MAX_MAGNITUDE: f64 = 1e30;
 
 /// Longest expansion, s, so that its powers up to the highest order do not overflow.
 const LONGEST: f64 = 1e9;

@@ -49,23 +49,23 @@ fn arrays_of_another_length_are_refused() {
 #[test]
 fn states_that_are_too_large_are_discarded() {
     let mut instance = continuous(&[]);
-    for x in [f64::NAN, f64::INFINITY, 1e100, -1e100] {
+    for x in [f64::NAN, f64::INFINITY, 1e30, -1e30] {
         let before = to_bytes(&instance);
         let why = discarded(instance.set_continuous_states(&[1.0, x]));
         let x = if x.is_nan() { "NaN".into() } else { format!("{x:?}") };
         assert_eq!(
             why,
-            format!("fmi2SetContinuousStates: level[2] = {x} (allowed: magnitudes below 1e100)")
+            format!("fmi2SetContinuousStates: level[2] = {x} (allowed: magnitudes below 1e30)")
         );
         assert_eq!(to_bytes(&instance), before);
     }
-    assert_eq!(instance.set_continuous_states(&[0.99e100, -0.99e100]), Ok(()));
+    assert_eq!(instance.set_continuous_states(&[0.99e30, -0.99e30]), Ok(()));
 }
 
 #[test]
 fn derivatives_that_are_not_finite_are_discarded() {
     let mut instance = continuous(&[("leak", 1e300)]);
-    instance.set_continuous_states(&[0.0, 1e99]).unwrap();
+    instance.set_continuous_states(&[0.0, 1e29]).unwrap();
     let mut x = [0.0; 2];
     assert_eq!(discarded(instance.derivatives(&mut x)), "fmi2GetDerivatives: der(level[2]) = -inf");
 }

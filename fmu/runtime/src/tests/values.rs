@@ -253,3 +253,18 @@ fn after_a_step_that_failed_the_last_values_can_be_read() {
     assert_eq!(real(&mut instance, "sum"), 7.0);
     assert!(unchanged(&mut instance, |i| set(i, "z", 1.0)).contains("state \"step failed\""));
 }
+
+/// A leak of 1e300 1/s empties a level of 1e20 m at a rate that no number holds.
+#[test]
+fn what_is_no_number_is_an_error_that_names_it_and_what_it_is_computed_from() {
+    let mut instance = started(ME, &[]);
+    instance.enter_event_mode().unwrap();
+    set(&mut instance, "leak", 1e300).unwrap();
+    instance.enter_continuous_time_mode().unwrap();
+    instance.set_continuous_states(&[1e20, 1.0]).unwrap();
+    let why = refused(get(&mut instance, "net[1]"));
+    assert!(why.contains("net[1] = -inf") && why.contains("level[1]"), "{why}");
+    let why = refused(get(&mut instance, "der(level[1])"));
+    assert!(why.contains("der(level[1]) = -inf"), "{why}");
+    assert!(instance.derivatives(&mut [0.0; 2]).is_err());
+}

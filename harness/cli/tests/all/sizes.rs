@@ -110,15 +110,8 @@ fn sizes_0_and_1_give_a_result_or_one_error() {
     prepare(folder);
     let mut commands = Vec::new();
     for command in COMMANDS.lines().filter(|line| !line.is_empty()) {
-        const OF_FMUS: [&str; 7] = [
-            "analyse",
-            "campaign",
-            "design",
-            "gyro --hours",
-            "identify",
-            "run",
-            "view",
-        ];
+        const OF_FMUS: [&str; 7] =
+            ["analyse", "campaign", "design", "gyro --hours", "identify", "run", "view"];
         let takes_fmu = OF_FMUS.iter().any(|begin| command.starts_with(begin));
         let ours = takes_fmu && !command.contains("--fmu");
         let recordings = if command.contains("Model3") { "small" } else { "rows" };
