@@ -324,7 +324,7 @@ fn a_torque_that_is_no_number_is_named_by_file_and_row() {
         ("time,tau_cmd\n0,1\n1,NaN\n2,0\n", "row 2"),
         ("time,tau_cmd\n0,1\n1,1\n2,inf\n", "row 3"),
         ("time,tau_cmd\n0,1\n1,one\n", "row 2"),
-        ("time,tau_cmd\n0,1\n1,1\n1,1\n", "row 3"),
+        ("time,tau_cmd\n0,1\n1,1\n0.9,1\n", "row 3"),
         ("time,tau_cmd\n0,1\n", "1 rows"),
     ] {
         std::fs::write(directory.join("in.csv"), text).unwrap();
