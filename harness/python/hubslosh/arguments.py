@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .fmu import FmuError
 
-SECONDS: Mapping[str, tuple[float, float]] = {
+SECONDS: dict[str, tuple[float, float]] = {
     "period": (1e-6, 1e6), "delay": (0.0, 1e6), "stop": (1e-9, 1e12),
 }  # fmt: skip
 """Allowed times, s."""
@@ -21,6 +21,9 @@ WHOLE: Mapping[str, tuple[int, int]] = {
     "seed": (0, 2**63 - 1),
 }  # fmt: skip
 """Allowed whole numbers."""
+
+PLAIN: dict[str, tuple[float, float]] = {"largest": (1e-3, 1e3), "sigmas": (1e-3, 1e2)}
+"""Allowed numbers without unit."""
 
 MOST_FILLS = 1000
 """Most fills of a review."""
@@ -47,16 +50,15 @@ def out_of_range(**values: Any) -> list[str]:
     for name, value in values.items():
         is_number = isinstance(value, int | float | np.integer | np.floating)
         is_number &= not isinstance(value, bool)
-        if name in SECONDS:
-            low, high = SECONDS[name]
-            if not (is_number and low <= value <= high):
-                found.append(
-                    f"{name} must be a number of seconds from {low:g} to {high:g}, not {value!r}"
-                )
-        else:
+        if name in WHOLE:
             least, most = WHOLE[name]
             if not (is_number and least <= value <= most and value == int(value)):
                 found.append(f"{name} must be a whole number from {least} to {most}, not {value!r}")
+            continue
+        low, high = (SECONDS | PLAIN)[name]
+        if not (is_number and low <= value <= high):
+            unit = " of seconds" if name in SECONDS else ""
+            found.append(f"{name} must be a number{unit} from {low:g} to {high:g}, not {value!r}")
     return found
 
 

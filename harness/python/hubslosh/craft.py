@@ -16,7 +16,7 @@ from .fmu import Fmu, FmuError, FmuWarning, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import OperatingPoint, rotation, trim
-from .quantities import DELAY, changed, full_names, of_mode
+from .quantities import DELAY, RESERVED, changed, full_names, of_mode
 from .simulation import outputs_of, parameters_of
 from .tanks import (
     Question,
@@ -203,6 +203,12 @@ class Craft:
             problems.append(f"tanks must be up to {MOST_TANKS} MountedTank by name")
         else:
             for name, tank in self.tanks.items():
+                if not isinstance(name, str) or not name or RESERVED.fullmatch(name):
+                    problems.append(
+                        f"a tank cannot have the name {name!r}: parameters of the FMU begin with it"
+                        if isinstance(name, str) and name
+                        else f"the name of a tank must be a text, not {name!r}"
+                    )
                 if not isinstance(tank, MountedTank):
                     problems.append(f"tank {name} must be a MountedTank, not {tank!r}")
                     continue

@@ -24,6 +24,9 @@ KINDS = ("frequency", "zeta", "mass", "bob")
 DELAY = "delay"
 """Delay of a loop, s."""
 
+RESERVED = re.compile(r"tank(\[\d\])?|craft|init|pivot|solver|delay|force|torque|omega|q")
+"""Names that no tank of a `Craft` may have: parameters of the FMU begin with them."""
+
 _OF_A_MODE = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
 _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
 
@@ -49,10 +52,11 @@ def of_mode(name: str) -> OfMode | None:
 
 def full_name(name: str, tanks: Iterable[str]) -> str:
     """Return a name with the number of its tank: ``tank[1].zeta[1]`` for ``NTO.zeta[1]``."""
-    for number, tank in enumerate(tanks, 1):
-        if name.startswith(f"{tank}."):
-            return f"tank[{number}]{name.removeprefix(tank)}"
-    return name
+    found = [(tank, number) for number, tank in enumerate(tanks, 1) if name.startswith(f"{tank}.")]
+    if not found:
+        return name
+    tank, number = max(found, key=lambda row: len(row[0]))
+    return f"tank[{number}]{name.removeprefix(tank)}"
 
 
 def full_names(given: Mapping[str, Quantity], tanks: Iterable[str]) -> dict[str, Quantity]:

@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import floats, names_of
+from .arguments import check_ranges, floats, names_of, out_of_range
 from .fmu import FmuError, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
@@ -669,6 +669,7 @@ class UncertainModel:
         is no proof.
         """
         K = self._controller(loop)
+        check_ranges(largest=largest)
 
         def poles(delta: Matrix) -> NDArray[np.complex128]:
             return _closed(loop._gain(self.at(delta), K))
@@ -869,6 +870,7 @@ def uncertain(
     values = dict(craft.values)
     ranges = dict(ranges or {})
     problems = [_unknown(name, values) for name in ranges if name not in values]
+    problems += out_of_range(sigmas=sigmas)
     of_axes, root = [], np.zeros((0, 0))
     if covariance is not None:
         is_fit = isinstance(covariance, Identification)

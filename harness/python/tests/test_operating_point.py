@@ -181,3 +181,22 @@ def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
     assert again.parameters("50%") == craft.parameters("50%")
     for thing in (loop, review, craft.trim("50%"), craft.uncertain("50%", {"craft.Jxx": "5%"})):
         assert str(pickle.loads(pickle.dumps(thing))) == str(thing)
+
+
+def test_names_of_tanks_do_not_hide_parameters(craft: Craft) -> None:
+    """The longest name counts; names with which parameters of the FMU begin are refused."""
+    tanks = {"A": craft.tanks["NTO"], "A.B": craft.tanks["MMH"]}
+    both = replace(craft, tanks=tanks)
+    values = both.parameters("50%", parameters={"A.B.zeta[1]": 0.07, "A.zeta[1]": 0.03})
+    assert (values["tank[2].zeta[1]"], values["tank[1].zeta[1]"]) == (0.07, 0.03)
+    for name in ("craft", "tank[2]", "init", ""):
+        with pytest.raises(FmuError, match=r"a tank cannot have the name|must be a text"):
+            replace(craft, tanks={name: craft.tanks["NTO"]})
+
+
+@pytest.mark.parametrize("largest", [0, np.nan, 1e9, "3"])
+def test_a_worst_case_has_a_budget(craft: Craft, largest: object) -> None:
+    """The search ends at a multiple of the ranges that makes sense."""
+    model = craft.uncertain("50%", {"craft.Jxx": "5%"})
+    with pytest.raises(FmuError, match=r"largest must be a number from 0\.001 to 1000"):
+        model.worst_case(craft.loop(GAINS, PERIOD, "50%"), largest=largest)
