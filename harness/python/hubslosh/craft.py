@@ -658,8 +658,9 @@ class Craft:
           share of the nominal ones; "nominal" does not vary them. A frequency changes alone: the
           bob stays.
         * ``uncertain``: Ranges by name: (low, high) in SI units, or a share of the nominal value
-          such as "5%". Names as for `parameters`, and "delay". A mode that is named here leaves
-          ``damping`` or ``frequency`` of its tank. ``craft.mass`` changes the acceleration.
+          such as "5%". Names as for `parameters`, and "delay". A mode whose frequency or damping
+          ratio is named here, or whose damping ratio is among ``parameters``, leaves ``frequency``
+          or ``damping`` of its tank. ``craft.mass`` changes the acceleration.
         * ``draws``: Number of random points over all fills, uniform within the ranges.
         * ``seed``: Seed of the draws.
 

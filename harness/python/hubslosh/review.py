@@ -3,7 +3,7 @@
 import os
 import re
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -447,7 +447,9 @@ class _Space:
         for text in said:
             warnings.warn(text, FmuWarning, stacklevel=4)
         ranges = _named(craft, uncertain or {})
-        found = _damping(craft, tanks, ranges) if damping == "interval" else []
+        # a damping ratio that was given has no interval
+        known = {*ranges, *given[0][1]}
+        found = _damping(craft, tanks, known) if damping == "interval" else []
         found += _frequencies(craft, loops, frequency, ranges)
         found += _quantities(loops, [every for every, _ in given], ranges)
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
@@ -513,10 +515,11 @@ def _named(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
     return found
 
 
-def _damping(
-    craft: "Craft", tanks: list[dict[str, Any]], ranges: Mapping[str, Any]
-) -> list[Uncertain]:
-    """Return the damping of each tank, all of whose modes share the error of one correlation."""
+def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str]) -> list[Uncertain]:
+    """Return the damping of each tank, all of whose modes share the error of one correlation.
+
+    given: full names of quantities that have a value or a range of their own.
+    """
     found, known = [], False
     for number, name in enumerate(craft.tanks, 1):
         tables = [of[name].modes if name in of else None for of in tanks]
@@ -527,7 +530,7 @@ def _damping(
                 rows = table[["zeta_low", "zeta", "zeta_high"]].to_numpy().tolist()
             known |= bool(rows)
             here = {f"tank[{number}].zeta[{n}]": tuple(row) for n, row in enumerate(rows, 1)}
-            ends.append({name: row for name, row in here.items() if name not in ranges})
+            ends.append({name: row for name, row in here.items() if name not in given})
         if any(ends):
             found.append(Uncertain(f"damping of {name}", "over its interval", tuple(ends)))
     if craft.tanks and not known:

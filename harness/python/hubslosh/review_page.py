@@ -110,7 +110,7 @@ def _figures(review: "Review") -> Iterator[str]:
     unit = "fill (% of the volume)" if review.unit == "%" else "liquid (kg)"
     yield _figure(
         "How do the margins change as the tanks empty?",
-        "Line: nominal. Band: all points within the uncertainty." + _marked(review),
+        f"Line: nominal. Band: all points within the uncertainty{_marked(review)}.",
         5.6, lambda figure: _margins(figure, review, unit),
     )  # fmt: skip
     if len(review.slosh):
@@ -228,8 +228,8 @@ def _marked(review: "Review") -> str:
     if not bands["unstable"].any():
         return ""
     return (
-        " Of stable points only: an unstable one has no margin. Red lines: fills whose nominal "
-        "point (solid), or others within the uncertainty (dashed), are unstable."
+        " that are stable, since an unstable one has no margin. Red lines: fills whose nominal "
+        "point is unstable (solid), or another one within the uncertainty (dashed)"
     )
 
 
@@ -531,7 +531,7 @@ def _unstable_points(review: "Review") -> str:
 def _range(row: Any, name: str) -> str:
     nominal, low, high = (row[f"{name}_{end}"] for end in ("nominal", "low", "high"))
     if np.isnan(nominal):
-        return "none" if np.isnan(low) else f"– ({low:.3g} to {high:.3g})"
+        return f"– ({low:.3g} to {high:.3g})" if np.isfinite([low, high]).all() else "none"
     if not np.isfinite([low, high]).all():
         return f"{nominal:.3g}" if np.isfinite(nominal) else "none"
     return f"{nominal:.3g} ({low:.3g} to {high:.3g})"

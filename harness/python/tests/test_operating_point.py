@@ -168,6 +168,11 @@ def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
     assert [u.name for u in found.uncertain] == ["frequency of NTO", "frequency of MMH"]
     ends = found.uncertain[0].ends[0]["tank[1].frequency[1]"]
     assert ends == pytest.approx((0.9 * ends[1], ends[1], 1.1 * ends[1]), rel=1e-12)
+    # a damping ratio that was given, or has a range, leaves the interval of its tank's correlation
+    given = {"parameters": {"NTO.zeta[1]": 0.01}, "uncertain": {"MMH.zeta[2]": "5%"}}
+    found = craft.review(GAINS, PERIOD, ["50%"], draws=0, frequency="nominal", **given)
+    assert [u.name for u in found.uncertain] == ["damping of MMH", "MMH.zeta[2]"]
+    assert list(found.uncertain[0].ends[0]) == ["tank[2].zeta[1]"]
     with pytest.raises(FmuError, match=r'frequency must be a share .* such as "10%"'):
         craft.review(GAINS, PERIOD, ["50%"], frequency="10")
 
