@@ -43,7 +43,7 @@ LEFT_OUT = {
     r"python3 -m venv\b": "makes the environment that this script makes",
     r"\. \.venv/bin/activate": "as above",
     r"hubslosh analyse --bench-day (tuesday|target/day)": "a day's logs; tests of `bench_day`",
-    r"(PYTHONPATH=harness/python )?python3? harness/studies/": "studies; tests/python.rs runs their short forms",
+    r"(PYTHONPATH=harness/python )?python3? harness/studies/": "tests/python.rs",
     r"python examples/(6|7|11)_": "needs dask, libcosimpy or bsk; tests/python.rs",
     r"hubslosh identify decay\.csv --tank": "a recording of forces; tests of `force_record`",
     r"hubslosh (identify (a|flight)|design slew)\.csv": "others' recordings; tests of `any_fmu`",
@@ -82,6 +82,7 @@ inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
 run = hubslosh.simulate(parameters={"tank.h": 0.1}, inputs=inputs, outputs=["omega"])
 rate = np.degrees(run["omega"]) + 0.003 * np.random.default_rng(1).standard_normal(len(run))
 run.assign(tau_cmd=torque)[["time", "tau_cmd", "omega"]].to_csv("recording.csv", index=False)
+inputs.to_csv("torque.csv", index=False)
 logs = {"bench": "T_cmd", "bench_050": "T_cmd", "bench_100": "T_cmd", "torque_bench": "T"}
 for name, command in logs.items():
     log = pd.DataFrame({"t": 1e3 * time, command: 1e3 * torque, "gyro_z": rate})
