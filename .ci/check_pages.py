@@ -47,6 +47,7 @@ LEFT_OUT = {
     r"python examples/(6|7|11)_": "needs dask, libcosimpy or bsk; tests/python.rs",
     r"hubslosh identify decay\.csv --tank": "a recording of forces; tests of `force_record`",
     r"hubslosh (identify (a|flight)|design slew)\.csv": "others' recordings; tests of `any_fmu`",
+    r"pytest\b": "tests of the source; tests/python.rs",
     r"hubslosh view .*--video": "needs a browser; .ci/browser",
 }
 """Commands that do not run here, and why."""
@@ -92,7 +93,18 @@ GIVEN = {
     "README.md": RECORDING,
     "book/identification.md": RECORDING
     + "\nimport shutil; shutil.move('torque_bench.csv', 'bench.csv')\n",
-    "book/recordings.md": RECORDING,
+    "book/recordings.md": RECORDING
+    + """
+import subprocess
+for number in ("050", "100"):
+    profile = f"exp-sweep:amplitude=0.{number},f0=1.25,f1=3.5,duration=2700"
+    arguments = ["--profile", profile, "--set", "tank.h=0.1", "--columns", "omega"]
+    subprocess.run(["hubslosh", "run", *arguments, "--out", "sweep.csv"], check=True)
+    sweep = hubslosh.read_table("sweep.csv")
+    table = {"t": 1e3 * sweep["time"], "T_cmd": 1e3 * sweep["tau_cmd"],
+             "gyro_z": np.degrees(sweep["omega"])}
+    pd.DataFrame(table).to_csv(f"bench_{number}.csv", index=False)
+""",
     "book/reader_test.md": RECORDING
     + "\nimport shutil; shutil.move('torque_bench.csv', 'bench.csv')\n",
     "book/first_check.md": """
@@ -129,7 +141,15 @@ sweep = pd.DataFrame({"time": time, "tau_cmd": 0.05 * np.sin(15 * time)})
 """,
     "book/uncertain.md": """
 import sys
+import numpy as np, pandas as pd, hubslosh
 sys.path.insert(0, "examples/14_telecom_satellite")
+known = {"force[3]": 2400.0, "init.omega[1]": 0.0, "init.omega[3]": 0.0}
+time = np.arange(0, 120, 0.1)
+chirp = 30 * np.sin(0.3 * time + 0.004 * time**2)
+inputs = pd.DataFrame({"time": time, "torque[2]": chirp})
+flight = hubslosh.simulate("Spacecraft", known, inputs=inputs, outputs=["omega[2]"])
+flight["omega[2]"] += 1e-5 * np.random.default_rng(1).standard_normal(len(flight))
+flight["torque[2]"] = chirp
 """,
     "book/design_review.md": """
 import sys
