@@ -111,7 +111,9 @@ fn sizes<M: Model>() -> String {
         }
         text += "        ],\n    },\n";
     }
-    format!("\n/// Parameters that size arrays.\npub const SIZES: &[crate::Size] = &[\n{text}];\n")
+    format!(
+        "\n/// Parameters that size arrays.\n#[rustfmt::skip]\npub const SIZES: &[crate::Size] = &[\n{text}];\n"
+    )
 }
 
 /// Returns a name with underscores as Rust writes the name of a variant.

@@ -186,25 +186,28 @@ pub mod solver {
 }
 
 /// Parameters that size arrays.
-pub const SIZES: &[crate::Size] = &[crate::Size {
-    parameter: "slosh.modes",
-    most: 10,
-    has_indicators: false,
-    arrays: &[
-        ("slosh.damping", 0),
-        ("slosh.q_radial", 0),
-        ("slosh.q_tangential", 0),
-        ("slosh.v_radial", 0),
-        ("slosh.v_tangential", 0),
-        ("der(slosh.q_radial)", 0),
-        ("der(slosh.q_tangential)", 0),
-        ("der(slosh.v_radial)", 0),
-        ("der(slosh.v_tangential)", 0),
-        ("slosh.mass", 0),
-        ("slosh.length", 0),
-        ("slosh.frequency", 0),
-    ],
-}];
+#[rustfmt::skip]
+pub const SIZES: &[crate::Size] = &[
+    crate::Size {
+        parameter: "slosh.modes",
+        most: 10,
+        has_indicators: false,
+        arrays: &[
+            ("slosh.damping", 0),
+            ("slosh.q_radial", 0),
+            ("slosh.q_tangential", 0),
+            ("slosh.v_radial", 0),
+            ("slosh.v_tangential", 0),
+            ("der(slosh.q_radial)", 0),
+            ("der(slosh.q_tangential)", 0),
+            ("der(slosh.v_radial)", 0),
+            ("der(slosh.v_tangential)", 0),
+            ("slosh.mass", 0),
+            ("slosh.length", 0),
+            ("slosh.frequency", 0),
+        ],
+    },
+];
 
 enumeration! {
     Regime: Linear = 1 "linear", Transitional = 2 "transitional", Nonlinear = 3 "nonlinear"

@@ -150,6 +150,7 @@ pub mod solver {
 }
 
 /// Parameters that size arrays.
+#[rustfmt::skip]
 pub const SIZES: &[crate::Size] = &[
     crate::Size {
         parameter: "tanks",
