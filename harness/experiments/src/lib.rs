@@ -3,6 +3,7 @@
 pub mod campaign;
 pub mod example;
 pub mod gyro;
+pub mod limits;
 pub mod plan;
 pub mod profile;
 pub mod progress;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use experiments::campaign::{Range, WAVE, stored_columns};
+use experiments::limits::Limits;
 use experiments::profile::{self, SAMPLE, Written};
 use experiments::rest;
 use experiments::run::{self, Run, driven, histories};
@@ -168,11 +169,12 @@ impl RunArgs {
                 "--tension is for the tanks of Spacecraft and SloshTank (the bench's is fluid.sigma)"
             );
         }
+        let limits = Limits::of(description);
         let forces = tanks.iter().flat_map(Tanks::needs).collect::<Vec<_>>();
         let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
         let wave = range.as_ref().map(|_| WAVE);
         let needs = wave.into_iter().chain(forces.iter().map(String::as_str));
-        let columns = run.columns_with(&columns, needs.chain(sensors.needs()));
+        let columns = run.columns_with(&columns, needs.chain(limits.needs()).chain(sensors.needs()));
         // the table, its copy for --columns, and what is written: 25 characters for a number
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64 + run.course_bytes());
@@ -203,6 +205,7 @@ impl RunArgs {
             })
             .flatten()
             .chain(tanks.iter().flat_map(|tanks| tanks.without_weight(&table)))
+            .chain(limits.words(&table))
             .collect();
         let driven = table.names().len() - columns.len();
         let table = sensors.recorded(table, driven + asked, "run", run.step)?;
