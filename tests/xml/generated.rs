@@ -58,7 +58,7 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
 /// Scalar parameters, and those of them that a craft with one tank of one mode has: without further tanks and modes.
 fn parameters<M: Model>() -> [usize; 2] {
     /// Arrays of a tank whose first index is the mode.
-    const OF_MODES: [&str; 22] = [
+    const OF_MODES: [&str; 26] = [
         "mass",
         "length",
         "frequency",
@@ -72,12 +72,16 @@ fn parameters<M: Model>() -> [usize; 2] {
         "breaking_steepness",
         "nonlinear_inertia",
         "nonlinear_stiffness",
+        "angle_limit",
+        "swirl_limit",
         "wave",
         "fill.mass",
         "fill.length",
         "fill.zeta",
         "fill.nonlinear_inertia",
         "fill.nonlinear_stiffness",
+        "fill.angle_limit",
+        "fill.swirl_limit",
         "fill.hinge",
         "p_0",
         "p_dot_0",
