@@ -152,8 +152,8 @@ def rectangular_tanks() -> tuple[list[Row], str]:
         of, found = tank(unit, h, 1)
         slow = frequency(of) / math.sqrt(G)
         # without coefficients (secondary resonance) there is no statement
-        mode = found["finite_amplitude"]["mode"] or {"planar": 0.0, "angle_limit": 0.0}
-        fast = slow * math.sqrt(1 + mode["planar"] * mode["angle_limit"] ** 2)
+        mode = found["finite_amplitude"]["mode"] or {"planar": 0.0, "series_limit": 0.0}
+        fast = slow * math.sqrt(1 + mode["planar"] * mode["series_limit"] ** 2)
         return slow, fast, float(np.sign(mode["planar"]))
 
     unique = {h: band(h) for h in sorted(set(depth))}
