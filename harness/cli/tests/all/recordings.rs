@@ -254,7 +254,7 @@ fn a_recorded_gyro_at_rest_is_characterised() {
     }
     named("t,gyro_dps").unwrap();
     let error = characterise("time=t,omega=gyro_dps").unwrap_err();
-    assert!(error.contains("column t states no unit, and its rows are 20 apart"), "{error}");
+    assert!(error.contains("column t states no unit, and its rows are 20.0 apart"), "{error}");
     named("t_ms,w").unwrap();
     let said = characterise("time=t_ms,omega=w").unwrap();
     assert!(said.contains("omega = w, no unit stated, taken as rad/s"), "{said}");

@@ -549,9 +549,11 @@ fn plausible(time: &[f64]) -> Result<()> {
     if usual == 0.0 {
         usual = (time[time.len() - 1] - time[0]) / steps.len() as f64;
     }
+    // to six digits
+    let shown: f64 = format!("{usual:.5e}").parse().unwrap_or(usual);
     ensure!(
         usual < SLOWEST && (usual > FASTEST || usual <= 0.0),
-        "states no unit, and its rows are {usual} apart (allowed where no unit is stated: between {FASTEST} and {SLOWEST} s)"
+        "states no unit, and its rows are {shown:?} apart (allowed where no unit is stated: between {FASTEST} and {SLOWEST} s)"
     );
     Ok(())
 }

@@ -423,12 +423,14 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
             if factors.is_empty() {
                 factors = read(&parted(text));
             }
+            if factors.is_empty() {
+                continue;
+            }
             // Nm_s is no torque
             let rest = name[from..].trim();
             let continues = !is_last
                 && [false, true].iter().any(|divide| !products(rest, false, *divide).is_empty());
             match factors[..] {
-                [] => continue,
                 [factor] if !continues => found.push(stated(from, to, text, factor)),
                 _ => other = other.or(Some(if continues { rest } else { text })),
             }
