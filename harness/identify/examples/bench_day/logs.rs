@@ -47,6 +47,10 @@ pub struct Day<'a> {
     pub friction: bool,
     /// Slosh models that the report simulates.
     pub models: &'a str,
+    /// Relative difference of the recorder's clock: true times are 1 − clock times those of the logs.
+    pub clock: f64,
+    /// Part of the rows that the logger loses.
+    pub lost: f64,
 }
 
 /// The day of the test: six short sweeps.
@@ -59,6 +63,8 @@ pub const SHORT: Day = Day {
     rest: 600.0,
     friction: true,
     models: "\"linear\"",
+    clock: 0.0,
+    lost: 0.0,
 };
 
 /// The bench with its bearing.
@@ -134,7 +140,11 @@ impl Day<'_> {
                     ((read / GYRO.1).round() * GYRO.1).to_degrees()
                 });
             let angle = motion.angle[k].to_degrees();
-            let _ = writeln!(text, "{};{};{x};{y};{z};{angle:.4}", 20 * k, 1e3 * tau[k]);
+            let is_lost = self.lost > 0.0 && random.uniform() < self.lost;
+            if !is_lost {
+                let time = 20.0 * k as f64 * (1.0 + self.clock);
+                let _ = writeln!(text, "{time};{};{x};{y};{z};{angle:.4}", 1e3 * tau[k]);
+            }
         }
         text
     }

@@ -30,6 +30,8 @@ fn main() -> Result<()> {
         rest: 3600.0,
         friction: true,
         models: "\"linear\", \"spherical\"",
+        clock: 0.0,
+        lost: 0.0,
     };
     let is_short = arguments.next().is_some_and(|word| word == "short");
     Ok(if is_short { logs::SHORT } else { whole }.write(&directory)?)

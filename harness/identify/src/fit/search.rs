@@ -6,6 +6,7 @@
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};
 
+use crate::fit::decomposition::Curvature;
 use crate::fit::minimum::{self, End, SumOfSquares};
 use crate::fit::problem::{Answer, Problem, Step};
 use crate::input::record::Record;
@@ -31,11 +32,18 @@ impl Minimum {
         self.decrement < CONVERGED
     }
 
-    /// The unknowns at a bound beyond which the minimum lies by more than chance: [`PRESSED`] standard deviations that they have if
-    /// the others are held.
+    /// The unknowns at a bound beyond which the minimum lies by more than chance, [`PRESSED`] standard deviations.
     pub fn pressed(&self, problem: &Problem) -> Vec<usize> {
         let (inner, gradient) = (self.inner(problem), self.jacobian.tr_mul(&self.answer.e));
-        let beyond = |j: &usize| gradient[*j].abs() / self.jacobian.column(*j).norm();
+        let picked = self.jacobian.select_columns(&inner);
+        let curvature = Curvature::of(&self.jacobian, &problem.names(), &inner).ok();
+        let beyond = |j: &usize| {
+            let column = self.jacobian.column(*j);
+            // the part of the column that the others cannot take
+            let crossed: DVector<f64> = picked.tr_mul(&column);
+            let taken = curvature.as_ref().map_or(0.0, |c| crossed.dot(&c.solve(&crossed, 0.0)));
+            gradient[*j].abs() / (column.norm_squared() - taken).max(0.0).sqrt()
+        };
         (0..self.x.len()).filter(|j| !inner.contains(j) && beyond(j) > PRESSED).collect()
     }
 

@@ -3,9 +3,11 @@
 use analysis::random::Random;
 use files::output::atomically;
 use identify::any_fmu::{Identification, identify, page};
+use identify::fit::problem::Problem;
+use identify::fit::search::{not_worse, search};
 use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
-use identify::model::simulate::Model;
+use identify::model::simulate::{Model, Setup};
 use identify::uncertainty::foresee::foresee;
 use identify::uncertainty::likelihood::deviances;
 use pack::{Fmi, HUBSLOSH, packed_for_tests, packed_version_for_tests};
@@ -336,4 +338,42 @@ fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() 
     assert_eq!(heard.iter().filter(|line| warns(line)).count(), 1, "{heard:?}");
     let found = identify(&model, &question, &records, &mut |_| {}).unwrap();
     assert_eq!(found.done.iter().filter(|line| warns(line)).count(), 1, "{:?}", found.done);
+}
+
+/// A fit that began at the truth ended 28 standard deviations from it, where the sum of squares was larger by 68, and "fitted".
+#[test]
+fn a_minimum_that_is_worse_than_the_start_is_left() {
+    let model = Model::open(packed_for_tests(), Solver::Own).unwrap();
+    let records = [record(1, 0.2, 0.0)];
+    let truth = ["hub.I=0.35:0.1:1", "friction.b=0.05:0:1", "init.omega=0.2"];
+    let question = Question { biases: Vec::new(), ..question(&truth) };
+    let setup = Setup::new(&question, model.description()).unwrap();
+    let unknowns = question.unknowns(model.description(), &records).unwrap();
+    let problem = Problem::new(&model, &setup, &records, unknowns, NOISE);
+    let start = problem.answer(&problem.start()).unwrap().e.norm_squared();
+    for bad in [[0.5, 0.1, 0.2], [1.0, 0.05, 0.2], [0.35, 0.0, 0.2]] {
+        // one set of derivatives and no step
+        let steps = problem.first_steps();
+        let there = search(&problem, &bad, steps, (f64::INFINITY, 1), &mut |_| {}).unwrap();
+        assert!(there.cost() > start + 68.0);
+        let (found, is_better) = not_worse(&problem, there, &mut |_| {});
+        assert!(is_better && found.cost() <= start, "{bad:?}: {} {start}", found.cost());
+        assert!((found.x[0] - TRUTH.0).abs() < 2e-3, "{:?}", found.x);
+    }
+}
+
+/// The minimum lies six standard deviations beyond a bound: too few for the tests of the residual.
+#[test]
+fn a_minimum_that_a_bound_holds_does_not_fit_without_a_word() {
+    let free = found(&question(&FREE));
+    let e = &free.parameters["friction.b"];
+    let (low, start) = (e.value + 6.0 * e.std, e.value + 9.0 * e.std);
+    let held = found(&question(&[FREE[0], &format!("friction.b={start}:{low}:0.1"), FREE[2]]));
+    let words = held.verdict.join("\n");
+    assert_eq!(held.details.at_bound, ["friction.b"], "{words}");
+    assert!(held.fits.is_none() && words.contains("bounds hold friction.b"), "{words}");
+    // what was set is in the result
+    let set = |name: &str| held.settings.get(name).map(String::as_str);
+    assert_eq!(set("slosh.model"), Some("frozen"));
+    assert_eq!(set("fluid.rho"), Some("1e-6"));
 }

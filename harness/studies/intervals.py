@@ -1,0 +1,258 @@
+"""Coverage and width of the 95 % intervals that the command prints, each over random draws.
+
+    python3 harness/studies/intervals.py [--draws 100] [--program hubslosh] [--only METHOD]
+
+Each draw is a recording of a plant whose truth is known. It has noise of the gyro, and errors of
+clock, torque and scale drawn from the tolerances that the method states. The plants are closed
+forms, or one run of HubSlosh.fmu. Of 100 draws a share of 0.95 is known to 0.022.
+Prints the table of `book/verification.md`.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Vector = npt.NDArray[np.float64]
+Result = dict[str, tuple[float, float, float]]
+"""Truth and ends of each interval."""
+
+GYRO = 4.07e-4
+"""Noise of a row of the gyro, rad/s."""
+
+
+class Bench:
+    """Runs the command in a folder."""
+
+    def __init__(self, program: str, fmu: str, folder: Path) -> None:
+        """Keep the paths of the command, of HubSlosh.fmu and of the folder."""
+        self.program, self.fmu, self.folder = program, fmu, folder
+
+    def call(self, *arguments: str) -> str:
+        """Return what the command prints."""
+        done = subprocess.run(
+            [self.program, *arguments], cwd=self.folder, capture_output=True, text=True, check=False
+        )
+        if done.returncode:
+            message = f"{' '.join(arguments)}: {done.stderr}"
+            raise RuntimeError(message)
+        return done.stdout
+
+    def write(self, name: str, **columns: Vector) -> None:
+        """Write a table as CSV."""
+        rows = np.column_stack(list(columns.values()))
+        header = ",".join(columns)
+        np.savetxt(self.folder / name, rows, delimiter=",", header=header, comments="", fmt="%.12g")
+
+    def identify(self, *arguments: str) -> dict[str, dict[str, dict[str, object]]]:
+        """Return the result of `hubslosh identify`."""
+        self.call("identify", "draw.csv", "--out", "found.json", *arguments)
+        return json.loads((self.folder / "found.json").read_text())
+
+    def run(self, *settings: str, profile: str) -> tuple[Vector, Vector, Vector]:
+        """Return time, torque and true rate of HubSlosh.fmu."""
+        flags = [flag for setting in settings for flag in ("--set", setting)]
+        self.call(
+            "run",
+            "--fmu",
+            self.fmu,
+            "--profile",
+            profile,
+            *flags,
+            "--columns",
+            "omega",
+            "--out",
+            "clean.csv",
+        )
+        table = np.genfromtxt(self.folder / "clean.csv", delimiter=",", names=True)
+        return table["time"], table["tau_cmd"], table["omega"]
+
+
+def ends(found: dict[str, object], truth: float) -> tuple[float, float, float]:
+    """Return truth and ends; an end that is null is open."""
+    low, high = found["interval"]  # type: ignore[misc]
+    return truth, -np.inf if low is None else low, np.inf if high is None else high
+
+
+def free_decay(bench: Bench, rng: np.random.Generator) -> Result:
+    """Fit a damped oscillation of 2.3 Hz, recorded by a clock of 100 ppm."""
+    f, zeta = 2.3, 0.004
+    time = np.arange(0, 60, 0.02)
+    natural = 2 * np.pi * f
+    signal = np.exp(-zeta * natural * time) * np.cos(natural * np.sqrt(1 - zeta**2) * time + 1)
+    clock = 1 + 1e-4 * rng.standard_normal()
+    bench.write(
+        "draw.csv",
+        time=time / clock,
+        wave_height=0.01 * signal + 2e-4 * rng.standard_normal(time.size),
+    )
+    found = bench.identify("--method", "free-decay")["measurement"]
+    return {"frequency": ends(found["frequency"], f), "zeta": ends(found["zeta"], zeta)}
+
+
+def gyro(bench: Bench, rng: np.random.Generator) -> Result:
+    """Estimate white noise of a gyro at 10 Hz over half an hour."""
+    truth = 1e-4
+    time = 0.1 * np.arange(1 << 14)
+    bench.write("draw.csv", time=time, omega=truth / np.sqrt(0.1) * rng.standard_normal(time.size))
+    said = bench.call("gyro", "--recording", "draw.csv", "--chunk", "100", "--out", "gyro")
+    line = next(line for line in said.splitlines() if line.startswith("angle random walk"))
+    low, high = line.split("95 %: ")[1].strip(")").split(" to ") if " to " in line else ("0", "inf")
+    return {"N": (truth, float(low), float(high))}
+
+
+def acceleration(bench: Bench, rng: np.random.Generator) -> Result:
+    """Fit an empty bench; the scales of torque and gyro have errors of 1 %."""
+    time, torque, rate = clean(
+        bench,
+        "slosh.model=frozen",
+        "fluid.rho=1e-6",
+        profile="lin-sweep:amplitude=0.05,f0=0.1,f1=1.5,duration=120",
+    )
+    torque = torque / (1 + 0.01 * rng.standard_normal())
+    rate = rate * (1 + 0.01 * rng.standard_normal()) + GYRO * rng.standard_normal(time.size)
+    bench.write("draw.csv", time=time, tau_cmd=torque, omega=rate)
+    found = bench.identify("--fmu", bench.fmu, "--method", "acceleration", "--empty")["parameters"]
+    truths = {
+        "hub.I": 0.322414,
+        "friction.b": 0.03793,
+        "friction.c": 3.498e-3,
+        "friction.d": 2.423e-3,
+    }
+    return {name: ends(found[name], truth) for name, truth in truths.items()}
+
+
+def frequency(bench: Bench, rng: np.random.Generator) -> Result:
+    """Fit a linear bench with viscous friction; torque, gyro and clock have errors."""
+    time, torque, rate = clean(
+        bench,
+        "slosh.model=linear",
+        "slosh.zeta_from_correlation=false",
+        "slosh.zeta=0.003",
+        "friction.model=viscous",
+        profile="lin-sweep:amplitude=0.02,f0=1.25,f1=3.5,duration=300",
+    )
+    torque = torque / (1 + 0.01 * rng.standard_normal())
+    rate = rate * (1 + 0.01 * rng.standard_normal()) + GYRO * rng.standard_normal(time.size)
+    clock = 1 + 1e-4 * rng.standard_normal()
+    bench.write("draw.csv", time=time / clock, tau_cmd=torque, omega=rate)
+    all_found = bench.identify("--fmu", bench.fmu, "--method", "frequency")
+    found = all_found["parameters"] | all_found["measurement"]
+    truths = {
+        "hub.I": 0.322414,
+        "tank.d": 0.163,
+        "tank.h": 0.1,
+        "slosh.zeta": 0.003,
+        "friction": 0.03793,
+    }
+    return {name: ends(found[name], truth) for name, truth in truths.items()}
+
+
+def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
+    """Fit a hub in closed form with `--free`; the scale of its torque is known to 1 %."""
+    inertia, b, step = 0.35, 0.05, 0.05
+    time = step * np.arange(600)
+    torque = np.repeat(0.1 * (2 * rng.random(15) - 1), 40)
+    keep = np.exp(-b * step / inertia)
+    rate = np.zeros(time.size)
+    for k in range(1, time.size):
+        rate[k] = keep * rate[k - 1] + torque[k - 1] / b * (1 - keep)
+    scale = 1 + 0.01 * rng.standard_normal()
+    bench.write(
+        "draw.csv",
+        time=time,
+        tau_cmd=torque / scale,
+        omega=rate + 1e-3 * rng.standard_normal(time.size),
+    )
+    found = bench.identify(
+        "--fmu",
+        bench.fmu,
+        "--free",
+        "hub.I=0.3:0.1:1,friction.b=0.04:0:1",
+        "--inputs",
+        "tau_cmd",
+        "--held",
+        "tau_cmd",
+        "--outputs",
+        "omega",
+        "--set",
+        "slosh.model=frozen",
+        "--set",
+        "fluid.rho=1e-6",
+        "--set",
+        "friction.model=viscous",
+        "--tolerance",
+        "scale(tau_cmd)=1%",
+    )["parameters"]
+    return {"hub.I": ends(found["hub.I"], inertia), "friction.b": ends(found["friction.b"], b)}
+
+
+CLEAN: dict[str, tuple[Vector, Vector, Vector]] = {}
+
+
+def clean(bench: Bench, *settings: str, profile: str) -> tuple[Vector, Vector, Vector]:
+    """Return a run without noise, which is made once."""
+    if profile not in CLEAN:
+        CLEAN[profile] = bench.run(*settings, profile=profile)
+    return CLEAN[profile]
+
+
+METHODS: dict[str, Callable[[Bench, np.random.Generator], Result]] = {
+    "identify --method free-decay": free_decay,
+    "gyro --recording": gyro,
+    "identify --method acceleration --empty": acceleration,
+    "identify --method frequency": frequency,
+    "identify --free": any_fmu,
+}
+
+
+def census(bench: Bench, only: str, draws: int) -> Iterator[str]:
+    """Yield the rows of the table."""
+    for name, method in METHODS.items():
+        if only not in name:
+            continue
+        found: dict[str, list[tuple[float, float, float]]] = {}
+        refused = 0
+        for seed in range(draws):
+            for parameter, interval in method(bench, np.random.default_rng(seed)).items():
+                found.setdefault(parameter, []).append(interval)
+        for parameter, intervals in found.items():
+            given = [(t, low, high) for t, low, high in intervals if np.isfinite(high - low)]
+            refused = len(intervals) - len(given)
+            held = sum(low <= truth <= high for truth, low, high in given)
+            width = (
+                np.median([(high - low) / truth for truth, low, high in given]) if given else np.nan
+            )
+            share = f"{held} of {len(given)} | {100 * width:.2g} %"
+            yield f"| `{name}` | `{parameter}` | {share} | {refused} |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--draws", type=int, default=100)
+    parser.add_argument("--program", default="target/release/hubslosh")
+    parser.add_argument("--fmu", default="dist/HubSlosh.fmu")
+    parser.add_argument("--only", default="")
+    args = parser.parse_args()
+    print("| command | quantity | held | width, of the truth | without an interval |")
+    print("| --- | --- | --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(
+            str(Path(args.program).resolve()), str(Path(args.fmu).resolve()), Path(folder)
+        )
+        for row in census(bench, args.only, args.draws):
+            print(row)
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
