@@ -182,3 +182,42 @@ fn a_missing_file_has_a_message_and_its_chapter_says_so() {
     let said = text(&analyse(folder).stderr);
     assert!(said.contains("day.toml is needed"), "{said}");
 }
+
+/// 50 ppm made every sweep "another profile, or the torque's sign", and 3 % of lost rows were too many.
+#[test]
+fn a_clock_300_ppm_off_and_lost_rows_change_no_feature_beyond_its_interval() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let day = Day {
+        fills: &[0.1],
+        amplitudes: &[0.1],
+        sweep: 900.0,
+        rest: 0.0,
+        friction: false,
+        clock: 3e-4,
+        lost: 0.03,
+        ..SHORT
+    };
+    day.write(folder).unwrap();
+    let done = analyse(folder);
+    let said = text(&done.stdout) + &text(&done.stderr);
+    assert!(done.status.success(), "{said}");
+    assert!(said.contains("its clock runs +300 ppm"), "{said}");
+    let rows = features(folder);
+    let of = |is_recording: bool| {
+        let found = rows.iter().find(|row| (row["model"] == "recording") == is_recording);
+        found.unwrap_or_else(|| panic!("{said}"))
+    };
+    for name in ["f_dip", "f_res"] {
+        let [a, b] = [true, false].map(|is| number(of(is), &format!("{name}_hz")));
+        let [s, t] = [true, false].map(|is| number(of(is), &format!("{name}_std_hz")));
+        println!("{name}: {a:.5} ± {s:.1e} Hz, model {b:.5} ± {t:.1e} Hz");
+        assert!((a - b).abs() < 3.0 * s.hypot(t), "{name}: {a} ± {s}, {b} ± {t}");
+    }
+    // the sign is named where it is the sign
+    let manifest = folder.join("day.toml");
+    let list = std::fs::read_to_string(&manifest).unwrap();
+    std::fs::write(&manifest, list.replace("amplitude = 0.1", "amplitude = -0.1")).unwrap();
+    let said = text(&analyse(folder).stderr);
+    assert!(said.contains("with the other sign"), "{said}");
+}

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use analysis::Complex64;
 use analysis::sweep::Sweep;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use files::budget;
 use nalgebra::{DMatrix, DVector};
 use signals::fourier::{Forward, Inverse};
@@ -86,20 +86,18 @@ pub(super) fn table(
             budget::table(budget::steps(to - from, step).with_context(|| name.to_string())?, 4)?;
             let sought = Sought { step, span: (from, to), sweep };
             let (clock, correlation) = sought.found_in(torque);
-            if correlation <= LEAST_CORRELATION {
-                let reversed: Vec<f64> = torque.iter().map(|tau| -tau).collect();
-                ensure!(
-                    sought.found_in(&reversed).1 <= LEAST_CORRELATION,
-                    "{name}: its torque is {} with the other sign. A factor of -1 in --columns tau_cmd=COLUMN, or in the logger, turns it",
-                    case.profile
-                );
-                bail!(
-                    "{name}: its torque is not {} (correlation {correlation:.2}; allowed: at least {LEAST_CORRELATION}, with a clock \
-                     that is up to {} ppm off). Another profile, duration or band acted, or the times are in another unit",
-                    case.profile,
-                    1e6 * FASTEST_CLOCK
-                );
-            }
+            ensure!(
+                !sought.is_reversed(torque, (clock, correlation)),
+                "{name}: its torque is {} with the other sign. A factor of -1 in the logger, or another sign of the amplitude, turns it",
+                case.profile
+            );
+            ensure!(
+                correlation > LEAST_CORRELATION,
+                "{name}: its torque is not {} (correlation {correlation:.2}; allowed: at least {LEAST_CORRELATION}, with a clock \
+                 that is up to {} ppm off). Another profile, duration or band acted, or the times are in another unit",
+                case.profile,
+                1e6 * FASTEST_CLOCK
+            );
             clock
         }
         // of a noise nobody knows which it was
@@ -197,6 +195,14 @@ impl Sought<'_> {
         }
         let found = self.correlation(record, clock);
         if found > correlation { (clock, found) } else { (whole, correlation) }
+    }
+
+    /// Returns true if the sweep of the other sign explains a record better. Half a cycle is a delay and a clock that are off, to a correlation
+    /// of more than 0.9, so a clock that is off is compared with it.
+    fn is_reversed(&self, record: &[f64], (clock, correlation): (Clock, f64)) -> bool {
+        let is_plain = clock.rate == 0.0 && correlation > LEAST_CORRELATION;
+        let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();
+        !is_plain && self.found_in(&reversed).1 > correlation.max(LEAST_CORRELATION)
     }
 
     /// Time of the sweep at a row of the record.
@@ -332,6 +338,9 @@ mod tests {
             // a ppm of 2700 s is 2.7 ms: a hundredth of a cycle
             assert!((clock.rate - rate).abs() < 1e-6, "{rate} {clock:?}");
             assert!((clock.first - begins / 0.02).abs() < 0.2, "{rate} {clock:?}");
+            let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();
+            assert!(!sought.is_reversed(&record, (clock, correlation)));
+            assert!(sought.is_reversed(&reversed, sought.found_in(&reversed)), "{rate}");
         }
         let other = Sweep { duration: 2600.0, ..sweep };
         let record: Vec<f64> = (0..135_000).map(|k| other.torque(0.02 * f64::from(k))).collect();
