@@ -174,7 +174,8 @@ impl RunArgs {
         let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
         let wave = range.as_ref().map(|_| WAVE);
         let needs = wave.into_iter().chain(forces.iter().map(String::as_str));
-        let columns = run.columns_with(&columns, needs.chain(limits.needs()).chain(sensors.needs()));
+        let columns =
+            run.columns_with(&columns, needs.chain(limits.needs()).chain(sensors.needs()));
         // the table, its copy for --columns, and what is written: 25 characters for a number
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64 + run.course_bytes());
