@@ -91,6 +91,7 @@ for name, command in logs.items():
 """
 GIVEN = {
     "README.md": RECORDING,
+    "harness/python/README.md": RECORDING,
     "book/identification.md": RECORDING
     + "\nimport shutil; shutil.move('torque_bench.csv', 'bench.csv')\n",
     "book/recordings.md": RECORDING
@@ -100,7 +101,7 @@ for number in ("050", "100"):
     profile = f"exp-sweep:amplitude=0.{number},f0=1.25,f1=3.5,duration=2700"
     arguments = ["--profile", profile, "--set", "tank.h=0.1", "--columns", "omega"]
     subprocess.run(["hubslosh", "run", *arguments, "--out", "sweep.csv"], check=True)
-    sweep = hubslosh.read_table("sweep.csv")
+    sweep = hubslosh.read_table("sweep.csv", ["time", "tau_cmd", "omega"])
     table = {"t": 1e3 * sweep["time"], "T_cmd": 1e3 * sweep["tau_cmd"],
              "gyro_z": np.degrees(sweep["omega"])}
     pd.DataFrame(table).to_csv(f"bench_{number}.csv", index=False)

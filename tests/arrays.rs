@@ -755,6 +755,7 @@ fn a_part_of_the_variables_refuses_more_tanks_and_states_of_the_whole() {
     let mut run = part.instance(Interface::CoSimulation);
     let (_, text) = refusal(run.instance.deserialize(&bytes));
     assert!(text.contains("another part of the variables"), "{text}");
+    let mut run = part.instance(Interface::CoSimulation);
     let own = run.instance.get_state().unwrap();
     let bytes = run.instance.serialize(&own).unwrap();
     let again = run.instance.deserialize(&bytes).unwrap();
