@@ -101,7 +101,7 @@ for number in ("050", "100"):
     profile = f"exp-sweep:amplitude=0.{number},f0=1.25,f1=3.5,duration=2700"
     arguments = ["--profile", profile, "--set", "tank.h=0.1", "--columns", "omega"]
     subprocess.run(["hubslosh", "run", *arguments, "--out", "sweep.csv"], check=True)
-    sweep = hubslosh.read_table("sweep.csv", ["time", "tau_cmd", "omega"])
+    sweep = pd.read_csv("sweep.csv")
     table = {"t": 1e3 * sweep["time"], "T_cmd": 1e3 * sweep["tau_cmd"],
              "gyro_z": np.degrees(sweep["omega"])}
     pd.DataFrame(table).to_csv(f"bench_{number}.csv", index=False)
