@@ -156,8 +156,8 @@ impl Growth {
         time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
     }
 
-    /// Returns the relative drag `h` after the start of the expansion, from u by its series up to order n and from the
-    /// relative other drag, and the square of the rate W^(1/2) A.
+    /// Returns the relative drag `h` after the start of the expansion, and u. u comes from its series up
+    /// to order n, the rest from u and the relative other drag.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);
         let root = libm::sqrt(u);

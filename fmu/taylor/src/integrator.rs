@@ -114,8 +114,8 @@ pub trait Motion {
 
     /// Sets the error scale of a step of length `h` from coefficients 0 and 1, with the relative
     /// error `allowed`. Returns the time over which the series is valid, at most `h`, from
-    /// coefficients 0 to 2 of every quantity: a function with a rounded corner has singularities
-    /// near the real axis, which its coefficients may not show before they are passed.
+    /// coefficients 0 to 2 of every quantity. A function with a rounded corner has singularities near
+    /// the real axis, which later coefficients may not show.
     fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64;
 
     /// Returns the largest of the states' coefficients n relative to its allowed error.
@@ -139,8 +139,9 @@ pub trait Motion {
         ORDER
     }
 
-    /// Returns the error at `h` after the start of the expansion, relative to the allowed error, that functions with
-    /// rounded corners have by their series up to order n: the difference from their values at the motion's end.
+    /// Returns the error at `h` after the start of the expansion, relative to the allowed error, of
+    /// functions with rounded corners by their series up to order n. It is the difference from their
+    /// values there.
     #[inline(always)]
     fn defect(&self, _n: usize, _h: f64) -> f64 {
         0.0

@@ -48,8 +48,9 @@ fn table(r: &mut Random) -> Vec<Row> {
     (0..8).map(row).collect()
 }
 
-/// One or two tanks with drag of every law that follows the specific force, half of them with the default a_f; a third of the
-/// modes with drag that grows, a third with waves that break, a sixth of the tanks with bobs on other surfaces.
+/// One or two tanks with drag of every law that follows the specific force, half of
+/// them with the default a_f. A third of the modes has drag that grows, a third waves that break.
+/// A sixth of the tanks has bobs on other surfaces.
 fn parameters(r: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1 + r.below(2), mount: Mount::Free, ..r.parameters() };
     p.max_steps = 1_000_000;
@@ -160,9 +161,9 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
 }
 
-/// Compares communication steps of whole rows with the exact motion: steps of 2 ms at a tolerance of 1e-13. The error of a run
-/// may be the tolerance times 30, and times the growth of a small displacement at the start where the motion itself multiplies
-/// errors (a pendulum that falls over).
+/// Compares communication steps of whole rows with the exact motion: steps of 2 ms at a tolerance of 1e-13. The error of a run may be the
+/// tolerance times 30. A pendulum that falls over multiplies errors: then it may be larger by the
+/// growth of a small displacement at the start.
 fn keep_the_tolerance(seeds: core::ops::Range<u64>, run: impl Fn(u64, Way) -> Vec<f64>) {
     let mut worst = (0.0, 0, 0.0);
     for seed in seeds {

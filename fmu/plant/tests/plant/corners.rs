@@ -123,8 +123,9 @@ fn keep_the_tolerance(seeds: impl Iterator<Item = u64>) {
     println!("worst error {:.2} tolerances: case {} at {:e}", worst.0, worst.1, worst.2);
 }
 
-/// The drag of liquid at rest under zero specific force starts with the fourth power of time, which the first terms of its series
-/// do not show; a step that did not see it was off by 6e-4 at every tolerance (case 1651). Near zero specific force the drag of
+/// The drag of liquid at rest under zero specific force starts with the fourth power of time, which the
+/// first terms of its series do not show. A step that did not see it was off by 6e-4 at every
+/// tolerance (case 1651). Near zero specific force the drag of
 /// growing and breaking waves has singularities that no radius of convergence was declared for (cases 234, 1040, 1224).
 #[test]
 fn drag_that_grows_keeps_the_tolerance_where_specific_force_vanishes() {
