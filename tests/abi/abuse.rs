@@ -525,7 +525,7 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
                 ("force[3]", "-1180"),
             ];
             vec![
-                vec![few],
+                vec![few, ("init.omega[1]", "0.02"), ("init.omega[3]", "0.1")],
                 four_tanks,
                 on_a_pivot,
                 planar,
@@ -535,12 +535,13 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
             ]
         }
         "SloshTank" => vec![
-            vec![few],
+            vec![few, ("a[1]", "0.1"), ("a[3]", "9.81")],
             vec![
                 few,
                 ("tank.modes", "3"),
                 ("tank.diameter", "0.9"),
                 ("a[1]", "1"),
+                ("a[3]", "9.81"),
                 ("omega[1]", "0.2"),
                 ("host.mass", "1000"),
                 ("coupling", "3"),
@@ -557,6 +558,8 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
             vec![
                 few,
                 ("tank.fill.points", "5"),
+                ("a[1]", "0.1"),
+                ("a[3]", "9.81"),
                 ("tank.liquid_0", "200"),
                 ("tank.fill.liquid[7]", "0"),
                 ("tank.fill.length[1,8]", "0"),
