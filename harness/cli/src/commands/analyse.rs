@@ -86,7 +86,8 @@ impl AnalyseArgs {
     /// The plan of the command line: every recording as a run with its torque's amplitude, simulated with every model.
     fn written(&self) -> Result<String> {
         let profile: Written = self.profile.parse()?;
-        if let Torque::Rows { .. } = profile.torque()? {
+        let torque = profile.torque()?;
+        if let Torque::Rows { .. } = torque {
             bail!(
                 "--profile {}: it must be a sweep or a noise, which have a frequency response",
                 self.profile
@@ -105,9 +106,10 @@ impl AnalyseArgs {
                  time=COLUMN:UNIT states it",
                 path.display()
             );
+            recorded::check_rows(path, each, &torque)?;
             step.get_or_insert(each);
-            let torque = table.column(TAU_CMD).unwrap_or_default();
-            let amplitude = torque.iter().fold(0.0, |most: f64, tau| most.max(tau.abs()));
+            let column = table.column(TAU_CMD).unwrap_or_default();
+            let amplitude = column.iter().fold(0.0, |most: f64, tau| most.max(tau.abs()));
             ensure!(amplitude > 0.0, "{}: tau_cmd is 0 N·m all along", path.display());
             runs.push_str("[[run]]\n");
             runs.push_str(&format!("recording = {}\n", text(&path.display().to_string())));

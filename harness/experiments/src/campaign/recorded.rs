@@ -1,6 +1,7 @@
 //! Reads a recording as a run: on an equally spaced grid, from the torque's beginning to its end.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
 use analysis::Complex64;
 use analysis::sweep::Sweep;
@@ -53,6 +54,23 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
         .with_context(|| format!("{name} cannot be used"))
 }
 
+/// Fails if rows of a recording that are `step` s apart cannot show the torque.
+///
+/// # Errors
+/// The torque has frequencies of half of their rate or more.
+pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
+    let Torque::Profile(profile) = torque else { return Ok(()) };
+    let highest = profile.band().map_or(0.0, |band| band.1);
+    ensure!(
+        step * highest < 0.5,
+        "{}: its rows are {step:.3e} s apart, and {profile} goes to {highest} Hz (allowed: less than {:.3e} s). Is the time in \
+         another unit? --columns time=COLUMN:UNIT states it",
+        path.display(),
+        0.5 / highest
+    );
+    Ok(())
+}
+
 /// Reads the recording of a run. Time counts from the torque's beginning, found by correlation with the torque of the
 /// plan. The columns are those of a stored run, as far as the recording has them.
 ///
@@ -69,20 +87,13 @@ pub(super) fn table(
     let (time, torque) = (column("time"), column("tau_cmd"));
     let (from, to) = case.torque.span();
     let to = to.min(case.stop);
-    let profile = match &*case.torque {
-        Torque::Profile(profile) => profile.sweep().map(|sweep| (sweep, profile)),
+    let sweep = match &*case.torque {
+        Torque::Profile(profile) => profile.sweep(),
         Torque::Rows { .. } => None,
     };
-    let clock = match profile {
-        Some((sweep, profile)) => {
-            let highest = profile.band().map_or(0.0, |band| band.1);
-            ensure!(
-                step * highest < 0.5,
-                "{name}: its rows are {step:.3e} s apart, and {} goes to {highest} Hz (allowed: less than {:.3e} s). Is the time in \
-                 another unit? --columns time=COLUMN:UNIT states it",
-                case.profile,
-                0.5 / highest
-            );
+    let clock = match sweep {
+        Some(sweep) => {
+            check_rows(&recorded.path, step, &case.torque)?;
             budget::table(budget::steps(to - from, step).with_context(|| name.to_string())?, 4)?;
             let sought = Sought { step, span: (from, to), sweep };
             let (clock, correlation) = sought.found_in(torque);
