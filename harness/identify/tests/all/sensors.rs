@@ -26,7 +26,7 @@ fn twin(sensor: &Sensor, column: &str) -> Record {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let known = KNOWN.iter().map(|(name, value)| (name.to_string(), value.to_string()));
     let own = TRUTH.iter().map(|(name, value)| (name.to_string(), value.to_string()));
-    let profile = "noise:rms=0.03,f0=1,f1=4,duration=100";
+    let profile = "noise:rms=0.03,f0=1,f1=3.5,duration=100";
     let run = Run {
         settings: known.chain(own).collect(),
         input: Some(TORQUE.into()),
