@@ -132,7 +132,7 @@ def rotation(what: str, turning: Any) -> str:
     return (
         f"{what} is no steady state: an angular acceleration of {size:.4g} rad/s² is left, "
         f"{_row(np.asarray(turning, float))} about the body axes, so that linear models and "
-        "margins hold at its start only. Causes are a thrust beside the centre of mass, which "
-        "Craft.trim moves there, a constant torque, and liquid off its rest, as in a tank that "
-        "leans against the thrust"
+        "margins hold at its start only. Causes are a thrust that misses the centre of mass "
+        "(Craft.trim moves it there), a constant torque, and liquid off its rest, as in a tank "
+        "that leans against the thrust"
     )

@@ -269,7 +269,7 @@ _Label = tuple[Any, float, float, str, str]
 
 
 def _annotate(labels: list[_Label]) -> None:
-    """Write labels beside their places where they cover no other one; else leave them out."""
+    """Write labels next to their places; those that would cover another one are left out."""
     if not labels:
         return
     labels[0][0].figure.draw_without_rendering()  # the layout moves the axes

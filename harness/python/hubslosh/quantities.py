@@ -3,7 +3,7 @@
 A quantity of a slosh mode changes alone. ``frequency`` is that with the tank held, under the thrust
 that acts: the bob's height stays, and a centring stiffness keeps its share of the restoring force.
 ``mass`` and ``bob`` (the bob's height on the tank's axis) leave mass, centre of mass and inertia of
-the liquid at rest as they are: the rigid liquid takes up the difference.
+the liquid at rest as they are. The rigid liquid takes up the difference.
 """
 
 import re

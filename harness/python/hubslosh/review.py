@@ -129,8 +129,8 @@ class Review:
         """Return the least and largest value of each margin at each fill, over all stable points.
 
         Columns: ``fill`` (index), ``at`` (see `at`), ``unstable`` (number of unstable points),
-        ``points`` (number of all), and for each margin ``…_low``, ``…_nominal`` and ``…_high``; NaN
-        where no point, or for ``…_nominal`` the nominal one, is stable.
+        ``points`` (number of all), and for each margin ``…_low``, ``…_nominal`` and ``…_high``.
+        They are NaN where no point, or for ``…_nominal`` the nominal one, is stable.
         """
         names = ["modulus_margin", "phase_margin", "gain_up", "gain_down", "delay_margin"]
         groups = self.points.groupby("fill")

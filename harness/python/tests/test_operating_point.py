@@ -22,7 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:tank.*outside the measured")
 
 @pytest.fixture
 def craft(fmu: Path) -> Craft:
-    """Return a craft of two tanks whose thrust passes 0.1 m beside its centre of mass."""
+    """Return a craft of two tanks whose thrust misses its centre of mass by 0.1 m."""
     tanks = {
         "NTO": MountedTank(SPHERE, (0.1, 0.5, -0.2), modes=1, nu=3e-7),
         "MMH": MountedTank(CYLINDER, (0.1, -0.6, -0.4), modes=2, nu=9e-7, sigma=0.03),
@@ -39,7 +39,7 @@ def numbers(found: hubslosh.Margins) -> np.ndarray:
 
 
 def test_every_method_linearises_at_the_same_trimmed_point(craft: Craft) -> None:
-    """Thrust 0.1 m beside the centre of mass: loop, review, linearize and uncertain agree to 1e-9.
+    """Thrust 0.1 m off the centre of mass: loop, review, linearize and uncertain agree to 1e-9.
 
     Without trimming the delay margin is another one, and a warning says how fast the craft turns.
     """
