@@ -96,7 +96,7 @@ def test_what_is_wrong_with_a_tank_is_told(tmp_path: Path) -> None:
         ),
         "number is 1 to 4, not 5": lambda: full.parameters("Spacecraft", 5),
         "no parameters of a tank for 'Craft'": lambda: full.parameters("Craft"),
-        "ends in .svg": lambda: full.save("tank.png"),
+        "must end in .svg": lambda: full.save("tank.png"),
         "cannot stand in a tank file": lambda: tank({"density": object()}, fill=0.3),
     }
     for sentence, call in wrong.items():
@@ -287,7 +287,7 @@ def test_units_of_a_parameter_set_are_converted(
         (
             parameter("tank.h", "1"),
             '<ssc:Unit name="x"/>',
-            'line 8: the unit "x" has no valid BaseUnit',
+            'line 9: the unit "x" has no valid BaseUnit',
         ),
         (
             parameter("tank.h", "1"),
