@@ -109,9 +109,14 @@ def compare(mine, theirs, error):
 
 
 settings = {"stop_time": 2, "output_interval": 0.02}
+# Spacecraft and SloshTank rest unless something moves them
+motion = {"Spacecraft": ("init.omega", [0.02, 0.0, 0.1]), "SloshTank": ("a", [0.1, 0.0, 9.8])}.get(name)
+starts = {arrays: {motion[0]: motion[1]} if motion else {}}
+starts[scalars] = {f"{motion[0]}[{i}]": x for i, x in enumerate(motion[1], 1)} if motion else {}
 for kind, error in (("CoSimulation", 0.0), ("ModelExchange", 1e-6)):
     both = [
-        simulate_fmu(fmu, fmi_type=kind, relative_tolerance=1e-9, **settings) for fmu in (arrays, scalars)
+        simulate_fmu(fmu, fmi_type=kind, relative_tolerance=1e-9, start_values=starts[fmu], **settings)
+        for fmu in (arrays, scalars)
     ]
     if kind == "ModelExchange":
         # it steps where its solver finds events
@@ -128,12 +133,14 @@ try:
     instance.enterConfigurationMode()
     instance.setUInt64([reference], [number])
     instance.exitConfigurationMode()
-    mine = simulate_fmu(unpacked, model_description=description, fmu_instance=instance, **settings)
+    mine = simulate_fmu(
+        unpacked, model_description=description, fmu_instance=instance, start_values=starts[arrays], **settings
+    )
 finally:
     shutil.rmtree(unpacked)
-theirs = simulate_fmu(scalars, start_values={size: number}, fmi_type="CoSimulation", **settings)
+theirs = simulate_fmu(scalars, start_values=starts[scalars] | {size: number}, fmi_type="CoSimulation", **settings)
 compare(mine, theirs, 0.0)
-plain = simulate_fmu(scalars, fmi_type="CoSimulation", **settings)
+plain = simulate_fmu(scalars, start_values=starts[scalars], fmi_type="CoSimulation", **settings)
 assert any(not np.array_equal(theirs[output], plain[output]) for output in theirs.dtype.names), "the size is felt"
 "#;
 

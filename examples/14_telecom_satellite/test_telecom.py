@@ -51,7 +51,7 @@ def test_mass_properties_and_margins_are_those_by_hand(spacecraft: str) -> None:
         assert found.center_of_mass == pytest.approx(center, abs=1e-12)
         assert found.inertia == pytest.approx(inertia, abs=1e-12 * inertia.max())
 
-        mine = replace(telecom.loop(fill), model=spacecraft)
+        mine = telecom.loop(fill, craft)
         # O, where the thrust along z acts, moves to the centre of mass
         across = np.array([*center[:2], 0.0])
         hand = DRY | {f"craft.r[{i + 1}]": DRY[f"craft.r[{i + 1}]"] - across[i] for i in range(3)}

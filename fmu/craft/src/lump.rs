@@ -70,6 +70,8 @@ use crate::state::BallState;
 /// Cosine of the largest angle from the axis at which a bob represents liquid.
 pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
+/// Largest coefficient of the liquid's place whose square is formed, m.
+const LARGEST_COEFFICIENT: f64 = 1e75;
 /// Value of f within which the lump touches the wall.
 const TOUCHING: f64 = 1e-10;
 /// Value of f' below which the lump moves neither from nor towards the wall, 1/s.
@@ -818,6 +820,10 @@ impl Lump {
 
     fn next_contact(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
+        // Squares of what a diverging host hands over must not overflow.
+        if !(0..=n).all(|k| largest(x(k)) < LARGEST_COEFFICIENT) {
+            return None;
+        }
         // f is exact for the series of x up to order n. Cut at order n, it could miss an impact.
         let mut f = [0.0; 2 * ORDER + 1];
         for (k, f) in f.iter_mut().enumerate().take(2 * n + 1) {

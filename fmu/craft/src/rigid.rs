@@ -153,27 +153,50 @@ impl<T: Number> Factors<T> {
         factors
     }
 
+    /// The same for a matrix that may be far from positive definite, as a diverging host's states make it. Of such a matrix the
+    /// solution of any equations is 0, because products of its factors could overflow.
+    pub fn of_any(matrix: &Mat6<T>) -> Factors<T> {
+        let zero = T::constant(0.0);
+        let none = Factors { l: [[zero; 6]; 6], inverse: [zero; 6] };
+        let mut factors = none;
+        for j in 0..6 {
+            let d = factors.set_row(matrix, j);
+            if d.value() < SMALLEST_DIVISOR {
+                return none;
+            }
+            factors.inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
+        }
+        factors
+    }
+
     /// Factorises another matrix in place. Copies of matrices would take a fortieth of a step's instructions.
     #[inline(always)]
     pub fn set(&mut self, matrix: &Mat6<T>) {
-        let Factors { l, inverse } = self;
         for j in 0..6 {
-            // Row j of L D, then of L.
-            let mut d = matrix[j][j];
-            for k in 0..j {
-                let mut x = matrix[j][k];
-                for i in 0..k {
-                    x = x - l[j][i] * l[k][i];
-                }
-                l[j][k] = x;
-            }
-            for k in 0..j {
-                let x = l[j][k] * inverse[k];
-                d = d - l[j][k] * x;
-                l[j][k] = x;
-            }
-            inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
+            let d = self.set_row(matrix, j);
+            self.inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
         }
+    }
+
+    /// Sets row j of L from the rows before; returns D's element of this row.
+    #[inline(always)]
+    fn set_row(&mut self, matrix: &Mat6<T>, j: usize) -> T {
+        let Factors { l, inverse } = self;
+        // Row j of L D, then of L.
+        let mut d = matrix[j][j];
+        for k in 0..j {
+            let mut x = matrix[j][k];
+            for i in 0..k {
+                x = x - l[j][i] * l[k][i];
+            }
+            l[j][k] = x;
+        }
+        for k in 0..j {
+            let x = l[j][k] * inverse[k];
+            d = d - l[j][k] * x;
+            l[j][k] = x;
+        }
+        d
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use crate::clock::Instant;
+pub use crate::clock::Instant;
 use crate::table::Table;
 
 /// Failure of a step.

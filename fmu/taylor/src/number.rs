@@ -22,9 +22,17 @@ pub trait Number:
     fn result(self) -> f64;
     /// Returns the value.
     fn value(self) -> f64;
-    /// Returns the larger of itself and a constant.
+    /// Returns the larger of itself and a constant. The value is a maximum and no choice of two numbers: from 1/choice the
+    /// compiler makes a choice of two quotients, and divides by a zero that was not chosen.
     fn at_least(self, floor: f64) -> Self {
-        if self.value() < floor { Self::constant(floor) } else { self }
+        let slope = if self.value() < floor { 0.0 } else { self.result() };
+        Self::of(f64::max(self.value(), floor), slope)
+    }
+    /// Returns itself over a divisor that is not negative, and 0 where the divisor is 0. The divisor is a maximum, not a
+    /// choice: a compiler that computes both sides of a choice would divide by 0.
+    fn over_or_zero(self, divisor: Self) -> Self {
+        let numerator = if divisor.value() > 0.0 { self } else { Self::constant(0.0) };
+        numerator / divisor.at_least(f64::MIN_POSITIVE)
     }
     /// Returns itself limited to two constant bounds.
     fn clamp(self, low: f64, high: f64) -> Self {
@@ -173,7 +181,7 @@ impl Number for Dual {
 
     fn sqrt(self) -> Dual {
         let value = libm::sqrt(self.value);
-        Dual { value, slope: if value > 0.0 { 0.5 * self.slope / value } else { 0.0 } }
+        Dual { value, slope: (0.5 * self.slope).over_or_zero(value) }
     }
 
     fn sin(self) -> Dual {
@@ -193,14 +201,13 @@ impl Number for Dual {
 
     fn asin(self) -> Dual {
         let cos = libm::sqrt(f64::max((1.0 - self.value) * (1.0 + self.value), 0.0));
-        let slope = if cos > 0.0 { self.slope / cos } else { 0.0 };
-        Dual { value: libm::asin(self.value.clamp(-1.0, 1.0)), slope }
+        Dual { value: libm::asin(self.value.clamp(-1.0, 1.0)), slope: self.slope.over_or_zero(cos) }
     }
 
     fn hypot(self, b: Dual) -> Dual {
         let value = libm::hypot(self.value, b.value);
         let along = self.slope * self.value + b.slope * b.value;
-        Dual { value, slope: if value > 0.0 { along / value } else { 0.0 } }
+        Dual { value, slope: along.over_or_zero(value) }
     }
 }
 

@@ -1,7 +1,6 @@
 //! A mass on a spring, m x'' = F - d x' - k x, by Runge-Kutta 4 in steps of 1 ms at most.
 
-use runtime::clock::Instant;
-use runtime::model::{Model, StepFailure};
+use runtime::model::{Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 

@@ -105,7 +105,7 @@ impl SloshMode for Paraboloid {
         let sin = q.map(|q| (q / l).clamp(-1.0, 1.0));
         let rate = |i: usize| {
             let cos = ((one - sin[i]) * (one + sin[i])).sqrt();
-            if cos.value() > 0.0 { q_d[i] / (l * cos) } else { T::constant(0.0) }
+            q_d[i].over_or_zero(l * cos)
         };
         Angles { angle: sin.map(T::asin), rate: [rate(0), rate(1)] }
     }

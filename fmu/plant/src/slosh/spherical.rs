@@ -210,7 +210,7 @@ impl SloshMode for Spherical {
         let (d, one) = (numbers::<T>(&self.dir_d), T::constant(1.0));
         let rate = |i: usize| {
             let cos = ((one - p[i]) * (one + p[i])).sqrt();
-            if cos.value() > 0.0 { d[i] / cos } else { T::constant(0.0) }
+            d[i].over_or_zero(cos)
         };
         Angles { angle: p.map(T::asin), rate: [rate(0), rate(1)] }
     }

@@ -31,13 +31,15 @@ fn files(directory: &Path) -> Vec<String> {
     names
 }
 
-/// The run fails with one line that says all of `words`, and leaves the directory as it was.
+/// The run fails with one line that says all of `words`, and leaves the directory as it was. A line with the columns that are
+/// used may stand before it.
 fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     let before = files(directory);
     let output = output();
     let said = String::from_utf8_lossy(&output.stderr).trim().to_string();
     assert!(!output.status.success(), "it succeeded; {said}");
-    assert_eq!(said.lines().count(), 1, "not one sentence: {said}");
+    let lines = said.lines().filter(|line| !line.contains(": columns used: "));
+    assert_eq!(lines.count(), 1, "not one sentence: {said}");
     for word in words {
         assert!(said.contains(word), "\"{word}\" is not in: {said}");
     }
@@ -289,7 +291,7 @@ fn what_stands_twice_is_refused() {
     let directory = directory.path();
     std::fs::write(directory.join("in.csv"), "time,tau_cmd,tau_cmd\n0,1,2\n1,1,2\n").unwrap();
     let run = || short_run(directory, &["--input", "in.csv"]);
-    refuses(directory, run, &["in.csv", "more than one of its columns is called tau_cmd"]);
+    refuses(directory, run, &["in.csv", "more than one column tau_cmd"]);
     let twice = || short_run(directory, &["--profile", "zero", "--columns", "omega,omega"]);
     refuses(directory, twice, &["omega twice"]);
     let tank = pack::root().join("harness/tank/examples/capsule.toml");
@@ -560,7 +562,7 @@ fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     assert_eq!(text(&loud.stdout), "11 rows in out.csv\n");
     let quiet = short_run(directory, &["--profile", "zero", "--quiet", "--strict"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
-    // no stiffness: the FMU warns, and the run says which force rules the liquid
+    // no stiffness: the FMU warns, and the run says which force rules the liquid and where the model ends
     let weightless = ["--profile", "zero", "--set", "g_axial=0", "--quiet"];
     let warned = short_run(directory, &weightless);
     assert!(warned.status.success() && text(&warned.stderr).starts_with("warning: "));
@@ -569,7 +571,7 @@ fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     let last = text(&strict.stderr).lines().last().map(String::from);
     assert_eq!(
         last.as_deref(),
-        Some("error: there were 2 warnings, which --strict makes an error")
+        Some("error: there were 3 warnings, which --strict makes an error")
     );
     let rows = hubslosh(directory, &["--quiet", "torque", "--profiles"]);
     assert!(text(&rows.stdout).contains("exp-sweep"), "what is asked for is not a notice");

@@ -264,14 +264,16 @@ fn limited(command: &Command, blocks: usize) -> Command {
 fn a_full_disk_names_the_file_and_leaves_what_was_there() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
-    let plan = "title = \"A\"\nprofile = \"sine:duration=0.2\"\n";
-    successful(campaign(directory, plan));
+    // four runs of 60 s, so that the report is larger than the FMU's binary
+    let vary = "[vary]\nslosh.model = [\"frozen\", \"linear\", \"planar\", \"spherical\"]\n";
+    let plan = format!("title = \"A\"\nprofile = \"sine:duration=60\"\n{vary}");
+    successful(campaign(directory, &plan));
     let before = published(directory);
     // 4 KiB less than the report, which is larger than the FMU's binary and smaller than a run of a sweep
     let room = before["report.html"].len() / 512 - 8;
     let sweep = "title = \"B\"\nprofile = \"exp-sweep:duration=2700\"\n";
-    let short = "title = \"C\"\nprofile = \"sine:duration=0.3\"\n";
-    for (plan, file) in [(sweep, "c/runs/linear_100mm_100.parquet"), (short, "c/report.html")] {
+    let short = format!("title = \"C\"\nprofile = \"sine:duration=61\"\n{vary}");
+    for (plan, file) in [(sweep, "c/runs/linear_100mm_100.parquet"), (&short, "c/report.html")] {
         let done = limited(&campaign(directory, plan), room).output().unwrap();
         let (_, error) = said(&done);
         assert_eq!(done.status.code(), Some(1), "{error}");

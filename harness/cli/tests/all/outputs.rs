@@ -115,7 +115,7 @@ fn helps(command: &[&str], texts: &mut Vec<(String, String)>) {
 /// Options that name files which a command reads.
 const INPUTS: &str = "analyse --plan, analyse --bench-day, analyse --fmu, campaign --plan, campaign --fmu, \
     campaign --compare, design --fmu, example --fmu, gyro --recording, gyro --fmu, identify --fmu, run --input, \
-    run --parameters, run --fmu, variables --fmu, view --parameters, view --fmu, book --theme";
+    run --parameters, run --fmu, pack --parameters, variables --fmu, view --parameters, view --fmu, book --theme";
 
 #[test]
 fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
