@@ -50,7 +50,10 @@ impl History {
             "its columns have different lengths"
         );
         // also true of NaN
-        if let Some(row) = time.windows(2).position(|pair| !(pair[0] <= pair[1])) {
+        if let Some(row) = time
+            .windows(2)
+            .position(|pair| pair[0] > pair[1] || pair[0].is_nan() || pair[1].is_nan())
+        {
             bail!(
                 "row {}: time goes from {} to {} s; it must not go back (two rows at one time are a jump)",
                 row + 2,

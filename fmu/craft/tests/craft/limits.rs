@@ -141,7 +141,7 @@ fn a_tank_is_out_of_range_beyond_each_limit_and_inside_of_none() {
     }
 }
 
-/// Swirl is told from planar motion at every phase: an ellipse with semi-axes in a ratio of 0.6 swirls, one of 0.4 does
+/// Swirl is distinguished from planar motion at every phase: an ellipse with semi-axes in a ratio of 0.6 swirls, one of 0.4 does
 /// not.
 #[test]
 fn rotary_motion_is_that_of_a_wide_ellipse_at_every_phase() {

@@ -143,7 +143,7 @@ pub fn words(
     lines
 }
 
-/// Returns the sentence about a misfit without a known cause: where it is, and which effects cannot be told apart.
+/// Returns the sentence about a misfit without a known cause: where it is, and which effects the recording cannot distinguish.
 fn unknown_cause(findings: &Findings, fit: &ModelFit) -> String {
     let worst = |test: fn(&Tests) -> (f64, f64)| {
         let all = fit.tests.iter().map(test);

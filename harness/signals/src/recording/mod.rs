@@ -1,6 +1,6 @@
 //! Recordings: signals in SI units from files that others wrote. The name's ending separates
 //! text in columns, Parquet and MATLAB's `.mat`. [`Columns`], a row of units or the names of the columns (`gyro_z [deg/s]`,
-//! `gyro_z_dps`) give the signal and the unit of each column; a unit that none of them states is SI's, which is said, or the file is
+//! `gyro_z_dps`) give the signal and the unit of each column; a unit that none of them states is SI's, which the output states, or the file is
 //! refused where that is implausible.
 //!
 //! The rows of a recording are those with a value of one signal, its rows' signal. Where another one has none,

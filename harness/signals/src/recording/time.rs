@@ -165,7 +165,7 @@ fn offset(text: &str) -> Option<i64> {
     (hours <= 14 && minutes < 60).then_some(sign * (hours * 3600 + minutes * 60) * SECOND)
 }
 
-/// Nanoseconds since midnight of `12:00:00.020`, `12:00:00:020`, `12:00:00.020pm` and, beside a date, `12:00`.
+/// Nanoseconds since midnight of `12:00:00.020`, `12:00:00:020`, `12:00:00.020pm` and, next to a date, `12:00`.
 fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
     let (text, half) = match (text.strip_suffix("am"), text.strip_suffix("pm")) {
         (Some(text), _) => (text, Some(0)),
