@@ -48,7 +48,6 @@ LEFT_OUT = {
     r"hubslosh identify decay\.csv --tank": "a recording of forces; tests of `force_record`",
     r"hubslosh (identify (a|flight)|design slew)\.csv": "others' recordings; tests of `any_fmu`",
     r"pytest\b": "tests of the source; tests/python.rs",
-    r"hubslosh view .*--video": "needs a browser; .ci/browser",
 }
 """Commands that do not run here, and why."""
 

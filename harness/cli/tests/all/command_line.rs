@@ -324,8 +324,8 @@ fn a_torque_that_is_no_number_is_named_by_file_and_row() {
     let directory = directory.path();
     for (text, word) in [
         ("time,tau_cmd\n0,1\n1,NaN\n2,0\n", "row 2"),
-        ("time,tau_cmd\n0,1\n1,1\n2,inf\n", "row 3"),
-        ("time,tau_cmd\n0,1\n1,one\n", "row 2"),
+        ("time,tau_cmd\n0,1\n1,1\n2,inf\n", "line 4, column tau_cmd"),
+        ("time,tau_cmd\n0,1\n1,one\n", "line 3, column tau_cmd"),
         ("time,tau_cmd\n0,1\n1,1\n0.9,1\n", "row 3"),
         ("time,tau_cmd\n0,1\n", "1 rows"),
     ] {
