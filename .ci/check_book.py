@@ -53,6 +53,11 @@ def main() -> None:
             assert not titles(page, nonsense)
             assert f"No page has “{nonsense}”" in page.inner_text("#found")
             assert not page.locator("#found button").count()
+        # the last pages of the list are far below the sidebar's first screen
+        page.set_viewport_size({"width": 1400, "height": 800})
+        page.goto((arguments.book / "work_precision.html").absolute().as_uri())
+        box = page.locator("nav [aria-current]").bounding_box()
+        assert 0 < box["y"] < 700, f"the present page is outside the sidebar: {box}"
     print(f"{arguments.book}: spellings, endings, mistakes")
 
 

@@ -38,7 +38,6 @@ INDENTED = r" {4}(hubslosh|python3?|pip|cargo) "
 LEFT_OUT = {
     r"cargo (run|test|build|install)\b": "needs the source and Rust; .ci/run and CI's workflows",
     r"hubslosh pack\b": "needs the source and Rust; .ci/run packs",
-    r"harness/platforms/setup\b": "installs tools of the machine; .ci/platforms",
     r"pip install\b": "this script and .ci/wheels install the wheel",
     r"python3 -m venv\b": "makes the environment that this script makes",
     r"\. \.venv/bin/activate": "as above",
@@ -47,6 +46,7 @@ LEFT_OUT = {
     r"python examples/(6|7|11)_": "needs dask, libcosimpy or bsk; tests/python.rs",
     r"hubslosh identify decay\.csv --tank": "a recording of forces; tests of `force_record`",
     r"hubslosh (identify (a|flight)|design slew)\.csv": "others' recordings; tests of `any_fmu`",
+    r"hubslosh check my\.fmu --strict": "FMUs built here need a newer glibc, an error; .ci/run",
     r"pytest\b": "tests of the source; tests/python.rs",
 }
 """Commands that do not run here, and why."""

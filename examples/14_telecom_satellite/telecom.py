@@ -44,9 +44,9 @@ def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpa
     return control.append(*axes)
 
 
-def loop(fill: str, of: hubslosh.Craft = craft) -> hubslosh.Loop:
-    """Return the three-axis loop of a craft at a fill of both tanks."""
-    return of.loop(controller(), PERIOD, fill, measured=MEASURED, delay=DELAY)
+def loop(fill: str, of: hubslosh.Craft | None = None) -> hubslosh.Loop:
+    """Return the three-axis loop at a fill of both tanks, of this satellite or another craft."""
+    return (of or craft).loop(controller(), PERIOD, fill, measured=MEASURED, delay=DELAY)
 
 
 def over_fills() -> pd.DataFrame:

@@ -4,6 +4,13 @@ const field = document.getElementById("search");
 const found = document.getElementById("found");
 const pages = document.getElementById("pages");
 
+// The reader keeps the place in the list of pages: the present page stands in the middle of the sidebar, if the sidebar scrolls.
+const sidebar = document.querySelector("nav"), present = pages.querySelector("[aria-current]");
+if (present && sidebar.scrollHeight > sidebar.clientHeight) {
+  const from = sidebar.getBoundingClientRect().top, at = present.getBoundingClientRect().top;
+  sidebar.scrollTop += at - from - sidebar.clientHeight / 2;
+}
+
 function wordsOf(text) {
   return text.toLowerCase().split(/[^\p{L}\p{N}_.]+/u).filter(Boolean);
 }

@@ -394,8 +394,8 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
                 }
                 found.push(found_here);
             }
-            // `data(3)` of a .mat file is a name
-            [] if inside.chars().all(|c| c.is_ascii_digit()) => {}
+            // `data(3)` of a .mat file and `p[1,2]` of an FMU are names
+            [] if inside.chars().all(|c| c.is_ascii_digit() || ", ".contains(c)) => {}
             [] if !is_unit(inside) && !name[to..].trim().is_empty() => {}
             _ => other = Some(inside),
         }
@@ -440,7 +440,9 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
         }
         let is_foreign = |text: &str| {
             let minutes = dimension == Time.dimension() && text.eq_ignore_ascii_case("m");
-            minutes || text.len() > 1 && !OFTEN_OTHERS.contains(&text) && is_unit(text)
+            // an index is no unit: omega[1]
+            let is_index = !text.contains(|c: char| c.is_alphabetic() || "%°".contains(c));
+            minutes || !is_index && text.len() > 1 && !OFTEN_OTHERS.contains(&text) && is_unit(text)
         };
         if found.is_empty() && other.is_none() {
             let ends = starts.iter().filter(|from| **from > 0).map(|from| name[*from..].trim());
@@ -590,6 +592,16 @@ impl fmt::Display for Quantity {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_index_of_a_variable_is_no_unit() {
+        for name in ["omega[1]", "torque[3]", "q[4]", "tank[1].p[1,2]", "data(3)"] {
+            for quantity in Quantity::ALL {
+                let found = in_name(name, quantity.dimension());
+                assert!(matches!(found, Ok(None)), "{name} is no {quantity}");
+            }
+        }
+    }
 
     #[test]
     fn a_unit_is_known_in_each_of_its_spellings() {
