@@ -36,8 +36,10 @@ fn description<M: Model>(layout: Layout) -> Element {
     let used: Vec<_> = table.units().map(|unit| unit.name).collect();
     let units = UNITS.iter().filter(|unit| unit.name == TIME_UNIT || used.contains(&unit.name));
     let variables = Element::new("ModelVariables");
-    let all_unknowns =
-        |list, name| unknowns::<M>(list, name, "valueReference", |s| reference(layout, s));
+    // CasADi 3.8 reads no entry without dependencies
+    let all_unknowns = |list, name| {
+        unknowns::<M>(list, name, "valueReference", usize::MAX, |s| reference(layout, s))
+    };
     root::<M>("3.0", "instantiationToken", Fmi3::token::<M>(layout))
         .holding([
             interface::<M>("ModelExchange")

@@ -48,7 +48,7 @@ pub fn xml<M: Model>() -> Result<String, xml::writer::Error> {
 
 fn description<M: Model>() -> Element {
     let table = M::table();
-    let all_unknowns = |list| unknowns::<M>(list, "Unknown", "index", index);
+    let all_unknowns = |list| unknowns::<M>(list, "Unknown", "index", LONGEST, index);
     root::<M>("2.0", "guid", table.guid())
         .with("numberOfEventIndicators", table.about.event_indicators)
         .holding([
@@ -268,20 +268,21 @@ impl List {
     }
 }
 
-/// Longest list of dependencies of an initial value that is written. The values that depend on the accelerations depend on nearly
-/// all parameters, and their lists would be most of the file.
+/// Longest list of dependencies of an initial value that an FMU 2.0 has. The values that depend on the accelerations depend on
+/// nearly all parameters, and their lists would be most of the file.
 const LONGEST: usize = 100;
 
 /// The scalars of a list in the order of their numbers, each with the numbers of those it depends on. An array depends on
 /// what any of its elements does. `element` and `attribute` are what the version calls them.
 ///
-/// Dependencies of an initial value are left out if they are more than [`LONGEST`]: a host then takes it that the value depends on
+/// Dependencies of an initial value are left out if they are more than `longest`: a host then takes it that the value depends on
 /// everything. The list of an output stays if the output does not depend on all inputs, so that no host sees a loop that there is
 /// not.
 fn unknowns<M: Model>(
     list: List,
     element: &'static str,
     attribute: &'static str,
+    longest: usize,
     number: impl Fn(&Scalar<M>) -> u32,
 ) -> Vec<Element> {
     let inputs: BTreeSet<u32> = M::table().inputs().iter().map(&number).collect();
@@ -297,7 +298,7 @@ fn unknowns<M: Model>(
     }
     let is_left_out = |is_output: bool, known: &BTreeSet<u32>| {
         let by_inputs = !is_output || inputs.is_subset(known);
-        list == List::Initial && known.len() > LONGEST && by_inputs
+        list == List::Initial && known.len() > longest && by_inputs
     };
     let one = |(n, (is_output, known)): (u32, (bool, BTreeSet<u32>))| {
         let known = (!is_left_out(is_output, &known)).then_some(known);

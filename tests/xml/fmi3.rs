@@ -115,7 +115,13 @@ fn the_structure_is_as_in_fmi_2<M: Model>() {
         let old: Vec<_> = old.list(list).map(|unknown| of(unknown, "index")).collect();
         let new = new.children.iter().filter(|child| child.name == element);
         let new: Vec<_> = new.map(|unknown| of(unknown, "valueReference")).collect();
-        assert_eq!(old, new, "{list}");
+        assert_eq!(old.len(), new.len(), "{list}");
+        for (old, new) in old.iter().zip(&new) {
+            // FMI 2.0 leaves out long lists of initial values
+            let [reference, dependencies, _] = old;
+            let same = if dependencies.is_some() { old == new } else { *reference == new[0] };
+            assert!(same && new[1].is_some(), "{list}: {old:?}, {new:?}");
+        }
     }
     let indicators: Vec<_> =
         new.children.iter().filter(|child| child.name == "EventIndicator").collect();
