@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use host::c_abi::Message;
 use host::c_abi::version::{Fmu, Instance, Interface, Version};
+use host::guard;
 use host::xml::Element;
 
 use super::Findings;
@@ -127,7 +128,7 @@ impl<V: Version> Loaded<V> {
         let mut found = findings.clone();
         let place = what.clone();
         let (returned, waiting) = mpsc::channel::<()>();
-        std::thread::spawn(move || {
+        guard::spawn(move || {
             if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
                 found
                     .add(place, format!("no end after {PATIENCE:?} (allowed: every call returns)"));

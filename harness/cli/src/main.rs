@@ -156,7 +156,7 @@ fn command_line() -> clap::Command {
 fn clean_up_on_signals() {
     use signal_hook::consts::{SIGINT, SIGTERM};
     let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]) else { return };
-    std::thread::spawn(move || {
+    guard::spawn(move || {
         for signal in signals.forever() {
             guard::end_all();
             files::temporary::remove_all();

@@ -470,11 +470,38 @@ struct Reader {
     end: Receiver<()>,
 }
 
+/// Starts a thread. A system that is short of resources for a moment (EAGAIN) is asked again for up to two seconds.
+///
+/// # Panics
+/// If the system still refuses the thread then.
+pub fn spawn(work: impl FnOnce() + Send + 'static) {
+    let work = Arc::new(Mutex::new(Some(work)));
+    let attempt = || {
+        let work = work.clone();
+        std::thread::Builder::new().spawn(move || {
+            let work = lock(&work).take();
+            if let Some(work) = work {
+                work();
+            }
+        })
+    };
+    for _ in 0..40 {
+        match attempt() {
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            Err(error) => panic!("a thread could not be started: {error}"),
+            Ok(_) => return,
+        }
+    }
+    panic!("a thread could not be started: the system is short of resources");
+}
+
 /// Reads a pipe to its end, so that nobody who writes waits, and keeps the beginning.
 fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
     let (printed, (tell, end)) = (Arc::<Mutex<Printed>>::default(), channel());
     let to = printed.clone();
-    std::thread::spawn(move || {
+    spawn(move || {
         let mut buffer = vec![0; 1 << 16];
         while let Ok(read @ 1..) = pipe.read(&mut buffer) {
             let mut to = lock(&to);
@@ -532,7 +559,7 @@ pub fn enter() -> Result<()> {
         panics: |report| tell(PANICS, report.as_bytes()),
         catches: || tell(CATCHES, &[]),
     });
-    std::thread::spawn(tell_of_life);
+    spawn(tell_of_life);
     Ok(())
 }
 
