@@ -209,6 +209,14 @@ impl Bounds {
         self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest)
     }
 
+    /// Returns the specific force along the axis, m/s2, above that at which the liquid of any mode leaves the bottom; infinite
+    /// without modes.
+    pub fn margin(&self, axial: f64) -> f64 {
+        self.lowest[..self.modes]
+            .iter()
+            .fold(f64::INFINITY, |least, lowest| f64::min(least, axial - lowest))
+    }
+
     fn are_upright(&self, heights: [f64; MODES]) -> bool {
         heights[..self.modes].iter().all(|height| *height < -COS_45)
     }

@@ -1213,10 +1213,15 @@ impl SloshTank {
     }
 
     /// Returns functions of states and inputs that cross zero at events: at the end of the liquid's current state, and
-    /// at the end of its sliding on the wall. They are 1 in a tank without a model of detached liquid.
+    /// at the end of its sliding on the wall. In a tank without a model of detached liquid the first crosses zero where the
+    /// thrust no longer holds the liquid at the bottom, at which the tank leaves its range, and the second is 1.
     pub fn event_indicators(&mut self, inputs: &TankInputs) -> [f64; 2] {
+        /// Smallest indicator of liquid that is held, m/s2: at rest without thrust the margin is 0, and an indicator is not.
+        const HELD: f64 = 1e-9;
         if !self.has_ball() {
-            return [1.0; 2];
+            let axial = self.outputs_held(inputs).tank.axial;
+            let margin = self.bounds.margin(axial);
+            return [if margin >= 0.0 { margin.clamp(HELD, 1.0 / HELD) } else { margin }, 1.0];
         }
         self.motion.evaluate(inputs);
         let TankMotion { bobs, a, w, w_d, .. } = &*self.motion;
