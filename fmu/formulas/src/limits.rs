@@ -53,25 +53,26 @@ impl LimitedBy {
         LimitedBy::Contact,
     ];
 
+    /// Names and meanings of all reasons, in the order of their numbers.
+    pub const ITEMS: [(&str, &str); 8] = [
+        ("none", "In range"),
+        ("third_order", "Slosh angle above the limit of the amplitude model, or above 45 degrees"),
+        ("breaking", "Waves so steep that they break: above breaking_steepness"),
+        ("secondary_resonance", "Swirl beyond the fold of its branch by a secondary resonance"),
+        ("spin", "The tank turns about its axis so fast that the spin of the liquid matters"),
+        ("bond_number", "Surface tension matters, and the parameters do not include it"),
+        ("empty", "The tank has drained to the first point of its fill table"),
+        ("contact", "The liquid leaves the bottom of its tank, or is detached"),
+    ];
+
     /// Returns the reason with this number.
     pub fn from_number(number: u8) -> Option<LimitedBy> {
         LimitedBy::ALL.into_iter().find(|reason| *reason as u8 == number)
     }
 
-    /// Returns the reason in words, as the end of the sentence "out of range: …".
-    pub fn words(self) -> &'static str {
-        match self {
-            LimitedBy::None => "in range",
-            LimitedBy::ThirdOrder => {
-                "slosh angle above the limit of the amplitude model (third order)"
-            }
-            LimitedBy::Breaking => "waves break",
-            LimitedBy::SecondaryResonance => "swirl beyond its fold by a secondary resonance",
-            LimitedBy::Spin => "the liquid spins with its tank",
-            LimitedBy::BondNumber => "surface tension matters (Bond number)",
-            LimitedBy::Empty => "the tank has drained to the end of its fill table",
-            LimitedBy::Contact => "the liquid leaves the bottom of its tank",
-        }
+    /// Returns the meaning of the reason.
+    pub fn meaning(self) -> &'static str {
+        LimitedBy::ITEMS[self as usize - 1].1
     }
 }
 
@@ -107,9 +108,9 @@ const FOLD: [[f64; 2]; 6] =
 /// Slosh angles, rad, at which a model of the first mode ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleLimit {
-    /// The model's frequency errs by [`FREQUENCY`].
+    /// Angle at which the model's frequency errs by [`FREQUENCY`].
     pub frequency: f64,
-    /// Its frequency errs by [`FORCED`], and a forced response by 3 %.
+    /// Angle at which the model's frequency errs by [`FORCED`], so that a forced response errs by 3 %.
     pub forced: f64,
 }
 

@@ -668,23 +668,12 @@ static REGIME: Enumeration = Enumeration {
     ],
 };
 
-/// The same items as in the other FMUs.
+static LIMITED_BY_ITEMS: [Item; 8] = Item::list(LimitedBy::ITEMS);
+
 static LIMITED_BY: Enumeration = Enumeration {
     name: "LimitedBy",
-    description: "Reason why the slosh modes do not represent the liquid",
-    items: &[
-        Item::new("none", "In range"),
-        Item::new("third_order", "Slosh angle above that at which the model's frequency is wrong"),
-        Item::new("breaking", "Waves so steep that they break: above slosh.breaking_steepness"),
-        Item::new(
-            "secondary_resonance",
-            "Rotary motion beyond the fold of its branch by a secondary resonance",
-        ),
-        Item::new("spin", "The hub turns so fast that the liquid's spin matters"),
-        Item::new("bond_number", "Surface tension matters, and the model does not include it"),
-        Item::new("empty", "A tank of Spacecraft or SloshTank has drained"),
-        Item::new("contact", "Liquid of Spacecraft or SloshTank leaves the bottom of its tank"),
-    ],
+    description: "Reason why no slosh mode represents the liquid",
+    items: &LIMITED_BY_ITEMS,
 };
 
 pub(crate) fn set_item<T: Copy>(field: &mut T, items: &[T], number: i32) {

@@ -75,7 +75,7 @@ pub struct Quantity {
 }
 
 /// An item of an enumeration; the first has the number 1.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Item {
     /// Name.
     pub name: &'static str,
@@ -87,6 +87,17 @@ impl Item {
     /// An item in a table.
     pub const fn new(name: &'static str, description: &'static str) -> Item {
         Item { name, description }
+    }
+
+    /// Items of names and descriptions.
+    pub const fn list<const N: usize>(rows: [(&'static str, &'static str); N]) -> [Item; N] {
+        let mut items = [Item { name: "", description: "" }; N];
+        let mut i = 0;
+        while i < N {
+            items[i] = Item::new(rows[i].0, rows[i].1);
+            i += 1;
+        }
+        items
     }
 }
 

@@ -1,7 +1,7 @@
 //! Every variable of SloshTank.fmu, once. Start values are those of
 //! `craft::TankParameters::default()`; the host is at rest.
 
-use craft::{BallState, Coupling, DampingLaw, MODES, POINTS, TRIANGLE, TankState};
+use craft::{BallState, Coupling, DampingLaw, LimitedBy, MODES, POINTS, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
@@ -367,22 +367,12 @@ static REGIME: Enumeration = Enumeration {
     ],
 };
 
+static LIMITED_BY_ITEMS: [Item; 8] = Item::list(LimitedBy::ITEMS);
+
 static LIMITED_BY: Enumeration = Enumeration {
     name: "LimitedBy",
     description: "Reason why no pendulum represents the liquid",
-    items: &[
-        Item::new("none", "In range"),
-        Item::new("third_order", "Slosh angle above angle_limit, or above 45 degrees"),
-        Item::new("breaking", "Waves so steep that they break: above breaking_steepness"),
-        Item::new(
-            "secondary_resonance",
-            "Rotary motion above swirl_limit, where its branch folds by a secondary resonance",
-        ),
-        Item::new("spin", "The tank turns about its axis so fast that the liquid's spin matters"),
-        Item::new("bond_number", "Surface tension matters, and the parameters do not include it"),
-        Item::new("empty", "The tank has drained to the first point of its fill table"),
-        Item::new("contact", "The liquid leaves the bottom of its tank, or is detached"),
-    ],
+    items: &LIMITED_BY_ITEMS,
 };
 
 static BALL_STATE: Enumeration = Enumeration {

@@ -4,7 +4,7 @@
 //! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, … with
 //! the indices tank, mode, axis.
 
-use craft::{BallState, DampingLaw, MODES, POINTS, STATES, State, TANKS, index};
+use craft::{BallState, DampingLaw, LimitedBy, MODES, POINTS, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized, Used};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
@@ -510,22 +510,12 @@ static REGIME: Enumeration = Enumeration {
     ],
 };
 
+static LIMITED_BY_ITEMS: [Item; 8] = Item::list(LimitedBy::ITEMS);
+
 static LIMITED_BY: Enumeration = Enumeration {
     name: "LimitedBy",
     description: "Reason why no pendulum represents the liquid",
-    items: &[
-        Item::new("none", "In range"),
-        Item::new("third_order", "Slosh angle above angle_limit, or above 45 degrees"),
-        Item::new("breaking", "Waves so steep that they break: above breaking_steepness"),
-        Item::new(
-            "secondary_resonance",
-            "Rotary motion above swirl_limit, where its branch folds by a secondary resonance",
-        ),
-        Item::new("spin", "The tank turns about its axis so fast that the liquid's spin matters"),
-        Item::new("bond_number", "Surface tension matters, and the parameters do not include it"),
-        Item::new("empty", "The tank has drained to the first point of its fill table"),
-        Item::new("contact", "The liquid leaves the bottom of its tank, or is detached"),
-    ],
+    items: &LIMITED_BY_ITEMS,
 };
 
 static BALL_STATE: Enumeration = Enumeration {

@@ -1,4 +1,4 @@
-//! What a run was limited by: the reasons for which our FMUs were out of range, and for which share of the time.
+//! Reasons for which the tanks of a run were out of the range of their model, each with its share of the time.
 
 use formulas::limits::LimitedBy;
 use host::description::ModelDescription;
@@ -13,7 +13,7 @@ pub struct Limits {
 
 impl Limits {
     /// Finds the variables of an FMU.
-    pub fn of(description: &ModelDescription) -> Limits {
+    pub fn find(description: &ModelDescription) -> Limits {
         let several = (1..=spacecraft::MOST_TANKS)
             .map(|i| (spacecraft::tank::LIMITED_BY_KIND.at([i]), format!("tank {i}: ")));
         let one = [hubslosh::LIMITED_BY_KIND, sloshtank::tank::LIMITED_BY_KIND]
@@ -36,7 +36,7 @@ impl Limits {
             let out: f64 = shares.iter().map(|(_, share)| share).sum();
             let list: Vec<String> = shares
                 .iter()
-                .map(|(reason, share)| format!("{} ({})", reason.words(), percent(*share)))
+                .map(|(reason, share)| format!("{} ({})", lower(reason.meaning()), percent(*share)))
                 .collect();
             (out > 0.0).then(|| {
                 format!("{tank}out of range for {} of the time: {}", percent(out), list.join("; "))
@@ -68,6 +68,10 @@ fn shares(time: &[f64], reasons: &[f64]) -> Vec<(LimitedBy, f64)> {
         .collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all
+}
+
+fn lower(sentence: &str) -> String {
+    sentence[..1].to_lowercase() + &sentence[1..]
 }
 
 /// Returns a share in per cent, never rounded to nothing.

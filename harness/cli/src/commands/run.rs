@@ -169,7 +169,7 @@ impl RunArgs {
                 "--tension is for the tanks of Spacecraft and SloshTank (the bench's is fluid.sigma)"
             );
         }
-        let limits = Limits::of(description);
+        let limits = Limits::find(description);
         let forces = tanks.iter().flat_map(Tanks::needs).collect::<Vec<_>>();
         let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
         let wave = range.as_ref().map(|_| WAVE);
