@@ -136,7 +136,7 @@ impl Bounds {
     }
 
     /// Returns the ranges for a tank's outputs, at the angular velocity `omega`, rad/s, and mass of liquid, kg.
-    pub fn of(&self, out: &TankOutputs, omega: Vec3, liquid: f64) -> Ranges {
+    pub fn classify(&self, out: &TankOutputs, omega: Vec3, liquid: f64) -> Ranges {
         if out.ball_state != BallState::Settled {
             let limited_by = LimitedBy::Contact;
             return Ranges { regime: Regime::Nonlinear, limited_by, is_physical: false };
@@ -209,12 +209,14 @@ impl Bounds {
         self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest)
     }
 
-    /// Returns the specific force along the axis, m/s2, above that at which the liquid of any mode leaves the bottom; infinite
-    /// without modes.
-    pub fn margin(&self, axial: f64) -> f64 {
-        self.lowest[..self.modes]
-            .iter()
-            .fold(f64::INFINITY, |least, lowest| f64::min(least, axial - lowest))
+    /// Returns the event indicator of a tank without a model of detached liquid, m/s2: it is negative where the specific force
+    /// `axial` along the tank no longer holds the liquid of every mode at the bottom, and never 0.
+    pub fn held_indicator(&self, axial: f64) -> f64 {
+        /// Smallest indicator of liquid that is held: at rest without thrust the margin is 0.
+        const HELD: f64 = 1e-9;
+        let margins = self.lowest[..self.modes].iter().map(|lowest| axial - lowest);
+        let margin = margins.fold(1.0 / HELD, f64::min);
+        if margin >= 0.0 { margin.max(HELD) } else { margin }
     }
 
     fn are_upright(&self, heights: [f64; MODES]) -> bool {

@@ -1180,7 +1180,7 @@ impl SloshTank {
     /// Returns the ranges of the current motion.
     pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
-        self.bounds.of(&outputs.tank, inputs.omega, self.motion.state.x[LIQUID])
+        self.bounds.classify(&outputs.tank, inputs.omega, self.motion.state.x[LIQUID])
     }
 
     /// Returns the ranges as of the last event.
@@ -1216,12 +1216,9 @@ impl SloshTank {
     /// at the end of its sliding on the wall. In a tank without a model of detached liquid the first crosses zero where the
     /// thrust no longer holds the liquid at the bottom, at which the tank leaves its range, and the second is 1.
     pub fn event_indicators(&mut self, inputs: &TankInputs) -> [f64; 2] {
-        /// Smallest indicator of liquid that is held, m/s2: at rest without thrust the margin is 0, and an indicator is not.
-        const HELD: f64 = 1e-9;
         if !self.has_ball() {
             let axial = self.outputs_held(inputs).tank.axial;
-            let margin = self.bounds.margin(axial);
-            return [if margin >= 0.0 { margin.clamp(HELD, 1.0 / HELD) } else { margin }, 1.0];
+            return [self.bounds.held_indicator(axial), 1.0];
         }
         self.motion.evaluate(inputs);
         let TankMotion { bobs, a, w, w_d, .. } = &*self.motion;
@@ -1265,7 +1262,7 @@ impl SloshTank {
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let mut outputs = self.outputs_held(inputs);
         let liquid = self.motion.state.x[LIQUID];
-        outputs.tank.ranges = self.bounds.of(&outputs.tank, inputs.omega, liquid);
+        outputs.tank.ranges = self.bounds.classify(&outputs.tank, inputs.omega, liquid);
         outputs
     }
 

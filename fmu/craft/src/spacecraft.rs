@@ -199,7 +199,7 @@ impl Spacecraft {
     fn update_ranges(&self, outputs: &mut Outputs) {
         let (omega, x) = (outputs.omega, &self.motion.state.x);
         for (i, (tank, limits)) in outputs.tank.iter_mut().zip(&self.bounds).enumerate() {
-            tank.ranges = limits.of(tank, omega, x[index::LIQUID + i]);
+            tank.ranges = limits.classify(tank, omega, x[index::LIQUID + i]);
         }
     }
 
@@ -311,16 +311,26 @@ impl Spacecraft {
     }
 
     /// Writes event indicators, two for each tank: one crosses zero at the end of the liquid's current state, one at the end of
-    /// its sliding on the wall. They are 1 where there is no such event.
+    /// its sliding on the wall. In a tank without a model of detached liquid the first crosses zero where the thrust no longer
+    /// holds the liquid at the bottom, at which the tank leaves its range. Where there is no such event they are 1.
     pub fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         self.motion.indicators(inputs, indicators);
+        if (0..self.bounds.len()).all(|i| self.has_ball(i)) {
+            return;
+        }
+        let outputs = self.outputs_held(inputs);
+        for (i, bounds) in self.bounds.iter().enumerate() {
+            if !self.has_ball(i) {
+                indicators[2 * i] = bounds.held_indicator(outputs.tank[i].axial);
+            }
+        }
     }
 
     /// Returns true if a host that integrates itself has passed an event of a liquid, whatever the indicators of its last steps
     /// were. The liquid is then outside its wall and moves outwards, must leave bottom or wall, or may settle.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let mut now = [1.0; 2 * TANKS];
-        self.event_indicators(inputs, &mut now);
+        self.motion.indicators(inputs, &mut now);
         let at = |tank: usize| [now[2 * tank], now[2 * tank + 1]];
         self.motion.lumps.iter().any(|lump| lump.is_overdue(at(lump.tank)))
     }
