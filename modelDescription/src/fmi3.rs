@@ -14,8 +14,8 @@ use runtime::version::Version;
 
 use crate::element::Element;
 use crate::{
-    List, Own, default_experiment, folder, items, log_categories, of_type, root, state_of, text,
-    type_definitions, unit, unknown, unknowns, variability,
+    List, Long, Own, default_experiment, folder, items, log_categories, of_type, root, state_of,
+    text, type_definitions, unit, unknown, unknowns, variability,
 };
 
 /// Path of the committed XML.
@@ -38,7 +38,7 @@ fn description<M: Model>(layout: Layout) -> Element {
     let variables = Element::new("ModelVariables");
     // CasADi 3.8 reads no entry without dependencies
     let all_unknowns = |list, name| {
-        unknowns::<M>(list, name, "valueReference", usize::MAX, |s| reference(layout, s))
+        unknowns::<M>(list, name, "valueReference", Long::Dependencies, |s| reference(layout, s))
     };
     root::<M>("3.0", "instantiationToken", Fmi3::token::<M>(layout))
         .holding([
@@ -232,5 +232,5 @@ fn event_indicators<M: Model>(layout: Layout) -> impl Iterator<Item = Element> {
         Layout::Scalars => time_reference::<M>() + 1..=time_reference::<M>() + count,
         Layout::Arrays => arrays::time::<M>() + 1..=arrays::time::<M>() + count.min(1),
     };
-    references.map(move |n| unknown("EventIndicator", "valueReference", n, Some(&known)))
+    references.map(move |n| unknown("EventIndicator", "valueReference", n, &known))
 }

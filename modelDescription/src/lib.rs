@@ -48,7 +48,7 @@ pub fn xml<M: Model>() -> Result<String, xml::writer::Error> {
 
 fn description<M: Model>() -> Element {
     let table = M::table();
-    let all_unknowns = |list| unknowns::<M>(list, "Unknown", "index", LONGEST, index);
+    let all_unknowns = |list| unknowns::<M>(list, "Unknown", "index", Long::Nothing, index);
     root::<M>("2.0", "guid", table.guid())
         .with("numberOfEventIndicators", table.about.event_indicators)
         .holding([
@@ -268,21 +268,29 @@ impl List {
     }
 }
 
-/// Longest list of dependencies of an initial value that an FMU 2.0 has. The values that depend on the accelerations depend on
+/// Longest list of dependencies of an initial value that is written whole. The values that depend on the accelerations depend on
 /// nearly all parameters, and their lists would be most of the file.
 const LONGEST: usize = 100;
+
+/// Part that is written of a list of dependencies with more than [`LONGEST`] entries.
+#[derive(Clone, Copy, PartialEq)]
+enum Long {
+    /// Nothing: a host then takes it that the value depends on everything. The list of an output stays if the output does not
+    /// depend on all inputs, so that no host sees a loop that does not exist.
+    Nothing,
+    /// The dependencies without their kinds: a host then takes each as `dependent`, which it is.
+    Dependencies,
+}
 
 /// The scalars of a list in the order of their numbers, each with the numbers of those it depends on. An array depends on
 /// what any of its elements does. `element` and `attribute` are what the version calls them.
 ///
-/// Dependencies of an initial value are left out if they are more than `longest`: a host then takes it that the value depends on
-/// everything. The list of an output stays if the output does not depend on all inputs, so that no host sees a loop that there is
-/// not.
+/// `long` is the part that is written of a long list of an initial value.
 fn unknowns<M: Model>(
     list: List,
     element: &'static str,
     attribute: &'static str,
-    longest: usize,
+    long: Long,
     number: impl Fn(&Scalar<M>) -> u32,
 ) -> Vec<Element> {
     let inputs: BTreeSet<u32> = M::table().inputs().iter().map(&number).collect();
@@ -296,28 +304,33 @@ fn unknowns<M: Model>(
         *is_output = scalar.variable.causality == Causality::Output;
         all.extend(known.into_iter().map(&number));
     }
-    let is_left_out = |is_output: bool, known: &BTreeSet<u32>| {
-        let by_inputs = !is_output || inputs.is_subset(known);
-        list == List::Initial && known.len() > longest && by_inputs
-    };
     let one = |(n, (is_output, known)): (u32, (bool, BTreeSet<u32>))| {
-        let known = (!is_left_out(is_output, &known)).then_some(known);
-        unknown(element, attribute, n, known.as_ref())
+        if list == List::Initial && known.len() > LONGEST {
+            let entry = Element::new(element).with(attribute, n);
+            match long {
+                Long::Nothing if !is_output || inputs.is_subset(&known) => return entry,
+                Long::Nothing => {}
+                Long::Dependencies => return entry.with("dependencies", numbers(&known)),
+            }
+        }
+        unknown(element, attribute, n, &known)
     };
     unknowns.into_iter().map(one).collect()
 }
 
-/// An entry of ModelStructure. Without `known` it depends on everything.
+/// An entry of ModelStructure with all that it depends on.
 fn unknown(
     element: &'static str,
     attribute: &'static str,
     number: u32,
-    known: Option<&BTreeSet<u32>>,
+    known: &BTreeSet<u32>,
 ) -> Element {
-    let element = Element::new(element).with(attribute, number);
-    let Some(known) = known else { return element };
-    let numbers: Vec<_> = known.iter().map(u32::to_string).collect();
-    element
-        .with("dependencies", numbers.join(" "))
-        .with("dependenciesKind", vec!["dependent"; numbers.len()].join(" "))
+    Element::new(element)
+        .with(attribute, number)
+        .with("dependencies", numbers(known))
+        .with("dependenciesKind", vec!["dependent"; known.len()].join(" "))
+}
+
+fn numbers(known: &BTreeSet<u32>) -> String {
+    known.iter().map(u32::to_string).collect::<Vec<_>>().join(" ")
 }

@@ -17,9 +17,9 @@ pub const START_VALUES: &str = "resources/start_values.txt";
 pub struct Limit<'a> {
     /// Name of the parameter.
     pub parameter: &'a str,
-    /// Its largest value in the part.
+    /// Largest value of the parameter in the part.
     pub size: usize,
-    /// Its largest value in the whole description.
+    /// Largest value of the parameter in the whole description.
     pub most: usize,
     /// True if each element has its event indicators.
     pub has_indicators: bool,
@@ -105,12 +105,14 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
             Some(new) => {
                 edits.set(&unknown, key, new);
                 let listed = |name| unknown.attribute(name).unwrap_or_default().split_whitespace();
-                let kept = listed("dependencies").zip(listed("dependenciesKind"));
-                let kept = kept.filter_map(|(known, kind)| Some((renumbered.get(known)?, kind)));
-                let (known, kinds): (Vec<_>, Vec<_>) =
-                    kept.map(|(known, kind)| (known.as_str(), kind)).unzip();
+                let is_kept = |known: &&str| renumbered.contains_key(*known);
+                let known: Vec<_> =
+                    listed("dependencies").filter_map(|k| renumbered.get(k)).collect();
+                let kinds = listed("dependencies").zip(listed("dependenciesKind"));
+                let kinds = kinds.filter(|(known, _)| is_kept(known)).map(|(_, kind)| kind);
+                let known: Vec<_> = known.into_iter().map(String::as_str).collect();
                 edits.set(&unknown, "dependencies", &known.join(" "));
-                edits.set(&unknown, "dependenciesKind", &kinds.join(" "));
+                edits.set(&unknown, "dependenciesKind", &kinds.collect::<Vec<_>>().join(" "));
             }
         }
     }
