@@ -297,7 +297,7 @@ impl Draining {
                 }
             }
         }
-        Equations { matrix, factors: Factors::of_any(&held) }
+        Equations { matrix, factors: Factors::definite_or_zero(&held) }
     }
 
     /// Solves the equations of motion for [a; w']; on a pivot a is given.

@@ -153,9 +153,10 @@ impl<T: Number> Factors<T> {
         factors
     }
 
-    /// The same for a matrix that may be far from positive definite, as a diverging host's states make it. Of such a matrix the
-    /// solution of any equations is 0, because products of its factors could overflow.
-    pub fn of_any(matrix: &Mat6<T>) -> Factors<T> {
+    /// Factorises a matrix that may be far from positive definite, because a host whose integration diverges hands over any
+    /// states. If the matrix is not positive definite, all factors are 0 and [`Factors::solve`] returns 0: products of the
+    /// true factors could overflow.
+    pub fn definite_or_zero(matrix: &Mat6<T>) -> Factors<T> {
         let zero = T::constant(0.0);
         let none = Factors { l: [[zero; 6]; 6], inverse: [zero; 6] };
         let mut factors = none;

@@ -39,9 +39,9 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Returns the part of the table in the description with this token, with the table's start values. `whole` is the token of the
-    /// whole description. `None` if the token is of no such description.
-    pub fn of_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
+    /// Returns the part of the table that the description with this token has, with the table's start values. `whole` is the
+    /// token of the whole description. Returns `None` if the token does not belong to a part of this table.
+    pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
             return None;
@@ -236,26 +236,26 @@ mod tests {
     use super::*;
     use crate::tests::trays::Trays;
 
-    fn of(digits: &str) -> Option<Extent> {
+    fn extent_with(digits: &str) -> Option<Extent> {
         let whole = Trays::table().guid();
         let token = format!("{}{digits}}}", &whole[..GUID_LENGTH - 1 - DIGITS]);
-        Extent::of_token::<Trays>(&token, whole)
+        Extent::from_token::<Trays>(&token, whole)
     }
 
     /// Three trays at most: levels are states, one each; the table's start value of the number is 2.
     #[test]
     fn a_token_says_how_many_states_there_are() {
         assert_eq!(Trays::table().sizes(), [("rows", 3)]);
-        let extent = of("10010000").unwrap();
+        let extent = extent_with("10010000").unwrap();
         assert_eq!((extent.places(), &extent.starts()[0]), (&[0][..], &Value::Integer(1)));
-        assert_eq!(of("20020000").unwrap().places(), [0, 1]);
-        assert_eq!(of("20020000").unwrap().starts()[0], Value::Integer(2));
+        assert_eq!(extent_with("20020000").unwrap().places(), [0, 1]);
+        assert_eq!(extent_with("20020000").unwrap().starts()[0], Value::Integer(2));
         for wrong in ["10020000", "40030000", "00000000", "11010000", "g0010000", "1001000"] {
-            assert_eq!(of(wrong), None, "{wrong}");
+            assert_eq!(extent_with(wrong), None, "{wrong}");
         }
         let whole = Trays::table().guid();
-        assert_eq!(Extent::of_token::<Trays>("", whole), None);
-        assert_eq!(Extent::of_token::<Trays>("{é}", whole), None);
+        assert_eq!(Extent::from_token::<Trays>("", whole), None);
+        assert_eq!(Extent::from_token::<Trays>("{é}", whole), None);
     }
 
     #[test]
@@ -268,10 +268,10 @@ mod tests {
             ("file:///C:/a/b", "C:/a/b"),
             ("/tmp/a", "/tmp/a"),
         ] {
-            assert_eq!(of(uri).as_deref(), Some(path));
+            assert_eq!(extent_with(uri).as_deref(), Some(path));
         }
         for wrong in ["", "http://a/b", "file:///%4", "file:///%zz", "file://host", "file:///%ff"] {
-            assert_eq!(of(wrong), None, "{wrong}");
+            assert_eq!(extent_with(wrong), None, "{wrong}");
         }
     }
 }

@@ -124,7 +124,7 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     let text = String::from_utf8_lossy(&guid);
     let extent = match layout {
         Some(_) => None,
-        None => Extent::of_token::<M>(&text, V::token::<M>(Layout::Scalars)).map(Arc::new),
+        None => Extent::from_token::<M>(&text, V::token::<M>(Layout::Scalars)).map(Arc::new),
     };
     let Some(layout) = layout.or(extent.is_some().then_some(Layout::Scalars)) else {
         let guid = text;

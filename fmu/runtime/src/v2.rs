@@ -342,7 +342,7 @@ fn interface<M: Model>(
         None => Err(format!("fmuGUID is NULL; expected {expected}")),
         Some(guid) if guid == expected => Ok((interface, None)),
         Some(guid) => {
-            let Some(mut extent) = Extent::of_token::<M>(&guid, expected) else {
+            let Some(mut extent) = Extent::from_token::<M>(&guid, expected) else {
                 return Err(format!(
                     "fmuGUID is {guid}; expected {expected}: model description and binary do not belong together"
                 ));

@@ -245,12 +245,12 @@ fn from_json(text: &str) -> Result<ParameterSet> {
         let value = value.with_context(|| format!("parameters: {name} has no number \"value\""))?;
         add(name, Value::Real(value));
     }
-    Ok(of_one_run(ParameterSet { parameters, warnings }))
+    Ok(keep_parameters_of_one_run(ParameterSet { parameters, warnings }))
 }
 
 /// Keeps the parameters of one run: those of all recordings, and those of the only recording (`NAME@1`). If there are several
 /// recordings, their own parameters are left out, and a warning names them.
-fn of_one_run(found: ParameterSet) -> ParameterSet {
+fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     let recording = |name: &str| -> Option<usize> { name.rsplit_once('@')?.1.parse().ok() };
     let has_others = found.parameters.iter().any(|p| recording(&p.name).is_some_and(|n| n > 1));
     let (mut left_out, mut parameters, mut warnings) = (Vec::new(), Vec::new(), found.warnings);

@@ -13,7 +13,7 @@ use crate::description::ModelDescription;
 /// to be moved there: 3 · 0.02 is not 0.06.
 const SAME: f64 = 1e-6;
 
-/// What a row of a result pairs, for its metadata.
+/// Sentence for the metadata of a result: which inputs and which outputs stand in one row.
 pub const ROWS: &str =
     "inputs from the row's time on; other variables at the row's time, before these inputs act";
 

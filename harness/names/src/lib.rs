@@ -28,7 +28,7 @@ impl<const D: usize> Array<D> {
 pub struct Size {
     /// Name of the parameter.
     pub parameter: &'static str,
-    /// Its largest value.
+    /// Largest value of the parameter.
     pub most: usize,
     /// True if each element has its event indicators.
     pub has_indicators: bool,

@@ -112,7 +112,7 @@ fn check_token<M: Model>(
         None => Err(format!("instantiationToken is NULL; {}", expected())),
         Some(token) if token == scalars => Ok((Layout::Scalars, None)),
         Some(token) if token == with_arrays => Ok((Layout::Arrays, None)),
-        Some(token) => match Extent::of_token::<M>(&token, scalars) {
+        Some(token) => match Extent::from_token::<M>(&token, scalars) {
             Some(extent) => Ok((Layout::Scalars, Some(extent))),
             None => Err(format!(
                 "instantiationToken is {token}; {}: model description and binary do not belong together",

@@ -17,11 +17,11 @@ const LARGEST: f64 = 0.25;
 /// A number of the thesis.
 struct Number {
     section: &'static str,
-    /// What the number is, with its unit.
+    /// Quantity that the number is a value of, with its unit.
     quantity: &'static str,
     /// The number is about the synthetic data, whose liquid is linear; it is compared with the linear model only.
     synthetic: bool,
-    /// As the thesis prints it.
+    /// The number as the thesis prints it.
     printed: &'static str,
     /// Values that agree with the printed one. The range is that of the thesis where it prints one, otherwise 15 % for an
     /// acceleration (the thesis states neither the fill nor the filter of its gyro) and half a step between torques.

@@ -22,10 +22,10 @@ pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> 
     even_with_gaps(table, MISSING, done)
 }
 
-/// The same, of a record of which another part than usual may be missing.
+/// Puts a table on an even grid as [`even`] does, but accepts that up to the share `most_missing` of the rows is missing.
 ///
 /// # Errors
-/// As [`even`].
+/// If time does not grow, or if more rows are missing.
 pub fn even_with_gaps(
     table: Table,
     most_missing: f64,

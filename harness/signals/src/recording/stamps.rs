@@ -24,7 +24,7 @@ const BEYOND: f64 = 0.02;
 /// Fewest rows.
 const FEWEST: usize = 20;
 
-/// What the times of a recording are.
+/// Relation between the times of a recording and an even grid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stamps {
     /// On an even grid anyway, or on none that explains them.

@@ -347,7 +347,7 @@ const OFTEN_OTHERS: [&str; 5] = ["min", "in", "rev", "raw", "counts"];
 /// A unit within the name of a column.
 #[derive(Debug, PartialEq)]
 pub(super) struct Stated {
-    /// As it is written.
+    /// The unit as the name writes it.
     pub text: String,
     /// Value in SI.
     pub factor: f64,
@@ -357,12 +357,12 @@ pub(super) struct Stated {
     pub is_last: bool,
 }
 
-/// What is wrong with the unit in a name.
+/// Reason why the unit in a name cannot be used.
 #[derive(Debug, PartialEq)]
 pub(super) enum Fault {
-    /// It is not one of the dimension.
+    /// The unit belongs to another quantity.
     Foreign(String),
-    /// There are two.
+    /// The name states two different units.
     Two(String, String),
 }
 
@@ -535,7 +535,7 @@ fn parted(text: &str) -> String {
 impl Quantity {
     const ALL: [Quantity; 7] = [Time, Torque, Rate, Angle, Acceleration, Length, Force];
 
-    /// Its dimension.
+    /// Returns the exponents of kg, m, s and rad.
     pub(super) fn dimension(self) -> Dimension {
         match self {
             Time => [0, 0, 1, 0],
