@@ -9,6 +9,7 @@ Prints the table of `book/verification.md`.
 """
 
 import argparse
+import csv
 import json
 import subprocess
 import sys
@@ -193,6 +194,52 @@ def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
     return {"hub.I": ends(found["hub.I"], inertia), "friction.b": ends(found["friction.b"], b)}
 
 
+def campaign(friction: str) -> Callable[[Bench, np.random.Generator], Result]:
+    """Return a method: features of slow sweeps whose gyro has another seed each.
+
+    The truth is the feature of the run without a gyro.
+    """
+    rows: list[dict[str, str]] = []
+
+    def method(bench: Bench, rng: np.random.Generator) -> Result:
+        del rng  # the draws are the campaign's
+        if not rows:
+            seeds = ", ".join(str(seed) for seed in range(1, DRAWS[0] + 1))
+            plan = f"""title = "Intervals"
+profile = "lin-sweep:amplitude=0.02,f0=2.0,f1=2.6,duration=720"
+[set]
+slosh.model = "linear"
+friction.model = "{friction}"
+"""
+            (bench.folder / "clean.toml").write_text(plan)
+            (bench.folder / "noisy.toml").write_text(
+                f"{plan}imu.enabled = true\n[vary]\nimu.seed = [{seeds}]\n"
+            )
+            for name in ("clean", "noisy"):
+                out = f"{name}-{friction}"
+                bench.call("campaign", "--fmu", bench.fmu, "--plan", f"{name}.toml", "--out", out)
+                for estimate in ("features.csv", "features_spa.csv"):
+                    with (bench.folder / out / estimate).open() as file:
+                        TABLES[out, estimate] = list(csv.DictReader(file))
+            rows.extend(TABLES[f"noisy-{friction}", "features.csv"])
+        k = len(rows) - DRAWS[0]
+        rows.append({})
+        result = {}
+        for estimate in ("features.csv", "features_spa.csv"):
+            row = TABLES[f"noisy-{friction}", estimate][k]
+            truths = TABLES[f"clean-{friction}", estimate][0]
+            for feature in ("f_res", "f_dip"):
+                value = float(row[f"{feature}_hz"])
+                half = 1.96 * float(row[f"{feature}_std_hz"])
+                name = f"{feature}_hz, {estimate}"
+                result[name] = (float(truths[f"{feature}_hz"]), value - half, value + half)
+        return result
+
+    return method
+
+
+DRAWS = [100]
+TABLES: dict[tuple[str, str], list[dict[str, str]]] = {}
 CLEAN: dict[str, tuple[Vector, Vector, Vector]] = {}
 
 
@@ -209,6 +256,8 @@ METHODS: dict[str, Callable[[Bench, np.random.Generator], Result]] = {
     "identify --method acceleration --empty": acceleration,
     "identify --method frequency": frequency,
     "identify --free": any_fmu,
+    "campaign (viscous)": campaign("viscous"),
+    "campaign (stribeck)": campaign("stribeck"),
 }
 
 
@@ -243,6 +292,7 @@ def main() -> None:
     parser.add_argument("--fmu", default="dist/HubSlosh.fmu")
     parser.add_argument("--only", default="")
     args = parser.parse_args()
+    DRAWS[0] = args.draws
     print("| command | quantity | held | width, of the truth | without an interval |")
     print("| --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as folder:

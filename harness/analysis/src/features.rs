@@ -1,6 +1,7 @@
 //! Antiresonance and resonance of a frequency response (thesis 6.3.1).
 
-use crate::FrequencyResponse;
+use crate::random::Random;
+use crate::{Complex64, FrequencyResponse};
 
 /// Features of a frequency response.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,9 +25,13 @@ pub struct Deviations {
 
 impl Features {
     /// Returns the standard deviations of the features, from the response, its relative standard deviation at each
-    /// frequency, and the relative rate at which its error changes along the frequency, 1/Hz. An error ε of ln |H|
-    /// moves an extremum by −ε'/(ln |H|)'' if the curvature is that of the response. Where ε'' is no longer small against it, as at an
-    /// antiresonance whose bottom is below the noise, the extremum may be anywhere where |H| is within the error of its difference, √2 ε.
+    /// frequency, and the relative rate at which its error changes along the frequency, 1/Hz. In responses with another error of this
+    /// kind added, 95 % of the features' shifts are below 1.96 deviations.
+    ///
+    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. Normal sₖ with the
+    /// rate as deviation make its correlation that of a Gaussian window, exp(−s²Δf²/2). A quotient of the slope of the error
+    /// and of the curvature of ln |H| would do only where the error is small against the response, which it is not at
+    /// an antiresonance.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,
@@ -34,23 +39,50 @@ impl Features {
         slope: impl Fn(f64) -> f64,
     ) -> Deviations {
         let f = &response.frequency;
-        let of = |found: Option<f64>| {
-            let i = f.partition_point(|f| *f < found.unwrap_or(f64::NAN)).clamp(1, f.len() - 2);
-            let i = if f[i] - found? > found? - f[i - 1] { (i - 1).max(1) } else { i };
-            let level = |i: usize| response.response[i].norm().ln();
-            let rise = |i: usize| (level(i + 1) - level(i)) / (f[i + 1] - f[i]);
-            let curvature = 2.0 * (rise(i) - rise(i - 1)) / (f[i + 1] - f[i - 1]);
-            let (relative, slope) = (*relative.get(i)?, slope(f[i]));
-            let std = slope * relative / curvature.abs();
-            let near =
-                |j: &usize| (level(*j) - level(i)).abs() < std::f64::consts::SQRT_2 * relative;
-            let low = (0..i).rev().take_while(near).last().unwrap_or(i);
-            let high = (i + 1..f.len()).take_while(near).last().unwrap_or(i);
-            let is_noise = slope * slope * relative > NOISY * curvature.abs();
-            let std = if is_noise { std.max(0.5 * (f[high] - f[low])) } else { std };
-            std.is_finite().then_some(std)
+        // far enough for the extremum of a response with an error, and not farther, which takes time
+        let margin = 3.0 * self.delta_f().unwrap_or(f64::INFINITY);
+        let near = |f: f64| self.f_dip.is_none_or(|dip| f > dip - margin);
+        let first = f.partition_point(|f| !near(*f));
+        let end = f.partition_point(|f| self.f_res.is_none_or(|top| *f < top + margin)).max(first);
+        let (f, h, relative) = match relative.get(first..end) {
+            Some(relative) if self.any() => {
+                (&f[first..end], &response.response[first..end], relative)
+            }
+            _ => return Deviations::default(),
         };
-        Deviations { f_res: of(self.f_res), f_dip: of(self.f_dip) }
+        if relative.iter().any(|x| !x.is_finite()) {
+            return Deviations::default();
+        }
+        // ∫ s df, along which the error's correlation is the same everywhere
+        let mut phase = vec![0.0; f.len()];
+        for i in 1..f.len() {
+            phase[i] = phase[i - 1] + 0.5 * (slope(f[i]) + slope(f[i - 1])) * (f[i] - f[i - 1]);
+        }
+        let mut random = Random::new(1, 0);
+        let mut shifts = [const { Vec::new() }; 2];
+        for _ in 0..DRAWS {
+            let waves: [(f64, Complex64); WAVES] = std::array::from_fn(|_| {
+                let size = Complex64::new(random.normal(), random.normal());
+                (random.normal(), size / (WAVES as f64).sqrt())
+            });
+            let drawn = h.iter().zip(relative).zip(&phase).map(|((h, relative), phase)| {
+                let error: Complex64 =
+                    waves.iter().map(|(s, z)| z * Complex64::cis(s * phase)).sum();
+                h + relative * h.norm() * error
+            });
+            let drawn = FrequencyResponse { response: drawn.collect(), frequency: f.to_vec() };
+            let found = Features::of(&drawn);
+            let pairs = [(found.f_res, self.f_res), (found.f_dip, self.f_dip)];
+            for (shifts, (new, old)) in shifts.iter_mut().zip(pairs) {
+                shifts.extend(new.zip(old).map(|(new, old)| (new - old).abs()));
+            }
+        }
+        let [f_res, f_dip] = shifts.map(|mut shifts| {
+            shifts.sort_by(f64::total_cmp);
+            let within = (0.95 * shifts.len() as f64) as usize;
+            (2 * shifts.len() > DRAWS).then(|| shifts[within] / 1.96)
+        });
+        Deviations { f_res, f_dip }
     }
 
     /// Finds antiresonance and resonance: the two ends of the largest rise of |H| (in dB) with
@@ -95,8 +127,10 @@ impl Features {
     }
 }
 
-/// Curvature of the error of ln |H| over that of an extremum, beyond which the extremum may be one of the error alone.
-const NOISY: f64 = 0.25;
+/// Responses with another error that are drawn: their deviation is known to 7 %.
+const DRAWS: usize = 100;
+/// Waves of which an error consists.
+const WAVES: usize = 8;
 
 /// Smallest rise from antiresonance to resonance that counts, dB. A tank damped to ζ = 0.05 still
 /// rises by 3.9 dB.
