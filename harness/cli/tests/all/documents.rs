@@ -7,14 +7,25 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(pack::root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// A newcomer, and a machine that tries the project, finds both in the first screen, ready to copy.
+/// A newcomer finds the way to a first plot, the tools that the FMUs were tried with, and the commands of the source
+/// in the first screen. Each of the two commands of the source stands alone on its line, ready to copy.
 #[test]
-fn readme_begins_with_the_two_commands_in_bold_each_alone_on_its_line() {
+fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
     let readme = read("README.md");
     let first: Vec<&str> = readme.lines().take(40).collect();
     for command in ["cargo run --release", "cargo test --release"] {
         let bold = ["<b>", "", "```sh", command, "```", "", "</b>"];
         assert!(first.windows(bold.len()).any(|lines| lines == bold), "{command}: {first:#?}");
+    }
+    for begin in [
+        "![",
+        "pip install ",
+        "python examples/0_your_own_tank/my_tank.py",
+        "| by tests and CI | FMPy",
+        "| not | Simulink",
+        "* [Against published measurements]",
+    ] {
+        assert!(first.iter().any(|line| line.starts_with(begin)), "{begin}: {first:#?}");
     }
 }
 
