@@ -29,8 +29,6 @@ ROOT = Path(__file__).resolve().parents[1]
 
 PAGES = ("README.md", "book/**/*.md", "examples/**/README.md", "harness/python/README.md",
          "modelDescription/*/documentation/*.md")  # fmt: skip
-SIGNATURES = "book/api.md"
-"""Its blocks are signatures, which reference.py writes."""
 
 INDENTED = r" {4}(hubslosh|python3?|pip|cargo) "
 """Begin of a block of the shell that is indented instead of fenced."""
@@ -390,7 +388,7 @@ def main() -> None:
     every = [
         p.relative_to(ROOT).as_posix() for pattern in PAGES for p in sorted(ROOT.glob(pattern))
     ]
-    pages = args.pages or [page for page in every if page != SIGNATURES and blocks(page)]
+    pages = args.pages or [page for page in every if blocks(page)]
     folder = args.keep or Path(tempfile.mkdtemp(prefix="pages-"))
     folder.mkdir(exist_ok=True)
     try:

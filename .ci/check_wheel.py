@@ -133,9 +133,9 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
     for fmu in fmus:
         print(run(program, "check", fmu)[0].strip().splitlines()[-1])
     for command in ([program], [python, "-m", "hubslosh"]):
-        book = Path(run(*command, "book", "--no-open")[0].strip())
-        if not book.is_relative_to(machine.folder) or len(list(book.parent.iterdir())) < 100:
-            sys.exit(f"error: the book is not in the wheel: {book}")
+        address = run(*command, "book")[0].strip()
+        if not address.endswith("/book/index.md"):
+            sys.exit(f"error: hubslosh book does not say where the book is: {address}")
     drawing = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
     run(program, "tank", drawing, "--fill", "1.2", "--out", "tank.json")
     run(program, "run", "--profile", "exp-sweep:amplitude=0.1", "--out", "sweep.csv")

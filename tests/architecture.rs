@@ -56,7 +56,7 @@ const HARNESS: [(&str, &[&str]); 14] = [
     ("analysis", &["signals"]),
     ("experiments", &["files", "formulas", "host", "names", "signals", "analysis"]),
     ("web", &[]),
-    ("pack", &["files", "host", "web"]),
+    ("pack", &["files", "host"]),
     ("report", &["formulas", "host", "names", "signals", "analysis", "experiments", "web"]),
     (
         "identify",

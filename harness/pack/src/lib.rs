@@ -2,6 +2,7 @@
 //! section 2.5).
 
 pub mod archive;
+pub mod book;
 pub mod components;
 pub mod documentation;
 pub mod fmi;

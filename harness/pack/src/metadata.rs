@@ -53,7 +53,7 @@ fn compose(pyproject: &Table, readme: &str) -> Result<String> {
     lines.extend(of("classifiers").iter().map(|classifier| format!("Classifier: {classifier}")));
     for (name, page) in [
         ("Source", ""),
-        ("Documentation", "/blob/main/book/SUMMARY.md"),
+        ("Documentation", "/blob/main/book/index.md"),
         ("Changelog", "/blob/main/CHANGELOG.md"),
         ("Issues", "/issues"),
     ] {

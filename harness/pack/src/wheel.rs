@@ -15,7 +15,6 @@ use host::fmi2::PLATFORM;
 use sha2::{Digest, Sha256};
 
 use crate::archive::{self, Files, Packed, below, read};
-use crate::documentation::book;
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::platforms::{self, Platform, Product, Target, Toolchain};
 use crate::{Fmi, MODELS, build, build_native, components, files as files_of_fmu, pack, root};
@@ -222,9 +221,6 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
         .collect();
     for (name, bytes) in examples(&root().join("examples"))? {
         files.push((format!("{PACKAGE}/examples/{name}"), bytes));
-    }
-    for (name, bytes) in book::render(&root())? {
-        files.push((format!("{PACKAGE}/book/{name}"), bytes));
     }
     for (name, bytes) in binaries.fmus {
         files.push((format!("{PACKAGE}/fmus/{name}"), bytes));

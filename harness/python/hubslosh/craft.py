@@ -618,6 +618,7 @@ class Craft:
         """Return the loop of a sampled controller around the craft at a fill, trimmed; see `Loop`.
 
         Small angles: ``q[2]``, ``q[3]``, ``q[4]`` are half the angles about the body axes.
+
         * ``parameters``: Further parameters, which override those of the craft; see `parameters`.
           ``"delay"`` among them replaces ``delay``.
         * ``mass_flow``, ``between``: Tanks drain during the simulation, see `drain`.

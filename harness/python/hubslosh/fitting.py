@@ -24,7 +24,7 @@ class TransferFunction:
     denominator: NDArray[np.float64]
     """Coefficients of A; the first is 1."""
     fit: float
-    """100 (1 − |H_data − H| / |H_data − mean H_data|), %: 100 is perfect."""
+    """``100 (1 − |H_data − H| / |H_data − mean H_data|)``, %: 100 is perfect."""
 
     @property
     def poles(self) -> NDArray[np.complex128]:

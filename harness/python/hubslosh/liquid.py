@@ -169,7 +169,7 @@ class LiquidModes:
 
         Each mode is planar, with its own direction; damping ratios are 0. The bobs hang at r_n from
         the liquid's centre, which the tank's axis passes through. A rigid body completes mass,
-        centre and inertia of the liquid under a lid:
+        centre and inertia of the liquid under a lid::
 
             m_0 = m − Σ m_n,   m_0 r_0 = −Σ m_n r_n,
             J_0 = J − Σ m_n (|r_n|² 1 − r_n⊗r_n) − m_0 (|r_0|² 1 − r_0⊗r_0)

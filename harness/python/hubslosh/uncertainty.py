@@ -486,7 +486,7 @@ class WorstCase:
 class UncertainModel:
     """A linear fractional transformation y = F_u(M, Δ) u of Spacecraft; see `uncertain`.
 
-    Δ is diagonal and real: each of ``deltas`` in ``counts`` copies, |δ| ≤ 1. The parameters are
+    Δ is diagonal and real: each of ``deltas`` in ``counts`` copies, ``|δ| ≤ 1``. The parameters are
     ``center`` + ``spread`` · δ.
     """
 
@@ -664,7 +664,7 @@ class UncertainModel:
         """Return the smallest real Δ that a search finds at the limit of stability of a loop.
 
         The sampled loop is exact, delay included. From each lightly damped pole the search follows
-        the sign of the pole's derivatives by δ, up to |δ| = ``largest``, until the signs repeat.
+        the sign of the pole's derivatives by δ, up to ``|δ| = largest``, until the signs repeat.
         Damping ratios stay at 0 or above. Any Δ found is a lower bound of µ; one that is not found
         is no proof.
         """

@@ -1,6 +1,7 @@
 """`import hubslosh` imports nothing large, and offers what its type checkers see."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,13 @@ def test_what_comes_on_first_use_is_what_type_checkers_see() -> None:
     for name in hubslosh.__all__:
         assert getattr(hubslosh, name) is not None and name in dir(hubslosh)
     assert isinstance(hubslosh.__version__, str)
+
+
+def test_every_name_is_in_the_books_reference() -> None:
+    """``book/api.md`` lists each public name once; Sphinx makes its page from the docstring."""
+    page = Path(__file__).parents[3] / "book" / "api.md"
+    listed = re.findall(r"^(?:   |\.\. autodata:: hubslosh\.\w+\.)(\w+)$", page.read_text(), re.M)
+    assert sorted(listed) == sorted(hubslosh.__all__)
 
 
 def test_a_misspelt_name_is_an_error_to_type_checkers() -> None:

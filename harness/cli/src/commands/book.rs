@@ -2,22 +2,22 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
-use pack::archive;
-use pack::documentation::book;
+use anyhow::{Result, ensure};
+use pack::book;
 
 use crate::{fmu, terminal};
 
-/// Opens the documentation in the web browser: a static site with search that needs no network.
+/// Builds the documentation from the project's source, and opens it in the web browser: a static site with search that needs no
+/// network.
 ///
-/// The Python package contains the book. From the project's source the command makes it of the Markdown files that
-/// book/SUMMARY.md lists.
+/// Sphinx builds it. The first time, its packages are downloaded (70 MB). The Python package does not contain the book: there the
+/// command prints the address at which it can be read.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh book\n  hubslosh book --no-open\n  hubslosh book --out site"
 )]
 pub struct BookArgs {
-    /// Writes the book to this directory, and opens no browser [default: the Python package's own book, or dist/book].
+    /// Writes the book to this directory, and opens no browser [default: dist/book].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
     /// Prints the path of the first page and opens no browser.
@@ -28,20 +28,21 @@ pub struct BookArgs {
 impl BookArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let shipped = fmu::came_with("book");
-        let folder = match (shipped, &self.out) {
-            (Some(shipped), None) => shipped,
-            (Some(shipped), Some(out)) => {
-                book::write(&archive::below(&shipped)?, out)?;
-                out.clone()
-            }
-            (None, out) => {
-                pack::needs_source("the book")?;
-                let out = out.clone().unwrap_or_else(|| "dist/book".into());
-                book::write(&book::render(&pack::root())?, &out)?;
-                out
-            }
-        };
+        if fmu::came_with("fmus").is_some() || !pack::has_source() {
+            let address = book::address();
+            ensure!(
+                self.out.is_none(),
+                "--out: the book is built from the project's source, which this command does not have; read it at {address}"
+            );
+            println!("{address}");
+            terminal::note(
+                "the Python package does not contain the book: read it at the address above, or build it in the project's folder \
+                 with cargo run --release -- book",
+            );
+            return Ok(());
+        }
+        let folder = self.out.clone().unwrap_or_else(|| "dist/book".into());
+        book::write(&folder)?;
         let page = folder.join("index.html");
         println!("{}", page.display());
         if self.out.is_none() && !self.no_open && open::that_detached(&page).is_err() {

@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::Result;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::page::{Gathered, Layout, Page};
+use super::page::{Gathered, Page};
 
 /// Files below `documentation/` in an FMU.
 pub struct Documentation {
@@ -34,8 +34,7 @@ pub fn render(root: &Path, introduction: &str, title: &str) -> Result<Documentat
 }
 
 /// All pages as one file.
-pub(super) fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> Markup {
-    let layout = Layout::OneFile;
+fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -51,10 +50,10 @@ pub(super) fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathe
                     ul {
                         @for page in pages {
                             li {
-                                a href=(layout.address(page, "")) { (page.title) }
+                                a href=(page.address("")) { (page.title) }
                                 ul {
                                     @for heading in page.chapters() {
-                                        @let address = layout.address(page, &heading.slug);
+                                        @let address = page.address(&heading.slug);
                                         li { a href=(address) { (heading.title) } }
                                     }
                                 }
@@ -64,7 +63,7 @@ pub(super) fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathe
                 }
                 main {
                     @for page in pages {
-                        section id=(layout.id(page, "")) { (page.html(root, pages, layout, all)) }
+                        section id=(page.id("")) { (page.html(root, pages, all)) }
                     }
                 }
             }

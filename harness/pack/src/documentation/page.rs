@@ -35,35 +35,6 @@ pub struct Heading {
     pub slug: String,
 }
 
-/// Form of links in one kind of output.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
-    /// All pages in one file.
-    OneFile,
-    /// A file for each page.
-    Site,
-}
-
-impl Layout {
-    /// The `id` of a heading, or of the page itself if `slug` is empty.
-    pub fn id(self, page: &Page, slug: &str) -> String {
-        match (self, slug) {
-            (Layout::Site, slug) => slug.into(),
-            (Layout::OneFile, "") => page.name.clone(),
-            (Layout::OneFile, slug) => format!("{}--{slug}", page.name),
-        }
-    }
-
-    /// The address of a heading, or of the page itself if `slug` is empty.
-    pub fn address(self, page: &Page, slug: &str) -> String {
-        match (self, slug) {
-            (Layout::OneFile, slug) => format!("#{}", self.id(page, slug)),
-            (Layout::Site, "") => format!("{}.html", page.name),
-            (Layout::Site, slug) => format!("{}.html#{slug}", page.name),
-        }
-    }
-}
-
 /// Requirements and errors of the pages, collected while they are written.
 #[derive(Debug, Default)]
 pub struct Gathered {
@@ -88,17 +59,17 @@ impl Gathered {
     }
 }
 
-/// The words of one heading and what is below it, for a search.
-pub struct Section {
-    /// Empty before the first heading.
-    pub slug: String,
-    /// The heading.
-    pub title: String,
-    /// All words below it.
-    pub words: String,
-}
-
 impl Page {
+    /// Returns the `id` of a heading in the file of all pages, or of the page itself if `slug` is empty.
+    pub fn id(&self, slug: &str) -> String {
+        if slug.is_empty() { self.name.clone() } else { format!("{}--{slug}", self.name) }
+    }
+
+    /// Returns the address of a heading, or of the page itself if `slug` is empty.
+    pub fn address(&self, slug: &str) -> String {
+        format!("#{}", self.id(slug))
+    }
+
     /// Reads a file of the project.
     pub fn read(root: &Path, path: &str) -> Result<Self> {
         let text = std::fs::read_to_string(root.join(path))
@@ -139,16 +110,16 @@ impl Page {
 
     /// The page as HTML. A link to one of `pages` leads there; of another link that leads to a file of
     /// the project only the text is left.
-    pub fn html(&self, root: &Path, pages: &[Page], layout: Layout, all: &mut Gathered) -> Markup {
+    pub fn html(&self, root: &Path, pages: &[Page], all: &mut Gathered) -> Markup {
         let mut headings = self.headings.iter();
         let mut dropped = false; // inside a link that leads out of the documentation
         let events = events(&self.text).filter_map(|event| match event {
             Event::Start(Tag::Heading { level, classes, attrs, .. }) => {
-                let id = headings.next().map(|h| CowStr::from(layout.id(self, &h.slug)));
+                let id = headings.next().map(|h| CowStr::from(self.id(&h.slug)));
                 Some(Event::Start(Tag::Heading { level, id, classes, attrs }))
             }
             Event::Start(Tag::Link { link_type, dest_url, title, id }) => {
-                match self.address(root, pages, layout, &dest_url) {
+                match self.target(root, pages, &dest_url) {
                     Ok(Some(address)) => {
                         let dest_url = address.into();
                         return Some(Event::Start(Tag::Link { link_type, dest_url, title, id }));
@@ -188,13 +159,7 @@ impl Page {
     }
 
     /// Target of a link; `None` if it leaves the documentation.
-    fn address(
-        &self,
-        root: &Path,
-        pages: &[Page],
-        layout: Layout,
-        link: &str,
-    ) -> Result<Option<String>, String> {
+    fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>, String> {
         if link.contains("://") {
             return Ok(None);
         }
@@ -207,7 +172,7 @@ impl Page {
         if !slug.is_empty() && !page.headings.iter().any(|heading| heading.slug == slug) {
             return Err(dead());
         }
-        Ok(Some(layout.address(page, slug)))
+        Ok(Some(page.address(slug)))
     }
 
     /// An equation as MathML.
@@ -241,36 +206,6 @@ impl Page {
             mathml = html! { span .equation { (PreEscaped(mathml)) } }.into_string();
         }
         mathml.into()
-    }
-
-    /// The page's words by headings of the first and second level.
-    pub fn sections(&self) -> Vec<Section> {
-        let first = Section { slug: String::new(), title: String::new(), words: String::new() };
-        let mut all = vec![first];
-        let mut headings = self.headings.iter();
-        let mut level = 0;
-        for event in events(&self.text) {
-            let last = all.len() - 1;
-            match event {
-                Event::Start(Tag::Heading { .. }) => {
-                    let Some(heading) = headings.next() else { continue };
-                    level = heading.level;
-                    if level <= 2 {
-                        let (slug, title) = (heading.slug.clone(), heading.title.clone());
-                        all.push(Section { slug, title, words: String::new() });
-                    }
-                }
-                Event::End(TagEnd::Heading(_)) => level = 0,
-                Event::Text(text) | Event::Code(text) if level == 0 || level > 2 => {
-                    let words = &mut all[last].words;
-                    words.push_str(&text);
-                    words.push(' ');
-                }
-                _ => {}
-            }
-        }
-        all.retain(|section| !section.title.is_empty() || !section.words.trim().is_empty());
-        all
     }
 }
 
@@ -325,7 +260,7 @@ fn name(path: &str) -> String {
 }
 
 /// The path of a link in a file, from the project's root.
-pub(super) fn resolve(from: &str, link: &str) -> String {
+fn resolve(from: &str, link: &str) -> String {
     let mut parts: Vec<&str> = from.split('/').collect();
     parts.pop();
     for part in link.split('/') {
@@ -375,7 +310,7 @@ mod tests {
         .unwrap();
         let page = Page::read(folder.path(), "a.md").unwrap();
         let mut all = Gathered::default();
-        let html = page.html(folder.path(), &[], Layout::Site, &mut all).into_string();
+        let html = page.html(folder.path(), &[], &mut all).into_string();
         assert!(html.contains("<msub><mi>ξ</mi><mn>1</mn></msub>"), "{html}");
         assert!(html.contains("display=\"block\"") && html.contains("<mfrac>"), "{html}");
         assert_eq!(all.faults.len(), 1);
