@@ -1,4 +1,4 @@
-//! Files: parameters that are read, and places of outputs.
+//! Files: parameters and recordings that are read, and places of outputs.
 
 use std::path::PathBuf;
 
@@ -6,9 +6,11 @@ use ::files::output::{self, Destination};
 use host::description::Value;
 use host::parameter_set::ParameterSet;
 use pyo3::prelude::*;
-use pyo3::types::PyList;
+use pyo3::types::{PyBytes, PyList};
+use signals::recording::{self, Between, Columns, Signal, Wanted};
 
 use crate::fmu::error;
+use crate::schedule::bytes;
 
 /// Exponents of SI's base units, factor, offset.
 type Base = ([i32; 8], f64, f64);
@@ -33,6 +35,40 @@ pub fn read_parameters(py: Python, path: PathBuf) -> PyResult<(Bound<PyList>, Ve
         }
     }
     Ok((all, found.warnings))
+}
+
+/// A signal: its name, its SI unit, its values as 64-bit floats.
+type Values<'py> = (String, &'static str, Bound<'py, PyBytes>);
+
+/// Return the signals of a recording, the time first, and notes on what was read; None if it is of a kind that the package
+/// converts. Errors call it `name`.
+#[pyfunction]
+pub fn read_recording<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    name: PathBuf,
+    columns: Option<&str>,
+    rate: Option<f64>,
+) -> PyResult<Option<(Vec<Values<'py>>, Vec<String>)>> {
+    let signal = |(name, _): &(&'static str, _)| Signal {
+        name,
+        required: false,
+        between: Between::Missing,
+        unit: None,
+    };
+    let signals: Vec<Signal> = recording::SIGNALS.iter().skip(1).map(signal).collect();
+    let columns: Columns = columns.unwrap_or_default().parse().map_err(error)?;
+    let columns = columns.with_rate(rate).map_err(error)?;
+    let wanted = Wanted { signals: &signals, columns: &columns };
+    let mut notes = Vec::new();
+    let read =
+        py.detach(|| recording::read_here(&path, &name, &wanted, &mut |note| notes.push(note)));
+    let Some(table) = read.map_err(error)? else { return Ok(None) };
+    let values = table.names().iter().zip(table.columns()).map(|(name, values)| {
+        let unit = recording::quantity(name).map_err(error)?.unit();
+        Ok((name.clone(), unit, bytes(py, values)))
+    });
+    Ok(Some((values.collect::<PyResult<_>>()?, notes)))
 }
 
 /// Return the plain file to which the path of an output leads, which the output may replace; None for a device or a pipe, to which

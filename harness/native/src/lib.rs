@@ -1,6 +1,6 @@
 //! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and drives their instances by single calls
 //! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]). It also finds the [`crossings`]
-//! of loop gains, computes the modal parameters of [`tanks`], and reads and places [`files`].
+//! of loop gains, computes the modal parameters of [`tanks`], reads recordings and parameters, and places [`files`].
 //!
 //! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
 //! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.
@@ -21,7 +21,7 @@ mod _native {
     #[pymodule_export]
     use crate::crossings::Model;
     #[pymodule_export]
-    use crate::files::{destination, put, read_parameters};
+    use crate::files::{destination, put, read_parameters, read_recording};
     #[pymodule_export]
     use crate::fmu::{Fmu, FmuError, FmuWarning, Variable};
     #[pymodule_export]

@@ -12,7 +12,7 @@ use crate::numbers::numbers;
 pub struct History(schedule::History);
 
 /// The floats as bytes, for numpy.
-fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyBytes> {
+pub fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyBytes> {
     let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
     PyBytes::new(py, &bytes)
 }

@@ -11,6 +11,7 @@
 estimate from a history, `fit` a transfer function through such an estimate. `analyse`, `campaign`,
 `check`, `identify` and `view` call the program ``hubslosh``. `tank` and `liquid_modes` find slosh
 modes, `mode_errors` says how many a model needs, `posterior` samples the result of `identify`.
+`read_recording` reads the files of loggers.
 `view` shows a run in 3-D, `plot` draws. `Plant` and `drive` are for those who step an instance
 themselves.
 """
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from .operating_point import OperatingPoint
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
+    from .recordings import read_recording
     from .review import Review
     from .run import Run
     from .sampling import draw, monte_carlo, quantiles
@@ -64,6 +66,7 @@ _MODULES = {
     "operating_point": ("OperatingPoint",),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
+    "recordings": ("read_recording",),
     "review": ("Review",),
     "run": ("Run",),
     "sampling": ("draw", "monte_carlo", "quantiles"),
@@ -129,6 +132,7 @@ __all__ = [
     "posterior",
     "quantiles",
     "read_parameters",
+    "read_recording",
     "read_table",
     "setting",
     "simulate",

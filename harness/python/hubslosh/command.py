@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import sysconfig
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -76,6 +77,7 @@ def call(
             stderr=subprocess.PIPE,
             encoding="utf-8",
             errors="replace",
+            env=os.environ | {"HUBSLOSH_PYTHON": sys.executable},
         )
     except OSError as error:
         raise FmuError(f"{program} cannot be started: {error}") from None

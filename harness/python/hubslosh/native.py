@@ -42,6 +42,7 @@ FmuWarning = _native.FmuWarning
 """Python warning that passes on a warning of an FMU or of the program ``hubslosh``."""
 Model = _native.Model
 destination, put, read_parameters = _native.destination, _native.put, _native.read_parameters
+read_recording = _native.read_recording
 History = _native.History
 check_interpolation = _native.check_interpolation
 communication_points, pairing = _native.communication_points, _native.pairing

@@ -64,7 +64,7 @@ def analyse(
 ) -> pd.DataFrame:
     """Analyse recordings of a bench with ``hubslosh analyse``, and return its table of runs.
 
-    * ``recordings``: Files (text, .parquet, .mat) with torque and one to three rates.
+    * ``recordings``: Files, as `read_recording` reads them, with torque and one to three rates.
     * ``out``: Directory for runs, tables and report.html.
     * ``columns``: Columns of the signals, with units, such as
       ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``.
@@ -206,7 +206,7 @@ def identify(
 ) -> Identification:
     """Estimate an FMU's parameters from recordings, with the program ``hubslosh identify``.
 
-    * ``data``: A table, or a file (text, .parquet, .mat), with the columns ``time`` (s),
+    * ``data``: A table, or a file as `read_recording` reads it, with the columns ``time`` (s),
       ``tau_cmd`` (N·m) and ``omega`` (rad/s), or others by the flag ``--columns``.
     * ``model``: The slosh model.
     * ``arguments``: Further flags of the command.

@@ -79,6 +79,11 @@ impl Table {
         &self.names
     }
 
+    /// Values of the columns.
+    pub fn columns(&self) -> &[Vec<f64>] {
+        &self.columns
+    }
+
     /// The column of that name.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         let index = self.names.iter().position(|n| n == name)?;

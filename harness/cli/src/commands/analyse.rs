@@ -23,7 +23,7 @@ use super::{RunsArgs, bench_day, campaign, open, setting};
     hubslosh analyse --bench-day tuesday --out dist/tuesday\n\n\
     In a plan a [[run]] with recording = \"FILE\" (and columns = \"…\") is read; it is simulated too.")]
 pub struct AnalyseArgs {
-    /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
+    /// Recordings: text in columns or Parquet; .mat, HDF5, TDMS, MDF4, .xlsx by the Python package.
     #[arg(value_name = "RECORDING", required_unless_present_any = ["plan", "bench_day"])]
     recordings: Vec<PathBuf>,
     /// Columns of the recordings for the signals, with units.

@@ -25,7 +25,7 @@ const DEFAULT_GYRO: &str = "dist/gyro";
     hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro\n  \
     hubslosh gyro --recording rest.csv --columns time=t:ms,omega=gyro_z:deg/s --out dist/our_gyro")]
 pub struct GyroArgs {
-    /// A gyro's recording at rest: text in columns, .parquet or .mat.
+    /// A gyro's recording at rest: text in columns, Parquet or another kind of recording.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["hours", "records", "settings", "fmu"])]
     recording: Option<PathBuf>,
     /// Columns of the recording for time and omega, with units.

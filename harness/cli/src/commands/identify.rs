@@ -42,12 +42,12 @@ use crate::terminal;
     --set tank.d=0.163 --out result.json\n  \
     hubslosh identify empty.csv --method acceleration --weights run --out friction.json\n  \
     hubslosh identify multisine.csv --method frequency --out poles.json\n  \
-    hubslosh identify bench.mat --columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s --out result.json\n  \
+    hubslosh identify bench.csv --columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s --out result.json\n  \
     hubslosh identify decay.csv --method free-decay --columns wave_height=probe:mm --out decay.json\n  \
     hubslosh identify a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 --outputs x0,x1 \\\n      \
     --exchange --out result.json --report result.html")]
 pub struct IdentifyArgs {
-    /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
+    /// Recordings: text in columns or Parquet; .mat, HDF5, TDMS, MDF4, .xlsx by the Python package.
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
     /// Identification method. `output-error` fits all of the FMU's parameters in the time domain. `acceleration` fits friction

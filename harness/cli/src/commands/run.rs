@@ -31,7 +31,7 @@ pub struct RunArgs {
         required_unless_present = "input"
     )]
     profile: Option<String>,
-    /// Histories of inputs: text in columns, .parquet or .mat, with the column time. Every column with the name of an input of the
+    /// Histories of inputs: text in columns, Parquet or another kind of recording, with the column time. Every column with the name of an input of the
     /// FMU drives that input, such as tau_cmd, tau_ext, g_axial, in the unit of the file (`tau_cmd [mNm]`), else of the FMU; times
     /// without a unit are in s. tau_slope is tau_cmd's derivative until the next row.
     #[arg(long, value_name = "FILE")]

@@ -256,7 +256,7 @@ fn a_named_pipe_is_refused_as_any_input() {
         "run --fmu FMU --profile zero --parameters pipe.ssv --out a.csv",
         "run --fmu FMU --profile file:path=pipe.csv --out a.csv",
         "campaign --fmu FMU --plan pipe.toml --out a",
-        "gyro --recording pipe.mat --out a",
+        "gyro --recording pipe.csv --out a",
         "gyro --recording pipe.csv --out a",
         "identify pipe.parquet --method frequency --fmu FMU --out a.json",
         "tank pipe.toml --fill 1",

@@ -1,4 +1,4 @@
-//! Fuzzing of the readers: recordings and tables (CSV, `.mat`, Parquet), parameter sets (SSV), plans, tanks and the data
+//! Fuzzing of the readers: recordings and tables (CSV, Parquet), parameter sets (SSV), plans, tanks and the data
 //! of a run's page. Inputs are valid files with random changes. None may panic, take more than 10 s, or 1 GB of memory.
 //!
 //! A plain loop, not libFuzzer: every reader takes whole files and spends its time in other crates, which would all have to
@@ -216,15 +216,6 @@ fn csv(count: u64) {
     });
 }
 
-fn mat(count: u64) {
-    let seeds = files("harness/signals/tests/all/data", "mat");
-    fuzz("mat", "mat", &seeds, count, |path, _| {
-        recording_of(path, "");
-        recording_of(path, "time=t:ms,omega=gyro(3),tau_cmd=T_cmd:mNm");
-        recording_of(path, "time=log.t:ms,omega=log.gyro(3),tau_cmd=log.T_cmd:mNm");
-    });
-}
-
 fn parquet(count: u64) {
     let seeds = files("harness/signals/tests/all/data", "parquet");
     fuzz("parquet", "parquet", &seeds, count, |path, _| {
@@ -324,7 +315,6 @@ macro_rules! targets {
 
 targets!(
     csv a_damaged_csv_file_is_an_error_at_worst,
-    mat a_damaged_mat_file_is_an_error_at_worst,
     parquet a_damaged_parquet_file_is_an_error_at_worst,
     ssv a_damaged_parameter_set_is_an_error_at_worst,
     plan a_damaged_plan_is_an_error_at_worst,

@@ -1,5 +1,5 @@
-//! Recordings: signals in SI units from files that others wrote. The name's ending separates
-//! text in columns, Parquet and MATLAB's `.mat`. [`Columns`], a row of units or the names of the columns (`gyro_z [deg/s]`,
+//! Recordings: signals in SI units from files that others wrote. Text in columns and Parquet are read here; the Python
+//! package converts other kinds to text ([`foreign`]). [`Columns`], a row of units or the names of the columns (`gyro_z [deg/s]`,
 //! `gyro_z_dps`) give the signal and the unit of each column; a unit that none of them states is SI's, which the output states, or the file is
 //! refused where that is implausible.
 //!
@@ -10,21 +10,20 @@
 
 mod columns;
 mod even;
-mod matlab;
+mod foreign;
 mod number;
 mod stamps;
 mod text;
 mod time;
 mod unit;
 
-use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use files::input;
 
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
 pub use self::even::{even, even_with_gaps};
+use self::foreign::{Foreign, Kind};
 use self::stamps::Stamps;
 use self::unit::{Dimension, Fault};
 pub use self::unit::{Quantity, conversion};
@@ -162,7 +161,7 @@ fn bracketed(name: &str) -> Option<(&str, &str)> {
     };
     let (bare, unit) = name.rsplit_once(open)?;
     let (bare, unit) = (bare.trim(), unit.trim_end_matches(close).trim());
-    // `data(3)` of a .mat file is a name
+    // data(3) is a name
     let number = unit.chars().all(|c| c.is_ascii_digit());
     (!bare.is_empty() && !number).then_some((bare, unit))
 }
@@ -226,16 +225,10 @@ const LATE_BY: f64 = 1.5;
 /// Time over which any signal may be completed, s.
 const SHORT: f64 = 0.25;
 
-/// Names of a file's columns, units in brackets left out.
-pub fn names(path: &Path) -> Result<Vec<String>> {
-    let file = File::open(path).with_context(|| format!("{} cannot be used", path.display()))?;
-    Ok(file.header().names.clone())
-}
-
 /// Returns every column of a file by its name there, with the place among `signals` of the one that it is: it has the signal's name,
 /// with a unit or without.
 pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<usize>)>> {
-    let file = File::open(path).with_context(|| format!("{} cannot be used", path.display()))?;
+    let file = opened(path, File::open)?;
     let header = file.header();
     let mut found: Vec<_> = header.full.iter().map(|name| (name.clone(), None)).collect();
     for (k, signal) in signals.iter().enumerate() {
@@ -253,8 +246,25 @@ pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<u
 /// If the file cannot be read so. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
-    read_as(path, wanted, None, &mut |words| done(format!("{name}: {words}")))
-        .with_context(|| format!("{name} cannot be used"))
+    let mut done = |words| done(format!("{name}: {words}"));
+    opened(path, |path| read_as(path, wanted, None, &mut done))
+}
+
+/// Reads a recording that errors call `name`, if it is text in columns or Parquet; `None` for one of another kind, which the
+/// Python package converts.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_here(
+    path: &Path,
+    name: &Path,
+    wanted: &Wanted,
+    done: &mut dyn FnMut(String),
+) -> Result<Option<Table>> {
+    match read_as(path, wanted, None, done) {
+        Err(error) if error.is::<Foreign>() => Ok(None),
+        read => read.map(Some).with_context(|| format!("{} cannot be used", name.display())),
+    }
 }
 
 /// Reads histories of inputs: `time` (s) and the signals, every row as it is. Those among `booleans` may be `true` and `false`, which
@@ -269,72 +279,43 @@ pub fn read_inputs(
     done: &mut dyn FnMut(String),
 ) -> Result<Table> {
     let name = path.display().to_string();
-    let read = read_as(path, wanted, Some(booleans), &mut |words| done(format!("{name}: {words}")));
-    let table = read.with_context(|| format!("{name} cannot be used"))?;
+    let mut done = |words| done(format!("{name}: {words}"));
+    let table = opened(path, |path| read_as(path, wanted, Some(booleans), &mut done))?;
     table.all_finite().map_err(|error| anyhow!("{name}, {error}"))?;
     Ok(table)
 }
 
-/// The kinds of files.
+/// A file that is read here.
 enum File {
     Text(text::Layout),
     Parquet(Header),
-    Matlab(Header),
 }
 
 impl File {
     fn open(path: &Path) -> Result<File> {
-        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_lowercase);
-        if !matches!(ending.as_deref(), Some("parquet" | "mat")) {
-            refuse_binary(path)?;
-        }
-        match ending.as_deref() {
-            Some("csv" | "txt" | "tsv" | "dat" | "asc" | "log" | "lvm") => {
-                Ok(File::Text(text::Layout::of(path)?))
-            }
-            Some("parquet") => {
-                let header = |names| Header::of(names, None);
-                Ok(File::Parquet(header(parquet_file::names(path)?)))
-            }
-            Some("mat") => Ok(File::Matlab(matlab::header(path)?)),
-            _ => bail!(
-                "the name must end in .csv, .txt, .tsv, .dat, .asc, .log or .lvm (text in columns), .parquet or .mat"
-            ),
-        }
+        Ok(match foreign::kind(path)? {
+            Kind::Text => File::Text(text::Layout::of(path)?),
+            Kind::Parquet => File::Parquet(Header::of(parquet_file::names(path)?, None)),
+        })
     }
 
     fn header(&self) -> &Header {
         match self {
             File::Text(layout) => &layout.header,
-            File::Parquet(header) | File::Matlab(header) => header,
+            File::Parquet(header) => header,
         }
     }
 }
 
-/// Fails for files of formats that others call by the ending of a text, with what to do.
-fn refuse_binary(path: &Path) -> Result<()> {
-    const KNOWN: [(&[u8], &str); 8] = [
-        (b"\x1f\x8b", "it is compressed with gzip: unpack it first (gunzip)"),
-        (b"\x28\xb5\x2f\xfd", "it is compressed with zstd: unpack it first (unzstd)"),
-        (
-            b"PK\x03\x04",
-            "it is a zip archive, as .xlsx is: save the sheet as CSV UTF-8, or unpack the archive",
-        ),
-        (b"\xd0\xcf\x11\xe0", "it is an old Excel workbook (.xls): save the sheet as CSV UTF-8"),
-        (
-            b"SQLite format 3",
-            "it is an SQLite database, as a ROS 2 bag is: export its topics as CSV",
-        ),
-        (b"\x89HDF", "it is HDF5: read it with h5py or pandas, and write CSV or Parquet"),
-        (b"TDSm", "it is TDMS: read it with npTDMS, and write CSV or Parquet"),
-        (b"PAR1", "it is Parquet: give it the ending .parquet"),
-    ];
-    let mut start = Vec::new();
-    input::open(path).context("it cannot be opened")?.take(16).read_to_end(&mut start)?;
-    match KNOWN.iter().find(|(sign, _)| start.starts_with(sign)) {
-        Some((_, words)) => bail!("{words}"),
-        None => Ok(()),
-    }
+/// Has `work` read a file, or the text to which the Python package converts it.
+fn opened<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> Result<T> {
+    let read = match work(path) {
+        Err(error) if error.is::<Foreign>() => {
+            foreign::converted(path, &error).and_then(|(_folder, text)| work(&text))
+        }
+        read => read,
+    };
+    read.with_context(|| format!("{} cannot be used", path.display()))
 }
 
 /// Reads a recording, or with `inputs`, of which those are Booleans, histories of inputs.
@@ -418,6 +399,12 @@ fn read_as(
         places.push(place);
         factors.push(unit.map_or(1.0, |(_, factor)| factor));
     }
+    if signals.iter().all(|signal| signal.name == "time")
+        && problems.is_empty()
+        && !names.is_empty()
+    {
+        problems.push(format!("no column {}", names.join(", ")));
+    }
     ensure!(
         problems.is_empty(),
         "{} (columns in it: {}{}; --columns SIGNAL=COLUMN:UNIT,... says which is which{})",
@@ -426,7 +413,6 @@ fn read_as(
         if let File::Text(layout) = &file { &layout.texts } else { "" },
         if timeless { "; --rate HZ takes equally spaced rows without times" } else { "" }
     );
-    ensure!(!places.is_empty(), "it has no signal that is wanted");
     let time = header.full[places[0]].as_str();
     let timed = counted.is_none();
     // seconds and the rest of them in two columns are one time
@@ -453,10 +439,6 @@ fn read_as(
             let time = timed.then_some(time);
             let found = parquet_file::read(path, |_| Ok(places.clone()), time, &booleans)?;
             Found { columns: found.columns, origin: found.origin, seconds: found.seconds }
-        }
-        File::Matlab(header) => {
-            let unstated = (timed && stated.is_none()).then_some(&remedy);
-            matlab::read(path, header, &places, unstated)?
         }
     };
     done(format!("columns used: {}", used.join(", ")));

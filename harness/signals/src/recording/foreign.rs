@@ -1,0 +1,93 @@
+//! Files of other kinds than text in columns and Parquet (`.mat`, HDF5, TDMS, MDF4, Excel): the Python package `hubslosh` writes
+//! them as text, which is read here then.
+
+use std::fmt;
+use std::io::{ErrorKind, Read as _};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+use files::input;
+use files::temporary::Folder;
+
+/// Error of a file that the Python package may read.
+#[derive(Debug)]
+pub struct Foreign(pub String);
+
+impl fmt::Display for Foreign {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Foreign {}
+
+/// What to do where the package is not installed.
+const ADVICE: &str = "the Python package reads .mat (5 and 7.3), HDF5, TDMS, MDF4, .xlsx and every type of Parquet: \
+    pip install 'hubslosh[recordings]', then python3 -m hubslosh.recordings FILE FILE.csv writes text that is read here";
+
+/// Kind of a file, by its first bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Text,
+    Parquet,
+}
+
+/// Returns the kind of a file.
+///
+/// # Errors
+/// [`Foreign`] if it is another one.
+pub fn kind(path: &Path) -> Result<Kind> {
+    const PACKED: [(&[u8], &str); 3] = [
+        (b"\x1f\x8b", "it is compressed with gzip: unpack it first (gunzip)"),
+        (b"\x28\xb5\x2f\xfd", "it is compressed with zstd: unpack it first (unzstd)"),
+        (
+            b"SQLite format 3",
+            "it is an SQLite database, as a ROS 2 bag is: export its topics as CSV",
+        ),
+    ];
+    let mut start = Vec::new();
+    input::open(path).context("it cannot be opened")?.take(4096).read_to_end(&mut start)?;
+    if let Some((_, words)) = PACKED.iter().find(|(sign, _)| start.starts_with(sign)) {
+        bail!("{words}");
+    }
+    if [&b"\xff\xfe"[..], b"\xfe\xff"].iter().any(|mark| start.starts_with(mark)) {
+        bail!("it is UTF-16; save it as UTF-8");
+    }
+    match start.contains(&0) {
+        _ if start.starts_with(b"PAR1") => Ok(Kind::Parquet),
+        true => Err(Foreign("it is neither text in columns nor Parquet".into()).into()),
+        false => Ok(Kind::Text),
+    }
+}
+
+/// Has the Python package write a file as text in columns, in a folder that goes with the value.
+///
+/// # Errors
+/// If there is no such package, or it cannot read the file.
+pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> {
+    let folder = Folder::new()?;
+    let out = folder.path().join("recording.csv");
+    let name = if cfg!(windows) { "python.exe" } else { "python3" };
+    let program = std::env::current_exe().ok().and_then(|own| Some(own.parent()?.join(name)));
+    let given = std::env::var_os("HUBSLOSH_PYTHON").map(PathBuf::from);
+    for python in given.into_iter().chain(program).chain([name.into()]) {
+        // -P: a folder hubslosh where the command runs is not the package
+        let mut command = Command::new(python);
+        command.args(["-P", "-m", "hubslosh.recordings"]).arg(path).arg(&out);
+        let done = match command.output() {
+            Err(error) if error.kind() == ErrorKind::NotFound => continue,
+            done => done.context("Python cannot be started")?,
+        };
+        if done.status.success() {
+            return Ok((folder, out));
+        }
+        let words = String::from_utf8_lossy(&done.stderr);
+        // an interpreter without the package, or with an older one
+        let is_there = words.lines().last().and_then(|line| line.strip_prefix("error: "));
+        if let Some(words) = is_there {
+            bail!("{words}");
+        }
+    }
+    bail!("{why}; {ADVICE}")
+}
