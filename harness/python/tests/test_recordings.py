@@ -137,6 +137,21 @@ def test_every_kind_of_file_is_the_same_table(
     assert any(note.startswith("columns used: ") for note in table.attrs["notes"])
 
 
+def test_times_of_every_type_of_parquet_are_seconds() -> None:
+    """Timestamps, durations, times of day, dates of Spark; decimals and halves."""
+    files = sorted((ROOT / "harness" / "signals" / "tests" / "all" / "data").glob("*.parquet"))
+    assert len(files) > 12
+    for path in files:
+        if path.stem == "plain":
+            with pytest.raises(FmuError, match="column time states no unit"):
+                read_recording(path)
+            continue
+        table = read_recording(path)
+        step = 1.0 if path.stem.endswith("_s") else 0.02
+        np.testing.assert_allclose(table["time"] - table["time"][0], step * np.arange(5), atol=1e-9)
+        np.testing.assert_allclose(table["tau_cmd"], 0.1 * np.arange(5), atol=2e-4)
+
+
 def test_every_reader_has_a_file_that_tests_it() -> None:
     """A kind without a writer above would go untested."""
     endings = {Path(name).suffix for name, _, _ in WRITERS}

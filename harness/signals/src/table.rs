@@ -280,12 +280,8 @@ fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), columns))
 }
 
-/// Advice if a file has integers as the table's time.
-const IN_SECONDS: &str = "the table's time is in s, write it as floating-point numbers";
-
 fn read_parquet(path: &Path, wanted: &[&str]) -> Result<Table> {
-    let place = wanted.iter().position(|name| *name == "time");
-    let time = place.map(|place| parquet_file::Time { place, stated: None, remedy: IN_SECONDS });
+    let time = wanted.iter().position(|name| *name == "time").map(|place| (place, false));
     let names = |names: &[String]| positions(names.iter().map(String::as_str), wanted);
     let found = parquet_file::read(path, names, time, &[])?;
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), found.columns))

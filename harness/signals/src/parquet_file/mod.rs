@@ -1,46 +1,70 @@
-//! Reads Parquet files: numbers of every type, and times in seconds. Times go by their logical type (TIMESTAMP, TIME, DATE,
-//! INTERVAL, INT96) or by the type in Arrow's schema (durations of pandas and Polars). Nothing is taken for a number that is
-//! none, and no unit is guessed.
+//! Reads Parquet files: floating-point numbers, integers, Booleans, and timestamps as times. The Python package reads other types.
 
-mod arrow;
-mod kind;
 mod pages;
 
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use chrono::DateTime;
 use files::{budget, bug, input};
-use parquet::basic::Compression;
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{DataType, Int96};
+use parquet::data_type::DataType;
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
 
-use self::kind::Kind;
+use crate::recording::Foreign;
 
 /// Rows that are decoded at once.
 const BATCH: usize = 1 << 16;
 
-/// Reading of the time column.
-#[derive(Clone, Copy, Debug)]
-pub struct Time<'a> {
-    /// Place among the wanted columns.
-    pub place: usize,
-    /// Seconds in the unit that the user or the column's name states; `None`: no unit is stated.
-    pub stated: Option<f64>,
-    /// End of an error's sentence: how to state the unit.
-    pub remedy: &'a str,
+/// Type of a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Real,
+    Boolean,
+    Integer {
+        is_signed: bool,
+    },
+    /// Ticks since 1970, so many a second.
+    Date(i64),
+}
+
+impl Kind {
+    /// The type of a column; `None` for one that is not read here.
+    fn of(column: &ColumnDescriptor) -> Option<Kind> {
+        let logical = match (column.logical_type_ref(), column.converted_type()) {
+            (Some(LogicalType::Timestamp(stamp)), _) => Some(Kind::Date(match stamp.unit {
+                TimeUnit::MILLIS => 1_000,
+                TimeUnit::MICROS => 1_000_000,
+                TimeUnit::NANOS => 1_000_000_000,
+            })),
+            (Some(LogicalType::Integer(integer)), _) => {
+                Some(Kind::Integer { is_signed: integer.is_signed })
+            }
+            (None, ConvertedType::NONE) => None,
+            _ => return None,
+        };
+        match column.physical_type() {
+            _ if column.max_rep_level() > 0 => None,
+            Physical::FLOAT | Physical::DOUBLE if logical.is_none() => Some(Kind::Real),
+            Physical::BOOLEAN => Some(Kind::Boolean),
+            Physical::INT32 | Physical::INT64 => {
+                Some(logical.unwrap_or(Kind::Integer { is_signed: true }))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// Columns that were read, NaN where a value is missing.
 pub struct Found {
     /// Values of each wanted column.
     pub columns: Vec<Vec<f64>>,
-    /// The first row's date in RFC 3339, if the times are dates: they count from that row.
+    /// The first row's date in RFC 3339, if the times are dates: they count from that row, in seconds.
     pub origin: Option<String>,
-    /// True if the type of the time column gives seconds, whatever unit is stated.
-    pub seconds: bool,
 }
 
 /// Paths of the columns, `a.b` within a structure.
@@ -71,15 +95,15 @@ pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
 
-/// Reads the columns at the places that `positions` finds among the names of all. Those at which `booleans` is true may hold true
-/// and false.
+/// Reads the columns at the places that `positions` finds among the names of all. `time` is the place of the time among them, and true
+/// if a unit is stated for it, so that it may be integers. Those at which `booleans` is true may hold true and false.
 ///
 /// # Errors
-/// If the file cannot be read, a column holds no numbers, or the unit of the time is not known.
+/// If the file cannot be read; [`Foreign`] for types that are not read here.
 pub fn read(
     path: &Path,
     positions: impl Fn(&[String]) -> Result<Vec<usize>>,
-    time: Option<Time>,
+    time: Option<(usize, bool)>,
     booleans: &[bool],
 ) -> Result<Found> {
     guarded(|| {
@@ -92,57 +116,66 @@ pub fn read(
         let size = file.metadata()?.len();
         let rows = metadata.row_groups().iter().map(|group| group.num_rows().max(0) as usize);
         budget::reading(rows.fold(0, usize::saturating_add), positions.len(), size)?;
-        let arrow = match pairs(&reader).get("ARROW:schema") {
-            Some(text) => arrow::temporals(text).context("its entry ARROW:schema is damaged")?,
-            None => BTreeMap::new(),
-        };
         let mut kinds = Vec::new();
         for (k, &position) in positions.iter().enumerate() {
             let column = schema.column(position);
-            let name = &names[position];
-            let kind = Kind::of(&column, arrow.get(name).copied())
-                .map_err(|why| anyhow!("column {name} does not hold numbers: {why}"))?;
-            let is_time = time.filter(|time| time.place == k);
-            let is_fine = match kind {
-                Kind::Time(_) => is_time.is_some(),
-                Kind::Boolean => booleans.get(k) == Some(&true),
-                _ => true,
+            let kind = Kind::of(&column);
+            let is_fine = match (kind, time.filter(|(place, _)| *place == k)) {
+                (Some(Kind::Real), _) | (Some(Kind::Date(_)), Some(_)) => true,
+                (Some(Kind::Integer { .. }), time) => time.is_none_or(|(_, is_stated)| is_stated),
+                (Some(Kind::Boolean), _) => booleans.get(k) == Some(&true),
+                _ => false,
             };
-            ensure!(is_fine, "column {name} holds {kind} (allowed: numbers)");
-            if let Some(time) = is_time {
-                kind.check_time(name, &time)?;
-            }
+            let Some(kind) = kind.filter(|_| is_fine) else {
+                let kind = column
+                    .logical_type_ref()
+                    .map_or(column.physical_type().to_string(), |of| format!("{of:?}"));
+                let allowed = match time.is_some_and(|(place, _)| place == k) {
+                    true => {
+                        "timestamps, floating-point numbers in s, integers of a unit that is stated"
+                    }
+                    false => "numbers",
+                };
+                return Err(Foreign(format!(
+                    "column {} holds {kind} (allowed: {allowed})",
+                    names[position]
+                ))
+                .into());
+            };
             kinds.push((kind, column.max_def_level()));
         }
         let mut columns = vec![Vec::new(); positions.len()];
-        let mut origins: Vec<Option<i64>> = vec![None; positions.len()];
+        let mut first = None;
         for group in 0..metadata.num_row_groups() {
             let group = reader.get_row_group(group)?;
             let rows = group.metadata().num_rows().max(0) as usize;
-            for (k, &position) in positions.iter().enumerate() {
-                let (start, length) = group.metadata().column(position).byte_range();
+            for ((&position, kind), into) in positions.iter().zip(&kinds).zip(&mut columns) {
+                let chunk = group.metadata().column(position);
+                let codec = chunk.compression();
+                if matches!(codec, Compression::BROTLI(_) | Compression::LZO) {
+                    let words = "allowed: none, Snappy, gzip, LZ4, Zstandard";
+                    return Err(Foreign(format!(
+                        "column {} is compressed with {codec} ({words})",
+                        names[position]
+                    ))
+                    .into());
+                }
+                let (start, length) = chunk.byte_range();
                 let column = || format!("column {}", names[position]);
-                let codec = group.metadata().column(position).compression();
-                ensure!(
-                    !matches!(codec, Compression::BROTLI(_) | Compression::LZO),
-                    "column {} is compressed with {codec} (allowed: none, Snappy, gzip, LZ4, Zstandard); in Python \
-                     pandas.read_parquet('FILE').to_parquet('FILE', compression='zstd') converts the file",
-                    names[position]
-                );
                 pages::check(&file, start, length, size).with_context(column)?;
-                let (kind, level) = &kinds[k];
                 let reader = group.get_column_reader(position)?;
-                let into = (&mut columns[k], &mut origins[k]);
-                values(reader, rows, *level, kind, into).with_context(column)?;
+                values(reader, rows, *kind, into, &mut first).with_context(column)?;
             }
         }
-        let place = time.map_or(usize::MAX, |time| time.place);
-        let of_time = kinds.get(place).and_then(|(kind, _)| match kind {
-            Kind::Time(temporal) => Some(temporal),
+        let ticks = kinds.iter().find_map(|(kind, _)| match kind {
+            Kind::Date(ticks) => Some(*ticks),
             _ => None,
         });
-        let origin = of_time.and_then(|t| t.date(*origins.get(place)?.as_ref()?));
-        Ok(Found { columns, origin, seconds: of_time.is_some() })
+        let origin = ticks.zip(first).and_then(|(ticks, first)| {
+            let nanoseconds = first.rem_euclid(ticks) * (1_000_000_000 / ticks);
+            DateTime::from_timestamp(first.div_euclid(ticks), nanoseconds as u32)
+        });
+        Ok(Found { columns, origin: origin.map(|at| at.to_rfc3339()) })
     })
 }
 
@@ -164,35 +197,33 @@ fn pairs(reader: &SerializedFileReader<File>) -> BTreeMap<String, String> {
     pairs.map(|pair| (pair.key.clone(), pair.value.clone().unwrap_or_default())).collect()
 }
 
-/// Appends the values of a column, and its first value if it is a date.
+/// Appends the values of a column of a type and a level of definition; dates count from the first.
 fn values(
     reader: ColumnReader,
     rows: usize,
-    level: i16,
-    kind: &Kind,
-    (into, origin): (&mut Vec<f64>, &mut Option<i64>),
+    (kind, level): (Kind, i16),
+    into: &mut Vec<f64>,
+    first: &mut Option<i64>,
 ) -> Result<()> {
-    let mut integer = |value: i64| kind.integer(value, origin);
+    let mut integer = |value: i64| match kind {
+        Kind::Date(ticks) => {
+            (i128::from(value) - i128::from(*first.get_or_insert(value))) as f64 / ticks as f64
+        }
+        Kind::Integer { is_signed: false } => value as u64 as f64,
+        _ => value as f64,
+    };
     match reader {
-        ColumnReader::DoubleColumnReader(r) => batches(r, rows, level, into, |v| Ok(*v)),
-        ColumnReader::FloatColumnReader(r) => batches(r, rows, level, into, |v| Ok(f64::from(*v))),
-        ColumnReader::Int32ColumnReader(r) => {
-            batches(r, rows, level, into, |v| Ok(integer(kind.widened(*v))))
-        }
-        ColumnReader::Int64ColumnReader(r) => batches(r, rows, level, into, |v| Ok(integer(*v))),
-        ColumnReader::Int96ColumnReader(r) => batches(r, rows, level, into, |v: &Int96| {
-            let nanoseconds = kind::of_int96(v.data());
-            Ok(integer(nanoseconds.context("a date is outside the years 1677 to 2262")?))
-        }),
-        ColumnReader::FixedLenByteArrayColumnReader(r) => {
-            batches(r, rows, level, into, |v| kind.bytes(v.data()))
-        }
-        ColumnReader::ByteArrayColumnReader(r) => {
-            batches(r, rows, level, into, |v| kind.bytes(v.data()))
-        }
+        ColumnReader::DoubleColumnReader(r) => batches(r, rows, level, into, |v| *v),
+        ColumnReader::FloatColumnReader(r) => batches(r, rows, level, into, |v| f64::from(*v)),
         ColumnReader::BoolColumnReader(r) => {
-            batches(r, rows, level, into, |v| Ok(f64::from(u8::from(*v))))
+            batches(r, rows, level, into, |v| f64::from(u8::from(*v)))
         }
+        ColumnReader::Int32ColumnReader(r) if kind == (Kind::Integer { is_signed: false }) => {
+            batches(r, rows, level, into, |v| f64::from(*v as u32))
+        }
+        ColumnReader::Int32ColumnReader(r) => batches(r, rows, level, into, |v| f64::from(*v)),
+        ColumnReader::Int64ColumnReader(r) => batches(r, rows, level, into, |v| integer(*v)),
+        _ => bail!("its type is not that of the file's schema"),
     }
 }
 
@@ -202,7 +233,7 @@ fn batches<T: DataType>(
     rows: usize,
     level: i16,
     into: &mut Vec<f64>,
-    mut convert: impl FnMut(&T::T) -> Result<f64>,
+    mut convert: impl FnMut(&T::T) -> f64,
 ) -> Result<()> {
     let (mut levels, mut values) = (Vec::new(), Vec::new());
     let mut done = 0;
@@ -216,15 +247,13 @@ fn batches<T: DataType>(
         let mut values = values.iter();
         if level == 0 {
             ensure!(values.len() == read, "it ends too early");
-            for value in values {
-                into.push(convert(value)?);
-            }
+            into.extend(values.map(&mut convert));
             continue;
         }
         ensure!(levels.len() == read, "it ends too early");
         for of_row in &levels {
             let value = if *of_row == level { values.next() } else { None };
-            into.push(value.map_or(Ok(f64::NAN), &mut convert)?);
+            into.push(value.map_or(f64::NAN, &mut convert));
         }
     }
     Ok(())

@@ -23,11 +23,12 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
 pub use self::even::{even, even_with_gaps};
-use self::foreign::{Foreign, Kind};
+pub use self::foreign::Foreign;
+use self::foreign::Kind;
 use self::stamps::Stamps;
 use self::unit::{Dimension, Fault};
 pub use self::unit::{Quantity, conversion};
-use crate::parquet_file;
+use crate::parquet_file::{self, Found};
 use crate::table::Table;
 
 /// Names and units of a file's columns.
@@ -164,15 +165,6 @@ fn bracketed(name: &str) -> Option<(&str, &str)> {
     // data(3) is a name
     let number = unit.chars().all(|c| c.is_ascii_digit());
     (!bare.is_empty() && !number).then_some((bare, unit))
-}
-
-/// The columns that were read; NaN where a value is missing.
-struct Found {
-    columns: Vec<Vec<f64>>,
-    /// The first row's date, if time is dates: time counts from there.
-    origin: Option<String>,
-    /// True if times are in s whatever unit is stated: dates, and types with a unit.
-    seconds: bool,
 }
 
 /// Treatment of a signal in rows without a value.
@@ -423,7 +415,6 @@ fn read_as(
         places[0] = *whole;
         places.push(*rest);
     }
-    let remedy = format!("--columns time={time}:ms, or :s, :us, :ns, :min, :h, states it");
     let booleans: Vec<bool> = (signals.iter())
         .map(|signal| inputs.is_some_and(|booleans| booleans.contains(&signal.name)))
         .chain([false])
@@ -434,15 +425,18 @@ fn read_as(
             layout.read(path, &places, timed, &booleans, done)?
         }
         File::Parquet(_) => {
-            let stated = if half.is_some() { Some(1.0) } else { stated };
-            let time = parquet_file::Time { place: 0, stated, remedy: &remedy };
-            let time = timed.then_some(time);
-            let found = parquet_file::read(path, |_| Ok(places.clone()), time, &booleans)?;
-            Found { columns: found.columns, origin: found.origin, seconds: found.seconds }
+            let is_stated = half.is_some() || stated.is_some();
+            parquet_file::read(
+                path,
+                |_| Ok(places.clone()),
+                timed.then_some((0, is_stated)),
+                &booleans,
+            )?
         }
     };
     done(format!("columns used: {}", used.join(", ")));
-    let Found { mut columns, origin, mut seconds } = found;
+    let Found { mut columns, origin } = found;
+    let mut seconds = origin.is_some();
     if let Some((whole, rest, factor)) = half {
         let part = columns.pop().unwrap_or_default();
         if let Some((first, joined)) = joined(&columns[0], &part, *factor) {
@@ -486,7 +480,7 @@ fn read_as(
         return Ok(Table::new(names, columns));
     }
     if timed && stated.is_none() && !seconds {
-        plausible(&columns[0]).map_err(|why| anyhow!("column {time} {why}: {remedy}"))?;
+        plausible(&columns[0]).map_err(|why| anyhow!("column {time} {why}: --columns time={time}:ms, or :s, :us, :ns, :min, :h, states it"))?;
     }
     match stamps::regular(&columns[0]) {
         Stamps::AsTheyAre => {}

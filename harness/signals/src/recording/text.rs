@@ -9,9 +9,10 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use files::{budget, input};
 
+use super::Header;
 use super::number::Style;
 use super::time::{Moment, Times, moment};
-use super::{Found, Header};
+use crate::parquet_file::Found;
 
 /// Lines from which separator and header are seen.
 const SAMPLE: usize = 200;
@@ -684,7 +685,6 @@ impl Layout {
             );
         }
         let origin = stamps.origin();
-        let seconds = origin.is_some();
-        Ok(Found { columns, origin, seconds })
+        Ok(Found { columns, origin })
     }
 }
