@@ -11,7 +11,6 @@
 mod columns;
 mod even;
 mod foreign;
-mod number;
 mod stamps;
 mod text;
 mod time;
@@ -43,10 +42,10 @@ struct Header {
 
 impl Header {
     /// From names and a row of units.
-    fn of(names: Vec<String>, row: Option<Vec<String>>) -> Header {
+    fn of(names: Vec<String>, row: Option<&Vec<String>>) -> Header {
         let mut header = Header { names: Vec::new(), full: Vec::new(), row: Vec::new() };
         for (k, name) in names.into_iter().enumerate() {
-            let below = row.as_ref().and_then(|row| row.get(k)).map_or("", |unit| unit.as_str());
+            let below = row.and_then(|row| row.get(k)).map_or("", |unit| unit.as_str());
             let unit = below.trim_matches(['[', ']', '(', ')', ' ']);
             header.row.push((!unit.is_empty()).then(|| unit.to_string()));
             header.names.push(bracketed(&name).map_or(name.as_str(), |(bare, _)| bare).to_string());

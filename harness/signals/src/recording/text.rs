@@ -1,83 +1,32 @@
-//! Numbers in columns of text: any separator (semicolon, tab, comma, blanks, or that of Excel's `sep=`), decimal points
-//! or commas, separators of thousands, lines of comment, a row of units, dates or clock times as time. The first lines
-//! of a file show its layout. Columns of text are skipped.
+//! Numbers in columns of text: separated by semicolons, tabs, commas or blanks, with decimal points or commas, lines of comment, lines
+//! above the header, a row of units below it, dates or clock times as time. The first lines of a file show its layout. Columns of text
+//! are skipped.
 
+use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read as _};
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
+use csv::ByteRecord;
 use files::{budget, input};
 
 use super::Header;
-use super::number::Style;
 use super::time::{Moment, Times, moment};
 use crate::parquet_file::Found;
 
-/// Lines from which separator and header are seen.
+/// Lines from which separator and header are detected.
 const SAMPLE: usize = 200;
-/// Longest line, bytes.
-const LONGEST_LINE: u64 = 1 << 20;
 /// Faults that are named before the rest is only counted.
 const NAMED: usize = 5;
-/// Names of a last column that rows may leave out.
-const COMMENT_COLUMNS: [&str; 4] = ["comment", "comments", "note", "notes"];
+/// Separators, in the order in which they are preferred.
+const SEPARATORS: [(u8, &str); 4] =
+    [(b';', "semicolons"), (b'\t', "tabs"), (b',', "commas"), (b' ', "blanks")];
 /// Beginnings of lines of comment.
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
-
-/// Separator between two fields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Separator {
-    Char(char),
-    Blanks,
-}
-
-/// In the order in which they are preferred.
-const SEPARATORS: [Separator; 4] =
-    [Separator::Char(';'), Separator::Char('\t'), Separator::Char(','), Separator::Blanks];
-
-impl Separator {
-    /// The fields of a line, without blanks and quotes around them; whether one was quoted.
-    fn split<'a>(self, line: &'a str, fields: &mut Vec<(&'a str, bool)>) {
-        fields.clear();
-        let is_separator = |c: char| match self {
-            Separator::Char(separator) => c == separator,
-            Separator::Blanks => c.is_whitespace(),
-        };
-        if line.contains('"') {
-            let mut quoted = false;
-            let parts = line.split(|c| {
-                quoted ^= c == '"';
-                is_separator(c) && !quoted
-            });
-            fields.extend(parts.map(|field| {
-                let field = field.trim();
-                let inner = field.strip_prefix('"').and_then(|f| f.strip_suffix('"'));
-                (inner.unwrap_or(field).trim(), inner.is_some())
-            }));
-        } else {
-            fields.extend(line.split(is_separator).map(|field| (field.trim(), false)));
-        }
-        match self {
-            Separator::Blanks => fields.retain(|(field, quoted)| *quoted || !field.is_empty()),
-            Separator::Char(_) => {
-                if let Some((stamp, rest)) = fields.first().and_then(|(field, _)| stamped(field)) {
-                    fields.splice(..1, [(stamp, false), (rest, false)]);
-                }
-            }
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Separator::Char(';') => "semicolons",
-            Separator::Char('\t') => "tabs",
-            Separator::Char(',') => "commas",
-            Separator::Char(_) => "the sign of its line sep=",
-            Separator::Blanks => "blanks",
-        }
-    }
-}
+/// Missing values, and what C's library and spreadsheets print for NaN.
+const MISSING: &str = "nan na n/a #n/a null none - -- nat -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind #nv #div/0!";
 
 /// Value of a field.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,66 +44,57 @@ impl Value {
     fn is_there(&self) -> bool {
         !matches!(self, Value::Missing | Value::Other)
     }
-}
 
-/// Divides a field into the date or clock time that a terminal program puts before each line, and the rest:
-/// `12:00:00.020 -> 5`, `[12:00:00.020] 5`, `12:00:00.020 5`.
-fn stamped(field: &str) -> Option<(&str, &str)> {
-    if !field.contains(':') || matches!(moment(field), Ok(Some(_))) {
-        return None;
-    }
-    let bracketed = field.strip_prefix('[').and_then(|field| field.split_once(']'));
-    let (stamp, rest) =
-        bracketed.or_else(|| field.split_once('>')).or_else(|| field.rsplit_once(' '))?;
-    // 12:00:00 CET
-    if bracketed.is_none() && rest.len() < 6 && rest.chars().all(|c| c.is_ascii_uppercase()) {
-        return None;
-    }
-    let (stamp, rest) = (stamp.trim_end_matches([' ', '-']), rest.trim());
-    (!rest.is_empty() && matches!(moment(stamp), Ok(Some(_)))).then_some((stamp, rest))
-}
-
-/// Returns true for a field that marks a missing value, or what C's library and spreadsheets print for NaN.
-fn missing(field: &str) -> bool {
-    const WORDS: [&str; 17] = [
-        "",
-        "nan",
-        "na",
-        "n/a",
-        "#n/a",
-        "null",
-        "none",
-        "-",
-        "--",
-        "nat",
-        "-nan",
-        "nan(ind)",
-        "-nan(ind)",
-        "1.#qnan",
-        "-1.#ind",
-        "#nv",
-        "#div/0!",
-    ];
-    field.len() < 10 && WORDS.iter().any(|word| field.eq_ignore_ascii_case(word))
-}
-
-/// Value of a field; `style` is how its column writes numbers so far.
-fn value((field, quoted): (&str, bool), separator: Separator, style: &mut Style) -> Value {
-    let comma = match separator {
-        Separator::Char(',') if !quoted => super::number::Comma::Separates,
-        Separator::Char(',') => super::number::Comma::Either,
-        _ => super::number::Comma::Decimal,
-    };
-    match style.number(field, comma) {
-        Ok(Some(number)) => Value::Number(number),
-        Ok(None) if missing(field) => Value::Missing,
-        Ok(None) => match moment(field) {
-            Ok(Some(moment)) => Value::Time(moment),
-            Ok(None) => Value::Other,
+    /// The value of a field; `decimal` is the decimal sign of the fields before.
+    fn of(field: &str, separator: u8, decimal: &mut Option<char>) -> Value {
+        match number(field, separator, decimal) {
+            Ok(Some(number)) => Value::Number(number),
+            Ok(None) if field.is_empty() => Value::Missing,
+            Ok(None) if MISSING.split(' ').any(|word| word.eq_ignore_ascii_case(field)) => {
+                Value::Missing
+            }
+            Ok(None) => match moment(field) {
+                Ok(Some(moment)) => Value::Time(moment),
+                Ok(None) => Value::Other,
+                Err(reason) => Value::Ambiguous(reason),
+            },
             Err(reason) => Value::Ambiguous(reason),
-        },
-        Err(reason) => Value::Ambiguous(reason),
+        }
     }
+}
+
+/// The number of a field; `None`: it is not one.
+///
+/// # Errors
+/// If it can be read in two ways, or has another decimal sign than the fields before.
+fn number(field: &str, separator: u8, decimal: &mut Option<char>) -> Result<Option<f64>, String> {
+    if !field.contains(|c: char| c.is_ascii_digit()) {
+        return Ok(None);
+    }
+    let text = field.replace('\u{2212}', "-");
+    let sign = text.chars().find(|c| matches!(c, '.' | ','));
+    let Ok(value) = text.replacen(',', ".", 1).parse::<f64>() else { return Ok(None) };
+    if let (Some(sign), Some(before)) = (sign, *decimal)
+        && sign != before
+    {
+        let name = |sign| if sign == ',' { "comma" } else { "point" };
+        return Err(format!(
+            "is read with a decimal {}, the lines above with a decimal {} (allowed: one of them in a file, and no separators of thousands)",
+            name(sign),
+            name(before)
+        ));
+    }
+    // quotes around a comma are about the columns' separator: "1,234"
+    if let (b',', Some((whole, rest)), None) = (separator, text.split_once(','), *decimal)
+        && rest.len() == 3
+        && (1..4).contains(&whole.trim_start_matches(['-', '+']).len())
+    {
+        return Err(format!(
+            "may be {whole}{rest} or {whole}.{rest} (allowed: numbers without separators of thousands, decimal points)"
+        ));
+    }
+    *decimal = decimal.or(sign);
+    Ok(value.is_finite().then_some(value))
 }
 
 /// The number of a Boolean.
@@ -166,287 +106,137 @@ fn truth(field: &str) -> Result<f64, String> {
     }
 }
 
-/// Values of the fields of a line in the sample.
-fn values(line: &str, separator: Separator) -> Vec<Value> {
-    let mut fields = Vec::new();
-    separator.split(line, &mut fields);
-    fields.into_iter().map(|field| value(field, separator, &mut Style::default())).collect()
-}
-
-/// Returns true if the first fields of rows are names of rows, which have no name in the header: quoted ones, or numbers
-/// from 1 on, as R writes them.
-fn are_row_names(rows: &[(usize, String)], separator: Separator) -> bool {
-    let mut fields = Vec::new();
-    rows.iter().enumerate().all(|(k, (_, row))| {
-        separator.split(row, &mut fields);
-        fields.first().is_some_and(|(name, quoted)| *quoted || *name == (k + 1).to_string())
-    })
-}
-
-/// The separator of a line `sep=;`, with which Excel begins a file.
-fn excels(line: &str) -> Option<Separator> {
-    let line = line.trim_matches(['"', ' ']);
-    let (name, sign) = line.split_at_checked(4)?;
-    let mut signs = sign.chars();
-    let sign =
-        signs.next().filter(|_| name.eq_ignore_ascii_case("sep=") && signs.next().is_none())?;
-    Some(Separator::Char(sign))
-}
-
-/// A way to divide the lines of a sample into columns.
-struct Division {
-    separator: Separator,
-    width: usize,
-    /// The columns of text.
-    texts: Vec<usize>,
-    /// True if most rows have text in a column.
-    is_wordy: bool,
-    /// The columns with a value in most rows; if there are none, all but those of text.
-    dense: Vec<usize>,
-    /// Lines whose columns hold values, but for those of text.
-    rows: usize,
-}
-
-impl Division {
-    /// Divides a sample; rows have at least `least` fields.
-    fn of(sample: &[(usize, String)], separator: Separator, least: usize) -> Division {
-        let lines: Vec<Vec<Value>> =
-            sample.iter().map(|(_, line)| values(line, separator)).collect();
-        // lines with a value somewhere are rows, or a row of units with a 1
-        let rows = || lines.iter().filter(|l| l.len() >= least && l.iter().any(Value::is_there));
-        let mut widths = std::collections::BTreeMap::new();
-        rows().for_each(|line| *widths.entry(line.len()).or_insert(0_usize) += 1);
-        let width = widths.iter().max_by_key(|(_, count)| **count).map_or(0, |(width, _)| *width);
-        let count = widths.get(&width).copied().unwrap_or(0);
-        let of = |k: usize, wanted: fn(&Value) -> bool| {
-            rows().filter(|line| line.len() == width && wanted(&line[k])).count()
-        };
-        let others = |k| of(k, |value| *value == Value::Other);
-        let there = |k| of(k, Value::is_there);
-        let is_wordy = (0..width).any(|k| 2 * others(k) > count);
-        // words in some rows only, where the others have nothing, are text as well
-        let is_text = |k: &usize| 2 * others(*k) > count || others(*k) > 0 && there(*k) == 0;
-        let (texts, numbers): (Vec<_>, Vec<_>) = (0..width).partition(is_text);
-        let mut dense: Vec<usize> =
-            numbers.iter().copied().filter(|k| 2 * there(*k) > count).collect();
-        if dense.is_empty() {
-            dense = numbers;
-        }
-        let mut found = Division { separator, width, texts, is_wordy, dense, rows: 0 };
-        found.rows = lines.iter().filter(|line| found.is_sound(line)).count();
-        found
-    }
-
-    fn numbers<'v>(&self, line: &'v [Value]) -> impl Iterator<Item = &'v Value> {
-        let texts = self.texts.clone();
-        line.iter().enumerate().filter(move |(k, _)| !texts.contains(k)).map(|(_, value)| value)
-    }
-
-    /// Returns true if all columns but those of text hold values, and at least one that is not missing.
-    fn is_sound(&self, line: &[Value]) -> bool {
-        line.len() == self.width
-            && self.numbers(line).all(|value| *value != Value::Other)
-            && self.numbers(line).any(Value::is_there)
-    }
-
-    /// Number of values and of words in the columns that have values in most rows.
-    fn count(&self, line: &[Value]) -> (usize, usize) {
-        let dense = || self.dense.iter().filter_map(|k| line.get(*k));
-        let others = dense().filter(|value| **value == Value::Other).count();
-        (dense().filter(|value| value.is_there()).count(), others)
-    }
-
-    /// Returns true for a row, even if a few of its values are none; a row of units may have a 1. A field more than the
-    /// others have makes no other line of it.
-    fn is_row(&self, line: &str) -> bool {
-        let line = values(line, self.separator);
-        let (there, others) = self.count(&line);
-        let first = self.dense.first().and_then(|k| line.get(*k)).is_some_and(Value::is_there);
-        let mostly = first && others < there;
-        self.is_sound(&line) || [self.width, self.width + 1].contains(&line.len()) && mostly
-    }
-
-    /// The fields of a line.
-    fn texts(&self, line: &str) -> Vec<String> {
-        let mut fields = Vec::new();
-        self.separator.split(line, &mut fields);
-        fields.iter().map(|(field, _)| field.to_string()).collect()
-    }
-
-    /// Returns true for a line that has as many fields as the rows, or one more or less, which is the last of a row, or
-    /// the first.
-    fn fits(&self, line: &str) -> bool {
-        self.width > 1 && self.texts(line).len().abs_diff(self.width) < 2
-            || self.width == 1 && self.texts(line).len() == 1
-    }
-
-    /// Units of the columns, if a line is a row of units. A label before them says what they are: `unit`, `Y_Unit_Label`.
-    fn units(&self, line: &str) -> Option<(Vec<String>, bool)> {
-        let mut fields = self.texts(line);
-        let labelled = fields.first().is_some_and(|field| field.to_lowercase().contains("unit"));
-        if labelled {
-            fields[0].clear();
-        }
-        let there =
-            fields.iter().enumerate().filter(|(k, f)| !self.texts.contains(k) && !f.is_empty());
-        let (known, unknown): (Vec<_>, Vec<_>) =
-            there.partition(|(_, field)| super::unit::is_unit(field));
-        (known.len() > unknown.len()).then_some((fields, labelled))
-    }
-
-    /// Returns the sample without the separators that end its rows, if they end all rows and the header names no column there.
-    /// Where rows are numbered from 1 and the header has a name less, a last column without values is as likely: `None`.
-    fn opened(&self, sample: &[(usize, String)]) -> Option<Vec<(usize, String)>> {
-        let Separator::Char(sign) = self.separator else { return None };
-        let at =
-            sample.iter().position(|(_, line)| self.is_row(line)).filter(|_| self.width > 2)?;
-        let (above, rows) = sample.split_at(at);
-        let fields = |line: &str| self.texts(line).len();
-        let is_closed = |line: &str| fields(line) == self.width && line.ends_with(sign);
-        let is_numbered = |(k, (_, row)): (usize, &(usize, String))| {
-            self.texts(row).first().is_some_and(|first| *first == (k + 1).to_string())
-        };
-        let mut heads = above.iter().map(|(_, line)| self.texts(line));
-        let mut less = heads.clone().filter(|head| head.len() + 1 == self.width).peekable();
-        // an empty first name is that of the rows
-        let is_one_less = less.peek().is_some()
-            && less.all(|head| !head[0].is_empty())
-            && rows.iter().enumerate().all(is_numbered);
-        let is_named =
-            heads.any(|head| head.len() == self.width && !head[self.width - 1].is_empty());
-        let are_closed = rows.iter().all(|(_, row)| fields(row) != self.width || is_closed(row));
-        (are_closed && !is_named && !is_one_less).then(|| {
-            let open = |line: &String| match is_closed(line) {
-                true => line[..line.len() - sign.len_utf8()].to_string(),
-                false => line.clone(),
-            };
-            sample.iter().map(|(number, line)| (*number, open(line))).collect()
-        })
-    }
-
-    /// Fails for a file whose lines are records of several kinds, each with a name and columns of its own.
-    fn refuse_kinds(&self, sample: &[(usize, String)], has_header: bool) -> Result<()> {
-        if !self.texts.contains(&0) {
-            return Ok(());
-        }
-        let mut kinds = std::collections::BTreeMap::new();
-        for (line, text) in sample {
-            let values = values(text, self.separator);
-            let fields = self.texts(text);
-            if fields.len() > 1 && !fields[0].is_empty() && values.iter().any(Value::is_there) {
-                let kind = (fields[0].trim_end_matches([',', ';']).to_string(), fields.len());
-                kinds.entry(kind).or_insert_with(Vec::new).push(*line);
-            }
-        }
-        kinds.retain(|_, lines| lines.len() > 1);
-        let mut kinds: Vec<_> = kinds.into_iter().collect();
-        kinds.sort_by_key(|(_, lines)| lines[0]);
-        if let [((word, width), lines), .., ((other, rest), more)] = &kinds[..]
-            && (!has_header || kinds.iter().any(|((_, fields), _)| fields != width))
-        {
-            bail!(
-                "its lines are records of several kinds: line {} begins with \"{word}\" and has {width} fields. Line {} begins \
-                 with \"{other}\" and has {rest} (allowed: rows of one kind). Export one kind, for ArduPilot's logs by \
-                 mavlogdump.py --types IMU --format csv",
-                lines[0],
-                more[0]
-            );
-        }
-        Ok(())
-    }
-}
-
-/// The lines of a file, without comments and empty ones.
+/// The lines of a file, divided into fields, without comments and empty ones.
 struct Lines {
-    reader: BufReader<File>,
-    bytes: Vec<u8>,
-    /// Number of the last line, from 1.
-    number: usize,
-    /// True if that line has an end.
-    ended: bool,
-    /// The last comment, without its sign.
-    comment: Option<String>,
-    /// The byte that ends a line.
-    end: u8,
+    reader: csv::Reader<File>,
+    record: ByteRecord,
+    separator: u8,
+    /// Lines so far.
+    count: usize,
+    /// Fields of the last comment, without its sign.
+    comment: Vec<String>,
 }
 
 impl Lines {
-    fn open(path: &Path) -> Result<Self> {
+    fn open(path: &Path, separator: u8) -> Result<Self> {
         let file = input::open(path).context("it cannot be opened")?;
-        let mut reader = BufReader::with_capacity(1 << 16, file);
-        let start = reader.fill_buf()?;
-        // lines that end in CR alone, as of old Macs and some instruments
-        let is_old = start.contains(&b'\r') && !start.contains(&b'\n');
-        Ok(Lines {
-            reader,
-            end: if is_old { b'\r' } else { b'\n' },
-            bytes: Vec::new(),
-            number: 0,
-            ended: true,
-            comment: None,
-        })
+        let mut builder = csv::ReaderBuilder::new();
+        let reader =
+            builder.has_headers(false).flexible(true).delimiter(separator).from_reader(file);
+        Ok(Lines { reader, record: ByteRecord::new(), separator, count: 0, comment: Vec::new() })
     }
 
-    /// The next line in `text`; `false` at the end.
-    fn next(&mut self, text: &mut String) -> Result<bool> {
-        loop {
-            self.bytes.clear();
-            let read =
-                (&mut self.reader).take(LONGEST_LINE).read_until(self.end, &mut self.bytes)?;
-            self.number += 1;
-            if read == 0 {
-                return Ok(false);
-            }
-            self.ended = self.bytes.ends_with(&[self.end]);
-            let line = self.number;
+    /// Goes to the next line; false at the end.
+    fn next(&mut self) -> Result<bool> {
+        while self.reader.read_byte_record(&mut self.record)? {
             ensure!(
-                (read as u64) < LONGEST_LINE,
-                "line {line} is longer than {LONGEST_LINE} bytes: it is not text"
+                !self.record.as_slice().contains(&0),
+                "line {} has a byte 0: it is not text",
+                self.number()
             );
-            ensure!(
-                line > 1
-                    || !(self.bytes.starts_with(&[0xff, 0xfe])
-                        || self.bytes.starts_with(&[0xfe, 0xff])),
-                "it is UTF-16; save it as UTF-8"
-            );
-            ensure!(!self.bytes.contains(&0), "line {line} has a byte 0: it is not text");
-            let cut = self.bytes.trim_ascii_end();
-            ensure!(
-                !cut.contains(&b'\r') && !cut.contains(&b'\n'),
-                "line {line} has a carriage return within it: some lines of the file end in CR alone, others in LF (allowed: one kind \
-                 of line ends)"
-            );
-            text.clear();
-            match std::str::from_utf8(&self.bytes) {
-                Ok(valid) => text.push_str(valid),
-                // names in an old code page: ° and µ become �
-                Err(_) => text.push_str(&String::from_utf8_lossy(&self.bytes)),
-            }
-            if line == 1 && text.starts_with('\u{feff}') {
-                text.drain(..'\u{feff}'.len_utf8());
-            }
-            text.truncate(text.trim_end_matches(['\r', '\n']).len());
-            let trimmed = text.trim_start();
-            match COMMENTS.iter().find_map(|sign| trimmed.strip_prefix(sign)) {
-                Some(comment) => {
-                    self.comment = Some(comment.trim_start_matches(['#', '%', '/']).trim().into());
+            let fields = self.fields();
+            match fields
+                .first()
+                .and_then(|first| COMMENTS.iter().find(|sign| first.starts_with(**sign)))
+            {
+                Some(_) => {
+                    let bare = |field: &Cow<str>| {
+                        field.trim_start_matches(['#', '%', '/', ' ']).to_string()
+                    };
+                    let from = usize::from(bare(&fields[0]).is_empty());
+                    self.comment = fields[from..].iter().map(bare).collect();
                 }
-                None if trimmed.is_empty() => {}
-                None => return Ok(true),
+                None if fields.iter().all(|field| field.is_empty()) => {}
+                None => {
+                    self.count += 1;
+                    return Ok(true);
+                }
             }
         }
+        Ok(false)
+    }
+
+    fn number(&self) -> u64 {
+        self.record.position().map_or(0, csv::Position::line)
+    }
+
+    /// The fields without blanks around them; names in an old code page have � for ° and µ.
+    fn fields(&self) -> Vec<Cow<'_, str>> {
+        let all =
+            self.record.iter().map(|field| match String::from_utf8_lossy(field.trim_ascii()) {
+                Cow::Borrowed(text) => Cow::Borrowed(text.trim_matches(['\u{feff}', '\u{a0}'])),
+                text => text,
+            });
+        all.filter(|field| self.separator != b' ' || !field.is_empty()).collect()
+    }
+}
+
+/// First lines of a file under one separator.
+struct Sample {
+    separator: (u8, &'static str),
+    /// Number, fields and values of each line.
+    lines: Vec<(u64, Vec<String>, Vec<Value>)>,
+    /// The comment before the first line.
+    comment: Vec<String>,
+    width: usize,
+    /// Columns of text.
+    texts: Vec<usize>,
+    /// Places of the rows.
+    rows: Vec<usize>,
+}
+
+impl Sample {
+    /// Reads the first lines; rows have at least `least` fields.
+    fn of(path: &Path, separator: (u8, &'static str), least: usize) -> Result<Sample> {
+        let mut file = Lines::open(path, separator.0)?;
+        let (mut lines, mut comment) = (Vec::new(), Vec::new());
+        while lines.len() < SAMPLE && file.next()? {
+            if lines.is_empty() {
+                comment.clone_from(&file.comment);
+            }
+            let fields: Vec<String> = file.fields().iter().map(|field| field.to_string()).collect();
+            let values =
+                fields.iter().map(|field| Value::of(field, separator.0, &mut None)).collect();
+            lines.push((file.number(), fields, values));
+        }
+        // lines with a value somewhere are rows, or a row of units with a 1
+        let valued = |(_, _, values): &&(u64, _, Vec<Value>)| {
+            values.len() >= least && values.iter().any(Value::is_there)
+        };
+        let widths: Vec<usize> =
+            lines.iter().filter(valued).map(|(_, _, values)| values.len()).collect();
+        let frequency =
+            |width: &usize| (widths.iter().filter(|other| *other == width).count(), *width);
+        let width = widths.iter().copied().max_by_key(frequency).unwrap_or(0);
+        let count = |k: usize, of: fn(&Value) -> bool| {
+            lines.iter().filter(valued).filter(|(_, _, v)| v.len() == width && of(&v[k])).count()
+        };
+        let texts: Vec<usize> = (0..width)
+            .filter(|k| count(*k, |value| *value == Value::Other) > count(*k, Value::is_there))
+            .collect();
+        let is_row = |(_, _, values): &(u64, _, Vec<Value>)| {
+            let numbers = || {
+                values
+                    .iter()
+                    .enumerate()
+                    .filter(|(k, _)| !texts.contains(k))
+                    .map(|(_, value)| value)
+            };
+            let others = numbers().filter(|value| **value == Value::Other).count();
+            values.len() == width && numbers().filter(|value| value.is_there()).count() > others
+        };
+        let rows = (0..lines.len()).filter(|k| is_row(&lines[*k])).collect();
+        Ok(Sample { separator, lines, comment, width, texts, rows })
     }
 }
 
 /// Layout of a file, detected in its first lines.
 pub(super) struct Layout {
-    separator: Separator,
+    separator: u8,
     /// Names and units of its columns.
     pub header: Header,
-    /// True if the last column holds comments, which rows may leave out.
-    has_comments: bool,
-    /// First line of data, counted from 1.
-    first: usize,
+    /// Lines before the first row.
+    above: usize,
     /// Notes on the detected layout.
     pub notes: Vec<String>,
     /// Columns of text, for the message that a column is missing.
@@ -456,149 +246,111 @@ pub(super) struct Layout {
 impl Layout {
     /// Detects the layout of a file.
     pub fn of(path: &Path) -> Result<Self> {
-        let mut lines = Lines::open(path)?;
-        let (mut sample, mut text) = (Vec::new(), String::new());
-        // the comment that stands before the first line
-        let mut comment = None;
-        while sample.len() < SAMPLE && lines.next(&mut text)? {
-            if sample.is_empty() {
-                comment = lines.comment.clone();
-            }
-            sample.push((lines.number, text.clone()));
+        // a table of times alone has one column
+        let mut tried = Vec::new();
+        for (separator, least) in
+            SEPARATORS.map(|of| (of, 2)).into_iter().chain([(SEPARATORS[2], 1)])
+        {
+            tried.push(Sample::of(path, separator, least)?);
         }
-        let told = sample.first().and_then(|(_, line)| excels(line));
-        if told.is_some() {
-            sample.remove(0);
-        }
-        ensure!(!sample.is_empty(), "it is empty");
-        // the separator by which most lines are values, at least two in each; columns of text count only where no
-        // separator does without; a table of times alone has one column
-        let of = |separator: &Separator, least| Division::of(&sample, *separator, least);
-        let tried = told.as_ref().map_or(&SEPARATORS[..], std::slice::from_ref);
-        let best = |divisions: Vec<Division>| {
-            let found = divisions.into_iter().filter(|d| d.rows > 0 && d.texts.len() < d.width);
-            found.reduce(|best, other| {
-                let key = |d: &Division| (!d.is_wordy, d.rows);
-                if key(&other) > key(&best) { other } else { best }
-            })
+        ensure!(tried.iter().any(|sample| !sample.lines.is_empty()), "it is empty");
+        let start = |fields: &[String], separator: u8| {
+            let line = fields.join(&char::from(separator).to_string());
+            line.chars().take(60).collect::<String>()
         };
-        let division = best(tried.iter().map(|separator| of(separator, 2)).collect())
-            .or_else(|| best(vec![of(&SEPARATORS[2], 1)]));
-        let Some(mut division) = division else {
-            let (line, text) = sample.get(1).unwrap_or(&sample[0]);
+        // the separator by which most lines are rows; columns of text count only where no separator does without
+        let key = |sample: &&Sample| (sample.width > 1, sample.texts.is_empty(), sample.rows.len());
+        let usable = tried
+            .iter()
+            .rev()
+            .filter(|sample| !sample.rows.is_empty() && sample.texts.len() < sample.width);
+        let Some(Sample { separator, lines, comment, width, texts, rows }) = usable.max_by_key(key)
+        else {
+            let (line, fields, _) = tried[2].lines.get(1).unwrap_or(&tried[2].lines[0]);
             bail!(
-                "line {line}, \"{}\", is not a row of numbers (allowed: numbers with decimal point or comma, separated by \
-                 semicolons, tabs, commas or blanks; decimal commas need another separator, or quotes; lines of \
-                 comment begin with {})",
-                text.chars().take(60).collect::<String>(),
+                "line {line}, \"{}\", is not a row of numbers (allowed: numbers with decimal point or comma, separated by semicolons, \
+                 tabs, commas or blanks; decimal commas need another separator, or quotes; lines of comment begin with {})",
+                start(fields, b','),
                 COMMENTS.join(" or ")
             );
         };
-        if let Some(opened) = division.opened(&sample) {
-            sample = opened;
-            division = Division::of(&sample, division.separator, 2);
-        }
-        let (separator, width) = (division.separator, division.width);
-        let at = sample.iter().position(|(_, line)| division.is_row(line)).unwrap_or(0);
-        let first = sample[at].0;
-        let (above, rows) = sample.split_at(at);
+        let (at, mut width) = (rows[0], *width);
         let mut notes = Vec::new();
-        // the lines right above the first row that may be its header: names, and units below or above them
-        let fitting = above.iter().rev().take_while(|(_, line)| division.fits(line)).count();
-        let block = &above[at - fitting..];
-        division.refuse_kinds(&sample, fitting > 0)?;
-        let is_cut = |line: &str| {
-            let line = values(line, separator);
-            line.len() < width && line.iter().all(|value| *value != Value::Other)
+        let is_units = |fields: &[String]| {
+            let there = fields
+                .iter()
+                .enumerate()
+                .filter(|(k, field)| !texts.contains(k) && !field.is_empty());
+            let (known, unknown): (Vec<_>, Vec<_>) =
+                there.partition(|(_, field)| super::unit::is_unit(field));
+            fields.len() <= width && known.len() > unknown.len()
         };
-        // without a label it stands right above the rows, and names above it
-        let units = (0..block.len()).rev().find_map(|k| {
-            let (units, labelled) = division.units(&block[k].1)?;
-            (labelled || k > 0 && k + 1 == block.len()).then_some((k, (units, labelled)))
-        });
-        let (head, units) = match units {
-            Some((k, (units, labelled))) => {
-                let below = block.len().checked_sub(1).filter(|last| labelled && *last > k);
-                (below.or(k.checked_sub(1)), Some((k, units)))
-            }
-            None => (block.len().checked_sub(1), None),
-        };
-        let mut has_comments = false;
-        let (names, units) = match head.map(|head| &block[head]) {
-            // a capture that begins within a line
-            Some((line, text)) if at == 1 && is_cut(text) => {
-                notes.push(format!("its first line, {line}, is not complete and was left out"));
-                (Vec::new(), None)
-            }
-            Some((line, text)) => {
-                let (there, others) = division.count(&values(text, separator));
+        let units = (at > 1 && is_units(&lines[at - 1].1)).then(|| &lines[at - 1]);
+        let head = at.checked_sub(1 + usize::from(units.is_some())).map(|head| &lines[head]);
+        let mut names = match head {
+            Some((line, fields, values)) if fields.len() > 1 || width == 1 => {
+                let names: Vec<String> =
+                    fields.iter().rev().skip_while(|name| name.is_empty()).cloned().collect();
+                let names: Vec<String> = names.into_iter().rev().collect();
                 ensure!(
-                    there <= others,
+                    values.iter().filter(|value| value.is_there()).count() <= values.len() / 2,
                     "line {line}, \"{}\", is neither a row of numbers nor a header (allowed: names above the rows)",
-                    text.chars().take(60).collect::<String>()
+                    start(fields, separator.0)
                 );
-                let mut names = division.texts(text);
-                let count = names.len();
-                let last = names.last().map(|name| name.to_lowercase()).unwrap_or_default();
-                if count > width && last.is_empty() {
-                    names.pop();
-                } else if count > width && COMMENT_COLUMNS.contains(&last.as_str()) {
-                    has_comments = true;
-                } else if count < width && are_row_names(rows, separator) {
-                    names.insert(0, String::new());
-                } else {
-                    let closed = division.texts(&rows[0].1).last().is_some_and(String::is_empty);
-                    ensure!(
-                        count == width || count < width && closed,
-                        "its header, line {line}, has {count} names, its rows have {width} fields (allowed: as many, or one more that is \
-                         empty; above the rows no other line with separators)"
-                    );
+                // separators at the end of each row
+                let is_empty = |k: usize| rows.iter().all(|row| lines[*row].1[k].is_empty());
+                while width > names.len() && is_empty(width - 1) && fields.len() < width {
+                    width -= 1;
                 }
-                let passed = above.iter().position(|(other, _)| other == line).unwrap_or(0);
+                ensure!(
+                    names.len() <= width && width <= fields.len().max(names.len()),
+                    "its header, line {line}, has {} names, its rows have {width} fields (allowed: as many; decimal commas need another \
+                     separator than commas, or quotes)",
+                    names.len()
+                );
+                let passed = at - 1 - usize::from(units.is_some());
                 if passed > 0 {
                     notes.push(format!("the {passed} lines above its header were passed over"));
                 }
-                if let Some((k, _)) = units {
-                    notes.push(format!("line {} was taken for a row of units", block[k].0));
-                }
-                (names, units.map(|(_, units)| units))
+                names
             }
-            None => {
-                if let Some((line, text)) = above.last() {
-                    let count = division.texts(text).len();
-                    ensure!(
-                        count < 2 || at == 1 && is_cut(text),
-                        "its header, line {line}, has {count} fields, its rows have {width} (decimal commas need \
-                         another separator than commas, or quotes)"
-                    );
-                    notes.push(match count {
-                        0 | 1 => format!("the {at} lines above its first row were passed over"),
-                        _ => format!("its first line, {line}, is not complete and was left out"),
-                    });
-                }
-                let comment = comment.map(|comment| division.texts(&comment));
-                (comment.filter(|names| names.len() == width).unwrap_or_default(), None)
+            _ if at > 0 => {
+                notes.push(format!("the {at} lines above its first row were passed over"));
+                Vec::new()
             }
+            _ if comment.len() == width => comment.clone(),
+            _ => Vec::new(),
         };
-        if separator != Separator::Char(',') {
-            notes.push(format!("its columns are separated by {}", separator.name()));
+        if names.is_empty() && texts.contains(&0) {
+            let kinds: BTreeSet<&str> = rows.iter().map(|row| lines[*row].1[0].as_str()).collect();
+            ensure!(
+                kinds.len() < 2,
+                "its lines are records of several kinds, such as {} (allowed: rows of one kind, or names above them)",
+                kinds.iter().take(2).copied().collect::<Vec<_>>().join(" and ")
+            );
         }
-        let mut header = Header::of(names, units);
+        let units = units.filter(|_| !names.is_empty());
+        if let Some((line, ..)) = units {
+            notes.push(format!("line {line} was taken for a row of units"));
+        }
+        if separator.0 != b',' {
+            notes.push(format!("its columns are separated by {}", separator.1));
+        }
+        names.truncate(width);
+        let mut header = Header::of(names, units.map(|(_, fields, _)| fields));
         header.widen(width);
-        let mut texts = String::new();
-        if !division.texts.is_empty() {
-            let fields = division.texts(&rows[0].1);
-            let example = |k: &usize| {
-                let field = fields.get(*k).map_or("", String::as_str);
-                format!("{} (\"{}\")", header.names[*k], field.chars().take(40).collect::<String>())
-            };
-            let examples: Vec<_> = division.texts.iter().map(example).collect();
-            texts = format!("; of text, as line {first} shows: {}", examples.join(", "));
-            let names: Vec<&str> =
-                division.texts.iter().map(|k| header.names[*k].as_str()).collect();
+        let row = &lines[at];
+        let example = |k: &usize| {
+            format!("{} (\"{}\")", header.names[*k], row.1[*k].chars().take(40).collect::<String>())
+        };
+        let examples: Vec<String> = texts.iter().map(example).collect();
+        let mut shown = String::new();
+        if !texts.is_empty() {
+            shown = format!("; of text, as line {} shows: {}", row.0, examples.join(", "));
+            let names: Vec<&str> = texts.iter().map(|k| header.names[*k].as_str()).collect();
             notes.push(format!("columns of text are skipped: {}", names.join(", ")));
         }
-        Ok(Layout { separator, header, has_comments, first, notes, texts })
+        Ok(Layout { separator: separator.0, header, above: at, notes, texts: shown })
     }
 
     /// Reads the columns at these places, that of the time first if the file has `times`: dates and clock times are
@@ -611,80 +363,75 @@ impl Layout {
         booleans: &[bool],
         done: &mut dyn FnMut(String),
     ) -> Result<Found> {
-        let mut lines = Lines::open(path)?;
-        let size = path.metadata()?.len();
+        let mut end = input::open(path)?;
+        let size = end.seek(SeekFrom::End(-1))? + 1;
+        let mut last = [0];
+        end.read_exact(&mut last)?;
+        let mut lines = Lines::open(path, self.separator)?;
         let mut columns = vec![Vec::new(); places.len()];
-        let mut styles = vec![Style::default(); places.len()];
-        let mut text = String::new();
-        let (mut stamps, mut faults, mut count) = (Times::default(), Vec::new(), 0_usize);
+        let (mut stamps, mut decimal) = (Times::default(), None);
+        let (mut faults, mut count, width) = (Vec::new(), 0_usize, self.header.names.len());
         let mut fault = |words: String| {
             count += 1;
             if count <= NAMED {
                 faults.push(words);
             }
         };
-        let width = self.header.names.len();
-        let least = width - usize::from(self.has_comments);
-        while lines.next(&mut text)? {
-            let line = lines.number;
-            if line < self.first {
+        while lines.next()? {
+            if lines.count <= self.above {
                 continue;
             }
-            let mut fields = Vec::with_capacity(width + 1);
-            self.separator.split(&text, &mut fields);
-            let closed = fields.len() == width + 1 && fields[width].0.is_empty();
-            if fields.len() < least && !lines.ended {
+            let (line, fields) = (lines.number(), lines.fields());
+            if fields.len() < width
+                && lines.reader.position().byte() == size
+                && !last[0].is_ascii_whitespace()
+            {
                 done(format!("its last line, {line}, is not complete and was left out"));
                 break;
             }
-            if !(least..=width).contains(&fields.len()) && !closed {
+            if fields.len() < width || fields[width..].iter().any(|field| !field.is_empty()) {
                 fault(format!(
-                    "line {line}: {} fields, where the others have {least}",
+                    "line {line}: {} fields, where the others have {width}",
                     fields.len()
                 ));
                 continue;
             }
-            fields.resize(fields.len().max(width), ("", false));
             budget::reading(columns.first().map_or(0, Vec::len) + 1, places.len(), size)?;
             for (k, &place) in places.iter().enumerate() {
-                let is_time = times && k == 0;
+                let (is_time, field) = (times && k == 0, &*fields[place]);
                 let begins = columns[k].is_empty();
-                let parsed = match value(fields[place], self.separator, &mut styles[k]) {
+                let parsed = match Value::of(field, self.separator, &mut decimal) {
                     Value::Number(number) if !is_time || stamps.is_empty() => Ok(number),
                     Value::Missing => Ok(f64::NAN),
                     Value::Time(moment) if is_time && (begins || !stamps.is_empty()) => {
-                        stamps.seconds(moment, fields[place].0)
+                        stamps.seconds(moment, field)
                     }
                     Value::Time(_) if is_time => {
                         Err("is a date or a clock time, where the lines above have numbers".into())
                     }
-                    Value::Other if booleans[k] => truth(fields[place].0),
+                    Value::Other if booleans[k] => truth(field),
                     Value::Ambiguous(reason) => Err(reason),
                     _ => Err("is not a number".into()),
                 };
                 columns[k].push(parsed.unwrap_or_else(|reason| {
+                    let field: String = field.chars().take(40).collect();
                     fault(format!(
-                        "line {line}, column {}: \"{}\" {reason}",
-                        self.header.names[place],
-                        fields[place].0.chars().take(40).collect::<String>()
+                        "line {line}, column {}: \"{field}\" {reason}",
+                        self.header.names[place]
                     ));
                     f64::NAN
                 }));
             }
         }
         if count > 0 {
-            let more = match count.saturating_sub(NAMED) {
-                0 => String::new(),
-                more => format!("; and {more} more"),
-            };
+            let more = count.saturating_sub(NAMED);
+            let more = if more > 0 { format!("; and {more} more") } else { String::new() };
             bail!(
-                "{}{more} (allowed: finite numbers with decimal point or comma; nothing, NaN or NA where a value is \
-                 missing; in the column of the time dates as 2026-01-31T12:00:00.020 or 31.01.2026 12:00:00.020 and clock \
-                 times as 12:00:00.020)",
+                "{}{more} (allowed: finite numbers with decimal point or comma; nothing, NaN or NA where a value is missing; in the \
+                 column of the time dates as 2026-01-31T12:00:00.020 or 31.01.2026 12:00:00.020 and clock times as 12:00:00.020)",
                 faults.join("; ")
             );
         }
-        let origin = stamps.origin();
-        Ok(Found { columns, origin })
+        Ok(Found { columns, origin: stamps.origin() })
     }
 }

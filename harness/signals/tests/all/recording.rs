@@ -317,7 +317,7 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
 #[test]
 fn files_of_loggers_and_spreadsheets_are_read_as_they_are_written() {
     let renamed = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";
-    let cases: [(&str, &str); 8] = [
+    let cases: [(&str, &str); 4] = [
         // rosbag exports, flight logs: a column of text, one of Booleans
         (
             "t,state,armed,T_cmd,gyro z\n0,idle,false,100,0\n20,\"sweep, up\",true,250,1\n40,sweep,true,-300,-1.5\n",
@@ -329,21 +329,6 @@ fn files_of_loggers_and_spreadsheets_are_read_as_they_are_written() {
         (
             "\u{feff}sep=;\nt;T_cmd;gyro z\n0,0;100;0\n20,0;250;1\n40,0;\u{2212}300;\u{2212}1,5\n",
             renamed,
-        ),
-        // a separator that only this line tells
-        ("sep=|\nt|T_cmd|gyro z\n0|100|0\n20|250|1\n40|-300|-1.5\n", renamed),
-        // thousands: µN·m in English, German and French
-        (
-            "t,T_cmd,gyro z\n0,\"100,000.0\",0\n20,\"250,000\",1\n40,\"-300,000.0\",-1.5\n",
-            "time=t:ms,tau_cmd=T_cmd:uNm,omega=gyro z:deg/s",
-        ),
-        (
-            "t;T_cmd;gyro z\n0;100.000,0;0\n20;250.000;1\n40;-300.000,0;-1,5\n",
-            "time=t:ms,tau_cmd=T_cmd:uNm,omega=gyro z:deg/s",
-        ),
-        (
-            "t;T_cmd;gyro z\n0;100\u{a0}000;0\n20;250 000;1\n40;-300\u{202f}000,0;-1,5\n",
-            "time=t:ms,tau_cmd=T_cmd:uNm,omega=gyro z:deg/s",
         ),
         // decimals in all columns, a 1 in the row of units
         (
@@ -405,7 +390,7 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
         ),
         (
             "time;tau_cmd;omega\n0,5;0;0\n1.234;0;0\n",
-            "line 3, column time: \"1.234\" may be 1234 or 1.234",
+            "line 3, column time: \"1.234\" is read with a decimal point, the lines above with a decimal comma",
         ),
         (
             "time;tau_cmd;omega\n0.5;0;0\n0,75;0;0\n",
@@ -417,8 +402,6 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
             "line 2, column omega: \"true\" is not a number; line 3",
         ),
         ("a,b\nidle,x\nbusy,y\n", "line 2, \"idle,x\", is not a row of numbers"),
-        // numbers of rows and no omega, or a separator at the end of each row
-        ("time [ms];tau_cmd;omega\n1;0;5;\n2;0;6;\n3;0;7;\n", "omega has values in 0 rows"),
     ];
     for (text, words) in cases {
         let error = read_text("csv", text.as_bytes(), "").unwrap_err();

@@ -130,8 +130,7 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     match form {
         0 => name = format!("t [{unit}]"),
         1 => name = format!("t ({unit})"),
-        2 => below = Some(""),
-        3 => below = Some("unit"),
+        2 | 3 => below = Some(""),
         4 | 5 => columns = format!("time=t:{unit}"),
         _ => {}
     }
@@ -147,9 +146,8 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     };
     // a column before the time: row names, or a keyword in the first row
     let first = match dice.u8(..4) {
-        0 => Some("rows"),
-        1 if below != Some("") => Some("keyword"),
-        _ if below == Some("unit") => Some("keyword"),
+        0 if separator != " " => Some("rows"),
+        1 if below.is_none() && separator != " " => Some("keyword"),
         _ => None,
     };
     let (is_closed, has_words) = (separator != " " && dice.u8(..5) == 0, dice.u8(..4) == 0);
@@ -167,12 +165,9 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     }
     let mut head = Vec::new();
     let mut units = Vec::new();
-    if first == Some("rows") && (dice.bool() || separator == " ") {
-        // R leaves the name of row names out, or empty
-        units.push(String::new());
-    } else if let Some(first) = first {
+    if let Some(first) = first {
         head.push(if first == "rows" { "\"\"".to_string() } else { "name".into() });
-        units.push(if below == Some("unit") { "unit".into() } else { String::new() });
+        units.push(String::new());
     }
     head.extend([name, "omega".into()]);
     units.extend([unit.to_string(), "rad/s".into()]);
