@@ -19,7 +19,7 @@ local function build(model, kind, stop)
   check(oms_newModel(model))
   check(oms_addSystem(model .. ".root", kind))
   check(oms_addSubModel(model .. ".root.plant", "dist/HubSlosh.fmu"))
-  -- SI units; slosh.model: 1 frozen, 2 linear, 3 planar, 4 spherical, 5 paraboloid
+  -- SI units; slosh.model: 1 frozen, 2 linear, 3 planar, 4 spherical, 5 liquid
   check(oms_setInteger(model .. ".root.plant.slosh.model", 4))
   check(oms_setReal(model .. ".root.plant.init.slosh_angle", 0.3))
   check(oms_setReal(model .. ".root.plant.init.omega", 0.1))

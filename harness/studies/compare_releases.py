@@ -39,7 +39,7 @@ STEP = 0.02  # s
 TOLERANCE = 1e-8
 ALLOWED = 1e-13
 SENSITIVE = 5
-SLOSH = ("frozen", "linear", "planar", "spherical", "paraboloid")
+SLOSH = ("frozen", "linear", "planar", "spherical", "liquid")
 FRICTION = ("none", "viscous", "stribeck_smooth", "stribeck")
 AMPLITUDES = (0.0125, *(n * 0.025 for n in range(1, 11)))  # N·m
 

@@ -443,7 +443,7 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
             ],
             vec![
                 few,
-                ("slosh.model", "6"),
+                ("slosh.model", "5"),
                 ("slosh.modes", "2"),
                 ("baffle.width", "0.01"),
                 ("baffle.depth", "0.02"),

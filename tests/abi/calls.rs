@@ -790,7 +790,7 @@ fn a_terminated_instance_can_still_be_read() {
 #[test]
 fn a_saved_state_continues_bit_for_bit_also_in_a_new_instance() {
     let fmu = open();
-    for model in ["frozen", "linear", "planar", "spherical", "paraboloid"] {
+    for model in ["frozen", "linear", "planar", "spherical", "liquid"] {
         let mut instance = fmu.instantiate("one").unwrap();
         for (name, value) in LIVELY {
             instance.set(name, value).unwrap();

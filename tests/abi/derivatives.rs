@@ -303,8 +303,8 @@ fn derivatives_of_hubslosh_are_transposed_and_those_of_differences_in_slip_in_st
     let (models, frictions) = (names("slosh.model"), names("friction.model"));
     let wheels = ["none", "torque", "speed"];
     for model in models {
-        // Of an angle; with paraboloid and liquid of a length, the third mode's pendulum's being 9 mm.
-        let unit = if ["paraboloid", "liquid"].contains(&model) { 0.009 } else { 1.0 };
+        // Of an angle; with liquid of a length, the third mode's pendulum's being 9 mm.
+        let unit = if model == "liquid" { 0.009 } else { 1.0 };
         for (k, friction) in frictions.iter().copied().chain(["stick"]).enumerate() {
             let is_stuck = friction == "stick";
             let friction = if is_stuck { "stribeck" } else { friction };

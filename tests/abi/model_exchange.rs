@@ -201,7 +201,7 @@ fn compare(
 /// 1e-8 after 20 s; forces are some newtons, slosh rates some rad/s.
 #[test]
 fn a_host_that_integrates_meets_co_simulation_with_stick_and_slip() {
-    for model in ["frozen", "linear", "planar", "spherical", "paraboloid"] {
+    for model in ["frozen", "linear", "planar", "spherical", "liquid"] {
         let settings = [
             ("slosh.model", model),
             ("init.omega", "0.08"),
@@ -639,7 +639,7 @@ fn a_step_past_the_stop_time_is_refused_and_a_trial_past_it_is_not() {
 #[test]
 fn states_out_of_the_models_range_end_the_run() {
     let fmu = open();
-    let mut host = Host::new(&fmu, &[("slosh.model", "paraboloid")]);
+    let mut host = Host::new(&fmu, &[("slosh.model", "liquid")]);
     let mut x = host.x;
     // slosh.q_radial[1]; the length is 4.5 cm.
     x[plant::x::SLOSH] = 0.1;

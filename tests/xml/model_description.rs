@@ -336,7 +336,7 @@ fn names_that_others_build_on_are_there() {
         slosh_angle_radial tau_friction tau_fluid F_tangential F_radial wave_height omega_imu \
         slosh_rate_radial energy momentum power_dissipated tau_actuator wheel_speed stuck regime \
         hub.I tank.d tank.h tank.r fluid.rho fluid.nu fluid.sigma slosh.model slosh.modes \
-        slosh.zeta_from_correlation slosh.zeta slosh.hardening friction.model friction.b \
+        slosh.zeta_from_correlation slosh.zeta friction.model friction.b \
         friction.c friction.d friction.omega_s friction.eps init.theta init.omega \
         init.slosh_angle init.slosh_angle_radial init.slosh_rate init.slosh_rate_radial \
         wheel.enabled wheel.I wheel.speed_0 wheel.speed_min wheel.speed_max wheel.tau_max \

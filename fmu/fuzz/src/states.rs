@@ -177,7 +177,7 @@ fn life_of<M: Model, V: Values>(
 pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
     match model {
         // each slosh model, each with a friction law; linear ones with a baffle
-        "HubSlosh" => [(1, 2), (2, 3), (3, 4), (4, 5), (5, 3), (6, 5), (2, 5)]
+        "HubSlosh" => [(1, 2), (2, 3), (3, 4), (4, 5), (5, 3), (2, 5)]
             .map(|(liquid, friction)| {
                 vec![
                     ("slosh.model", Integer(liquid)),

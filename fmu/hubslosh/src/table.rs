@@ -230,11 +230,11 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     // The slosh modes' coordinates. The other continuous states are the outputs and locals
     // marked is_state, and bristle.
     V::state("slosh.q_radial", |n| x::SLOSH + 4 * n, "",
-        "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused. Model spherical: stereographic, tangent of half the pendulum's angle from the vertical times the radial part of its direction (unit 1). Models paraboloid and liquid: displacement (m)")
+        "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused. Model spherical: stereographic, tangent of half the pendulum's angle from the vertical times the radial part of its direction (unit 1). Model liquid: displacement (m)")
         .shape(PER_MODE)
         .nominal(1e-3).depends_on(&["slosh.q_radial[]"]).initial_depends_on(SLOSH_START),
     V::state("slosh.q_tangential", |n| x::SLOSH + 4 * n + 1, "",
-        "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad). Model spherical: stereographic, as slosh.q_radial (unit 1). Models paraboloid and liquid: displacement (m)")
+        "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad). Model spherical: stereographic, as slosh.q_radial (unit 1). Model liquid: displacement (m)")
         .shape(PER_MODE)
         .nominal(1e-3).depends_on(&["slosh.q_tangential[]"]).initial_depends_on(SLOSH_START),
     V::state("slosh.v_radial", |n| x::SLOSH + 4 * n + 2, "",
@@ -372,9 +372,6 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("slosh.breaking_steepness", |p, _| &mut p.slosh.breaking_steepness, "1",
         "Steepness from which a mode's wave breaks. Steepness is wave number times amplitude at the wall. In an upright cylinder it is 1.541 times the amplitude of slosh_angle for mode 1; elsewhere slosh.table.wave_number times slosh.table.wave times the amplitude. Only if slosh.zeta_breaking is not 0")
         .range(0.0, 10.0),
-    V::parameter("slosh.hardening", |p, _| &mut p.slosh.hardening, "1",
-        "Coefficient of the quartic spring, for slosh.model = paraboloid only")
-        .range(0.0, 100.0),
     V::switch("slosh.capillarity", |p| &mut p.slosh.capillarity,
         "True: surface tension centres the liquid (flat surface, free contact line); for slosh.source = geometry only"),
     V::integer("slosh.capillarity_kind", |p, _| &mut p.capillarity_kind,
@@ -383,7 +380,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
 
     // The modes of a tank of any shape
     V::switch("slosh.table.one_axis", |p| &mut p.slosh.table.one_axis,
-        "True: the table holds the modes along one axis of the tank (a box, for example), and this axis lies along the tangent. Models spherical, paraboloid and liquid, which move along both axes, are then refused"),
+        "True: the table holds the modes along one axis of the tank (a box, for example), and this axis lies along the tangent. Models spherical and liquid, which move along both axes, are then refused"),
     V::integer("slosh.table.one_axis_kind", |p, _| &mut p.one_axis_kind,
         "slosh.table.one_axis as an integer, for hosts that misread Booleans (OpenModelica up to 1.27): 0 takes slosh.table.one_axis; 1 (false) and 2 (true) override it")
         .between(0, 2),
@@ -604,17 +601,15 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
 static SLOSH_MODEL: Enumeration = Enumeration {
     name: "SloshModel",
     description: "Mechanical models of the liquid",
-    items: &[
-        Item::new("frozen", "The whole liquid is rigid"),
-        Item::new("linear", "Linear planar pendulums"),
-        Item::new("planar", "Nonlinear planar pendulums"),
-        Item::new("spherical", "Spherical pendulums: the liquid can rotate"),
-        Item::new("paraboloid", "Masses on a paraboloid with a quartic spring"),
-        Item::new(
-            "liquid",
-            "Modes to third order in their amplitude: of an upright cylinder mode 1 from potential flow, of other tanks by slosh.table",
-        ),
-    ],
+    items: &{
+        let mut items = [Item::new("", ""); SloshModel::ALL.len()];
+        let mut i = 0;
+        while i < items.len() {
+            items[i] = Item::new(SloshModel::ALL[i].name(), SloshModel::ALL[i].description());
+            i += 1;
+        }
+        items
+    },
 };
 
 /// Source of the modal parameters.

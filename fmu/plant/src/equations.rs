@@ -288,11 +288,12 @@ impl Plant {
 mod tests {
     use super::*;
     use crate::outputs::Outputs;
-    use crate::parameters::{FrictionModel, Parameters, SloshModel, SloshSource};
+    use crate::parameters::{FrictionModel, Parameters, SloshSource};
+    use crate::slosh_model::SloshModel;
 
     /// Returns true if the model's coordinates are lengths, not angles.
     fn is_a_length(slosh: SloshModel) -> bool {
-        matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)
+        slosh == SloshModel::Liquid
     }
 
     fn plant(slosh: SloshModel, friction: FrictionModel) -> (Plant, Inputs) {

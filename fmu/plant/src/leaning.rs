@@ -18,11 +18,11 @@
 //! linear              F = M = 1
 //! planar              F = (1 + s^2 n^2)^(1/2),   M = 1/(1 + s^2 n^2)
 //! spherical           F = (1 + s^2)^(1/2),       M = 1 - n^2 s^2/(1 + s^2)
-//! paraboloid, liquid  u (1 + H u^2) = s,         M = 1 - n^2 + n^2/(1 + sigma u^2)
+//! liquid              u (1 + H u^2) = s,         M = 1 - n^2 + n^2/(1 + sigma u^2)
 //!                     F = M/[(1 - n^2)/(1 + H u^2) + n^2/(1 + 3 H u^2)]
 //! ```
 //!
-//! H l'^-2 is the coefficient of the quartic spring, sigma that of the vertical inertia (`paraboloid.rs`). M is e.(M^-1
+//! H l'^-2 is the coefficient of the quartic spring, sigma that of the vertical inertia (`third_order.rs`). M is e.(M^-1
 //! e), and F is its ratio to e.(K^-1 e), for the two equations of small motions, with e the tangent. Hence l' = l F/f
 //! and m' = m f/M.
 //!
@@ -38,7 +38,8 @@ use alloc::vec::Vec;
 use formulas::cylinder;
 use formulas::tilt::{factors, largest_slope};
 
-use crate::parameters::{Parameters, SloshModel, SloshSource};
+use crate::parameters::{Parameters, SloshSource};
+use crate::slosh_model::{Oblique, SloshModel};
 
 /// Direction of gravity relative to the axis of an upright cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,13 +48,6 @@ pub(crate) struct Leaning {
     slope: f64,
     /// n^2
     tangential: f64,
-}
-
-/// F and M of a pendulum that hangs obliquely.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Oblique {
-    stiffness: f64,
-    share: f64,
 }
 
 /// A mode: mass and length of its pendulum in the plant, and the length l/f of an upright pendulum with the same
@@ -86,17 +80,8 @@ impl Leaning {
     /// Returns mode n, from 0, for the upright tank's pendulum.
     pub fn mode(self, n: usize, p: &Parameters, upright: &cylinder::Pendulum) -> Mode {
         let [f, _] = self.factors(n, 2.0 * p.tank.h / p.tank.d);
-        // The paraboloid's quartic spring depends on the length: F changes it by a share H s^2.
-        let mut length = upright.length / f;
-        let mut oblique = self.oblique(n, p, length);
-        for _ in 0..LENGTHS {
-            let before = length;
-            length = upright.length * oblique.stiffness / f;
-            if length == before {
-                break;
-            }
-            oblique = self.oblique(n, p, length);
-        }
+        let oblique = self.oblique(n, p);
+        let length = upright.length * oblique.stiffness / f;
         Mode { mass: upright.mass * f / oblique.share, length, upright: upright.length / f }
     }
 
@@ -104,63 +89,17 @@ impl Leaning {
     /// frequency there.
     fn radial_frequency(self, p: &Parameters) -> f64 {
         let fill = 2.0 * p.tank.h / p.tank.d;
-        let upright = cylinder::pendulum(0, p.tank.d, p.tank.h, 1.0);
         let [tangential, radial] = self.factors(0, fill);
-        let length = self.mode(0, p, &upright).length;
         let turned = Leaning { tangential: 1.0 - self.tangential, ..self };
-        let stiffness = |leaning: Leaning| leaning.oblique(0, p, length).stiffness;
+        let stiffness = |leaning: Leaning| leaning.oblique(0, p).stiffness;
         libm::sqrt(stiffness(turned) / stiffness(self) * tangential / radial)
     }
 
-    /// Returns F and M of mode n, from 0, as a pendulum of this length.
-    fn oblique(self, n: usize, p: &Parameters, length: f64) -> Oblique {
-        let (s2, n2) = (self.slope * self.slope, self.tangential);
-        match p.slosh.model {
-            SloshModel::Frozen | SloshModel::Linear => Oblique { stiffness: 1.0, share: 1.0 },
-            SloshModel::Planar => {
-                let t = 1.0 + s2 * n2;
-                Oblique { stiffness: libm::sqrt(t), share: 1.0 / t }
-            }
-            SloshModel::Spherical => {
-                Oblique { stiffness: libm::sqrt(1.0 + s2), share: 1.0 - n2 * s2 / (1.0 + s2) }
-            }
-            SloshModel::Paraboloid | SloshModel::Liquid => {
-                let (sigma, spring) = quartic(n, p, length);
-                let u = rest(spring, self.slope);
-                let (u2, c2) = (u * u, 1.0 - n2);
-                let share = c2 + n2 / (1.0 + sigma * u2);
-                let soft = c2 / (1.0 + spring * u2) + n2 / (1.0 + 3.0 * spring * u2);
-                Oblique { stiffness: share / soft, share }
-            }
-        }
+    /// Returns F and M of mode n, from 0.
+    fn oblique(self, n: usize, p: &Parameters) -> Oblique {
+        let coefficients = p.slosh.third_order(n, 2.0 * p.tank.h / p.tank.d);
+        p.slosh.model.oblique(self.slope, self.tangential, coefficients)
     }
-}
-
-/// Largest number of substitutions of the length. Each leaves a share of about 2 H s^2 of the error, 2/3 for the
-/// hardest spring.
-const LENGTHS: usize = 100;
-
-/// Returns the coefficients sigma of the vertical inertia and H of the quartic spring of mode n,
-/// from 0.
-fn quartic(n: usize, p: &Parameters, length: f64) -> (f64, f64) {
-    let radius = p.tank.d / 2.0;
-    match p.slosh.model {
-        SloshModel::Liquid => {
-            let (s, kappa) = p.slosh.third_order(n, p.tank.h / radius);
-            (s, kappa / 2.0)
-        }
-        _ => (1.0, p.slosh.hardening * (length / radius) * (length / radius)),
-    }
-}
-
-/// Returns u of u (1 + H u^2) = s by Newton's method. For a softening spring it is the solution nearest to 0, if one
-/// exists.
-fn rest(spring: f64, slope: f64) -> f64 {
-    let mut u = if spring > 0.0 { slope } else { 0.0 };
-    for _ in 0..60 {
-        u -= (u * (1.0 + spring * u * u) - slope) / (1.0 + 3.0 * spring * u * u);
-    }
-    u
 }
 
 /// Lists problems of the parameters with this tilt.
@@ -201,12 +140,10 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
             libm::atan(most)
         ));
     }
-    let name = match p.slosh.model {
-        SloshModel::Spherical => "spherical",
-        SloshModel::Paraboloid => "paraboloid",
-        SloshModel::Liquid => "liquid",
-        SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar => return warnings,
-    };
+    if p.slosh.model.moves_along_one() {
+        return warnings;
+    }
+    let name = p.slosh.model.name();
     let off = leaning.radial_frequency(p) - 1.0;
     if off.abs() > APART {
         warnings.push(format!(

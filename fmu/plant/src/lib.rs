@@ -32,6 +32,7 @@ mod parameters;
 mod pendulum;
 mod plant;
 mod slosh;
+mod slosh_model;
 mod state;
 mod suspension;
 mod tank;
@@ -44,9 +45,10 @@ pub use inputs::{Inputs, Ramp};
 pub use outputs::{Discrete, Outputs};
 pub use parameters::{
     Bench, DampingLaw, Fluid, Friction, FrictionModel, Hub, Imu, Init, MODES, ModeTable,
-    Parameters, Ring, Slosh, SloshModel, SloshSource, Solver, Tank, Wheel,
+    Parameters, Ring, Slosh, SloshSource, Solver, Tank, Wheel,
 };
 pub use plant::{Plant, StepEnd, StoppedStep};
+pub use slosh_model::SloshModel;
 pub use state::{INDICATORS, STATES, State, indicator, x};
 pub use tank::Calculated;
 pub use taylor::error::StepError;

@@ -15,8 +15,7 @@
 use formulas::limits::{self, LOW_BOND, LimitedBy, SpinLimit};
 use formulas::third_order;
 
-use crate::parameters::{MODES, Parameters, SloshModel, SloshSource};
-use crate::pendulum::Pendulum;
+use crate::parameters::{MODES, Parameters, SloshSource};
 use crate::slosh::Angles;
 use crate::tank::Calculated;
 
@@ -42,26 +41,14 @@ struct ModeLimits {
     breaking: f64,
 }
 
-/// Returns the shifts of omega^2 over the squared angle of a model's mode; `None` for a motion that it does not have.
-fn shifts(model: SloshModel, pendulum: &Pendulum) -> [Option<f64>; 2] {
-    match model {
-        SloshModel::Frozen | SloshModel::Linear => [Some(0.0), None],
-        SloshModel::Planar => [Some(third_order::shifts(1.0, 1.0)[0]), None],
-        SloshModel::Spherical => third_order::shifts(1.0, 1.0).map(Some),
-        SloshModel::Paraboloid | SloshModel::Liquid => {
-            let kappa = 2.0 * pendulum.l * pendulum.l * pendulum.hardening;
-            third_order::shifts(pendulum.s, kappa).map(Some)
-        }
-    }
-}
-
 impl Limits {
     /// Creates the limits of the modes in use.
     pub fn new(p: &Parameters, calculated: &Calculated) -> Limits {
         let (slosh, radius) = (&p.slosh, p.tank.d / 2.0);
         let mut mode = [ModeLimits::default(); MODES];
         for (n, (mode, pendulum)) in mode.iter_mut().zip(calculated.pendulums(p)).enumerate() {
-            let shifts = shifts(slosh.model, &pendulum);
+            let kappa = 2.0 * pendulum.l * pendulum.l * pendulum.spring;
+            let shifts = slosh.model.shifts(pendulum.s, kappa);
             let fill = p.tank.h / radius;
             match slosh.source {
                 SloshSource::Geometry if n == 0 => {

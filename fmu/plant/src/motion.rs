@@ -16,8 +16,9 @@ use crate::damping::{Damping, RAMP_ORDER};
 use crate::friction::Law;
 use crate::hub::HubMotion;
 use crate::inputs::Ramp;
-use crate::parameters::{Imu, Parameters, SloshModel, SloshSource};
+use crate::parameters::{Imu, Parameters, SloshSource};
 use crate::slosh::SloshMode;
+use crate::slosh_model::SloshModel;
 use crate::state::{State, x};
 use crate::suspension::Suspension;
 

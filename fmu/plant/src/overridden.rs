@@ -2,7 +2,8 @@
 
 use alloc::string::String;
 
-use crate::parameters::{Parameters, SloshModel, SloshSource};
+use crate::parameters::{Parameters, SloshSource};
+use crate::slosh_model::SloshModel;
 
 impl Parameters {
     /// Returns why the value of a parameter is not used although its part of the model is in use; `None` if it is used,

@@ -5,6 +5,8 @@
 //! `wheel.inertia` (`hub.I`, `wheel.I`) and `own_inertia` (`I_own`). The FMU's variable table has
 //! their meanings, units and ranges.
 
+use crate::slosh_model::SloshModel;
+
 /// All parameters of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
@@ -51,36 +53,6 @@ pub struct Fluid {
     pub rho: f64,
     pub nu: f64,
     pub sigma: f64,
-}
-
-/// The mechanical models of the liquid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum SloshModel {
-    /// The whole liquid is rigid.
-    Frozen = 1,
-    /// Linear planar pendulums.
-    Linear = 2,
-    /// Nonlinear planar pendulums.
-    Planar = 3,
-    /// Spherical pendulums: the liquid can rotate.
-    Spherical = 4,
-    /// Masses on a paraboloid with a quartic spring.
-    Paraboloid = 5,
-    /// Modes to third order in the amplitude, with coefficients of an upright cylinder or from the table.
-    Liquid = 6,
-}
-
-impl SloshModel {
-    /// All models in the order of their numbers.
-    pub const ALL: [SloshModel; 6] = [
-        SloshModel::Frozen,
-        SloshModel::Linear,
-        SloshModel::Planar,
-        SloshModel::Spherical,
-        SloshModel::Paraboloid,
-        SloshModel::Liquid,
-    ];
 }
 
 /// Source of the modal parameters.
@@ -134,7 +106,6 @@ pub struct Slosh {
     pub zeta_amplitude: f64,
     pub zeta_breaking: f64,
     pub breaking_steepness: f64,
-    pub hardening: f64,
 }
 
 /// Modes of a tank of any shape; 0 for values that are not given.
@@ -328,7 +299,6 @@ impl Default for Slosh {
             zeta_amplitude: 0.0,
             zeta_breaking: 0.0,
             breaking_steepness: 0.0,
-            hardening: 0.58,
         }
     }
 }

@@ -40,10 +40,9 @@ pub struct Pendulum {
     pub inv_l: f64,
     /// Wall elevation per slosh angle, m/rad: a_n = 2 R / (xi_n^2 - 1) in a cylinder.
     pub wave: f64,
-    /// Coefficient of the quartic spring over R^2, 1/m2 (paraboloid and liquid only).
-    pub hardening: f64,
-    /// Coefficient of the inertia that grows with the amplitude, l/s and l^2/s (paraboloid and
-    /// liquid only).
+    /// Coefficient h of the quartic spring, 1/m2 (`third_order.rs` only).
+    pub spring: f64,
+    /// Coefficient of the inertia that grows with the amplitude, l/s and l^2/s (`third_order.rs` only).
     pub s: f64,
     pub l_s: f64,
     pub l2_s: f64,
@@ -71,7 +70,7 @@ impl Default for Pendulum {
             r_l: 0.0,
             inv_l: 1.0,
             wave: 0.0,
-            hardening: 0.0,
+            spring: 0.0,
             s: 1.0,
             l_s: 1.0,
             l2_s: 1.0,

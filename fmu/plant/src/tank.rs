@@ -23,8 +23,9 @@ use formulas::third_order::{BRIDGED, coefficients};
 use crate::amplitude::{Breaking, Growth};
 use crate::baffle::{self, Baffle};
 use crate::leaning::{self, Leaning};
-use crate::parameters::{MODES, ModeTable, Parameters, Slosh, SloshModel, SloshSource};
+use crate::parameters::{MODES, ModeTable, Parameters, Slosh, SloshSource};
 use crate::pendulum::Pendulum;
+use crate::slosh_model::SloshModel;
 
 /// Values calculated from the parameters; 0 for unused modes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -56,11 +57,10 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     if slosh.source != SloshSource::Table {
         return problems;
     }
-    let along_one =
-        matches!(slosh.model, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar);
+    let along_one = slosh.model.moves_along_one();
     if table.one_axis && !along_one {
         problems.push(
-            "slosh.table.one_axis with slosh.model = spherical, paraboloid or liquid, which move along both axes with the \
+            "slosh.table.one_axis with slosh.model = spherical or liquid, which move along both axes with the \
              same modes (allowed: slosh.model = frozen, linear or planar)"
                 .to_string(),
         );
@@ -69,7 +69,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let askew = (0..modes).find(|n| table.direction[*n] != 0.0);
     if let (Some(n), false) = (askew, along_one) {
         problems.push(format!(
-            "slosh.table.direction[{}] = {} rad with slosh.model = spherical, paraboloid or liquid, which move along all \
+            "slosh.table.direction[{}] = {} rad with slosh.model = spherical or liquid, which move along all \
              directions with the same frequency (allowed: slosh.model = frozen, linear or planar)",
             n + 1,
             table.direction[n]
@@ -261,11 +261,11 @@ fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
         SloshSource::Geometry => format!(
             "slosh.model = liquid at tank.h / (tank.d/2) = {fill:.4}: the inertia coefficient s = {s:.3} is not above 0, so \
              the kinetic energy would be indefinite. Use a fill with s above 0, such as 0.35 and above, or \
-             slosh.model = spherical or paraboloid"
+             slosh.model = spherical"
         ),
         SloshSource::Table => format!(
             "slosh.table.nonlinear_inertia[{}] = {s} with slosh.model = liquid (allowed: greater than 0, because the kinetic \
-             energy would be indefinite; or slosh.model = spherical or paraboloid)",
+             energy would be indefinite; or slosh.model = spherical)",
             n + 1
         ),
     })
@@ -306,10 +306,7 @@ fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
              slosh.zeta_amplitude"
         ));
     }
-    let largest = match p.slosh.model {
-        SloshModel::Paraboloid | SloshModel::Liquid => 1.0,
-        _ => core::f64::consts::FRAC_PI_2,
-    };
+    let largest = p.slosh.model.largest_amplitude();
     let first = calculated.pendulums(p).next()?;
     let steepness = p.slosh.breaking(0, first.wave, p.tank.d / 2.0).steepness * largest;
     (onset >= steepness).then(|| {
@@ -408,10 +405,6 @@ impl Calculated {
             };
             let [r_x, r_t] = along.map(|component| r * component);
             let (s, kappa) = slosh.third_order(n, p.tank.h / radius);
-            let hardening = match slosh.model {
-                SloshModel::Liquid => kappa / (2.0 * l * l),
-                _ => slosh.hardening / (radius * radius),
-            };
             Pendulum {
                 m,
                 l,
@@ -425,7 +418,7 @@ impl Calculated {
                 r_l: r_t / l,
                 inv_l: 1.0 / l,
                 wave,
-                hardening,
+                spring: kappa / (2.0 * l * l),
                 s,
                 l_s: l / s,
                 l2_s: l * l / s,

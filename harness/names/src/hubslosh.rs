@@ -59,7 +59,6 @@ pub mod slosh {
     pub const ZETA_AMPLITUDE: &str = "slosh.zeta_amplitude";
     pub const ZETA_BREAKING: &str = "slosh.zeta_breaking";
     pub const BREAKING_STEEPNESS: &str = "slosh.breaking_steepness";
-    pub const HARDENING: &str = "slosh.hardening";
     pub const CAPILLARITY: &str = "slosh.capillarity";
     pub const CAPILLARITY_KIND: &str = "slosh.capillarity_kind";
     pub const MASS: crate::Array<1> = crate::Array("slosh.mass");
@@ -218,7 +217,7 @@ enumeration! {
 }
 
 enumeration! {
-    SloshModel: Frozen = 1 "frozen", Linear = 2 "linear", Planar = 3 "planar", Spherical = 4 "spherical", Paraboloid = 5 "paraboloid", Liquid = 6 "liquid"
+    SloshModel: Frozen = 1 "frozen", Linear = 2 "linear", Planar = 3 "planar", Spherical = 4 "spherical", Liquid = 5 "liquid"
 }
 
 enumeration! {

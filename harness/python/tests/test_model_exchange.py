@@ -28,7 +28,7 @@ an oscillation that is hardly damped stay: a few hundred times as much comes tog
 bench's own motions that is below 1e-6 everywhere. A liquid that swings with 5 rad/s is given
 5e-9 rad/s at each step, and its rate is off by up to 7e-6.
 """
-MODELS = {"frozen": 1, "linear": 2, "planar": 3, "spherical": 4, "paraboloid": 5}
+MODELS = {"frozen": 1, "linear": 2, "planar": 3, "spherical": 4, "liquid": 5}
 
 
 def tau() -> np.ndarray:

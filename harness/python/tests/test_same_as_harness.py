@@ -14,7 +14,7 @@ from fmpy import extract, fmi2, read_model_description
 
 from hubslosh import COLUMNS, TORQUE, FmuError, drive, read_table, simulate, write_table
 
-MODELS = ["frozen", "linear", "planar", "spherical", "paraboloid"]
+MODELS = ["frozen", "linear", "planar", "spherical", "liquid"]
 FILLS = [0.05, 0.1]
 """Fills of Rubaga's thesis, m."""
 AMPLITUDES = [0.0125, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25]

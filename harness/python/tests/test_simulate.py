@@ -123,7 +123,7 @@ def test_everything_wrong_is_said_at_once(fmu: Path) -> None:
         "no variable tank.height; did you mean tank.h",
         "tank.h cannot be (5, 'inch'): it has no unit inch (units: m, mm)",
         "theta is computed by the FMU (output)",
-        "there are frozen, linear, planar, spherical, paraboloid",
+        "there are frozen, linear, planar, spherical, liquid",
         "no variable omga; did you mean omega",
         "omega is wanted twice",
         "step must be a positive number of seconds, not -1.0",

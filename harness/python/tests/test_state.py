@@ -37,7 +37,7 @@ def go_on(plant: Plant, steps: int) -> bytes:
     return np.array(rows).tobytes()
 
 
-@pytest.mark.parametrize("model", ["frozen", "linear", "planar", "spherical", "paraboloid"])
+@pytest.mark.parametrize("model", ["frozen", "linear", "planar", "spherical", "liquid"])
 def test_replay_from_a_saved_state_is_bit_identical(fmu: Path, model: str) -> None:
     """In the same instance, and in one that has never stepped and was set up differently."""
     settings = EVERYTHING | {"slosh.model": model}

@@ -507,7 +507,7 @@ impl ParameterSet {
             notes.push(format!(
                 "modes 1 to {count} are those along the box's first length, {length_x} m, which lies along the tangent on HubSlosh's hub; \
                  {first_across} to {} those along {length_y} m, along the radius (slosh.table.direction): what the hub's rate \
-                 does to these is in slosh.model = planar, to first order (linear) nothing; spherical and paraboloid are refused",
+                 does to these is in slosh.model = planar, to first order (linear) nothing; spherical and liquid are refused",
                 2 * count
             ));
             for n in first_across..=2 * count {

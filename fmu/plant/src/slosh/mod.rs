@@ -12,9 +12,9 @@
 //! where J, T, B and A do not contain w' (w the hub's rate).
 
 mod linear;
-mod paraboloid;
 mod planar;
 mod spherical;
+mod third_order;
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -22,13 +22,14 @@ use alloc::vec::Vec;
 use taylor::number::Number;
 
 use crate::hub::HubMotion;
-use crate::parameters::{Init, Parameters, SloshModel};
+use crate::parameters::{Init, Parameters};
 use crate::pendulum::Pendulum;
+use crate::slosh_model::SloshModel;
 use crate::tank::Calculated;
 use linear::Linear;
-use paraboloid::Paraboloid;
 use planar::Planar;
 use spherical::Spherical;
+use third_order::ThirdOrder;
 
 /// The slosh modes in use, for the chosen model.
 #[derive(Clone, Debug)]
@@ -36,7 +37,7 @@ pub(crate) enum Liquid {
     Linear(Vec<Linear>),
     Planar(Vec<Planar>),
     Spherical(Vec<Spherical>),
-    Paraboloid(Vec<Paraboloid>),
+    ThirdOrder(Vec<ThirdOrder>),
 }
 
 /// Evaluates an expression with the modes of the model in use.
@@ -47,7 +48,7 @@ macro_rules! with_modes {
             Liquid::Linear($modes) => $do,
             Liquid::Planar($modes) => $do,
             Liquid::Spherical($modes) => $do,
-            Liquid::Paraboloid($modes) => $do,
+            Liquid::ThirdOrder($modes) => $do,
         }
     }};
 }
@@ -64,7 +65,7 @@ impl Liquid {
             SloshModel::Frozen | SloshModel::Linear => Liquid::Linear(modes(p, calculated)),
             SloshModel::Planar => Liquid::Planar(modes(p, calculated)),
             SloshModel::Spherical => Liquid::Spherical(modes(p, calculated)),
-            SloshModel::Paraboloid | SloshModel::Liquid => Liquid::Paraboloid(modes(p, calculated)),
+            SloshModel::Liquid => Liquid::ThirdOrder(modes(p, calculated)),
         }
     }
 
@@ -120,7 +121,7 @@ pub trait SloshMode {
     fn pendulum(&self) -> &Pendulum;
     /// Returns [`SloshMode::pendulum`], mutable.
     fn pendulum_mut(&mut self) -> &mut Pendulum;
-    /// Returns the squares of angle and angular rate after `start`, rad2, rad2/s2; for a paraboloid those of
+    /// Returns the squares of angle and angular rate after `start`, rad2, rad2/s2; of [`ThirdOrder`] those of
     /// displacement over length.
     fn amplitude2<T: Number>(&self) -> [T; 2];
     /// Returns coordinates from angles with sin(angle) = displacement/l and their rates.

@@ -146,7 +146,7 @@ fn energy_never_grows_without_torque() {
                     last = now;
                 }
                 let damped = slosh != SloshModel::Frozen || friction != FrictionModel::None;
-                // A paraboloid may leave its rim in the first step.
+                // A mode of `liquid` may reach its rim in the first step.
                 if damped && first.energy > 0.0 && plant.time() > 0.0 {
                     assert!(last.heat > 0.0, "damping dissipates energy: {p:?}");
                 }

@@ -5,18 +5,20 @@ use plant::{FrictionModel, Parameters, SloshModel};
 /// Every slosh model.
 pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
 
-/// Slosh models with liquid that moves.
-pub const SLOSHING: [SloshModel; 5] = [
-    SloshModel::Linear,
-    SloshModel::Planar,
-    SloshModel::Spherical,
-    SloshModel::Paraboloid,
-    SloshModel::Liquid,
-];
+/// Slosh models with liquid that moves: all but the first, `Frozen`.
+pub const SLOSHING: [SloshModel; SLOSH.len() - 1] = {
+    let mut moving = [SloshModel::Linear; SLOSH.len() - 1];
+    let mut i = 0;
+    while i < moving.len() {
+        moving[i] = SLOSH[i + 1];
+        i += 1;
+    }
+    moving
+};
 
 /// Returns true if the model ends at a rim, which a violent motion reaches.
 pub fn has_rim(slosh: SloshModel) -> bool {
-    matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)
+    slosh == SloshModel::Liquid
 }
 
 /// Every friction law.
@@ -47,7 +49,6 @@ pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionMo
     p.hub.inertia = m_liq * p.tank.d * p.tank.d * 10f64.powf(between(-1.0, 2.0));
     p.slosh.zeta_from_correlation = between(0.0, 1.0) < 0.5;
     p.slosh.zeta = between(0.0, 0.3);
-    p.slosh.hardening = between(0.0, 2.0);
     let torque = p.hub.inertia * between(0.0, 1.0);
     p.friction.b = torque * between(0.0, 1.0);
     p.friction.c = torque * between(0.0, 0.1);

@@ -99,9 +99,7 @@ fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
         let x = plant.continuous_states();
         let now = match p.slosh.model {
             SloshModel::Spherical => plant.outputs(&at(9.81)).slosh_angle,
-            SloshModel::Paraboloid | SloshModel::Liquid => {
-                x[x::SLOSH + 1] / plant.calculated().length[0]
-            }
+            SloshModel::Liquid => x[x::SLOSH + 1] / plant.calculated().length[0],
             _ => x[x::SLOSH + 1],
         };
         last = [last[1], last[2], now];

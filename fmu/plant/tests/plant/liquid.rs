@@ -64,7 +64,6 @@ fn coefficients_of_a_table_are_asked_for() {
         (SloshModel::Linear, true),
         (SloshModel::Planar, false),
         (SloshModel::Spherical, false),
-        (SloshModel::Paraboloid, false),
         (SloshModel::Liquid, true),
     ] {
         let mut other = p;

@@ -177,7 +177,7 @@ fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
 
 #[test]
 fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
-    for slosh in [SloshModel::Spherical, SloshModel::Paraboloid] {
+    for slosh in [SloshModel::Spherical, SloshModel::Liquid] {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.friction.b = 0.3;
         p.bench.tilt = 0.02;
@@ -187,7 +187,7 @@ fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
             plant.step(&at(9.81), 1.0).unwrap();
         }
         let o = plant.outputs(&at(9.81));
-        // Downhill is theta = 0, and the bob hangs along gravity. On the paraboloid (tangent of the
+        // Downhill is theta = 0, and the bob hangs along gravity. In `liquid` (tangent of the
         // slope, quartic spring) to the third order.
         assert!(o.theta.abs() < 1e-9 && o.slosh_angle.abs() < 1e-9, "{slosh:?} {o:?}");
         let allowed = if slosh == SloshModel::Spherical { 1e-9 } else { 2e-5 };

@@ -257,7 +257,7 @@ fn descriptions_that_do_not_fit_the_binary_are_told() {
     let words = words.map(|[name, after, from, to, rule]| (name, changed(after, from, to), rule));
     let mut wrong = Vec::new();
     let others = [
-        ("an item that is missing", without_line("<Item name=\"paraboloid\""), "values.items"),
+        ("an item that is missing", without_line("<Item name=\"liquid\""), "values.items"),
         (
             "a constant factor that is none",
             unknown(

@@ -75,7 +75,7 @@ pub struct IdentifyArgs {
         value_name = "NAME,…",
         value_delimiter = ',',
         default_value = "frozen,linear,planar,spherical",
-        value_parser = ["frozen", "linear", "planar", "spherical", "paraboloid"]
+        value_parser = ["frozen", "linear", "planar", "spherical"]
     )]
     model: Vec<String>,
     /// Friction laws to try, the first with all slosh models, the others with the one that is chosen.

@@ -57,12 +57,12 @@ pub enum Coordinate {
 impl Coordinate {
     /// Coordinate of a `slosh.model`; `None` for a model whose liquid does not move.
     pub fn of(model: &str) -> Option<Coordinate> {
-        use SloshModel::{Frozen, Linear, Liquid, Paraboloid, Planar, Spherical};
+        use SloshModel::{Frozen, Linear, Liquid, Planar, Spherical};
         match SloshModel::named(model)? {
             Frozen => None,
             Linear | Planar => Some(Coordinate::Angle),
             Spherical => Some(Coordinate::Stereographic),
-            Paraboloid | Liquid => Some(Coordinate::Displacement),
+            Liquid => Some(Coordinate::Displacement),
         }
     }
 

@@ -41,7 +41,7 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
 }
 
 /// Models of the liquid of the plan that seeks the onset of rotary slosh; a search takes seconds.
-const MODELS: &str = r#"["linear", "planar", "spherical", "paraboloid", "liquid"]"#;
+const MODELS: &str = r#"["linear", "planar", "spherical", "liquid"]"#;
 
 /// At least one run of a plan that says so leaves the range, and no run of the others does. The search for the onset of rotary slosh has
 /// the linear liquid alone, which leaves the range.

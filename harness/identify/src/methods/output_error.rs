@@ -11,7 +11,7 @@ use formulas::cylinder::XI;
 use formulas::regime::Regime;
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
-use names::hubslosh::SloshModel::{self, Frozen, Linear, Paraboloid, Planar, Spherical};
+use names::hubslosh::SloshModel::{self, Frozen, Linear, Planar, Spherical};
 use names::hubslosh::{self, FrictionModel};
 use rayon::prelude::*;
 
@@ -77,12 +77,10 @@ impl Method for OutputError {
 }
 
 /// Slosh models in the order in which they are fitted.
-const ORDER: [&str; 5] =
-    [Linear.name(), Planar.name(), Spherical.name(), Paraboloid.name(), Frozen.name()];
+const ORDER: [&str; 4] = [Linear.name(), Planar.name(), Spherical.name(), Frozen.name()];
 
 /// Slosh models, the simplest first.
-const SIMPLEST: [&str; 5] =
-    [Frozen.name(), Linear.name(), Planar.name(), Spherical.name(), Paraboloid.name()];
+const SIMPLEST: [&str; 4] = [Frozen.name(), Linear.name(), Planar.name(), Spherical.name()];
 
 /// Identifies the FMU from recordings. `progress` receives each message.
 pub fn identify(

@@ -116,10 +116,9 @@ pub fn fit<'a>(
         progress: &mut |line| progress(News::Detail(line)),
     };
     let sibling = from.map(|other| {
-        use SloshModel::{Paraboloid, Planar, Spherical};
+        use SloshModel::{Planar, Spherical};
         let is_poorer = match SloshModel::named(&other.fit.model) {
-            Some(Planar) => [Spherical.name(), Paraboloid.name()].contains(&model),
-            Some(Spherical) => model == Paraboloid.name(),
+            Some(Planar) => model == Spherical.name(),
             _ => false,
         };
         Sibling {

@@ -1,6 +1,7 @@
-//! A mass on the paraboloid z = |q|^2/(2 l) with a quartic spring. Its rotary motion hardens less
-//! than that of a pendulum. q = (x, y) is the position of the bob relative to the hinge, m, in the
-//! hub's frame. With N = l^2/s + |q|^2, h = hardening/R^2 and the hub's Coriolis and centrifugal
+//! A mode to third order in its amplitude: a mass on the paraboloid z = |q|^2/(2 l) with a quartic spring, whose coefficients s
+//! and kappa give the liquid's shifts of frequency in planar and in circular motion (`formulas::third_order`). q = (x, y) is the
+//! position of the bob relative to the hinge, m, in the hub's frame. With N = l^2/s + |q|^2, h = kappa/(2 l^2) and the hub's
+//! Coriolis and centrifugal
 //! accelerations a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
 //!
 //! ```text
@@ -13,9 +14,8 @@
 //! ```
 //!
 //! These are Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + s z'^2)/2. On a
-//! tilted bench, gravity across the axis, e, adds to a, and -m e.(r + x, y) adds to E. The
-//! paraboloid has s = 1; the model `liquid` (`liquid.rs`) has another s and h = kappa/(2 l^2). For
-//! small q a pendulum is the case s = 1, h = 1/(2 l^2).
+//! tilted bench, gravity across the axis, e, adds to a, and -m e.(r + x, y) adds to E. For small q a pendulum is the case
+//! s = kappa = 1.
 
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
@@ -25,7 +25,7 @@ use crate::hub::HubMotion;
 use crate::pendulum::Pendulum;
 
 #[derive(Clone, Debug)]
-pub struct Paraboloid {
+pub struct ThirdOrder {
     p: Pendulum,
     q: [Series; 2],
     q_d: [Series; 2],
@@ -55,9 +55,9 @@ fn pair<T: Number>(a: &[Series; 2]) -> [T; 2] {
     [number(&a[0]), number(&a[1])]
 }
 
-impl SloshMode for Paraboloid {
+impl SloshMode for ThirdOrder {
     fn new(p: &Pendulum) -> Self {
-        Paraboloid {
+        ThirdOrder {
             p: *p,
             q: [ZERO; 2],
             q_d: [ZERO; 2],
@@ -126,7 +126,7 @@ impl SloshMode for Paraboloid {
 
     #[inline(always)]
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
-        let Pendulum { m, c, r, c_m, hardening, l_s, l2_s, .. } = self.p;
+        let Pendulum { m, c, r, c_m, spring, l_s, l2_s, .. } = self.p;
         let one = constant(n, 1.0);
         if ramp && self.p.follows_amplitude() {
             let inv_l2 = self.p.inv_l * self.p.inv_l;
@@ -142,7 +142,7 @@ impl SloshMode for Paraboloid {
         self.arm[n] = one * r + x[n];
         let q2 = square(n, x) + square(n, y);
         self.n[n] = one * l2_s + q2;
-        self.spring[n] = l_s * (one + hardening * q2);
+        self.spring[n] = l_s * (one + spring * q2);
         self.a[0][n] = 2.0 * mul(n, &hub.omega, y_d) + mul(n, &hub.omega2, &self.arm);
         self.a[1][n] = -2.0 * mul(n, &hub.omega, x_d) + mul(n, &hub.omega2, y);
         if ramp {
@@ -212,10 +212,10 @@ impl SloshMode for Paraboloid {
     /// m (|q|^2/2 + h |q|^4/4)/l
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
-        let Pendulum { m, l, r, hardening, .. } = self.p;
+        let Pendulum { m, l, r, spring, .. } = self.p;
         self.q2[n] = square(n, &self.q[0]) + square(n, &self.q[1]);
         let place = |j: usize| [constant(j, r) + self.q[0][j], self.q[1][j]];
-        m / l * (self.q2[n] / 2.0 + hardening * square(n, &self.q2) / 4.0)
+        m / l * (self.q2[n] / 2.0 + spring * square(n, &self.q2) / 4.0)
             + m * hub.tilt.height(n, place)
     }
 
@@ -226,13 +226,13 @@ impl SloshMode for Paraboloid {
     }
 
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
-        let Pendulum { m, l, hardening, .. } = self.p;
+        let Pendulum { m, l, spring, .. } = self.p;
         let [[x, y], rate] = [&self.q, &self.q_d].map(pair::<T>);
         let (q2, rise) = (x * x + y * y, x * rate[0] + y * rate[1]);
         let place = [number(&self.arm), y];
         let tilted = hub.tilt.height_now(place, rate, number(&hub.omega));
-        let height = q2 * 0.5 + q2 * q2 * hardening * 0.25;
-        let height_d = rise + q2 * rise * hardening;
+        let height = q2 * 0.5 + q2 * q2 * spring * 0.25;
+        let height_d = rise + q2 * rise * spring;
         [height * (m / l) + tilted[0] * m, height_d * (m / l) + tilted[1] * m]
     }
 
@@ -251,7 +251,7 @@ impl SloshMode for Paraboloid {
     }
 
     fn energy<T: Number>(&self, hub: &HubMotion) -> T {
-        let Pendulum { m, l, hardening, s, .. } = self.p;
+        let Pendulum { m, l, spring, s, .. } = self.p;
         let ([x, y], [x_d, y_d]) = (pair::<T>(&self.q), pair::<T>(&self.q_d));
         let (w, arm, l) = (number::<T>(&hub.omega), number::<T>(&self.arm), T::constant(l));
         let ([e_x, e_y], [g, _]) = (hub.tilt.now::<T>(), self.p.restoring_and_drag::<T>());
@@ -259,7 +259,7 @@ impl SloshMode for Paraboloid {
         let v_z = (x * x_d + y * y_d) / l;
         let q2 = x * x + y * y;
         (v_x * v_x + v_y * v_y + v_z * s * v_z) * m * 0.5
-            + g * m / l * (q2 * 0.5 + q2 * hardening * q2 * 0.25)
+            + g * m / l * (q2 * 0.5 + q2 * spring * q2 * 0.25)
             - (e_x * arm + e_y * y) * m
     }
 
@@ -271,10 +271,10 @@ impl SloshMode for Paraboloid {
 
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
         let q2 = q[0] * q[0] + q[1] * q[1];
-        let Pendulum { l, hardening, .. } = self.p;
+        let Pendulum { l, spring, .. } = self.p;
         if q2 >= l * l {
             Some("its mass has moved by its length l, where the surface is at 45 degrees")
-        } else if hardening * q2 < -0.9 {
+        } else if spring * q2 < -0.9 {
             Some("its wave is too high for a softening spring")
         } else {
             None
@@ -289,14 +289,14 @@ mod tests {
     /// The range ends at a displacement of one length. A softening spring ends at a tenth of its stiffness.
     #[test]
     fn a_mass_leaves_its_range_at_its_length_or_where_the_spring_is_nearly_gone() {
-        let outside = |hardening: f64, q: [f64; 2]| {
-            let mode = Paraboloid::new(&Pendulum { hardening, ..Pendulum::default() });
+        let outside = |spring: f64, q: [f64; 2]| {
+            let mode = ThirdOrder::new(&Pendulum { spring, ..Pendulum::default() });
             mode.out_of_range(&[q[0], q[1], 0.0, 0.0]).is_some()
         };
-        for (hardening, ends) in [(0.0, 1.0), (-2.0, 0.45), (2.0, 1.0)] {
+        for (spring, ends) in [(0.0, 1.0), (-2.0, 0.45), (2.0, 1.0)] {
             let at = |share: f64| [0.6, 0.8].map(|x| x * libm::sqrt(share * ends));
-            assert!(!outside(hardening, at(0.999)), "{hardening}");
-            assert!(outside(hardening, at(1.001)), "{hardening}");
+            assert!(!outside(spring, at(0.999)), "{spring}");
+            assert!(outside(spring, at(1.001)), "{spring}");
         }
     }
 }

@@ -1,0 +1,108 @@
+//! The models of the liquid, and what the rest of the plant needs to know about each. The series of their modes are in
+//! `slosh/`.
+
+use core::f64::consts::FRAC_PI_2;
+
+use formulas::third_order;
+
+macro_rules! models {
+    ($($name:ident = $number:literal, $item:literal, $description:literal;)+) => {
+        /// The mechanical models of the liquid.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum SloshModel {
+            $(#[doc = $description] $name = $number,)+
+        }
+
+        impl SloshModel {
+            /// All models in the order of their numbers.
+            pub const ALL: [SloshModel; [$($number),+].len()] = [$(SloshModel::$name),+];
+
+            /// Returns the model's value of `slosh.model`.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(SloshModel::$name => $item,)+
+                }
+            }
+
+            /// Returns the description of that value.
+            pub const fn description(self) -> &'static str {
+                match self {
+                    $(SloshModel::$name => $description,)+
+                }
+            }
+        }
+    };
+}
+
+models! {
+    Frozen = 1, "frozen", "The whole liquid is rigid";
+    Linear = 2, "linear", "Linear planar pendulums";
+    Planar = 3, "planar", "Nonlinear planar pendulums";
+    Spherical = 4, "spherical", "Spherical pendulums: the liquid can rotate";
+    Liquid = 5, "liquid", "Modes to third order in their amplitude: of an upright cylinder mode 1 from potential flow, of other tanks by slosh.table";
+}
+
+/// F and M of a pendulum that hangs obliquely (`leaning.rs`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Oblique {
+    pub stiffness: f64,
+    pub share: f64,
+}
+
+impl SloshModel {
+    /// Returns true if a mode moves along one direction only.
+    pub(crate) fn moves_along_one(self) -> bool {
+        matches!(self, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar)
+    }
+
+    /// Returns the amplitude at the end of the model's range: an angle, rad, or displacement over length.
+    pub(crate) fn largest_amplitude(self) -> f64 {
+        if self == SloshModel::Liquid { 1.0 } else { FRAC_PI_2 }
+    }
+
+    /// Returns the shifts of omega^2 over the squared angle, in planar and in circular motion, of a mode with the
+    /// coefficients s and kappa; `None` for a motion that the model does not have.
+    pub(crate) fn shifts(self, s: f64, kappa: f64) -> [Option<f64>; 2] {
+        match self {
+            SloshModel::Frozen | SloshModel::Linear => [Some(0.0), None],
+            SloshModel::Planar => [Some(third_order::shifts(1.0, 1.0)[0]), None],
+            SloshModel::Spherical => third_order::shifts(1.0, 1.0).map(Some),
+            SloshModel::Liquid => third_order::shifts(s, kappa).map(Some),
+        }
+    }
+
+    /// Returns F and M of a pendulum with the coefficients s and kappa that hangs obliquely by the slope `slope`, whose
+    /// tangential part, squared, is `n2`.
+    pub(crate) fn oblique(self, slope: f64, n2: f64, (s, kappa): (f64, f64)) -> Oblique {
+        let s2 = slope * slope;
+        match self {
+            SloshModel::Frozen | SloshModel::Linear => Oblique { stiffness: 1.0, share: 1.0 },
+            SloshModel::Planar => {
+                let t = 1.0 + s2 * n2;
+                Oblique { stiffness: libm::sqrt(t), share: 1.0 / t }
+            }
+            SloshModel::Spherical => {
+                Oblique { stiffness: libm::sqrt(1.0 + s2), share: 1.0 - n2 * s2 / (1.0 + s2) }
+            }
+            SloshModel::Liquid => {
+                let spring = kappa / 2.0;
+                let u = rest(spring, slope);
+                let (u2, c2) = (u * u, 1.0 - n2);
+                let share = c2 + n2 / (1.0 + s * u2);
+                let soft = c2 / (1.0 + spring * u2) + n2 / (1.0 + 3.0 * spring * u2);
+                Oblique { stiffness: share / soft, share }
+            }
+        }
+    }
+}
+
+/// Returns u of u (1 + H u^2) = s by Newton's method. For a softening spring it is the solution nearest to 0, if one
+/// exists.
+fn rest(spring: f64, slope: f64) -> f64 {
+    let mut u = if spring > 0.0 { slope } else { 0.0 };
+    for _ in 0..60 {
+        u -= (u * (1.0 + spring * u * u) - slope) / (1.0 + 3.0 * spring * u * u);
+    }
+    u
+}
