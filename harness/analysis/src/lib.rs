@@ -10,7 +10,6 @@
 //! * [`rational`]: a transfer function fitted to the spectra of the whole record.
 
 pub mod allan;
-pub mod armax;
 pub mod demodulation;
 mod exponential;
 pub mod features;

@@ -536,17 +536,6 @@ pub const FRICTION_POINTS: usize = 400;
 /// Speeds of the second chart over the Stribeck speed.
 pub const SLOW_CHART: f64 = 4.0;
 
-// Black box: `methods/black_box.rs`.
-// Tests: `armax_finds_a_noisy_linear_bench_where_arx_of_its_order_does_not`.
-/// Orders of ARX that are tried.
-pub const ARX_ORDERS: [usize; 9] = [2, 3, 4, 6, 8, 12, 16, 24, 32];
-/// Orders of ARMAX that are tried.
-pub const ARMAX_ORDERS: [usize; 4] = [2, 3, 4, 5];
-/// Part of the record that is fitted; the rest is held back.
-pub const FITTED_PART: f64 = 2.0 / 3.0;
-/// A larger model must simulate better by this much, %.
-pub const WORTH: f64 = 0.1;
-
 // Free decay: `methods/free_decay.rs`.
 // Tests: `harness/cli/tests/all/recordings.rs`.
 /// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.
@@ -562,15 +551,6 @@ pub const VARIANCE_LINES: usize = 40;
 pub const WEIGHT_ROUNDS: usize = 5;
 /// Residual over the gyro's noise beyond which the plant is not linear, or something else acts.
 pub const FREQUENCY_MISFIT: f64 = 1.3;
-
-// Multisine: `methods/multisine.rs`.
-// Tests: `noise_even_and_odd_distortion_are_told_apart`.
-/// Beginning that is left out, s: slosh of a bare tank decays with 23 s, to a thousandth in this time.
-pub const SETTLING: f64 = 150.0;
-/// Power of a line over the largest one above which it is excited.
-pub const EXCITED: f64 = 1e-4;
-/// Detection lines on each side that stand for the distortion at a line.
-pub const DETECTION_LINES: usize = 3;
 
 // Force records: `force_record.rs`.
 // Tests: `a_forced_record_of_another_integration_gives_the_whole_model`, `a_small_free_decay_does_not_state_mass_and_angle_but_their_product`.

@@ -102,9 +102,7 @@ class Estimated:
     """True if the interval has both ends and the standard deviation is below half the value."""
 
 
-Method = Literal[
-    "output-error", "acceleration", "frequency", "multisine", "black-box", "free-decay"
-]
+Method = Literal["output-error", "acceleration", "frequency", "free-decay"]
 """The methods of ``hubslosh identify``."""
 
 
@@ -220,9 +218,9 @@ def identify(
     ``simulate(parameters="result.json")``.
 
     * ``method``: "output-error" simulates the FMU. "acceleration" fits friction and inertia if no
-      liquid moves. "frequency" fits three poles and two zeros. "multisine" and "black-box" estimate
-      no parameters of the FMU; `all` has their results. "free-decay" finds frequency and damping
-      from data without torque: ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or ``omega``.
+      liquid moves. "frequency" fits three poles and two zeros. "free-decay" finds frequency and
+      damping from data without torque: ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or
+      ``omega``.
 
     * ``free``: Unknowns of any FMU, for ``fmu`` of other makers too. They are Real parameters and
       start values with a start, ``{"mu": 1.0}``, or with start and bounds, ``{"mu": (1.0, 0.1,

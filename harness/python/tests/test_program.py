@@ -198,7 +198,7 @@ def test_ctrl_c_ends_an_identification_and_its_processes(
 
 def test_the_method_of_an_identification_is_an_argument() -> None:
     """An unknown flag: the error lists those that exist."""
-    for flags in (["--method", "multisine"], ["--method=frequency"]):
+    for flags in (["--method", "acceleration"], ["--method=frequency"]):
         with pytest.raises(FmuError, match="method="):
             hubslosh.identify("data.csv", None, *flags)
 
@@ -206,7 +206,7 @@ def test_the_method_of_an_identification_is_an_argument() -> None:
 def test_every_method_gives_the_same_kind_of_answer(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """A sweep over a rigid liquid: friction by the acceleration, models without physics."""
+    """A sweep over a rigid liquid: friction by the acceleration."""
     time = np.arange(0, 300, 0.02)
     torque = 0.1 * np.sin(2 * np.pi * (1.25 * time + 0.00375 * time**2))
     inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
@@ -218,9 +218,6 @@ def test_every_method_gives_the_same_kind_of_answer(
     # how exact the method is, its own tests say (harness/identify/tests/all/methods.rs)
     assert abs(inertia.value / 0.322414 - 1) < 0.01 and inertia.std > 0 and found.fits
     assert found.model == "frozen" and found.all["condition"] > 1
-    found = hubslosh.identify(run, method="black-box", fmu=fmu, program=program)
-    assert not found.parameters and found.fits is None and found.model is None
-    assert len(found.all["models"]) > 2 and found.verdict
 
 
 def test_every_method_of_identification_is_in_the_package_and_in_the_book(

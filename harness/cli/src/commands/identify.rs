@@ -9,10 +9,8 @@ use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
 use identify::methods::acceleration::{self, Acceleration, Weights};
-use identify::methods::black_box::BlackBox;
 use identify::methods::free_decay::FreeDecay;
 use identify::methods::frequency::Frequency;
-use identify::methods::multisine::Multisine;
 use identify::methods::output_error::OutputError;
 use identify::methods::{Method, Task};
 use identify::model::bench::nominal::{self, Nominal};
@@ -52,8 +50,7 @@ pub struct IdentifyArgs {
     data: Vec<PathBuf>,
     /// Identification method. `output-error` fits all of the FMU's parameters in the time domain. `acceleration` fits friction
     /// and inertia without a simulation, for a bench whose liquid does not move. `frequency` fits three poles and two zeros.
-    /// `multisine` separates noise from nonlinear distortion. `black-box` fits ARX and ARMAX. `free-decay` finds frequency and
-    /// damping over the amplitude, from records without torque.
+    /// `free-decay` finds frequency and damping over the amplitude, from records without torque.
     #[arg(conflicts_with = "fit", long, value_name = "NAME", default_value = "output-error")]
     method: MethodName,
     /// Weights of the rows, of --method acceleration.
@@ -65,9 +62,6 @@ pub struct IdentifyArgs {
     /// Harmonics of the angle in the friction, 0 to 2, of --method acceleration.
     #[arg(conflicts_with = "fit", long, value_name = "NUMBER", default_value_t = 0)]
     harmonics: usize,
-    /// Period of the torque, s, of --method multisine.
-    #[arg(conflicts_with = "fit", long, value_name = "SECONDS", default_value_t = 100.0)]
-    period: f64,
     /// Slosh models to try.
     #[arg(
         conflicts_with = "fit",
@@ -185,9 +179,13 @@ enum MethodName {
     OutputError,
     Acceleration,
     Frequency,
-    Multisine,
-    BlackBox,
     FreeDecay,
+    /// Removed; the error names what replaces it.
+    #[value(hide = true)]
+    Multisine,
+    /// Removed; the error names what replaces it.
+    #[value(hide = true)]
+    BlackBox,
 }
 
 /// Weights of the rows.
@@ -250,9 +248,7 @@ impl IdentifyArgs {
             MethodName::OutputError => OutputError::NEEDS.fmu,
             MethodName::Acceleration => Acceleration::NEEDS.fmu,
             MethodName::Frequency => Frequency::NEEDS.fmu,
-            MethodName::Multisine => Multisine::NEEDS.fmu,
-            MethodName::BlackBox => BlackBox::NEEDS.fmu,
-            MethodName::FreeDecay => FreeDecay::NEEDS.fmu,
+            MethodName::FreeDecay | MethodName::Multisine | MethodName::BlackBox => false,
         }
     }
 
@@ -347,9 +343,14 @@ impl IdentifyArgs {
                 };
                 self.answer(frequency, trim)
             }
-            MethodName::Multisine => self.answer(Multisine { period: self.period }, trim),
-            MethodName::BlackBox => self.answer(BlackBox, trim),
             MethodName::FreeDecay => self.decay(trim),
+            MethodName::Multisine => bail!(
+                "--method multisine was removed: book/other_methods.md, 'Noise or nonlinearity?', has the estimate in Python"
+            ),
+            MethodName::BlackBox => bail!(
+                "--method black-box was removed: book/other_methods.md, 'ARX and ARMAX', has the fits in Python; \
+                 --method output-error fits parameters with a physical meaning"
+            ),
         }
     }
 
@@ -398,7 +399,7 @@ impl IdentifyArgs {
     fn answer<M: Method>(&self, method: M, trim: Option<(f64, f64)>) -> Result<()> {
         ensure!(
             self.validate.is_empty() || M::NEEDS.validation,
-            "--validate is for --method output-error and black-box alone"
+            "--validate is for --method output-error alone"
         );
         let fmu = if M::NEEDS.fmu { Some(open(&self.fmu)?) } else { None };
         let nominal = fmu.as_ref().map(|fmu| self.options()?.nominal(fmu)).transpose()?;

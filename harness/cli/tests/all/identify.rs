@@ -139,7 +139,7 @@ fn friction_by_the_accelerations_least_squares_is_fed_back_to_a_run() {
 }
 
 #[test]
-fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen() {
+fn a_designed_multisine_is_within_the_wheels_limits() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let asked = ["design", "--multisine", "0.5", "--duration", "400", "--optimal"];
@@ -155,14 +155,6 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
     let recommended =
         if numbers[0] <= numbers[1] { "the multisine" } else { "the sweep, --profile lin-sweep" };
     assert!(said.contains(&format!("Recommended: {recommended}")), "{said}");
-    let bench = ["--set", "imu.enabled=true", "--columns", "omega_imu"];
-    let asked = [&["run", "--input", "torque.csv"][..], &bench, &["--out", "clean.csv"]].concat();
-    hubslosh(folder, &asked).unwrap();
-    let all = ["time", "tau_cmd", "omega_imu"];
-    let clean = Table::read(&folder.join("clean.csv"), &all).unwrap();
-    let columns = all.map(|column| clean.column(column).unwrap().to_vec()).to_vec();
-    let names = ["time", "tau_cmd", "omega"].map(String::from).to_vec();
-    Table::new(names, columns).write(&folder.join("data.csv"), &Default::default()).unwrap();
     // less torque where the liquid must stay linear
     let asked = [
         "design",
@@ -176,13 +168,18 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
         serde_json::from_str(&hubslosh(folder, &asked).unwrap()).unwrap();
     let angle = limited["slosh_angle"].as_f64().unwrap();
     assert!((0.09..=0.1).contains(&angle), "{limited}");
-    let asked = ["identify", "data.csv", "--method", "multisine", "--out", "levels.json"];
-    let said = hubslosh(folder, &[&asked[..], &["--report", "levels.html"]].concat()).unwrap();
-    let page = std::fs::read_to_string(folder.join("levels.html")).unwrap();
-    assert!(page.contains("Response at the excited lines"), "{page}");
-    // dry friction is odd; the linear liquid adds nothing
-    assert!(said.contains("Odd nonlinear distortion is"), "{said}");
-    assert!(said.contains("Even nonlinear distortion is not seen"), "{said}");
+}
+
+#[test]
+fn a_removed_method_names_what_replaces_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for (method, replacement) in
+        [("multisine", "Noise or nonlinearity?"), ("black-box", "ARX and ARMAX")]
+    {
+        let asked = ["identify", "a.csv", "--method", method, "--out", "a.json"];
+        let said = hubslosh(folder.path(), &asked).unwrap_err();
+        assert!(said.contains("was removed") && said.contains(replacement), "{said}");
+    }
 }
 
 #[test]

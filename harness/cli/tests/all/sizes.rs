@@ -43,8 +43,6 @@ const COMMANDS: &str = "
 identify @ --out a.json
 identify @ --method acceleration --out a.json
 identify @ --method frequency --out a.json
-identify @ --method multisine --out a.json
-identify @ --method black-box --out a.json
 identify @ --method free-decay --out a.json
 identify @ --empty --out a.json
 identify @ --validate @ --out a.json

@@ -1,11 +1,9 @@
 //! Methods of identification, one a file: what each is given, what it needs of that, and what all return.
 
 pub mod acceleration;
-pub mod black_box;
 pub mod free_decay;
 pub mod frequency;
 pub mod identification;
-pub mod multisine;
 pub mod output_error;
 
 use anyhow::{Context, Result, bail};

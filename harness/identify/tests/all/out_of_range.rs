@@ -10,7 +10,7 @@ use identify::input::tolerance::Tolerances;
 use identify::methods::free_decay::FreeDecay;
 use identify::methods::frequency::Frequency;
 use identify::methods::output_error::OutputError;
-use identify::methods::{Method, Task, acceleration, black_box, multisine};
+use identify::methods::{Method, Task, acceleration};
 use identify::model::bench::simulate::Intersample;
 use identify::model::simulate::Model;
 use pack::packed_for_tests;
@@ -31,8 +31,6 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
     };
     vec![
         ("frequency", said(frequency.identify(&task, &mut |_| {}).err())),
-        ("multisine", said(multisine::analyse(recording, 10.0).err())),
-        ("black box", said(black_box::identify(recording, None).err())),
         (
             "acceleration",
             said(acceleration::identify(fmu, recordings, &crate::acceleration::options(0)).err()),
