@@ -61,18 +61,29 @@ const STANDARD: [(&str, &str); 10] = [
 ];
 const STANDARD_TEXT: &str = "rust-standard-library.txt";
 
-/// A run-time library that a linker adds, and a text that reveals it in a binary.
+/// A run-time library that a linker adds.
 struct RunTime {
-    mark: &'static str,
+    /// A text that reveals it in a binary, [`backwards`].
+    mark: &'static [u8],
     name: &'static str,
     licence: &'static str,
     text: &'static str,
     origin: &'static str,
 }
 
+/// Reverses a text at compile time. This program, in which a wheel's components are searched, then does not contain the text itself.
+const fn backwards<const N: usize>(text: [u8; N]) -> [u8; N] {
+    let (mut reversed, mut place) = ([0; N], 0);
+    while place < N {
+        reversed[place] = text[N - 1 - place];
+        place += 1;
+    }
+    reversed
+}
+
 const RUN_TIME: [RunTime; 4] = [
     RunTime {
-        mark: "libunwind: ",
+        mark: &backwards(*b"libunwind: "),
         name: "llvm-libunwind",
         licence: "Apache-2.0 WITH LLVM-exception",
         text: "llvm-libunwind.txt",
@@ -80,7 +91,7 @@ const RUN_TIME: [RunTime; 4] = [
     },
     RunTime {
         // the two come together: zig links both where it builds for an old glibc
-        mark: "libunwind: ",
+        mark: &backwards(*b"libunwind: "),
         name: "glibc-nonshared",
         licence: "LicenseRef-LGPL-2.1-or-later-with-unlimited-permission-to-link",
         text: "glibc.txt",
@@ -88,7 +99,7 @@ const RUN_TIME: [RunTime; 4] = [
                  head of its lib/libc/glibc/io/stat64-2.32.c",
     },
     RunTime {
-        mark: "Mingw-w64 runtime failure",
+        mark: &backwards(*b"Mingw-w64 runtime failure"),
         name: "mingw-w64-runtime",
         licence: "ZPL-2.1 AND LicenseRef-public-domain",
         text: "mingw-w64.txt",
@@ -96,7 +107,7 @@ const RUN_TIME: [RunTime; 4] = [
                  MinGW-w64's COPYING",
     },
     RunTime {
-        mark: "Mingw-w64 runtime failure",
+        mark: &backwards(*b"Mingw-w64 runtime failure"),
         name: "libgcc",
         licence: "GPL-3.0-or-later WITH GCC-exception-3.1",
         text: "gcc-runtime.txt",
@@ -144,7 +155,7 @@ pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
     for part in RUN_TIME {
         let platforms: BTreeSet<_> = binaries
             .iter()
-            .filter(|binary| contains(&binary.bytes, part.mark))
+            .filter(|binary| contains_backwards(&binary.bytes, part.mark))
             .map(|binary| binary.folder)
             .collect();
         if !platforms.is_empty() {
@@ -229,8 +240,9 @@ fn rust_version() -> Result<String> {
     Ok(version.into())
 }
 
-fn contains(bytes: &[u8], text: &str) -> bool {
-    bytes.windows(text.len()).any(|window| window == text.as_bytes())
+/// Returns true if the reverse of `text` is in `bytes`.
+fn contains_backwards(bytes: &[u8], text: &[u8]) -> bool {
+    bytes.windows(text.len()).any(|window| window.iter().rev().eq(text))
 }
 
 /// Crates of the standard library named in a binary, as in "/rust/deps/gimli-0.32.3/src".
@@ -496,6 +508,16 @@ mod tests {
             "/rust/deps/\\library`cargo metadata`", // the separators, then any other text
         ] {
             assert!(standard_crates(words.as_bytes()).unwrap().is_empty(), "{words}");
+        }
+    }
+
+    #[test]
+    fn this_program_contains_no_mark_of_a_run_time_library() {
+        let this = crate::archive::read(&std::env::current_exe().unwrap()).unwrap();
+        for part in RUN_TIME {
+            assert!(!contains_backwards(&this, part.mark), "{}", part.name);
+            let text: Vec<u8> = part.mark.iter().rev().copied().collect();
+            assert!(contains_backwards(&text, part.mark), "{}", part.name);
         }
     }
 
