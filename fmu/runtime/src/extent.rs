@@ -260,7 +260,8 @@ mod tests {
 
     #[test]
     fn a_uri_names_a_folder() {
-        let of = |uri: &str| folder_of_uri(uri).map(|path| path.to_string_lossy().into_owned());
+        let path_in =
+            |uri: &str| folder_of_uri(uri).map(|path| path.to_string_lossy().into_owned());
         for (uri, path) in [
             ("file:///tmp/a%20b/resources", "/tmp/a b/resources"),
             ("file:/tmp/a", "/tmp/a"),
@@ -268,10 +269,10 @@ mod tests {
             ("file:///C:/a/b", "C:/a/b"),
             ("/tmp/a", "/tmp/a"),
         ] {
-            assert_eq!(extent_with(uri).as_deref(), Some(path));
+            assert_eq!(path_in(uri).as_deref(), Some(path));
         }
         for wrong in ["", "http://a/b", "file:///%4", "file:///%zz", "file://host", "file:///%ff"] {
-            assert_eq!(extent_with(wrong), None, "{wrong}");
+            assert_eq!(path_in(wrong), None, "{wrong}");
         }
     }
 }
