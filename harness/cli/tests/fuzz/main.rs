@@ -185,9 +185,9 @@ fn recording_of(path: &Path, columns: &str) {
     let signal = |name, required| Signal { name, required, between: Between::Held, unit: None };
     let signals = [signal("omega", true), signal("tau_cmd", false), signal("theta", false)];
     let columns: Columns = columns.parse().unwrap();
-    let found =
-        recording::read(path, &Wanted { signals: &signals, columns: &columns }, &mut |_| {});
-    if let Ok(table) = found {
+    let wanted = Wanted { signals: &signals, columns: &columns };
+    let found = recording::read_here(path, path, &wanted, &mut |_| {});
+    if let Ok(Some(table)) = found {
         let _ = recording::even(table, &mut |_| {});
     }
 }

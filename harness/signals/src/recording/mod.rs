@@ -120,24 +120,18 @@ impl Header {
 
     /// Columns of whole seconds and of the rest of a second, with the factor of the rest: `stamp.sec`, `stamp.nanosec`.
     fn halves(&self) -> Vec<(usize, usize, f64)> {
-        const RESTS: [(&str, f64); 11] = [
-            ("nanosecs", 1e-9),
-            ("nanosec", 1e-9),
-            ("nanoseconds", 1e-9),
-            ("nsecs", 1e-9),
-            ("nsec", 1e-9),
-            ("ns", 1e-9),
-            ("microseconds", 1e-6),
-            ("usecs", 1e-6),
-            ("usec", 1e-6),
-            ("us", 1e-6),
+        const RESTS: [(&str, f64); 3] = [
+            ("nanoseconds nanosecs nanosec nsecs nsec ns", 1e-9),
+            ("microseconds usecs usec us", 1e-6),
             ("millisec", 1e-3),
         ];
         let lower: Vec<String> = self.names.iter().map(|name| name.to_lowercase()).collect();
         let mut found = Vec::new();
         for (rest, name) in lower.iter().enumerate() {
-            let stem =
-                RESTS.iter().find_map(|(end, factor)| Some((name.strip_suffix(end)?, *factor)));
+            let stem = RESTS.iter().find_map(|(ends, factor)| {
+                let stem = ends.split(' ').find_map(|end| name.strip_suffix(end));
+                stem.map(|stem| (stem, *factor))
+            });
             let Some((stem, factor)) = stem else { continue };
             let is_whole = |other: &String| {
                 other

@@ -4,7 +4,7 @@
 //! order that the file shows; clocks of 24 and 12 hours with any decimals, `12:00:00:020`; offsets from UTC as Z, UTC, +01:00,
 //! +0100, +01; durations as `1 days 00:00:00.02`. What can be read in two ways is an error.
 
-use chrono::{DateTime, Datelike as _, NaiveDate};
+use chrono::{DateTime, Datelike as _, NaiveDate, NaiveTime, Timelike as _};
 
 /// Nanoseconds of a second and of a day.
 const SECOND: i64 = 1_000_000_000;
@@ -131,97 +131,54 @@ fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
     if rest.len() > 12 || !fits || !rest.chars().all(is_zone) {
         return Ok(None);
     }
-    let lower = rest.trim().replace('.', "").to_lowercase();
+    let lower = rest.trim().replace('.', "").replace('−', "-").to_lowercase();
     let (half, zone) = match lower.get(..2) {
         Some(half @ ("am" | "pm")) => (half, lower[2..].trim()),
         _ => ("", lower.as_str()),
     };
     let zone = zone.strip_prefix("utc").or_else(|| zone.strip_prefix("gmt")).unwrap_or(zone);
-    let offset = match zone {
-        "" | "z" => 0,
-        _ => offset(zone).ok_or_else(|| {
-            format!(
-                "ends in \"{}\", which is no offset from UTC (allowed: Z, UTC, +01:00, +0100, AM, PM)",
-                rest.trim()
-            )
-        })?,
+    // chrono reads an offset after a date
+    let offset = DateTime::parse_from_str(&format!("2000-01-01 0:0 {zone}"), "%Y-%m-%d %H:%M %#z");
+    let offset = match (zone, offset) {
+        ("" | "z", _) => 0,
+        (_, Ok(offset)) => i64::from(offset.offset().local_minus_utc()),
+        _ => {
+            let rest = rest.trim();
+            return Err(format!(
+                "ends in \"{rest}\", which is no offset from UTC (allowed: Z, UTC, +01:00, +0100, AM, PM)"
+            ));
+        }
     };
-    Ok(Some((format!("{time}{half}"), offset)))
-}
-
-/// +01:00, +0100 or -05, ns.
-fn offset(text: &str) -> Option<i64> {
-    let (sign, size) = match text.strip_prefix('+') {
-        Some(size) => (1, size),
-        None => (-1, text.strip_prefix(['-', '−'])?),
-    };
-    let digits = size.replace(':', "");
-    let is_number = digits.bytes().all(|b| b.is_ascii_digit());
-    let (hours, minutes): (i64, i64) = match digits.len() {
-        2 if is_number => (digits.parse().ok()?, 0),
-        4 if is_number => (digits[..2].parse().ok()?, digits[2..].parse().ok()?),
-        _ => return None,
-    };
-    (hours <= 14 && minutes < 60).then_some(sign * (hours * 3600 + minutes * 60) * SECOND)
+    Ok(Some((format!("{time}{half}"), offset * SECOND)))
 }
 
 /// Nanoseconds since midnight of `12:00:00.020`, `12:00:00:020`, `12:00:00.020pm` and, next to a date, `12:00`.
 fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
-    let (text, half) = match (text.strip_suffix("am"), text.strip_suffix("pm")) {
-        (Some(text), _) => (text, Some(0)),
-        (_, Some(text)) => (text, Some(12)),
-        _ => (text, None),
+    let mut text = text.to_string();
+    // milli-, micro- or nanoseconds after a colon; not the frames of a film
+    if let Some((whole, part)) = text.rsplit_once(':')
+        && whole.matches(':').count() == 2
+        && [3, 6, 9].contains(&part.trim_end_matches(['a', 'p', 'm']).len())
+    {
+        text = format!("{whole}.{part}");
+    }
+    let format = match (text.ends_with('m'), text.matches(':').count()) {
+        (false, 1) if has_date && !text.contains('.') => "%H:%M",
+        (false, _) => "%H:%M:%S%.f",
+        (true, _) => "%I:%M:%S%.f%p",
     };
-    let parts: Vec<&str> = text.split(':').collect();
-    let number = |text: &str, most: usize| -> Option<i64> {
-        let fits = (1..=most).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_digit());
-        text.parse().ok().filter(|_| fits)
-    };
-    let (hour, minute, seconds) = match parts[..] {
-        [hour, minute] if has_date && !minute.contains('.') => (hour, minute, "0".to_string()),
-        [minute, second] if number(minute, 2).is_some() && second.len() > 1 => {
-            return Err(
-                "has two parts: minutes and seconds, or hours and minutes? (allowed: hours, minutes and seconds; in Excel the \
-                 format hh:mm:ss.000)"
-                    .into(),
-            );
+    match NaiveTime::parse_from_str(&text, format) {
+        // a leap second is no second of the day
+        Ok(time) if i64::from(time.nanosecond()) < SECOND => {
+            let seconds = i64::from(time.num_seconds_from_midnight());
+            Ok(Some(seconds * SECOND + i64::from(time.nanosecond())))
         }
-        [hour, minute, second] => (hour, minute, second.to_string()),
-        [hour, minute, second, part] if part.bytes().all(|b| b.is_ascii_digit()) => {
-            if ![3, 6, 9].contains(&part.len()) {
-                return Err(format!(
-                    "has four parts, and the last has {} digits (allowed: 3, 6 or 9, as milli-, micro- or nanoseconds; not frames of \
-                     a film)",
-                    part.len()
-                ));
-            }
-            (hour, minute, format!("{second}.{part}"))
-        }
-        _ => return Ok(None),
-    };
-    let (second, part) = seconds.split_once('.').unwrap_or((&seconds, ""));
-    let (Some(mut hour), Some(minute), Some(second)) =
-        (number(hour, 2), number(minute, 2), number(second, 2))
-    else {
-        return Ok(None);
-    };
-    if !part.bytes().all(|b| b.is_ascii_digit()) {
-        return Ok(None);
+        _ => Err(
+            "is no time of day (allowed: hours, minutes and seconds: 0:00:00 to 23:59:59.999, 12:00:00 AM to 11:59:59 PM, and 3, 6 or \
+             9 digits after a fourth colon; in Excel the format hh:mm:ss.000; durations in seconds)"
+                .into(),
+        ),
     }
-    let hours = if half.is_some() { 1..=12 } else { 0..=23 };
-    if !hours.contains(&hour) || minute > 59 || second > 59 {
-        return Err(format!(
-            "is no time of day (allowed: hours {} to {}, minutes and seconds up to 59; durations in seconds)",
-            hours.start(),
-            hours.end()
-        ));
-    }
-    if let Some(half) = half {
-        hour = hour % 12 + half;
-    }
-    let digits: String = part.chars().chain("000000000".chars()).take(9).collect();
-    let nanoseconds: i64 = digits.parse().unwrap_or(0);
-    Ok(Some((hour * 3600 + minute * 60 + second) * SECOND + nanoseconds))
 }
 
 /// A date.
@@ -420,10 +377,10 @@ mod tests {
             (&["31/01/2026 1:00:00", "01/31/2026 1:00:01"], "in another order"),
             (&["31/31/2026 1:00:00"], "neither 31 nor 31 is one"),
             (&["30.02.2026 1:00:00"], "there is no day 30 of month 2"),
-            (&["24:00:00.010"], "is no time of day (allowed: hours 0 to 23"),
-            (&["13:00:00 PM"], "hours 1 to 12"),
-            (&["12:00:00:05"], "the last has 2 digits"),
-            (&["00:20.0"], "minutes and seconds, or hours and minutes?"),
+            (&["24:00:00.010"], "is no time of day (allowed: hours, minutes and seconds"),
+            (&["13:00:00 PM"], "is no time of day (allowed: hours, minutes and seconds"),
+            (&["12:00:00:05"], "is no time of day (allowed: hours, minutes and seconds"),
+            (&["00:20.0"], "is no time of day (allowed: hours, minutes and seconds"),
             (&["2026-01-31 12:00:00 CET"], "ends in \"CET\", which is no offset"),
             (&["12:00:00", "2026-01-31 12:00:01"], "is a date, where the lines above have none"),
             (&["1/2/2026 12:00:00", "2026-01-31 12:00:01"], "in another form"),

@@ -74,34 +74,8 @@ const PREFIXES: [(&str, &str, f64); 5] = [
 ];
 
 /// Words in lower case for symbols, in the singular.
-const WORDS: [(&str, &str); 26] = [
-    ("sec", "s"),
-    ("second", "s"),
-    ("msec", "ms"),
-    ("milli", "ms"),
-    ("usec", "us"),
-    ("micro", "us"),
-    ("nsec", "ns"),
-    ("nano", "ns"),
-    ("min", "min"),
-    ("minute", "min"),
-    ("hr", "h"),
-    ("hour", "h"),
-    ("day", "d"),
-    ("rad", "rad"),
-    ("radian", "rad"),
-    ("deg", "deg"),
-    ("degree", "deg"),
-    ("rev", "rev"),
-    ("revolution", "rev"),
-    ("newton", "N"),
-    ("meter", "m"),
-    ("metre", "m"),
-    ("inch", "in"),
-    ("foot", "ft"),
-    ("lb", "lbf"),
-    ("oz", "ozf"),
-];
+const WORDS: &str = "sec=s second=s msec=ms milli=ms usec=us micro=us nsec=ns nano=ns min=min minute=min hr=h hour=h day=d rad=rad \
+    radian=rad deg=deg degree=deg rev=rev revolution=rev newton=N meter=m metre=m inch=in foot=ft lb=lbf oz=ozf";
 
 /// A product of symbols.
 type Product = (Dimension, f64);
@@ -127,16 +101,18 @@ fn symbol(name: &str, fold: bool) -> Vec<Product> {
 /// Words are the same in any case, in the plural, and with a prefix before them: `Milliseconds`.
 fn word(name: &str) -> Vec<Product> {
     let lower = name.to_lowercase();
-    let singular = [Some(lower.as_str()), lower.strip_suffix('s')];
     let mut found = Vec::new();
-    for text in singular.into_iter().flatten() {
-        let direct = WORDS.iter().filter(|(word, _)| *word == text);
-        found.extend(direct.flat_map(|(_, own)| symbol(own, false)));
-        for (_, prefix, scale) in PREFIXES {
-            let rest = text.strip_prefix(prefix).filter(|rest| rest.len() > 2);
-            let word = WORDS.iter().find(|(word, _)| Some(*word) == rest);
-            let product = word.and_then(|(_, own)| symbol(own, false).pop());
-            found.extend(product.map(|(dimension, factor)| (dimension, scale * factor)));
+    for text in [Some(lower.as_str()), lower.strip_suffix('s')].into_iter().flatten() {
+        for (word, own) in WORDS.split_whitespace().filter_map(|pair| pair.split_once('=')) {
+            let Some(prefix) = text.strip_suffix(word) else { continue };
+            let scale = match PREFIXES.iter().find(|(_, name, _)| *name == prefix) {
+                Some((.., scale)) if word.len() > 2 => *scale,
+                _ if prefix.is_empty() => 1.0,
+                _ => continue,
+            };
+            found.extend(
+                symbol(own, false).iter().map(|(dimension, factor)| (*dimension, scale * factor)),
+            );
         }
     }
     found
