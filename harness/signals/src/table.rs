@@ -29,24 +29,18 @@ pub struct Table {
     gaps: BTreeSet<String>,
 }
 
-/// File format of a table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Csv,
-    Parquet,
-}
-
-fn format_of(path: &Path) -> Result<Format> {
+/// Returns true for the name of a Parquet file, false for one of CSV.
+fn is_parquet(path: &Path) -> Result<bool> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
-        Some("csv") => Ok(Format::Csv),
-        Some("parquet") => Ok(Format::Parquet),
+        Some("csv") => Ok(false),
+        Some("parquet") => Ok(true),
         _ => bail!("{}: the name must end in .csv or .parquet", path.display()),
     }
 }
 
 /// Fails unless `path` names a kind of file that can be written.
 pub fn check_ending(path: &Path) -> Result<()> {
-    format_of(path).map(|_| ())
+    is_parquet(path).map(drop)
 }
 
 impl Table {
@@ -104,15 +98,8 @@ impl Table {
     /// number.
     pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
         let name = path.display();
-        let format = format_of(path)?;
-        let table = match format {
-            Format::Csv => {
-                let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
-                read_csv(file, wanted)
-            }
-            Format::Parquet => read_parquet(path, wanted),
-        }
-        .with_context(|| format!("{name} cannot be used"))?;
+        let read = if is_parquet(path)? { read_parquet } else { read_csv };
+        let table = read(path, wanted).with_context(|| format!("{name} cannot be used"))?;
         table.all_finite().map_err(|error| anyhow!("{name}, {error}"))?;
         Ok(table)
     }
@@ -142,10 +129,10 @@ impl Table {
     /// Writes the table, if all its values are finite or may be missing; `metadata` are a Parquet file's key-value
     /// pairs.
     pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
-        let format = format_of(path)?;
-        atomically(path, |file| match format {
-            Format::Csv => self.write_csv(file),
-            Format::Parquet => self.write_parquet(file, metadata),
+        let is_parquet = is_parquet(path)?;
+        atomically(path, |file| match is_parquet {
+            true => self.write_parquet(file, metadata),
+            false => self.write_csv(file),
         })
     }
 
@@ -230,42 +217,39 @@ pub fn writer(path: &Path) -> Option<String> {
 
 /// Names of the columns of a file.
 pub fn names(path: &Path) -> Result<Vec<String>> {
-    let name = path.display();
-    let format = format_of(path)?;
-    let names = || -> Result<Vec<String>> {
-        match format {
-            Format::Csv => {
-                let file = input::open(path).context("it cannot be opened")?;
-                let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
-                let header = reader.headers().context("it has no header row")?;
-                Ok(header.iter().map(|h| h.trim_start_matches('\u{feff}').to_string()).collect())
-            }
-            Format::Parquet => parquet_file::names(path),
-        }
+    let names = match is_parquet(path)? {
+        true => parquet_file::names(path),
+        false => header(path).map(|(_, names)| names),
     };
-    names().with_context(|| format!("{name} cannot be used"))
+    names.with_context(|| format!("{} cannot be used", path.display()))
+}
+
+/// The rows of a CSV file, and the names of its columns.
+fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
+    let file = input::open(path).context("it cannot be opened")?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+    let header = reader.headers().context("it has no header row")?;
+    let names = header.iter().map(|h| h.trim_start_matches('\u{feff}').to_string()).collect();
+    Ok((reader, names))
 }
 
 /// Position of each wanted column, or the missing ones.
-fn positions<'a>(there: impl Iterator<Item = &'a str>, wanted: &[&str]) -> Result<Vec<usize>> {
-    let there: Vec<&str> = there.map(str::trim).collect();
-    let missing: Vec<_> = wanted.iter().copied().filter(|w| !there.contains(w)).collect();
-    ensure!(
-        missing.is_empty(),
-        "it has no column {} (columns in it: {})",
-        missing.join(", "),
-        there.join(", ")
-    );
-    let twice: Vec<_> =
-        wanted.iter().filter(|w| there.iter().filter(|t| t == w).count() > 1).copied().collect();
-    ensure!(twice.is_empty(), "more than one of its columns is called {}", twice.join(", "));
-    Ok(wanted.iter().flat_map(|w| there.iter().position(|t| t == w)).collect())
+fn positions(there: &[String], wanted: &[&str]) -> Result<Vec<usize>> {
+    let count = |name: &&&str| there.iter().filter(|other| other.trim() == **name).count();
+    let listed = |of: fn(usize) -> bool| {
+        let names: Vec<&str> = wanted.iter().filter(|name| of(count(name))).copied().collect();
+        names.join(", ")
+    };
+    let (missing, twice) = (listed(|n| n == 0), listed(|n| n > 1));
+    let all = there.join(", ");
+    ensure!(missing.is_empty(), "it has no column {missing} (columns in it: {all})");
+    ensure!(twice.is_empty(), "more than one of its columns is called {twice}");
+    Ok(wanted.iter().flat_map(|w| there.iter().position(|t| t.trim() == *w)).collect())
 }
 
-fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
-    let header = reader.headers().context("it has no header row")?.clone();
-    let positions = positions(header.iter().map(|h| h.trim_start_matches('\u{feff}')), wanted)?;
+fn read_csv(path: &Path, wanted: &[&str]) -> Result<Table> {
+    let (mut reader, names) = header(path)?;
+    let positions = positions(&names, wanted)?;
     let mut columns = vec![Vec::new(); wanted.len()];
     for (row, record) in reader.records().enumerate() {
         budget::table(row + 1, wanted.len())?;
@@ -282,7 +266,6 @@ fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
 
 fn read_parquet(path: &Path, wanted: &[&str]) -> Result<Table> {
     let time = wanted.iter().position(|name| *name == "time").map(|place| (place, false));
-    let names = |names: &[String]| positions(names.iter().map(String::as_str), wanted);
-    let found = parquet_file::read(path, names, time, &[])?;
+    let found = parquet_file::read(path, |names| positions(names, wanted), time, &[])?;
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), found.columns))
 }
