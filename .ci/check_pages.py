@@ -45,6 +45,7 @@ LEFT_OUT = {
     r"hubslosh identify decay\.csv --tank": "a recording of forces; tests of `force_record`",
     r"hubslosh (identify (a|flight)|design slew)\.csv": "others' recordings; tests of `any_fmu`",
     r"hubslosh check my\.fmu --strict": "FMUs built here need a newer glibc, an error; .ci/run",
+    r"python3 -m hubslosh\.recordings": "needs the extra recordings; test_recordings.py",
     r"pytest\b": "tests of the source; tests/python.rs",
 }
 """Commands that do not run here, and why."""
