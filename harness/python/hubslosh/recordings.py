@@ -25,8 +25,8 @@ from .fmu import FmuError
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_VALUES = 400_000_000
-"""Most values of a file, those of columns that are not used included."""
+MOST_VALUES = 60_000_000
+"""Most values of a file, columns that are not used included: three signals in 20 million rows."""
 WIDEST = 100
 """Most columns of a matrix: a wider one is no table of signals."""
 DEEPEST = 8

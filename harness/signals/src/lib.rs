@@ -2,6 +2,7 @@
 //! transforms. What needs the large generic crates `parquet` and `realfft` stands here, so that their code is
 //! compiled once.
 
+mod foreign;
 pub mod fourier;
 mod parquet_file;
 pub mod recording;

@@ -15,7 +15,7 @@ use parquet::data_type::DataType;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use crate::recording::Foreign;
+use crate::foreign::Foreign;
 
 /// Rows that are decoded at once.
 const BATCH: usize = 1 << 16;

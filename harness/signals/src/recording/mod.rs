@@ -1,5 +1,5 @@
 //! Recordings: signals in SI units from files that others wrote. Text in columns and Parquet are read here; the Python
-//! package converts other kinds to text ([`foreign`]). [`Columns`], a row of units or the names of the columns (`gyro_z [deg/s]`,
+//! package converts other kinds to text ([`crate::foreign`]). [`Columns`], a row of units or the names of the columns (`gyro_z [deg/s]`,
 //! `gyro_z_dps`) give the signal and the unit of each column; a unit that none of them states is SI's, which the output states, or the file is
 //! refused where that is implausible.
 //!
@@ -10,7 +10,6 @@
 
 mod columns;
 mod even;
-mod foreign;
 mod stamps;
 mod text;
 mod time;
@@ -22,11 +21,10 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
 pub use self::even::{even, even_with_gaps};
-pub use self::foreign::Foreign;
-use self::foreign::Kind;
 use self::stamps::Stamps;
 use self::unit::{Dimension, Fault};
 pub use self::unit::{Quantity, conversion};
+use crate::foreign::{self, Foreign, Kind};
 use crate::parquet_file::{self, Found};
 use crate::table::Table;
 
