@@ -42,7 +42,7 @@ LEFT_OUT = {
     r"hubslosh analyse --bench-day (tuesday|target/day)": "a day's logs; tests of `bench_day`",
     r"(PYTHONPATH=harness/python )?python3? harness/studies/": "tests/python.rs",
     r"python examples/(6|7|11)_": "needs dask, libcosimpy or bsk; tests/python.rs",
-    r"hubslosh identify decay\.csv --tank": "a recording of forces; tests of `force_record`",
+    r"hubslosh identify (shaken|friction ramp)\.csv": "others' recordings; their tests",
     r"hubslosh (identify (a|flight)|design slew)\.csv": "others' recordings; tests of `any_fmu`",
     r"hubslosh check my\.fmu --strict": "FMUs built here need a newer glibc, an error; .ci/run",
     r"python3 -m hubslosh\.recordings": "needs the extra recordings; test_recordings.py",

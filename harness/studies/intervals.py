@@ -51,9 +51,9 @@ class Bench:
         header = ",".join(columns)
         np.savetxt(self.folder / name, rows, delimiter=",", header=header, comments="", fmt="%.12g")
 
-    def identify(self, *arguments: str) -> dict[str, dict[str, dict[str, object]]]:
+    def identify(self, kind: str, *arguments: str) -> dict[str, dict[str, dict[str, object]]]:
         """Return the result of `hubslosh identify`."""
-        self.call("identify", "draw.csv", "--out", "found.json", *arguments)
+        self.call("identify", kind, "draw.csv", "--out", "found.json", *arguments)
         return json.loads((self.folder / "found.json").read_text())
 
     def run(self, *settings: str, profile: str) -> tuple[Vector, Vector, Vector]:
@@ -93,7 +93,7 @@ def free_decay(bench: Bench, rng: np.random.Generator) -> Result:
         time=time / clock,
         wave_height=0.01 * signal + 2e-4 * rng.standard_normal(time.size),
     )
-    found = bench.identify("--method", "free-decay")["measurement"]
+    found = bench.identify("decay")["measurement"]
     return {"frequency": ends(found["frequency"], f), "zeta": ends(found["zeta"], zeta)}
 
 
@@ -108,7 +108,7 @@ def gyro(bench: Bench, rng: np.random.Generator) -> Result:
     return {"N": (truth, float(low), float(high))}
 
 
-def acceleration(bench: Bench, rng: np.random.Generator) -> Result:
+def friction(bench: Bench, rng: np.random.Generator) -> Result:
     """Fit an empty bench; the scales of torque and gyro have errors of 1 %."""
     time, torque, rate = clean(
         bench,
@@ -119,38 +119,12 @@ def acceleration(bench: Bench, rng: np.random.Generator) -> Result:
     torque = torque / (1 + 0.01 * rng.standard_normal())
     rate = rate * (1 + 0.01 * rng.standard_normal()) + GYRO * rng.standard_normal(time.size)
     bench.write("draw.csv", time=time, tau_cmd=torque, omega=rate)
-    found = bench.identify("--fmu", bench.fmu, "--method", "acceleration", "--empty")["parameters"]
+    found = bench.identify("friction", "--fmu", bench.fmu)["parameters"]
     truths = {
         "hub.I": 0.322414,
         "friction.b": 0.03793,
         "friction.c": 3.498e-3,
         "friction.d": 2.423e-3,
-    }
-    return {name: ends(found[name], truth) for name, truth in truths.items()}
-
-
-def frequency(bench: Bench, rng: np.random.Generator) -> Result:
-    """Fit a linear bench with viscous friction; torque, gyro and clock have errors."""
-    time, torque, rate = clean(
-        bench,
-        "slosh.model=linear",
-        "slosh.zeta_from_correlation=false",
-        "slosh.zeta=0.003",
-        "friction.model=viscous",
-        profile="lin-sweep:amplitude=0.02,f0=1.25,f1=3.5,duration=300",
-    )
-    torque = torque / (1 + 0.01 * rng.standard_normal())
-    rate = rate * (1 + 0.01 * rng.standard_normal()) + GYRO * rng.standard_normal(time.size)
-    clock = 1 + 1e-4 * rng.standard_normal()
-    bench.write("draw.csv", time=time / clock, tau_cmd=torque, omega=rate)
-    all_found = bench.identify("--fmu", bench.fmu, "--method", "frequency")
-    found = all_found["parameters"] | all_found["measurement"]
-    truths = {
-        "hub.I": 0.322414,
-        "tank.d": 0.163,
-        "tank.h": 0.1,
-        "slosh.zeta": 0.003,
-        "friction": 0.03793,
     }
     return {name: ends(found[name], truth) for name, truth in truths.items()}
 
@@ -172,6 +146,7 @@ def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
         omega=rate + 1e-3 * rng.standard_normal(time.size),
     )
     found = bench.identify(
+        "fmu",
         "--fmu",
         bench.fmu,
         "--free",
@@ -251,10 +226,9 @@ def clean(bench: Bench, *settings: str, profile: str) -> tuple[Vector, Vector, V
 
 
 METHODS: dict[str, Callable[[Bench, np.random.Generator], Result]] = {
-    "identify --method free-decay": free_decay,
+    "identify decay": free_decay,
     "gyro --recording": gyro,
-    "identify --method acceleration --empty": acceleration,
-    "identify --method frequency": frequency,
+    "identify friction": friction,
     "identify --free": any_fmu,
     "campaign (viscous)": campaign("viscous"),
     "campaign (stribeck)": campaign("stribeck"),

@@ -234,7 +234,7 @@ def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
-@pytest.mark.parametrize("only", ["free-decay", "gyro"])
+@pytest.mark.parametrize("only", ["decay", "gyro"])
 def test_intervals_of_four_draws(only: str, fmu: Path, program: Path, tmp_path: Path) -> None:
     """Every interval is given, and at most one of four misses the truth (by chance 1.4 %)."""
     bench = intervals.Bench(os.fspath(program), os.fspath(fmu), tmp_path)

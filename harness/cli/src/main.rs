@@ -170,7 +170,11 @@ fn main() -> ExitCode {
     clean_up_on_signals();
     bug::keep_panics();
     let mut command = command_line();
-    let matches = command.get_matches_mut();
+    let arguments = identify::with_kind(std::env::args_os().collect()).unwrap_or_else(|error| {
+        terminal::error(format_args!("{error:#}"));
+        std::process::exit(2)
+    });
+    let matches = command.try_get_matches_from_mut(arguments).unwrap_or_else(|e| e.exit());
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     cli.terminal.set();
     let work = || {

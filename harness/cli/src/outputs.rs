@@ -47,6 +47,11 @@ const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat",
 pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
     let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
     let Some(command) = command.find_subcommand(name) else { return Ok(()) };
+    // the kinds of recordings of identify have its options
+    let (command, matches) = match matches.subcommand() {
+        Some((kind, matches)) => (command.find_subcommand(kind).unwrap_or(command), matches),
+        None => (command, matches),
+    };
     let mut outputs: Vec<(&str, PathBuf, &[&str])> = Vec::new();
     for argument in command.get_arguments() {
         let option = argument.get_id().as_str();

@@ -1,13 +1,12 @@
 //! Estimates the FMU's parameters, with their uncertainty, from recordings of torque and hub rate.
 //!
 //! Each stage uses the ones before it: [`input`], [`model`], [`fit`], [`uncertainty`], [`words`]. The methods join them:
-//! [`methods`] for the bench, [`any_fmu`] and [`force_record`] for other FMUs. A folder `bench` holds the parts of a stage that only the bench needs,
+//! [`methods`] for the bench, [`any_fmu`] for other FMUs. A folder `bench` holds the parts of a stage that only the bench needs,
 //! [`tuning`] all constants that are chosen and not derived.
 
 pub mod any_fmu;
 pub mod estimate;
 pub mod fit;
-pub mod force_record;
 pub mod input;
 pub mod methods;
 pub mod model;

@@ -469,28 +469,9 @@ pub const GOES_ON: usize = 3;
 /// Farthest start of the study of starts over the estimate, or the estimate over it.
 pub const STUDY_REACH: f64 = 3.0;
 
-// Acceleration: `methods/acceleration.rs`.
-// Tests: `the_accelerations_least_squares_find_friction_and_inertia_without_its_biases`, `liquid_that_moves_does_not_fit_the_accelerations_least_squares`, `the_mean_sign_is_the_integral_and_its_slope_the_derivative`, `a_hub_that_turns_one_way_determines_the_friction_of_that_way_alone`.
-/// Length of the windows over which the residual's scores are summed, s: the difference makes neighbouring rows
-/// correlated.
-pub const SCORE_WINDOW: f64 = 2.0;
-/// Residual over that of the gyro's noise, beyond which something else acts.
-pub const ACCELERATION_MISFIT: f64 = 1.1;
-/// Parts of an interval over which the friction is averaged.
-pub const FRICTION_PARTS: usize = 8;
-/// Rate over the width of the noise beyond which its sign is certain: 1 − tanh is 1e-17.
-pub const CERTAIN_SIGN: f64 = 20.0;
-/// Change of the rate over the width of the noise, up to which its mean sign is that in the middle, to 1e-6.
-pub const SHORT_CHANGE: f64 = 1e-3;
-/// Rounds in which the rows of a hub that sticks are found with the bias.
-pub const STICKING_ROUNDS: usize = 4;
-/// Relative standard deviation of friction.d or omega_s beyond which the sum of squares is not quadratic in them.
-pub const VAGUE_STRIBECK: f64 = 0.3;
-/// Standard deviations by which a friction below zero would explain more, beyond which it is not zero but something else acts.
-pub const DRIVING_FRICTION: f64 = 3.0;
-/// Fall of the likelihood's logarithm that ends a 95 % interval, times two.
-pub const LIKELIHOOD_END: f64 = 3.84;
-/// Rows that are closer are taken together, s. The mean of a sine of 3.5 Hz over it is 0.2 % less than its peak.
+// Friction runs: `methods/friction.rs`.
+// Tests: `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_what_to_do`, `scatter_of_decays_is_no_preferential_direction_and_a_tenth_of_friction_is_one`.
+/// Rows that are closer are taken together for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
 /// Blocks of the shortest recording.
 pub const FEWEST_BLOCKS: usize = 100;
@@ -498,39 +479,12 @@ pub const FEWEST_BLOCKS: usize = 100;
 pub const MOVING_POWER: f64 = 2.0;
 /// Intervals of the rate over which the measured friction is averaged, and the fewest rows of one.
 pub const FRICTION_BINS: (usize, usize) = (160, 3);
-/// Farthest start of the study of starts over the estimate, or the estimate over it.
-pub const ACCELERATION_REACH: f64 = 10.0;
-/// Number of rows on which the starts are compared; the best start is then refined on all rows.
-pub const ROUGH_ROWS: usize = 20_000;
-/// Stride over the grid of Stribeck speeds for intervals.
-pub const GRID_STRIDE: usize = 2;
+/// A rate nearer to zero than this many standard deviations of its noise may be that of a hub that sticks.
+pub const STILL: f64 = 4.0;
 /// Torque below which nothing drives the hub, over the largest torque.
 pub const FREE_TORQUE: f64 = 1e-3;
 /// Speeds of free decay: above this part of the fastest, or the sign is not sure.
 pub const MOVING_SPEED: f64 = 0.05;
-
-// Starts of the acceleration: `methods/acceleration/starts.rs`.
-// Tests: `a_bias_of_five_degrees_a_second_leads_to_no_false_minimum`, `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `a_hub_that_resists_a_growing_torque_shows_the_bias`.
-/// Stribeck speeds of the grid over the fastest speed: the first and the last, and how many.
-pub const SPEED_GRID: (f64, f64, usize) = (2e-3, 3.0, 14);
-/// Basins of the grid that are followed.
-pub const FOLLOWED: usize = 3;
-/// A rate nearer to zero than this many standard deviations of its noise is that of a hub that sticks…
-pub const STILL: f64 = 4.0;
-/// …if so many rows in succession are.
-pub const STILL_RUN: usize = 5;
-/// Difference of the means of the halves of a rest in standard deviations beyond which the hub creeps; chance makes one in two million.
-pub const CREEPS: f64 = 5.0;
-/// Length of a part in which the hub rests without torque, s. A dry bearing that slips changes the rate within
-/// it by more than the noise.
-pub const REST: f64 = 0.5;
-/// Length of a part in which the hub rests under a torque, s.
-pub const LOADED: f64 = 2.0;
-/// Largest standard deviation of the share of the torque's changes that moves the hub: 0 at rest, 1 if it slips.
-pub const MOVING_SHARE: f64 = 0.1;
-
-// Page of the acceleration: `methods/acceleration/page.rs`.
-// Tests: `the_accelerations_least_squares_find_friction_and_inertia_without_its_biases`.
 /// Points of a curve.
 pub const FRICTION_POINTS: usize = 400;
 /// Speeds of the second chart over the Stribeck speed.
@@ -542,36 +496,3 @@ pub const SLOW_CHART: f64 = 4.0;
 pub const DECAY_MISFIT: f64 = 2.0;
 /// Part of the oscillation that another one in the residual has, from which on it is named.
 pub const NAMED_OSCILLATION: f64 = 0.02;
-
-// Frequency: `methods/frequency.rs`.
-// Tests: `ninety_five_percent_intervals_hold_the_truth_in_95_percent_of_records`.
-/// Lines on each side over which the residual's variance is averaged.
-pub const VARIANCE_LINES: usize = 40;
-/// Rounds of weights.
-pub const WEIGHT_ROUNDS: usize = 5;
-/// Residual over the gyro's noise beyond which the plant is not linear, or something else acts.
-pub const FREQUENCY_MISFIT: f64 = 1.3;
-
-// Force records: `force_record.rs`.
-// Tests: `a_forced_record_of_another_integration_gives_the_whole_model`, `a_small_free_decay_does_not_state_mass_and_angle_but_their_product`.
-/// Largest standard deviation of a stated value, over that of its wide prior.
-pub const STATED: f64 = 0.3;
-/// The same where the residual is not noise: the errors of the model may then be ten times those that the fit states.
-pub const STATED_WITHOUT_FIT: f64 = 0.03;
-/// Phase of the first mode from one input to the next: the error of the line between them is a 12th of its square.
-pub const INPUT_PHASE: f64 = 0.05;
-/// Largest number of inputs from one row to the next.
-pub const MOST_INPUTS: f64 = 20.0;
-
-// Starts of force records: `force_record/start.rs`.
-// Tests: `a_tank_that_turns_about_another_point_is_found_from_loads_in_its_axes`.
-/// Standard deviation of the wide priors of s and κ. Liquids have 0.9 to 1.5 and 0.3 to 8.
-pub const WIDE_SHIFT: f64 = 2.0;
-/// Largest number of points of a spectrum.
-pub const SPECTRUM_POINTS: usize = 1 << 14;
-/// Padding of a record with zeros, over its length.
-pub const PADDING: usize = 4;
-/// Slosh angle that is assumed for a first mass, rad.
-pub const ASSUMED_ANGLE: f64 = 0.0873;
-/// Part of a liquid's mass that is assumed to slosh.
-pub const SLOSHING_PART: f64 = 0.4;

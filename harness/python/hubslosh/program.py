@@ -102,8 +102,8 @@ class Estimated:
     """True if the interval has both ends and the standard deviation is below half the value."""
 
 
-Method = Literal["output-error", "acceleration", "frequency", "free-decay"]
-"""The methods of ``hubslosh identify``."""
+Method = Literal["bench", "friction", "decay"]
+"""Kinds of recordings of ``hubslosh identify``."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Identification:
     parameters: dict[str, Estimated]
     """Estimates of the FMU's parameters, by name."""
     measurement: dict[str, Estimated]
-    """Delay, gyro scale and bias; poles and zeros of method "frequency"."""
+    """Delay, gyro scale and bias; frequency and damping of a free decay."""
     model: str | None
     """The chosen slosh model, of a method that has one."""
     settings: dict[str, str]
@@ -190,14 +190,13 @@ def identify(
     data: Table | Sequence[Table],
     model: str | None = None,
     *arguments: str,
-    method: Method = "output-error",
+    method: Method = "bench",
     fmu: str | Path = "HubSlosh",
     free: Mapping[str, Free] | None = None,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
     prior: Mapping[str, tuple[float, float]] | None = None,
     settings: Mapping[str, object] | None = None,
-    tank: str | Path | bool = False,
     out: str | Path | None = None,
     progress: Progress = None,
     program: str | Path | None = None,
@@ -217,10 +216,9 @@ def identify(
     ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
     ``simulate(parameters="result.json")``.
 
-    * ``method``: "output-error" simulates the FMU. "acceleration" fits friction and inertia if no
-      liquid moves. "frequency" fits three poles and two zeros. "free-decay" finds frequency and
-      damping from data without torque: ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or
-      ``omega``.
+    * ``method``: The kind of recordings. "bench": torque and rate of the slosh bench. "friction":
+      the same with an empty tank. "decay": ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or
+      ``omega`` without torque; `all` has its frequency and damping.
 
     * ``free``: Unknowns of any FMU, for ``fmu`` of other makers too. They are Real parameters and
       start values with a start, ``{"mu": 1.0}``, or with start and bounds, ``{"mu": (1.0, 0.1,
@@ -228,28 +226,20 @@ def identify(
     * ``inputs``, ``outputs``: Columns of the data, by the FMU's names.
     * ``prior``: Mean and standard deviation of an unknown.
     * ``settings``: Values of other parameters.
-    * ``tank``: True, or the drawing of a tank (TANK.toml): ``data`` are records of its force and
-      moment, ``Fx`` to ``Mz`` over ``time``, and `all` has its mechanical model as ``"tank"``.
     """
-    if tank and (free is not None or model is not None or method != "output-error"):
-        raise FmuError("tank= fits SloshTank: free=, model= and method= are not for it")
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("--method is given as method=")
-    if free is None and (inputs or outputs or (prior and not tank)):
+    if free is None and (inputs or outputs or prior):
         raise FmuError("inputs=, outputs= and prior= go with free=")
-    if free is not None and (model is not None or method != "output-error"):
+    if free is not None and (model is not None or method != "bench"):
         raise FmuError("free= fits any FMU by output error: model= and method= are not for it")
     path = find_program(program)
-    needed: Sequence[str] = ("time",) if method == "free-decay" else ("time", "tau_cmd", "omega")
+    needed: Sequence[str] = ("time",) if method == "decay" else ("time", "tau_cmd", "omega")
     flags = ["--model", model] if model is not None else []
-    flags += ["--fmu", str(fmu_path("SloshTank" if tank and fmu == "HubSlosh" else fmu))]
-    if tank:
-        needed = ("time",)
-        flags += ["--tank" if tank is True else f"--tank={tank}"]
-        flags += _asked({}, inputs, outputs, prior or {})
-    elif free is None:
-        flags += ["--method", method]
-    else:
+    flags += [] if method == "decay" else ["--fmu", str(fmu_path(fmu))]
+    kind: str = method
+    if free is not None:
+        kind = "fmu"
         needed = (
             ()
             if any(a.split("=")[0] == "--columns" for a in arguments)
@@ -263,7 +253,7 @@ def identify(
         files = [
             _file(table, needed, Path(folder) / f"data{k}.csv") for k, table in enumerate(tables, 1)
         ]
-        loaded: dict[str, Any] = call(path, "identify", [*files, *flags], progress)
+        loaded: dict[str, Any] = call(path, "identify", [kind, *files, *flags], progress)
     estimates = {
         kind: {
             name: Estimated(**e | {"interval": tuple(e["interval"])})

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use experiments::sensors::Sensor;
 use identify::any_fmu::{self, Identification};
-use identify::force_record::Task;
 use identify::input::names::list;
 use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
@@ -25,15 +24,13 @@ use crate::terminal;
 pub struct AnyFmuArgs {
     /// Real parameters and start values of any FMU that are estimated, with bounds (else the FMU's min and max). NAME@each: every
     /// recording has its own. scale(NAME): the error of an input's or output's scale, 0 is exact.
-    #[arg(long, value_name = "NAME=START[:LOW:HIGH],…", group = "fit")]
+    #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
     /// Prior of an unknown: mean and standard deviation.
-    #[arg(long, value_name = "NAME=MEAN:STD,…", requires = "fit")]
+    #[arg(long, value_name = "NAME=MEAN:STD,…")]
     prior: Vec<String>,
-    /// Standard deviations of known values, included in the intervals. With --free: any value that is set, relative (0.5% or 0.005) or
-    /// absolute (5mm; ±0.1 in the variable's unit), and scales of inputs, outputs and clock, scale(NAME), scale(time). Of the bench,
-    /// relative alone: torque (1%), clock (0.01%), g_axial (0.1%), tank.r (0.4%), fluid.rho (0.3%). 0 is exact. --method acceleration
-    /// takes the torque's.
+    /// Standard deviations of known values, included in the intervals: any value that is set, relative (0.5% or 0.005) or
+    /// absolute (5mm; ±0.1 in the variable's unit), and scales of inputs, outputs and clock, scale(NAME), scale(time). 0 is exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
     /// Inputs that the recordings drive.
@@ -50,24 +47,23 @@ pub struct AnyFmuArgs {
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…", requires = "free")]
     sensors: Vec<Sensor>,
     /// Outputs whose sensor has a bias, in each recording another one; STD: what is known of it.
-    #[arg(long, value_name = "OUTPUT[=STD],…", requires = "fit")]
+    #[arg(long, value_name = "OUTPUT[=STD],…")]
     bias: Vec<String>,
     /// Three outputs read by an instrument with three axes, whose scales and alignment (rad) are estimated; SCALE and ANGLE are what
     /// is known of them.
     #[arg(long, value_name = "A,B,C=SCALE:ANGLE", requires = "free")]
     triad: Vec<String>,
     /// The noise of every output drifts: white noise and a Gauss–Markov bias.
-    #[arg(long, requires = "fit")]
+    #[arg(long)]
     drift: bool,
     /// The host steps the FMU (Model Exchange) with this relative tolerance, in place of the FMU's own solver.
     #[arg(long, value_name = "TOLERANCE", requires = "free", num_args = 0..=1, default_missing_value = "1e-8")]
     exchange: Option<f64>,
     /// Relative tolerance that the FMU's own solver is given [default: the FMU's own].
-    #[arg(long, value_name = "TOLERANCE", requires = "fit", conflicts_with = "exchange")]
+    #[arg(long, value_name = "TOLERANCE", conflicts_with = "exchange")]
     solver_tolerance: Option<f64>,
-    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit [default: 8, of
-    /// --tank 2].
-    #[arg(long, value_name = "NUMBER", requires = "fit")]
+    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit [default: 8].
+    #[arg(long, value_name = "NUMBER")]
     tries: Option<usize>,
 }
 
@@ -119,28 +115,9 @@ impl Told<'_> {
 }
 
 impl AnyFmuArgs {
-    /// Returns true if any of these options is given.
+    /// Returns true if unknowns are named.
     pub fn is_asked(&self) -> bool {
         !self.free.is_empty()
-    }
-
-    /// Returns the options that a force record shares: those of priors, offsets, noise and search.
-    ///
-    /// # Errors
-    /// All that is wrong with them.
-    pub fn common(&self, told: &Told) -> Result<Task> {
-        let mut problems = Vec::new();
-        let task = Task {
-            settings: read(&told.texts(), &mut problems),
-            priors: read(&self.prior, &mut problems),
-            biases: read(&self.bias, &mut problems),
-            drift: self.drift,
-            tolerance: self.solver_tolerance,
-            starts: self.tries.unwrap_or(2),
-            ..Task::default()
-        };
-        ensure!(problems.is_empty(), "{}", problems.join("; "));
-        Ok(task)
     }
 
     fn question(&self, told: &Told) -> Result<Question> {

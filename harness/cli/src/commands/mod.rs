@@ -21,7 +21,6 @@ pub mod estimates;
 pub mod example;
 pub mod examples;
 pub mod fmus;
-pub mod force_record;
 pub mod gyro;
 pub mod identify;
 pub mod pack;

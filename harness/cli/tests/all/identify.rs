@@ -91,15 +91,9 @@ fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
     let folder = folder.path();
     record(folder, "data.csv", &[]);
     let report = ["--out", "result.json", "--report", "nowhere/page.html"];
-    let start = ["--out", "result.json", "--method", "frequency", "--start", "tank.d=0.2"];
     for (flags, word) in [
         (&["--out", "nowhere/result.json"][..], "nowhere/result.json cannot be written"),
         (&report, "nowhere/page.html cannot be written"),
-        (
-            &["--out", "result.json", "--bound", "friction.c=0:1"],
-            "--bound is for --method acceleration",
-        ),
-        (&start, "--start is for --method output-error"),
     ] {
         let error = hubslosh(folder, &[&["identify", "data.csv"], flags].concat()).unwrap_err();
         assert!(error.contains(word), "{error}");
@@ -116,26 +110,18 @@ fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
 }
 
 #[test]
-fn friction_by_the_accelerations_least_squares_is_fed_back_to_a_run() {
+fn friction_runs_are_fed_back_to_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    record(folder, "data.csv", &[]);
-    let method = ["--method", "acceleration", "--bound", "friction.omega_s=0.02:0.5"];
-    let asked = [&["identify", "data.csv"][..], &method, &["--out", "friction.json"]].concat();
+    record(folder, "data.csv", &["fluid.rho=1e-6"]);
+    let asked = ["identify", "friction", "data.csv", "--out", "friction.json"];
+    let asked = [&asked[..], &["--report", "friction.html"]].concat();
     let said = hubslosh(folder, &asked).unwrap();
-    assert!(said.contains("correlations:") && said.contains("that of the gyro's noise"), "{said}");
+    assert!(said.contains("The tank is taken as empty"), "{said}");
+    let page = std::fs::read_to_string(folder.join("friction.html")).unwrap();
+    assert!(page.contains("Friction torque against the rate"), "{page}");
     let asked = ["run", "--parameters", "friction.json", "--input", "data.csv", "--ignore-columns"];
     hubslosh(folder, &[&asked[..], &["--out", "twin.csv"]].concat()).unwrap();
-    // the command refuses an option that the method does not use
-    let asked = ["identify", "data.csv", "--method", "acceleration", "--harmonics", "1"];
-    let said = hubslosh(folder, &[&asked[..], &["--out", "a.json"]].concat()).unwrap_err();
-    assert!(said.contains("harmonics of the angle need the column theta"), "{said}");
-    let asked = ["identify", "data.csv", "--method", "frequency", "--out", "a.json"];
-    let said = hubslosh(folder, &asked).unwrap_err();
-    assert!(
-        said.contains("not those of a hub with slosh") || said.contains("not determined"),
-        "{said}"
-    );
 }
 
 #[test]
@@ -171,15 +157,40 @@ fn a_designed_multisine_is_within_the_wheels_limits() {
 }
 
 #[test]
-fn a_removed_method_names_what_replaces_it() {
+fn a_removed_option_names_what_replaces_it() {
     let folder = tempfile::tempdir().unwrap();
-    for (method, replacement) in
-        [("multisine", "Noise or nonlinearity?"), ("black-box", "ARX and ARMAX")]
-    {
-        let asked = ["identify", "a.csv", "--method", method, "--out", "a.json"];
+    for (option, replacement) in [
+        (&["--method", "multisine"][..], "Noise or nonlinearity?"),
+        (&["--method=black-box"], "ARX and ARMAX"),
+        (&["--method", "acceleration"], "identify friction"),
+        (&["--method", "frequency"], "identify bench"),
+        (&["--method", "free-decay"], "identify decay"),
+        (&["--empty"], "identify friction"),
+        (&["--tank=a.toml"], "--fmu SloshTank"),
+    ] {
+        let asked = [&["identify", "a.csv"], option, &["--out", "a.json"]].concat();
         let said = hubslosh(folder.path(), &asked).unwrap_err();
         assert!(said.contains("was removed") && said.contains(replacement), "{said}");
     }
+}
+
+/// `identify FILE` is `identify bench FILE`, and with --free `identify fmu FILE`.
+#[test]
+fn a_command_without_a_kind_of_recording_has_the_usual_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let parsed = |arguments: &[&str]| {
+        let all = [&["--parse-only", "identify"], arguments, &["--out", "a.json"]].concat();
+        hubslosh(folder.path(), &all)
+    };
+    for kind in [&[][..], &["bench"]] {
+        assert!(parsed(&[kind, &["a.csv", "--model", "linear"]].concat()).is_ok());
+    }
+    for kind in [&[][..], &["fmu"]] {
+        assert!(parsed(&[kind, &["a.csv", "--free", "mu=1", "--outputs", "x"]].concat()).is_ok());
+    }
+    // an option of another kind of recording is refused
+    let error = parsed(&["friction", "a.csv", "--model", "linear"]).unwrap_err();
+    assert!(error.contains("unexpected argument '--model'"), "{error}");
 }
 
 #[test]
@@ -197,8 +208,7 @@ fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage
     assert_ne!(found["parameters"]["slosh.zeta"]["value"], 0.01, "{json}");
     // by which the ratio has no effect, of which the FMU warns
     record(folder.path(), "data.csv", &[]);
-    let method = ["--method", "acceleration", "--out", "a.json"];
-    let identify = [&["identify", "data.csv"], &method[..]].concat();
+    let identify = ["identify", "friction", "data.csv", "--out", "a.json"];
     for command in [&asked[..], &identify] {
         let said = run(folder.path(), &[command, &both].concat()).stderr;
         let said = String::from_utf8_lossy(&said).into_owned();

@@ -8,7 +8,6 @@ mod page;
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
-use maud::Markup;
 use serde::Serialize;
 
 use crate::estimate::{Estimated, prose};
@@ -317,7 +316,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<I
 }
 
 /// Sentence about intervals of a fit without tolerances.
-pub(crate) const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
+const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
 
 /// Writes remarks about one estimate.
 fn say(
@@ -427,10 +426,5 @@ pub fn lines(found: &Identification) -> Vec<String> {
 
 /// The page, in HTML.
 pub fn page(found: &Identification) -> String {
-    page_with(found, Markup::default())
-}
-
-/// The page with a section before the verdict, in HTML.
-pub fn page_with(found: &Identification, first: Markup) -> String {
-    page::of(found, first)
+    page::of(found)
 }

@@ -1,14 +1,14 @@
 //! One self-contained page on the identification of any FMU.
 
-use maud::{Markup, html};
+use maud::html;
 use report::page::table;
 
 use super::Identification;
 use crate::estimate::prose;
 use crate::words::page::{self, Sections};
 
-/// The page; `first` comes before the verdict.
-pub fn of(found: &Identification, first: Markup) -> String {
+/// The page.
+pub fn of(found: &Identification) -> String {
     let outputs = found.details.outputs.iter().map(|o| {
         vec![
             format!("{}, {}", o.recording, o.name),
@@ -24,5 +24,5 @@ pub fn of(found: &Identification, first: Markup) -> String {
              deviations of chance; 5 is the limit." }
         (table(["output", "rows", "noise", "fit, %", "worst test"], outputs))
     };
-    page::of(found, &Sections { first, figures, ..Sections::default() })
+    page::of(found, &Sections { figures, ..Sections::default() })
 }

@@ -224,6 +224,9 @@ impl Recording {
         }
         let rows = |time: f64| (time / self.step()) as usize;
         let (run_in, length) = (rows(run_in), rows(seconds));
+        if length < 3 {
+            return None; // the rows are farther apart than the part is long
+        }
         // about the mean: a gyro's bias is not motion
         let moving = about_mean(&self.rate);
         let power =

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::friction::{Braking, FrictionPoint};
 use crate::fit::bench::candidate::ModelFit;
 use crate::fit::bench::start::Response;
 use crate::model::bench::nominal::Start;
@@ -36,6 +37,12 @@ pub struct Details {
     /// Ends of searches from other starts, if requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub starts: Vec<Trial>,
+    /// Braking over the angle in free decay, counter-clockwise and clockwise, of friction runs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub braking: Vec<Braking>,
+    /// Measured friction over the rate, of friction runs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub friction_points: Vec<FrictionPoint>,
     /// Largest slosh angle of the fit, rad; 0 without slosh.
     pub slosh_angle: f64,
     /// Wall time, s.

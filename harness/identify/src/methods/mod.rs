@@ -1,19 +1,15 @@
 //! Methods of identification, one a file: what each is given, what it needs of that, and what all return.
 
-pub mod acceleration;
 pub mod free_decay;
-pub mod frequency;
+pub mod friction;
 pub mod identification;
 pub mod output_error;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use host::fmu::Fmu;
 use serde::Serialize;
 
-use crate::fit::bench::start;
-use crate::input::plausible;
 use crate::input::recording::Recording;
-use crate::model::bench::nominal::Nominal;
 use crate::news::News;
 use crate::words::identified::Identified;
 use crate::words::page::{self, Sections};
@@ -32,24 +28,6 @@ pub struct Task<'a> {
 impl<'a> Task<'a> {
     fn fmu(&self) -> Result<&'a Fmu> {
         self.fmu.context("this method needs an FMU")
-    }
-
-    fn one(&self) -> Result<&'a Recording> {
-        match self.recordings {
-            [one] => Ok(one),
-            _ => bail!(
-                "this method takes one uninterrupted recording, not {}",
-                self.recordings.len()
-            ),
-        }
-    }
-
-    /// Refuses recordings of another bench than the FMU's: units or inertia are wrong.
-    fn check_size(&self, nominal: &Nominal) -> Result<()> {
-        match start::from_data(self.recordings, nominal)? {
-            (Some(found), _) => plausible::check_size(found.inertia, nominal.inertia),
-            (None, _) => Ok(()),
-        }
     }
 }
 

@@ -8,8 +8,9 @@
 //! ```
 
 use analysis::random::Random;
-use identify::force_record::{ForceRecord, Frame, LOADS, Raw, Task, identify, lines, page};
-use identify::input::question::{Bias, Setting, Solver};
+use identify::any_fmu::{Identification, identify};
+use identify::input::question::{Question, Solver};
+use identify::input::record::Record;
 use identify::model::simulate::Model;
 use ode_solvers::{Rk4, System, Vector2};
 use pack::{MODELS, packed_model_for_tests};
@@ -88,16 +89,17 @@ impl Tank {
         -rest / inertia
     }
 
-    /// The record over `seconds` with rows `step` apart, released at an angle; noise as a part of each load's deviation.
-    fn record(&self, seconds: f64, step: f64, angle: f64, noise: f64, seed: u64) -> Raw {
+    /// The record over `seconds` with loads `step` apart, released at an angle; noise as a part of each load's deviation. The motion has
+    /// four rows a step, because a line from row to row loses (ω h)²/12 of a wave.
+    fn record(&self, seconds: f64, step: f64, angle: f64, noise: f64, seed: u64) -> Record {
         let start = Vector2::new(self.length * angle.sin(), 0.0);
-        // ten steps a row: ω h is 0.03, and the fifth power of that is 2e-8
-        let mut solver = Rk4::new(*self, 0.0, start, seconds, 0.1 * step);
+        // twelve steps a row: ω h is 0.03, and the fifth power of that is 2e-8
+        let mut solver = Rk4::new(*self, 0.0, start, seconds, step / 12.0);
         solver.integrate().unwrap();
-        let mut raw = Raw { name: "twin".into(), ..Raw::default() };
+        let mut record = Record { name: "twin".into(), ..Record::default() };
         let mut loads = [Vec::new(), Vec::new(), Vec::new()];
         let mut motion = Vec::new();
-        for (t, x) in solver.x_out().iter().zip(solver.y_out()).step_by(10) {
+        for (t, x) in solver.x_out().iter().zip(solver.y_out()).step_by(3) {
             let (q, v) = (x[0], x[1]);
             let qdd = self.acceleration(*t, q, v);
             let [z, slope, bend] = self.curve(q);
@@ -106,24 +108,30 @@ impl Tank {
             let (fx, fz) = (-self.mass * (qdd + drive), -self.mass * (zdd + G));
             let height = self.hinge - self.length + z;
             let rigid = -self.m_0 * drive;
-            raw.time.push(*t);
+            record.time.push(*t);
             loads[0].push(fx + rigid);
             loads[1].push(fz - self.m_0 * G);
             loads[2].push(height * fx - q * fz + self.h_0 * rigid);
             motion.push(drive);
         }
-        let mut random = Random::new(seed, 0);
-        for values in &mut loads {
-            let size = noise * analysis::statistics::deviation(values).max(0.1 * 0.2);
-            values.iter_mut().for_each(|value| *value += size * random.normal());
-        }
-        let [fx, fz, my] = loads;
-        raw.loads = [Some(fx), None, Some(fz), None, Some(my), None];
-        if self.drive[0] != 0.0 {
-            raw.motion[3] = Some(motion);
-        }
-        raw
+        record.outputs = measured(loads, |deviation| noise * deviation.max(0.02), seed);
+        record.inputs = vec![motion];
+        record
     }
+}
+
+/// Loads with noise, in every fourth row.
+fn measured(loads: [Vec<f64>; 3], size: impl Fn(f64) -> f64, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = Random::new(seed, 0);
+    let one = |values: Vec<f64>| -> Vec<f64> {
+        let size = size(analysis::statistics::deviation(&values));
+        let mut read = |(k, value): (usize, f64)| match k % 4 {
+            0 => value + size * random.normal(),
+            _ => f64::NAN,
+        };
+        values.into_iter().enumerate().map(&mut read).collect()
+    };
+    loads.into_iter().map(one).collect()
 }
 
 impl System<f64, Vector2<f64>> for Tank {
@@ -133,130 +141,123 @@ impl System<f64, Vector2<f64>> for Tank {
     }
 }
 
-fn task() -> Task {
-    Task {
-        frame: Frame { axes: Frame::axes("x,y,z").unwrap(), ..Frame::default() },
-        gravity: G,
-        starts: 2,
-        ..Task::default()
+/// Starts and bounds as one would read them off a drawing and the record's spectrum.
+const FREE: [(&str, &str); 9] = [
+    ("tank.mass[1]", "0.5:0.05:3"),
+    ("tank.length[1]", "0.05:0.03:0.08"),
+    ("tank.hinge[1]", "0.06:-0.2:0.3"),
+    ("tank.zeta[1]", "0.006:0:0.1"),
+    ("tank.zeta_amplitude[1]", "0.005:0:0.5"),
+    ("tank.nonlinear_inertia[1]", "1:-3:5"),
+    ("tank.nonlinear_stiffness[1]", "1:-3:5"),
+    ("tank.m_0", "1:0.1:5"),
+    ("tank.H_0", "0.05:-0.2:0.3"),
+];
+
+/// The question with these unknowns left out of [`FREE`], and values of the FMU.
+fn question(without: &[&str], settings: &[&str]) -> Question {
+    let names = |names: &[&str]| names.iter().map(|name| name.to_string()).collect();
+    let free = FREE.iter().filter(|(name, _)| !without.contains(name));
+    let usual = [
+        "tank.modes=1",
+        "tank.I_z=0",
+        "tank.I_0=0",
+        "tank.zeta_breaking[1]=0",
+        "tank.position[1]=0",
+        "tank.position[3]=0",
+    ];
+    let height = format!("a[3]={G}");
+    let gravity = format!("tank.g_ref={G}");
+    let usual = usual.into_iter().chain([&*height, &*gravity]);
+    Question {
+        free: free.map(|(name, range)| format!("{name}={range}").parse().unwrap()).collect(),
+        settings: usual.chain(settings.iter().copied()).map(|text| text.parse().unwrap()).collect(),
+        inputs: names(&["a[1]"]),
+        outputs: names(&["force[1]", "force[3]", "torque[2]"]),
+        held: Vec::new(),
+        priors: Vec::new(),
+        tolerances: Vec::new(),
+        sensors: Vec::new(),
+        biases: Vec::new(),
+        triads: Vec::new(),
+        drift: false,
+        solver: Solver::Own,
+        tolerance: None,
+        starts: 8,
     }
 }
 
-fn sloshtank() -> Model {
-    Model::open(packed_model_for_tests(&MODELS[SLOSHTANK]), Solver::Own).unwrap()
+fn found(question: &Question, record: &Record) -> Identification {
+    let model = Model::open(packed_model_for_tests(&MODELS[SLOSHTANK]), Solver::Own).unwrap();
+    let hear = &mut |news: &identify::news::News| println!("{}", news.line());
+    identify(&model, question, std::slice::from_ref(record), hear).unwrap()
 }
 
-fn found(task: &Task, raws: &[Raw]) -> ForceRecord {
-    identify(&sloshtank(), task, raws, &mut |news| println!("{}", news.line())).unwrap()
-}
-
-/// Labels, intervals and truths of what is stated.
-fn compared(tank: &Tank, result: &ForceRecord) -> Vec<(String, [f64; 2], f64)> {
+/// Names, intervals and truths of the estimates.
+fn compared(tank: &Tank, result: &Identification) -> Vec<(String, [f64; 2], f64)> {
     let truth = |name: &str| match name {
-        "tank.mass[1]" => Some(tank.mass),
-        "tank.length[1]" => Some(tank.length),
-        "tank.hinge[1]" => Some(tank.hinge),
-        "tank.zeta[1]" => Some(tank.zeta),
-        "tank.zeta_amplitude[1]" => Some(tank.growth),
-        "tank.zeta_breaking[1]" => Some(tank.breaking),
-        "tank.nonlinear_inertia[1]" => Some(tank.s),
-        "tank.nonlinear_stiffness[1]" => Some(tank.kappa),
-        "tank.m_0" => Some(tank.m_0),
-        "tank.H_0" => Some(tank.h_0),
-        _ => None,
+        "tank.mass[1]" => tank.mass,
+        "tank.length[1]" => tank.length,
+        "tank.hinge[1]" => tank.hinge,
+        "tank.zeta[1]" => tank.zeta,
+        "tank.zeta_amplitude[1]" => tank.growth,
+        "tank.zeta_breaking[1]" => tank.breaking,
+        "tank.nonlinear_inertia[1]" => tank.s,
+        "tank.nonlinear_stiffness[1]" => tank.kappa,
+        "tank.m_0" => tank.m_0,
+        "tank.H_0" => tank.h_0,
+        "tank.I_0" => MOVING.i_0,
+        other => panic!("{other}"),
     };
-    let of =
-        |q: &identify::force_record::Quantity| Some((q.name.clone(), q.interval?, truth(&q.name)?));
-    result.tank.iter().filter_map(of).collect()
+    result.parameters.iter().map(|(name, p)| (name.clone(), p.interval, truth(name))).collect()
 }
 
-fn is_untold(result: &ForceRecord, name: &str, words: &str) {
-    let q = result.tank.iter().find(|q| q.name == name).unwrap();
-    assert!(q.value.is_none() && q.interval.is_none(), "{q:?}");
-    assert!(q.reason.as_ref().unwrap().contains(words), "{q:?}");
-    assert!(!result.found.parameters.contains_key(name));
+/// Asserts that the fit is accepted, and that each truth is within 4 standard deviations.
+fn holds(tank: &Tank, result: &Identification) {
+    assert_eq!(result.fits, Some(true), "{:#?}", result.verdict);
+    for (name, [low, high], truth) in compared(tank, result) {
+        // half as wide again on either side, and once more
+        let room = 0.5 * (high - low) + 1e-9;
+        assert!(low - room < truth && truth < high + room, "{name}: {low} to {high}, not {truth}");
+    }
 }
 
 const FORCED: Tank = Tank { drive: [0.1, 2.2, 0.03], growth: 0.01, ..TANK };
 
 #[test]
-#[ignore = "8 s of CPU time: .ci/run --nightly"]
 fn a_forced_record_of_another_integration_gives_the_whole_model() {
-    let raw = FORCED.record(10.0, 0.02, 0.0, 0.01, 1);
-    let result = found(&task(), &[raw]);
-    assert_eq!(result.found.fits, Some(true), "{:#?}", lines(&result));
-    let stated = compared(&FORCED, &result);
-    for name in
-        ["tank.mass[1]", "tank.length[1]", "tank.hinge[1]", "tank.zeta[1]", "tank.m_0", "tank.H_0"]
-    {
-        assert!(stated.iter().any(|(other, ..)| other == name), "{name}: {:#?}", lines(&result));
+    let record = FORCED.record(10.0, 0.02, 0.0, 0.01, 1);
+    let result = found(&question(&[], &[]), &record);
+    holds(&FORCED, &result);
+    for (name, [low, high], truth) in compared(&FORCED, &result) {
+        let narrow = ["tank.mass[1]", "tank.length[1]", "tank.hinge[1]", "tank.m_0"];
+        assert!(!narrow.contains(&&*name) || high - low < 0.05 * truth, "{name}: {low} to {high}");
     }
-    for (name, [low, high], truth) in &stated {
-        // 4 standard deviations: half as wide again on either side, and once more
-        let room = 0.5 * (high - low) + 1e-9;
-        assert!(
-            low - room < *truth && *truth < high + room,
-            "{name}: {low} to {high}, not {truth}"
-        );
-    }
-    is_untold(&result, "tank.zeta_breaking[1]", "never breaks");
 }
 
-#[test]
-#[ignore = "11 s of CPU time: .ci/run --nightly"]
-fn a_small_free_decay_does_not_state_mass_and_angle_but_their_product() {
-    let raw = TANK.record(12.0, 0.02, 0.035, 0.02, 2);
-    let mut raw = raw;
-    raw.loads[2] = None;
-    let result = found(&task(), std::slice::from_ref(&raw));
-    is_untold(&result, "tank.mass[1]", "product of modal mass and slosh angle");
-    is_untold(&result, "tank.p_0[1,1]@1", "product of modal mass and slosh angle");
-    is_untold(&result, "tank.nonlinear_stiffness[1]", "does not show");
-    let product = result.tank.iter().find(|q| q.label.starts_with("modal mass times")).unwrap();
-    let [low, high] = product.interval.unwrap();
-    let truth = TANK.mass * 0.035_f64.tan();
-    assert!(low - 0.5 * (high - low) < truth && truth < high + 0.5 * (high - low), "{product:?}");
-    for (name, [low, high], truth) in compared(&TANK, &result) {
-        let room = 0.5 * (high - low);
-        assert!(low - room < truth && truth < high + room, "{name}: {low} to {high}, not {truth}");
-    }
-    let text = page(&result);
-    assert!(
-        text.contains("Mechanical model") && text.contains("not told") && !text.contains("NaN")
-    );
-    // the known angle gives the mass
-    let known = found(&Task { release: Some([0.035, 0.0]), ..task() }, &[raw]);
-    let mass = known.tank.iter().find(|q| q.name == "tank.mass[1]").unwrap();
-    assert!((mass.value.unwrap() / TANK.mass - 1.0).abs() < 0.01, "{mass:?}");
+/// Settings of a release at rest at an angle, rad.
+fn released(angle: f64) -> [String; 2] {
+    [format!("tank.p_0[1,1]={}", angle.sin()), format!("tank.p_0[1,3]={}", -angle.cos())]
 }
 
-/// The same record in the frame of a CFD code with y upwards, about another point and as reaction, gives the same model.
+/// Mass and angle stand for one another in a small free decay: a known angle gives the mass.
 #[test]
-fn frame_point_and_sign_do_not_change_the_model() {
-    let raw = TANK.record(4.0, 0.02, 0.15, 0.01, 3);
-    let release = Some([0.15, 0.0]);
-    let own = found(&Task { release, ..task() }, std::slice::from_ref(&raw));
-    // tank x = record z, tank y = record x, tank z = record y; about a point 0.2 m above and 0.03 m off its axis
-    let [fx, _, fz, _, my, _] = raw.loads.clone();
-    let negative =
-        |values: Option<Vec<f64>>| values.map(|v| v.into_iter().map(|x| -x).collect::<Vec<f64>>());
-    let (point, zipped) = ([0.03, 0.0, 0.2], fx.iter().flatten().zip(fz.iter().flatten()));
-    let lever: Vec<f64> = zipped.map(|(fx, fz)| 0.2 * fx - 0.03 * fz).collect();
-    let moment = my.map(|my| my.iter().zip(&lever).map(|(m, l)| m - l).collect::<Vec<f64>>());
-    let mut other = Raw { name: "cfd".into(), time: raw.time.clone(), ..Raw::default() };
-    other.loads[2] = negative(fx);
-    other.loads[1] = negative(fz);
-    other.loads[3] = negative(moment);
-    let frame =
-        Frame { axes: Frame::axes("z,x,y").unwrap(), point, is_reaction: true, is_fixed: false };
-    let turned = found(&Task { frame, release, ..task() }, &[other]);
-    for (a, b) in own.tank.iter().zip(&turned.tank) {
-        assert_eq!(a.label, b.label);
-        if let (Some(x), Some(y), Some([low, high])) = (a.value, b.value, a.interval) {
-            // the noise of the moment is another one about another point
-            assert!((x - y).abs() < 0.5 * (high - low) + 1e-9, "{}: {x} and {y}", a.label);
-        }
-    }
+fn a_free_decay_from_a_known_angle_gives_the_mass() {
+    let record = TANK.record(12.0, 0.02, 0.035, 0.02, 2);
+    let [x, z] = released(0.035);
+    let third = ["tank.nonlinear_inertia[1]=1.41", "tank.nonlinear_stiffness[1]=0.73"];
+    let unseen = [
+        "tank.nonlinear_inertia[1]",
+        "tank.nonlinear_stiffness[1]",
+        "tank.zeta_amplitude[1]",
+        "tank.H_0",
+    ];
+    let question = question(&unseen, &[&third[..], &["tank.zeta_amplitude[1]=0", &x, &z]].concat());
+    let still = Record { inputs: vec![vec![0.0; record.time.len()]], ..record };
+    let result = found(&question, &still);
+    holds(&TANK, &result);
+    let mass = &result.parameters["tank.mass[1]"];
+    assert!((mass.value / TANK.mass - 1.0).abs() < 0.01, "{mass:?}");
 }
 
 /// A tank that moves along its x axis and turns about its y axis through a reference point.
@@ -305,11 +306,12 @@ impl Moving {
         -rest / (1.0 + slope * slope + own * q * q)
     }
 
-    /// Rows of time, displacement and its second derivative, angle, and Fx, Fz, My in the tank's axes about the reference point.
-    fn rows(&self, seconds: f64, step: f64) -> Vec<[f64; 7]> {
-        let mut solver = Rk4::new(*self, 0.0, Vector2::new(0.0, 0.0), seconds, 0.1 * step);
+    /// Rows of time, specific force along x and z, angular rate and acceleration about y, and Fx, Fz, My about the reference point, in the
+    /// tank's axes.
+    fn rows(&self, seconds: f64, step: f64) -> Vec<[f64; 8]> {
+        let mut solver = Rk4::new(*self, 0.0, Vector2::new(0.0, 0.0), seconds, step / 12.0);
         solver.integrate().unwrap();
-        let at = solver.x_out().iter().zip(solver.y_out()).step_by(10);
+        let at = solver.x_out().iter().zip(solver.y_out()).step_by(3);
         at.map(|(t, x)| {
             let (t, q, v) = (*t, x[0], x[1]);
             let [z, slope, bend] = self.tank.curve(q);
@@ -320,9 +322,10 @@ impl Moving {
                 [bob[0] + q_dd, bob[1] + slope * q_dd + bend * v * v].map(|a| -self.tank.mass * a);
             let lever = self.tank.h_0 - self.point;
             let [rx, rz] = self.carried(t, [0.0, lever], [0.0; 2]).map(|a| -self.tank.m_0 * a);
-            let [[along, _, along_dd], [angle, _, angle_dd]] = self.motion(t);
+            let [_, [_, rate, angle_dd]] = self.motion(t);
             let moment = height * fx - q * fz + lever * rx - self.i_0 * angle_dd;
-            [t, along, along_dd, angle, fx + rx, fz + rz, moment]
+            let [along, up] = self.carried(t, [0.0; 2], [0.0; 2]);
+            [t, along, up, rate, angle_dd, fx + rx, fz + rz, moment]
         })
         .collect()
     }
@@ -342,169 +345,81 @@ const MOVING: Moving = Moving {
     size: [0.0015, 0.05],
 };
 
-/// The task of a record of [`MOVING`] with the tank's x axis along z and its z axis along y; the damping and the third order are known.
-fn moving(is_fixed: bool) -> Task {
-    let axes = Frame::axes("z,x,y").unwrap();
-    let point = [0.0, 0.0, MOVING.point];
-    Task {
-        frame: Frame { axes, point, is_fixed, is_reaction: false },
-        release: Some([0.0; 2]),
-        settings: vec![
-            known("zeta[1]", "0.004"),
-            known("zeta_amplitude[1]", "0"),
-            known("zeta_breaking[1]", "0"),
-            known("breaking_steepness[1]", "0.63"),
-            known("nonlinear_inertia[1]", "1"),
-            known("nonlinear_stiffness[1]", "1"),
-        ],
-        ..task()
-    }
-}
-
-/// The record of [`MOVING`], with displacement or acceleration, loads in turned or fixed axes, and noise.
-fn moved(has_displacement: bool, is_fixed: bool) -> Raw {
+/// The record of [`MOVING`], with offsets of the balance, and its question: damping and third order are known.
+fn moved(offsets: [f64; 3]) -> (Question, Record) {
     let rows = MOVING.rows(4.0, 0.01);
-    let mut raw = Raw { name: "moved".into(), ..Raw::default() };
-    let mut loads = [Vec::new(), Vec::new(), Vec::new()];
-    let mut motion = [Vec::new(), Vec::new()];
-    for [t, along, along_dd, angle, fx, fz, my] in rows {
-        raw.time.push(t);
-        motion[0].push(if has_displacement { along } else { along_dd });
-        motion[1].push(angle);
-        let (sin, cos) = angle.sin_cos();
-        let in_space = [cos * fx + sin * fz, cos * fz - sin * fx];
-        let [fx, fz, my] = match is_fixed {
-            // the fixed reference point is that at rest
-            true => [in_space[0], in_space[1], my - along * in_space[1]],
-            false => [fx, fz, my],
-        };
-        loads[0].push(fx);
-        loads[1].push(fz);
-        loads[2].push(my);
+    let column = |k: usize| -> Vec<f64> { rows.iter().map(|row| row[k]).collect() };
+    let mut outputs = measured([5, 6, 7].map(column), |_| 1.0, 7);
+    for (k, (values, size)) in outputs.iter_mut().zip([0.01, 0.01, 0.001]).enumerate() {
+        // the noise is that of the balance
+        let clean = column(5 + k);
+        for (value, clean) in values.iter_mut().zip(clean) {
+            *value = clean + offsets[k] + size * (*value - clean);
+        }
     }
-    let mut random = Random::new(7, 0);
-    for (values, size) in loads.iter_mut().zip([0.01, 0.01, 0.001]) {
-        values.iter_mut().for_each(|value| *value += size * random.normal());
-    }
-    let ([fx, fz, my], [along, angle]) = (loads, motion);
-    raw.loads = [None, Some(fz), Some(fx), Some(my), None, None];
-    raw.motion[if has_displacement { 2 } else { 5 }] = Some(along);
-    raw.motion[6] = Some(angle);
-    raw
-}
-
-fn holds_the_moved_tank(result: &ForceRecord) {
-    assert_eq!(result.found.fits, Some(true), "{:#?}", lines(result));
-    let stated = compared(&MOVING.tank, result);
-    assert!(stated.len() == 5, "{:#?}", lines(result));
-    let inertia = result.tank.iter().find(|q| q.name == "tank.I_0").unwrap();
-    let all =
-        stated.into_iter().chain([(inertia.name.clone(), inertia.interval.unwrap(), MOVING.i_0)]);
-    for (name, [low, high], truth) in all {
-        // 4 standard deviations, and no wider than a tenth of the value
-        let room = 0.5 * (high - low);
-        assert!(high - low < 0.1 * truth, "{name}: {low} to {high}");
-        assert!(low - room < truth && truth < high + room, "{name}: {low} to {high}, not {truth}");
-    }
+    let inputs = [1, 2, 3, 4].map(column).to_vec();
+    let record = Record { name: "moved".into(), time: column(0), inputs, outputs };
+    let third = ["tank.nonlinear_inertia[1]", "tank.nonlinear_stiffness[1]"];
+    let without = [&["tank.zeta[1]", "tank.zeta_amplitude[1]"], &third[..]].concat();
+    let place = format!("tank.position[3]={}", -MOVING.point);
+    let known =
+        ["tank.zeta[1]=0.004", "tank.nonlinear_inertia[1]=1", "tank.nonlinear_stiffness[1]=1"];
+    let mut question = question(&without, &[&known[..], &[&*place]].concat());
+    question.settings.retain(|setting| setting.name != "tank.I_0");
+    question.free.push("tank.I_0=0.001:0:0.1".parse().unwrap());
+    question.inputs = ["a[1]", "a[3]", "omega[2]", "omega_dot[2]"].map(String::from).to_vec();
+    (question, record)
 }
 
 #[test]
-fn a_tank_that_turns_about_another_point_is_found_from_loads_in_its_axes() {
-    holds_the_moved_tank(&found(&moving(false), &[moved(false, false)]));
-}
-
-#[test]
-fn a_displacement_and_loads_in_fixed_axes_give_the_same_tank() {
-    holds_the_moved_tank(&found(&moving(true), &[moved(true, true)]));
-}
-
-#[test]
-fn offsets_of_a_balance_are_found_in_the_signs_of_its_record() {
-    let mut raw = moved(false, false);
-    let offsets = [(2, 0.2), (3, -0.03)];
-    for (k, offset) in offsets {
-        raw.loads[k].iter_mut().flatten().for_each(|value| *value += offset);
+fn a_tank_that_turns_about_another_point_is_found_with_the_offsets_of_its_balance() {
+    for offsets in [[0.0; 3], [0.2, 0.0, -0.03]] {
+        let (mut question, record) = moved(offsets);
+        if offsets != [0.0; 3] {
+            question.biases = ["force[1]", "torque[2]"].map(|name| name.parse().unwrap()).to_vec();
+        }
+        let result = found(&question, &record);
+        holds(&MOVING.tank, &result);
+        for (name, p) in &result.parameters {
+            let [low, high] = p.interval;
+            assert!(high - low < 0.1 * p.value, "{name}: {p:?}");
+        }
+        for (name, p) in &result.measurement {
+            let truth = if name.starts_with("bias(force[1])") { offsets[0] } else { offsets[2] };
+            assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.03, "{name}: {p:?}");
+        }
     }
-    raw.loads.iter_mut().flatten().flatten().for_each(|value| *value = -*value);
-    let mut task = moving(false);
-    task.frame.is_reaction = true;
-    let bias = |k: usize| Bias { output: LOADS[k].0.into(), std: None };
-    task.biases = offsets.map(|(k, _)| bias(k)).into();
-    let result = found(&task, std::slice::from_ref(&raw));
-    holds_the_moved_tank(&result);
-    for (name, truth) in [("bias(Fz)@1", -0.2_f64), ("bias(Mx)@1", 0.03)] {
-        let q = result.tank.iter().find(|q| q.name == name).unwrap();
-        let [low, high] = q.interval.unwrap();
-        let room = 0.5 * (high - low);
-        assert!(high - low < 0.1 * truth.abs(), "{q:?}");
-        assert!(low - room < truth && truth < high + room, "{q:?}");
-    }
-    // a load that is not recorded, and axes in which an offset changes with the motion
-    task.biases = vec![bias(0)];
-    let refused =
-        |task: &Task| identify(&sloshtank(), task, &[raw.clone()], &mut |_| {}).unwrap_err();
-    assert!(refused(&task).to_string().contains("allowed: Fy, Fz, Mx"));
-    task.biases = vec![bias(2)];
-    task.frame.is_fixed = true;
-    assert!(refused(&task).to_string().contains("--bias with --fixed"));
 }
 
 /// A tank whose waves break.
 const BREAKS: Tank = Tank { growth: 0.01, breaking: 0.04, ..TANK };
 
-fn known(name: &str, value: &str) -> Setting {
-    Setting { name: format!("tank.{name}"), recording: None, value: value.into() }
-}
-
-/// Asserts that the damping by breaking is stated, with the truth in 4 standard deviations.
-fn holds_the_breaking(result: &ForceRecord) {
-    let stated = compared(&BREAKS, result);
-    let of = |name: &str| stated.iter().find(|(other, ..)| other == name).unwrap();
-    for name in ["tank.zeta[1]", "tank.zeta_breaking[1]"] {
-        let (_, [low, high], truth) = of(name);
-        let room = 0.5 * (high - low);
-        assert!(low - room < *truth && *truth < high + room, "{name}: {low} to {high}");
-    }
-}
-
+/// Without the damping of breaking waves the residual is not noise.
 #[test]
-fn a_misfit_of_waves_that_break_names_the_option_that_estimates_their_damping() {
-    let raw = BREAKS.record(4.0, 0.02, 0.6, 0.01, 11);
-    let settings = vec![
-        known("nonlinear_inertia[1]", "1.41"),
-        known("nonlinear_stiffness[1]", "0.73"),
-        known("zeta_amplitude[1]", "0.01"),
+fn waves_that_break_do_not_fit_without_their_damping_which_a_known_release_gives() {
+    let record = BREAKS.record(4.0, 0.02, 0.6, 0.01, 11);
+    let still = Record { inputs: vec![vec![0.0; record.time.len()]], ..record };
+    let [x, z] = released(0.6);
+    let third = ["tank.nonlinear_inertia[1]", "tank.nonlinear_stiffness[1]"];
+    let without = [&["tank.zeta_amplitude[1]", "tank.m_0", "tank.H_0"], &third[..]].concat();
+    let known = [
+        "tank.nonlinear_inertia[1]=1.41",
+        "tank.nonlinear_stiffness[1]=0.73",
+        "tank.zeta_amplitude[1]=0.01",
+        "tank.breaking_steepness[1]=0.63",
+        "tank.m_0=1.33",
+        "tank.H_0=0.045",
+        &x,
+        &z,
     ];
-    let release = Some([0.6, 0.0]);
-    let breaks = |task: &Task| {
-        let result = found(task, std::slice::from_ref(&raw));
-        let words = result.found.verdict.iter().find(|line| line.contains("waves that break"));
-        (words.cloned().unwrap_or_default(), result)
-    };
-    let (words, result) = breaks(&Task { settings: settings.clone(), ..task() });
-    assert_eq!(result.found.fits, Some(false), "{:#?}", lines(&result));
-    assert!(words.contains("--release DEG or --set tank.mass[1]=KG"), "{words}");
-
-    let unbroken = [settings.clone(), vec![known("zeta_breaking[1]", "0")]].concat();
-    let (words, result) = breaks(&Task { release, settings: unbroken, ..task() });
-    assert_eq!(result.found.fits, Some(false), "{:#?}", lines(&result));
-    assert!(words.contains("without --set tank.zeta_breaking[1]"), "{words}");
-
-    let (words, result) = breaks(&Task { release, settings, ..task() });
-    assert_eq!(result.found.fits, Some(true), "{:#?}", lines(&result));
-    assert_eq!(words, "");
-    holds_the_breaking(&result);
-}
-
-/// The force has overtones at which the tank does not move: no resonances.
-#[test]
-#[ignore = "10 s of CPU time: .ci/run --nightly"]
-fn a_forced_record_of_waves_that_break_gives_their_damping() {
-    let tank = Tank { drive: [0.35, 2.2, 0.03], ..BREAKS };
-    let raw = tank.record(10.0, 0.02, 0.0, 0.01, 12);
-    let result = found(&task(), &[raw]);
-    assert_eq!(result.found.fits, Some(true), "{:#?}", lines(&result));
-    holds_the_breaking(&result);
+    let mut question = question(&without, &known);
+    let unbroken = found(&question, &still);
+    assert_eq!(unbroken.fits, Some(false), "{:#?}", unbroken.verdict);
+    question.settings.retain(|setting| setting.name != "tank.zeta_breaking[1]");
+    question.free.push("tank.zeta_breaking[1]=0.02:0:0.2".parse().unwrap());
+    let result = found(&question, &still);
+    holds(&BREAKS, &result);
+    assert!(result.parameters["tank.zeta_breaking[1]"].std < 0.01, "{:?}", result.parameters);
 }
 
 /// Coverage of the 95 % intervals over 20 draws of noise. Statements of one draw are correlated, so that 90 % is two standard deviations
@@ -516,12 +431,11 @@ fn intervals_of_force_records_hold_the_truth_in_95_percent_of_20_draws() {
     let (from, to) = draws.split_once('-').expect("HUBSLOSH_DRAWS is FROM-TO");
     let (from, to): (u64, u64) = (from.parse().unwrap(), to.parse().unwrap());
     let mut all = std::collections::BTreeMap::<String, (u32, u32)>::new();
-    let mut trusted = 0;
+    let mut fitted = 0;
     for seed in from..=to {
-        let raw = FORCED.record(10.0, 0.02, 0.0, 0.01, seed);
-        let result = found(&task(), &[raw]);
-        trusted += u64::from(result.trusted);
-        println!("{seed:3} trusted: {}", result.trusted);
+        let record = FORCED.record(10.0, 0.02, 0.0, 0.01, seed);
+        let result = found(&question(&[], &[]), &record);
+        fitted += u64::from(result.fits == Some(true));
         for (name, [low, high], truth) in compared(&FORCED, &result) {
             let count = all.entry(name.clone()).or_default();
             count.0 += u32::from(low <= truth && truth <= high);
@@ -534,7 +448,7 @@ fn intervals_of_force_records_hold_the_truth_in_95_percent_of_20_draws() {
     for (name, (inside, of)) in &all {
         println!("{name:28} {inside} of {of}");
     }
-    println!("{trusted} of {} fits are trusted", to + 1 - from);
+    println!("{fitted} of {} fit", to + 1 - from);
     println!("together {inside} of {of}: {:.1} %", 100.0 * f64::from(inside) / f64::from(of));
     let share = f64::from(inside) / f64::from(of);
     assert!(share >= 0.9, "{all:?}");

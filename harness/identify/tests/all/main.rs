@@ -1,6 +1,5 @@
 //! Identification of simulated benches: estimates, uncertainties and verdicts.
 
-mod acceleration;
 mod any_fmu;
 #[path = "../../examples/twins/bench.rs"]
 #[allow(dead_code, reason = "the example looks at more of it")]
@@ -13,10 +12,10 @@ mod draw;
 #[allow(dead_code, reason = "the examples use the rest of it")]
 mod fmu_twin;
 mod force_record;
+mod friction;
 #[allow(dead_code, reason = "the example writes every habit")]
 #[path = "../../examples/twins/habits.rs"]
 mod habits;
-mod methods;
 mod other_bench;
 mod out_of_range;
 #[path = "../../examples/friction/runs.rs"]

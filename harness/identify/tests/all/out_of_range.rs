@@ -6,12 +6,10 @@ use identify::any_fmu::identify;
 use identify::fit::bench::options::Options;
 use identify::input::question::{Question, Solver};
 use identify::input::recording::Recording;
-use identify::input::tolerance::Tolerances;
 use identify::methods::free_decay::FreeDecay;
-use identify::methods::frequency::Frequency;
+use identify::methods::friction;
 use identify::methods::output_error::OutputError;
-use identify::methods::{Method, Task, acceleration};
-use identify::model::bench::simulate::Intersample;
+use identify::methods::{Method, Task};
 use identify::model::simulate::Model;
 use pack::packed_for_tests;
 
@@ -23,17 +21,10 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
     let recordings = std::slice::from_ref(recording);
     let task = Task { fmu: Some(fmu), recordings, validation: &[] };
     let said = |error: Option<anyhow::Error>| error.map(|error| format!("{error:#}"));
-    let frequency = Frequency {
-        settings: Vec::new(),
-        intersample: Intersample::FirstOrderHold,
-        tolerances: Tolerances::default(),
-        gyro_scale: 0.01,
-    };
     vec![
-        ("frequency", said(frequency.identify(&task, &mut |_| {}).err())),
         (
-            "acceleration",
-            said(acceleration::identify(fmu, recordings, &crate::acceleration::options(0)).err()),
+            "friction",
+            said(friction::identify(fmu, recordings, &Options::default(), &mut |_| {}).err()),
         ),
         (
             "free decay",

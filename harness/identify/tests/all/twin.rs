@@ -22,9 +22,9 @@ use identify::uncertainty::bench::budget;
 use identify::words::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
-use crate::acceleration::{is_one_way, push};
 use crate::bench::{Bench, Drive};
 use crate::fmu_twin::{self, SensorErrors, Twin, Unmodelled};
+use crate::friction::{is_one_way, push};
 
 /// The thesis's sweep of 2700 s.
 const LONG: &str = "lin-sweep:amplitude=0.1";

@@ -7,12 +7,14 @@ use anyhow::{Context, Result};
 use experiments::scaling::{OXYGEN, WATER};
 use host::fmu::Fmu;
 use identify::estimate::{Estimated, prose};
+use identify::fit::bench::options::Options;
 use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
-use identify::methods::acceleration::{self, Braking, LEAST_STRETCHES};
+use identify::methods::friction::{self as runs, Braking, LEAST_STRETCHES};
+use identify::methods::identification::Identification;
 use identify::model::bench::nominal;
 use identify::words::start_study;
-use names::hubslosh::{fluid, friction, hub, tank};
+use names::hubslosh::{friction, hub, tank};
 use report::campaign::{Chapter, Illustration};
 use report::svg::{Axis, Chart, Series, Style};
 use signals::recording::{self, Between, Signal, Wanted};
@@ -51,25 +53,25 @@ pub fn of(
     fmu: &Fmu,
     problems: &mut Vec<String>,
     found: &mut Vec<(String, String)>,
-) -> Result<(Vec<Chapter>, Option<acceleration::Found>)> {
+) -> Result<(Vec<Chapter>, Option<Identification>)> {
     let mut chapters = vec![bond_number(day, fmu)?];
     let friction = bench_recordings(day, Kind::Friction, problems);
     let decays = bench_recordings(day, Kind::Decay, problems);
     let has_friction = !friction.is_empty();
     let all: Vec<Recording> = friction.into_iter().chain(decays).collect();
     let mut settings = nominal::with_damping(day.settings.clone());
-    // the least that the FMU takes: the tank is empty
-    settings.push((fluid::RHO.into(), "1e-6".into()));
-    let options = acceleration::Options {
+    // the tank is empty in these runs
+    settings.extend(runs::empty());
+    let options = Options {
         settings,
         start_study: STARTS,
-        torque_scale: day.tolerances.torque,
+        tolerances: day.tolerances,
         gyro_scale: day.manifest.gyro_scale,
-        ..acceleration::Options::default()
+        ..Options::default()
     };
     let fitted = match all.is_empty() {
         true => None,
-        false => match acceleration::identify(fmu, &all, &options) {
+        false => match runs::identify(fmu, &all, &options, &mut |_| {}) {
             Ok(fitted) => Some(fitted),
             Err(error) => {
                 problems.push(format!("friction runs and decays: {error:#}"));
@@ -224,7 +226,7 @@ fn some(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
     points.iter().copied().step_by(points.len().div_ceil(POINTS).max(1))
 }
 
-fn bearing(fitted: &acceleration::Found, is_used: bool) -> Chapter {
+fn bearing(fitted: &Identification, is_used: bool) -> Chapter {
     let number = |name: &str| fitted.parameters.get(name).map_or(0.0, |p| p.value);
     let [b, c, d, speed, asymmetry] =
         [friction::B, friction::C, friction::D, friction::OMEGA_S, friction::ASYMMETRY].map(number);

@@ -152,7 +152,7 @@ impl Day {
         );
         ensure!(
             items.iter().any(|item| item.kind == Kind::Sweep),
-            "{name}: no [[recording]] has kind = \"sweep\"; friction runs alone: hubslosh identify --method acceleration"
+            "{name}: no [[recording]] has kind = \"sweep\"; friction runs alone: hubslosh identify friction"
         );
         let mut settings = Vec::new();
         flatten("", &manifest.set, &mut settings);

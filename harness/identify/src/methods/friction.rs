@@ -1,0 +1,474 @@
+//! Friction and inertia from runs whose liquid does not move, by [`output_error`] with a rigid liquid; besides, the measured friction over
+//! the rate, and braking over the hub's angle (thesis 5.2 to 5.4).
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use analysis::statistics::{mean, peak, variance};
+use anyhow::{Result, ensure};
+use host::fmu::Fmu;
+use maud::{Markup, html};
+use nalgebra::{DMatrix, DVector};
+use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, tank};
+use report::page::{axis_chart, drawn, series};
+use report::svg::{Axis, Style};
+use serde::Serialize;
+
+use super::identification::{Details, Identification};
+use super::output_error::{self, OutputError};
+use super::{Method, Needs, Task};
+use crate::fit::bench::options::Options;
+use crate::input::plausible;
+use crate::input::recording::Recording;
+use crate::model::bench::nominal::{self, Nominal};
+use crate::news::News;
+use crate::tuning::{
+    BLOCK, FEWEST_BLOCKS, FREE_TORQUE, FRICTION_BINS, FRICTION_POINTS, MOVING_POWER, MOVING_SPEED,
+    SLOW_CHART, STILL,
+};
+use crate::words::page::Sections;
+
+/// Fits friction and inertia.
+pub struct Friction {
+    /// Options of the fit; its slosh models and friction laws are not used.
+    pub options: Options,
+}
+
+impl Method for Friction {
+    type Details = Details;
+
+    const NEEDS: Needs = Needs { fmu: true, validation: true };
+
+    fn identify(&self, task: &Task, progress: &mut dyn FnMut(&News)) -> Result<Identification> {
+        let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };
+        identify(task.fmu()?, task.recordings, &options, progress)
+    }
+
+    fn lines(found: &Identification) -> Vec<String> {
+        OutputError::lines(found)
+    }
+
+    fn sections(found: &Identification) -> Sections {
+        let braking_over_angle = &found.details.braking;
+        Sections {
+            figures: html! {
+                (friction_curve(found))
+                @if !braking_over_angle.is_empty() { (braking_chart(braking_over_angle)) }
+            },
+            ..OutputError::sections(found)
+        }
+    }
+}
+
+/// Fits friction and inertia. The tank is empty unless the settings state how much liquid is in it; the verdict says so.
+///
+/// # Errors
+/// If the recordings do not show friction, with what to record.
+pub fn identify(
+    fmu: &Fmu,
+    recordings: &[Recording],
+    options: &Options,
+    progress: &mut dyn FnMut(&News),
+) -> Result<Identification> {
+    check(recordings)?;
+    let mut options = Options {
+        models: vec![SloshModel::Frozen.name().into()],
+        friction: vec![FrictionModel::Stribeck.name().into()],
+        ..options.clone()
+    };
+    let is_assumed = !nominal::states_liquid(&options.settings);
+    if is_assumed {
+        options.settings.extend(empty());
+    }
+    let mut found = output_error::identify(fmu, recordings, &options, progress)?;
+    let mut bench = nominal::initialised(fmu, &options.settings)?;
+    let liquid = bench.real(tank::M_LIQ)? * bench.real(tank::R)?.powi(2);
+    let number = |name: &str| found.parameters.get(name).map_or(0.0, |p| p.value);
+    let inertia = number(hub::I) + liquid;
+    if found.parameters.get(hub::I).is_some_and(|p| p.std < 0.3 * p.value) {
+        let nominal = Nominal::of(fmu, &options.settings, &[])?;
+        plausible::check_size(inertia, nominal.inertia)?;
+    }
+    let bias = |k: usize| {
+        let name = format!("gyro_bias[{}]", k + 1);
+        found.measurement.get(&name).map_or(0.0, |p| p.value)
+    };
+    let biases: Vec<f64> = (0..recordings.len()).map(bias).collect();
+    found.details.braking = brakings(recordings, &biases);
+    found.details.friction_points = friction_points(recordings, &biases, inertia);
+    if is_assumed {
+        found.verdict.push(
+            "The tank is taken as empty, so that hub.I is the inertia of all that turns. --set tank.h=… states the height of a \
+             liquid, whose inertia is then subtracted."
+                .into(),
+        );
+    }
+    if let Some(asymmetry) = found.parameters.get(friction::ASYMMETRY).filter(|a| a.determined)
+        && found.fits == Some(true)
+        && asymmetry.value.abs() > 3.0 * asymmetry.std
+    {
+        let ways = ["counter-clockwise", "clockwise"];
+        let [harder, easier] = if asymmetry.value > 0.0 { ways } else { [ways[1], ways[0]] };
+        found.verdict.push(format!(
+            "Preferential direction {easier}: {harder} the dry friction is {:.1} % stronger than the mean of both.",
+            100.0 * asymmetry.value.abs()
+        ));
+    }
+    if let [ahead, back] = &found.details.braking[..] {
+        found.verdict.push(format!(
+            "Free decay: counter-clockwise {:.4} rad/s², clockwise {:.4} rad/s² on average over the angle.",
+            ahead.coefficients[0], back.coefficients[0]
+        ));
+    }
+    Ok(found)
+}
+
+/// Settings of a bench without liquid: the least density that the FMU takes, 2e-9 kg in the bench's tank.
+pub fn empty() -> [(String, String); 1] {
+    [(fluid::RHO.into(), "1e-6".into())]
+}
+
+/// Refuses recordings that cannot show friction.
+fn check(recordings: &[Recording]) -> Result<()> {
+    ensure!(!recordings.is_empty(), "there is no recording");
+    for recording in recordings {
+        recording.check()?;
+        ensure!(
+            recording.duration() > FEWEST_BLOCKS as f64 * BLOCK,
+            "{}: it lasts {:e} s (allowed: more than {} s). Record a ramp, a step and a sweep of a minute or more each",
+            recording.name,
+            recording.duration(),
+            FEWEST_BLOCKS as f64 * BLOCK
+        );
+    }
+    let names = || recordings.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", ");
+    let torque = recordings.iter().map(|r| peak(&r.torque)).fold(0.0, f64::max);
+    ensure!(
+        torque > 0.0,
+        "{}: the torque is 0 in every row. Friction and inertia need a torque; record a ramp, a step or a sweep",
+        names()
+    );
+    let moves = |r: &Recording| variance(&r.rate) > MOVING_POWER * r.rate_noise().powi(2);
+    ensure!(
+        recordings.iter().any(moves),
+        "{}: the hub does not move: the rate is constant but for the gyro's noise. Static friction holds it up to the largest torque, \
+         {torque:.1e} N·m; record more torque",
+        names()
+    );
+    Ok(())
+}
+
+/// Mean of torque less inertia times acceleration over rows of similar rate.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct FrictionPoint {
+    /// Mean rate, rad/s.
+    pub rate: f64,
+    /// Mean friction torque, N·m; positive if it brakes a positive rate.
+    pub torque: f64,
+    /// Number of rows.
+    pub rows: usize,
+}
+
+/// Measured friction over rows of similar rate in which the hub slips; `inertia` is that of all that turns, kg·m².
+fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Vec<FrictionPoint> {
+    let (count, fewest) = FRICTION_BINS;
+    let mut all: Vec<(f64, f64)> = Vec::new();
+    for (recording, bias) in recordings.iter().zip(biases) {
+        let own = recording.of_gyro();
+        // differences over blocks of rows, so that fast sampling does not drown them in noise
+        let block = ((BLOCK / own.step() * (1.0 + 1e-9)) as usize).max(1);
+        let means = |signal: &[f64]| -> Vec<f64> { signal.chunks_exact(block).map(mean).collect() };
+        let [t, rate, torque] = [&own.time, &own.rate, &own.torque].map(|signal| means(signal));
+        let still = STILL * own.rate_noise();
+        for k in 1..t.len().saturating_sub(1) {
+            let slips = |w: &f64| (w - bias).abs() > still;
+            if rate[k - 1..=k + 1].iter().any(slips) {
+                let acceleration = (rate[k + 1] - rate[k - 1]) / (t[k + 1] - t[k - 1]);
+                let driving = 0.25 * (torque[k - 1] + 2.0 * torque[k] + torque[k + 1]);
+                all.push((rate[k] - bias, driving - inertia * acceleration));
+            }
+        }
+    }
+    let most = all.iter().map(|(w, _)| w.abs()).fold(f64::MIN_POSITIVE, f64::max);
+    // finer near zero, where friction changes most
+    let bin = |w: f64| (w.signum() * (w.abs() / most).sqrt() * count as f64 / 2.0).round() as i64;
+    let mut bins: BTreeMap<i64, (f64, f64, usize)> = BTreeMap::new();
+    for (w, torque) in all {
+        let sum = bins.entry(bin(w)).or_default();
+        *sum = (sum.0 + w, sum.1 + torque, sum.2 + 1);
+    }
+    let point = |(rate, torque, rows): (f64, f64, usize)| FrictionPoint {
+        rate: rate / rows as f64,
+        torque: torque / rows as f64,
+        rows,
+    };
+    bins.into_values().filter(|bin| bin.2 >= fewest).map(point).collect()
+}
+
+/// Deceleration over the hub's angle: β_0 + Σ β_h^s sin hθ + β_h^c cos hθ of one direction, where no torque acts (thesis 5.4).
+#[derive(Clone, Debug, Serialize)]
+pub struct Braking {
+    /// `counter-clockwise` (forwards) or `clockwise`.
+    pub direction: &'static str,
+    /// Speed to which the fit belongs, rad/s: the mean of both directions. A parabola takes the dependence on the speed.
+    pub speed: f64,
+    /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
+    pub coefficients: Vec<f64>,
+    /// Their standard deviations, rad/s².
+    pub std: Vec<f64>,
+    /// Root mean square of the residual, rad/s².
+    pub rmse: f64,
+    /// Coefficient of determination.
+    pub r_squared: f64,
+    /// Rows.
+    pub rows: usize,
+    /// Stretches of these rows: parts of one decay within one revolution of the hub.
+    pub stretches: usize,
+    /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
+    #[serde(skip)]
+    pub points: Vec<(f64, f64)>,
+    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`].
+    #[serde(skip)]
+    covariance: Option<DMatrix<f64>>,
+}
+
+/// Fewest stretches from whose scatter the uncertainty of five coefficients is computed.
+pub const LEAST_STRETCHES: usize = 10;
+
+/// Regressors of [`Braking`] at an angle: 1, then cos hθ and sin hθ of each harmonic.
+fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
+    let each = (1..=harmonics).flat_map(|h| {
+        let (sin, cos) = (angle * h as f64).sin_cos();
+        [cos, sin]
+    });
+    [1.0].into_iter().chain(each).collect()
+}
+
+impl Braking {
+    /// Returns the half-width of the fit's simultaneous 95 % band at an angle, rad/s²: with this probability the whole curve
+    /// lies in the band. The residuals of one stretch count as one value, because deceleration also depends on the rate,
+    /// which changes slowly within a stretch. `None` if there are too few
+    /// stretches. Liang and Zeger, Biometrika 73 (1986) 13,
+    /// with Scheffé's factor.
+    pub fn half_width(&self, angle: f64) -> Option<f64> {
+        /// 95 % quantile of χ² with five degrees of freedom.
+        const CHI_SQUARE: f64 = 11.070;
+        let width = self.coefficients.len();
+        let row = DVector::from_vec(harmonics_at(angle, (width - 1) / 2));
+        let variance = (row.transpose() * self.covariance.as_ref()? * &row)[(0, 0)];
+        let few = (self.stretches - 1) as f64 / (self.stretches - width - 2) as f64;
+        Some((CHI_SQUARE * few * variance).sqrt())
+    }
+
+    /// Returns the fitted acceleration at an angle, rad/s².
+    pub fn at(&self, angle: f64) -> f64 {
+        let [mean, harmonics @ ..] = &self.coefficients[..] else { return 0.0 };
+        let each = harmonics.chunks(2).zip(1..).map(|(pair, h)| {
+            let (sin, cos) = (f64::from(h) * angle).sin_cos();
+            pair[0] * cos + pair[1] * sin
+        });
+        mean + each.sum::<f64>()
+    }
+}
+
+/// Fits [`Braking`] in both directions; a direction with too few rows is left out.
+fn brakings(recordings: &[Recording], biases: &[f64]) -> Vec<Braking> {
+    let mut free: [Vec<FreeRow>; 2] = Default::default();
+    let mut stretch = 0;
+    for (recording, bias) in recordings.iter().zip(biases) {
+        let Some(angle) = &recording.angle else { continue };
+        let rate: Vec<f64> = recording.rate.iter().map(|w| w - bias).collect();
+        let (torque, t) = (&recording.torque, &recording.time);
+        let (still, slow) = (FREE_TORQUE * peak(torque), MOVING_SPEED * peak(&rate));
+        let (mut turned, mut last) = (0.0, None);
+        for k in 1..t.len() - 1 {
+            let step = angle[k] - angle[k - 1];
+            turned += step - TAU * (step / TAU).round(); // the angle may be wrapped
+            let way = rate[k].signum();
+            if !(k - 1..=k + 1).all(|i| torque[i].abs() <= still && way * rate[i] > slow) {
+                last = None;
+                continue;
+            }
+            let revolution = Some((turned / TAU).floor());
+            stretch += usize::from(last != revolution);
+            last = revolution;
+            free[usize::from(way < 0.0)].push(FreeRow {
+                angle: angle[k],
+                speed: rate[k].abs(),
+                acceleration: (rate[k + 1] - rate[k - 1]) / (t[k + 1] - t[k - 1]),
+                stretch,
+            });
+        }
+    }
+    let speeds: Vec<f64> = free.iter().flatten().map(|row| row.speed).collect();
+    let speed = mean(&speeds);
+    let [ahead, back] = &free;
+    [("counter-clockwise", ahead), ("clockwise", back)]
+        .into_iter()
+        .filter_map(|(direction, rows)| braking(direction, rows, speed))
+        .collect()
+}
+
+/// A row without torque in which the hub turns.
+struct FreeRow {
+    angle: f64,
+    speed: f64,
+    acceleration: f64,
+    /// Number of the part of a decay within one revolution of the hub.
+    stretch: usize,
+}
+
+/// Fits the rows of one direction by least squares, at this speed, rad/s. A parabola takes the dependence on the speed.
+fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Braking> {
+    let (harmonics, count) = (2, rows.len());
+    let (width, all) = (2 * harmonics + 1, 2 * harmonics + 3);
+    if count < 20 * all {
+        return None;
+    }
+    let regressors = rows.iter().flat_map(|row| {
+        let more = row.speed - speed;
+        [harmonics_at(row.angle, harmonics), vec![more, more * more]].concat()
+    });
+    let a = DMatrix::from_row_iterator(count, all, regressors);
+    let y = DVector::from_iterator(count, rows.iter().map(|row| row.acceleration));
+    let inverse = a.tr_mul(&a).try_inverse()?;
+    let found = &inverse * a.tr_mul(&y);
+    let residual = &y - &a * &found;
+    let variance = residual.norm_squared() / (count - all) as f64;
+    let at_speed = y - a.columns(width, 2) * found.rows(width, 2);
+    let about = at_speed.add_scalar(-at_speed.mean());
+    let mut sums: BTreeMap<usize, DVector<f64>> = BTreeMap::new();
+    for (i, row) in rows.iter().enumerate() {
+        let sum = sums.entry(row.stretch).or_insert_with(|| DVector::zeros(all));
+        *sum += a.row(i).transpose() * residual[i];
+    }
+    let meat = sums.values().fold(DMatrix::zeros(all, all), |all, s| all + s * s.transpose());
+    let covariance = (&inverse * meat * &inverse).view((0, 0), (width, width)).into_owned();
+    let stretches = sums.len();
+    Some(Braking {
+        direction,
+        speed,
+        std: (0..width).map(|j| (variance * inverse[(j, j)]).sqrt()).collect(),
+        coefficients: found.as_slice()[..width].to_vec(),
+        rmse: (residual.norm_squared() / count as f64).sqrt(),
+        r_squared: 1.0 - residual.norm_squared() / about.norm_squared(),
+        rows: count,
+        stretches,
+        points: rows.iter().map(|row| row.angle).zip(at_speed.iter().copied()).collect(),
+        covariance: (stretches >= LEAST_STRETCHES).then_some(covariance),
+    })
+}
+
+/// The friction's torque against the rate, measured and fitted (thesis 5.8 and 5.9).
+fn friction_curve(found: &Identification) -> Markup {
+    let points = &found.details.friction_points;
+    let value = |name: &str| found.parameters.get(name).map_or(0.0, |p| p.value);
+    let [b, c, d] = [friction::B, friction::C, friction::D].map(value);
+    let (speed, asymmetry) = (value(friction::OMEGA_S), value(friction::ASYMMETRY));
+    let curve = |w: f64| {
+        let shape = (-(w / speed).powi(2)).exp();
+        b * w + w.signum() * (1.0 + asymmetry * w.signum()) * (c + d * shape)
+    };
+    let chart = |title: &str, most: f64| {
+        let within: Vec<&FrictionPoint> = points.iter().filter(|p| p.rate.abs() <= most).collect();
+        let rates = || within.iter().map(|p| p.rate);
+        let (low, high) = (rates().fold(0.0, f64::min), rates().fold(0.0, f64::max));
+        let at = |k: usize| low + (high - low) * (k as f64 + 0.5) / FRICTION_POINTS as f64;
+        let fitted = (0..FRICTION_POINTS).map(|k| (at(k), curve(at(k)))).collect();
+        let measured = within.iter().map(|p| (p.rate, p.torque)).collect();
+        let lines = vec![
+            series(fitted, "a", Style::Line, "fitted"),
+            series(
+                measured,
+                "ink",
+                Style::Cloud,
+                "measured: torque less inertia times acceleration",
+            ),
+        ];
+        let label = "friction torque, N·m";
+        let mut chart = axis_chart(title, "rate, rad/s", label, lines, false);
+        // the curve rises to the corner of the legend
+        let torques = || within.iter().map(|p| p.torque);
+        let top = 1.6 * torques().fold(0.0, f64::max);
+        chart.y = Axis::linear(label, torques().chain([top]), 0.0, 5);
+        drawn(&chart)
+    };
+    html! {
+        h2 { "Friction" }
+        (chart("Friction torque against the rate, means over rows of similar rate", f64::INFINITY))
+        (chart("The same at low speed", SLOW_CHART * speed))
+    }
+}
+
+/// Deceleration over the angle in either direction (thesis 5.10 and 5.11).
+fn braking_chart(all: &[Braking]) -> Markup {
+    let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
+        let angle = |k: usize| PI * (2.0 * k as f64 / FRICTION_POINTS as f64 - 1.0);
+        let points =
+            (0..=FRICTION_POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();
+        series(points, color, Style::Line, braking.direction)
+    });
+    let title = "Deceleration in free decay over the angle";
+    drawn(&axis_chart(title, "angle, rad", "rad/s²", lines.collect(), false))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twelve decays in a direction from 6 rad/s, by viscous and dry friction, which depends on the angle by the share
+    /// `cosine`; the gyro has noise.
+    fn decays(random: &mut analysis::random::Random, way: f64, cosine: f64) -> Vec<Recording> {
+        (0..12)
+            .map(|_| {
+                let (h, mut time, mut torque) = (0.02, Vec::new(), Vec::new());
+                let (mut rate, mut angle) = (Vec::new(), Vec::new());
+                let (mut w, mut at) = (6.0, 10.0 * random.normal());
+                while w > 0.5 {
+                    time.push(h * time.len() as f64);
+                    torque.push(if time.len() < 3 { 0.1 } else { 0.0 });
+                    rate.push(way * w + 2e-3 * random.normal());
+                    angle.push(at);
+                    for _ in 0..10 {
+                        w -= 0.1 * h * (0.2 * w + 0.8 * (1.0 + cosine * f64::cos(at)));
+                        at += 0.1 * h * way * w;
+                    }
+                }
+                Recording {
+                    name: String::new(),
+                    time,
+                    torque,
+                    rate,
+                    angle: Some(angle),
+                    gravity: None,
+                    wheel_speed: None,
+                    off_axis: [None, None],
+                    from_rest: false,
+                    fresh: None,
+                    angle_fresh: None,
+                    commanded: None,
+                }
+            })
+            .collect()
+    }
+
+    /// True if the directions' difference is outside its 95 % band somewhere.
+    fn differ(seed: u64, cosine: f64) -> bool {
+        let mut random = analysis::random::Random::new(seed, 0);
+        let all = [decays(&mut random, 1.0, cosine), decays(&mut random, -1.0, 0.0)].concat();
+        let both = brakings(&all, &[0.0; 24]);
+        let [ahead, back] = &both[..] else { panic!("{both:?}") };
+        (0..90).map(|k| TAU * f64::from(k) / 90.0).any(|angle| {
+            let half = ahead.half_width(angle).unwrap().hypot(back.half_width(angle).unwrap());
+            (-ahead.at(angle) - back.at(angle)).abs() > half
+        })
+    }
+
+    #[test]
+    fn scatter_of_decays_is_no_preferential_direction_and_a_tenth_of_friction_is_one() {
+        let of = |cosine: f64| (0..100).filter(|seed| differ(*seed, cosine)).count();
+        // 95 % for the whole curve: 5 of 100 expected, 12 are three standard deviations more
+        assert!(of(0.0) <= 12, "{}", of(0.0));
+        assert!(of(0.1) >= 95, "{}", of(0.1));
+    }
+}

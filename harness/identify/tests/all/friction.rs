@@ -1,0 +1,279 @@
+//! Friction and inertia from runs of the torque, on recordings of a bench that is not the FMU.
+
+use std::collections::BTreeMap;
+
+use analysis::random::Random;
+use experiments::profile::Torque;
+use host::fmu::Fmu;
+use identify::estimate::Estimated;
+use identify::fit::bench::options::Options;
+use identify::input::recording::Recording;
+use identify::input::tolerance::Tolerances;
+use identify::methods::friction;
+use identify::methods::identification::Identification;
+use identify::model::bench::simulate::{Intersample, Setup};
+use identify::uncertainty::bench::sources::Combination;
+use identify::words::verdict::DOES_NOT_FIT;
+use pack::packed_for_tests;
+
+use crate::bench::{Bench, Drive};
+use crate::fmu_twin::{self, SensorErrors, Twin};
+use crate::runs::{self, SETS, Set, recordings};
+
+/// Asymmetry of the bearing in these recordings.
+const ASYMMETRY: f64 = 0.15;
+/// Noise of a row of the thesis's gyro at 50 Hz, rad/s.
+const NOISE: f64 = 4.066e-4;
+
+/// A push of 0.1 N·m for 5 s forwards (1) or backwards (−1), and the free decay to rest.
+pub fn push(seed: u64, way: f64) -> Recording {
+    let time: Vec<f64> = (0..=3000).map(|k| 0.02 * f64::from(k)).collect();
+    let tau: Vec<f64> =
+        time.iter().map(|t| if (1.0..6.0).contains(t) { 0.1 * way } else { 0.0 }).collect();
+    let motion = runs::bench(ASYMMETRY).motion(&Drive::Lines(&time, &tau), &time);
+    let mut random = Random::new(seed, 9);
+    let rate = motion.rate.iter().map(|w| w + NOISE * random.normal()).collect();
+    Recording::of("push", time, tau, rate)
+}
+
+/// The verdict calls the asymmetry not determined, and the friction of the one `way` is within four standard deviations of the truth.
+pub fn is_one_way(
+    parameters: &BTreeMap<String, Estimated>,
+    combinations: &[Combination],
+    verdict: &[String],
+    way: f64,
+) {
+    for name in ["friction.asymmetry", "friction.c", "friction.d"] {
+        let p = &parameters[name];
+        assert!(!p.determined, "{name}: {p:?}");
+    }
+    let bearing = Bench::default().bearing;
+    let [low, high] = parameters["friction.asymmetry"].interval;
+    assert!((low..=high).contains(&ASYMMETRY));
+    for (name, truth) in [("friction.c", bearing.c), ("friction.d", bearing.d)] {
+        let sign = if way > 0.0 { '+' } else { '-' };
+        let known = format!("{name} (1 {sign} friction.asymmetry)");
+        let combination = combinations.iter().find(|c| c.name == known).unwrap();
+        let off = (combination.value - truth * (1.0 + way * ASYMMETRY)) / combination.std;
+        assert!(off.abs() < 4.0, "{combination:?}");
+        assert!(verdict.iter().any(|line| line.contains(&known)), "{verdict:?}");
+        let [low, high] = parameters[name].interval;
+        assert!((low..=high).contains(&truth), "{name}: {low} to {high}");
+    }
+}
+
+pub fn options() -> Options {
+    Options {
+        settings: vec![("tank.h".into(), "0.1".into())],
+        gyro_scale: 0.0,
+        tolerances: Tolerances::NONE,
+        ..Options::default()
+    }
+}
+
+/// A fit of the rates only: the encoder of these recordings has no noise.
+fn fit(recordings: &[Recording], options: &Options) -> anyhow::Result<Identification> {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let rates: Vec<Recording> =
+        recordings.iter().map(|r| Recording { angle: None, ..r.clone() }).collect();
+    friction::identify(&fmu, &rates, options, &mut |_| {})
+}
+
+/// The parameters that are three standard deviations or more from the truth; the fit is a minimum, and none is at a bound.
+fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
+    let found = fit(&recordings(set, seed, bias, asymmetry), &options()).unwrap();
+    assert!(found.converged && found.fits == Some(true), "{seed}: {:?}", found.verdict);
+    let bearing = Bench::default().bearing;
+    let mut wrong = Vec::new();
+    for (name, truth) in [
+        ("hub.I", Bench::default().hub_inertia),
+        ("friction.b", bearing.b),
+        ("friction.c", bearing.c),
+        ("friction.d", bearing.d),
+        ("friction.omega_s", bearing.omega_s),
+        ("friction.asymmetry", asymmetry),
+        ("gyro_bias[1]", bias),
+        ("gyro_bias[2]", bias),
+        ("gyro_bias[3]", bias),
+    ] {
+        let p = found.parameters.get(name).unwrap_or_else(|| &found.measurement[name]);
+        let off = (p.value - truth) / p.std;
+        println!("{}, {seed}: {name} {:.4e} ± {:.1e}, {off:+.2} σ", set.name, p.value, p.std);
+        // one of 370 is further off by chance, and the seeds are fixed
+        wrong.extend(
+            (off.abs() >= 3.0).then(|| format!("{}, {seed}: {name} {off:+.1} σ", set.name)),
+        );
+        let limit = match name {
+            // the hub rests for 4 s before the ramp breaks it away: 5e-5 rad/s
+            "gyro_bias[1]" => 1e-4,
+            // the other recordings need not show a rest
+            "gyro_bias[2]" | "gyro_bias[3]" => f64::INFINITY,
+            _ => 0.3 * truth.abs(),
+        };
+        assert!(p.std < limit, "{seed}: {name} {p:?}");
+    }
+    wrong
+}
+
+/// Fits each seed of each set of runs.
+fn all_sets(seeds: std::ops::RangeInclusive<u64>) -> Vec<String> {
+    let of = |set| seeds.clone().flat_map(move |seed| wrong(set, seed, 0.002, ASYMMETRY));
+    SETS.iter().flat_map(of).collect()
+}
+
+/// Seed 2 of the first set failed while the rows at rest did not count: two choices of rows that stick alternated, each by the bias that
+/// the other one gives. `friction.d` was 3.4 standard deviations off and the bias of the ramp 4.9, and the fit was accepted.
+#[test]
+fn friction_of_three_sets_of_runs_ends_in_no_false_minimum() {
+    assert_eq!(all_sets(1..=2), [""; 0]);
+}
+
+/// The other six seeds of each set.
+#[test]
+#[ignore = "13 s of CPU time: .ci/run --nightly"]
+fn friction_of_eighteen_more_runs_ends_in_no_false_minimum() {
+    assert_eq!(all_sets(3..=8), [""; 0]);
+}
+
+/// A preferential direction in the other way comes back with its sign.
+#[test]
+fn the_preferential_direction_comes_back_in_either_way() {
+    assert_eq!(wrong(&SETS[0], 2, 0.002, -ASYMMETRY), [""; 0]);
+}
+
+#[test]
+fn a_bias_of_five_degrees_a_second_leads_to_no_false_minimum() {
+    assert_eq!(wrong(&SETS[0], 4, 0.087, ASYMMETRY), [""; 0]);
+}
+
+#[test]
+fn searches_from_afar_end_at_the_same_minimum_or_higher() {
+    let options = Options { start_study: 2, ..options() };
+    let found = fit(&recordings(&SETS[2], 1, 0.0, ASYMMETRY), &options).unwrap();
+    let trials = &found.details.starts;
+    assert_eq!(trials.len(), 10);
+    assert!(trials.iter().all(|trial| trial.more.is_some_and(|more| more > -0.5)), "{trials:?}");
+    assert!(trials.iter().filter(|trial| trial.is_same()).count() >= 5, "{trials:?}");
+    assert!(found.verdict.iter().any(|line| line.contains("of 10 starts")), "{:?}", found.verdict);
+}
+
+/// The tank counts as empty unless its liquid is stated, and the verdict says so.
+#[test]
+fn all_inertia_is_the_hubs_unless_the_liquid_is_stated() {
+    let recordings = recordings(&SETS[2], 1, 0.0, ASYMMETRY);
+    let with = |settings| fit(&recordings, &Options { settings, ..options() }).unwrap();
+    let (empty, full) = (with(Vec::new()), with(options().settings));
+    let bench = Bench::default();
+    let liquid = bench.density * std::f64::consts::PI / 4.0 * bench.diameter.powi(2) * bench.height;
+    let inertia = |found: &Identification| found.parameters["hub.I"].value;
+    let difference = inertia(&empty) - inertia(&full);
+    assert!((difference / (liquid * bench.arm.powi(2)) - 1.0).abs() < 1e-3, "{difference}");
+    let is_said = |found: &Identification| {
+        found.verdict.iter().any(|line| line.starts_with("The tank is taken as empty"))
+    };
+    assert!(is_said(&empty) && !is_said(&full));
+    // the measured friction lies on the law
+    let number = |name: &str| empty.parameters[name].value;
+    let law = |w: f64| number("friction.b") * w + w.signum() * number("friction.c");
+    let points = &empty.details.friction_points;
+    let fast: Vec<_> = points.iter().filter(|p| p.rate.abs() > 0.3 && p.rows > 20).collect();
+    assert!(fast.len() > 3, "{points:?}");
+    for p in fast {
+        // the asymmetry is 15 % of c
+        assert!((p.torque / law(p.rate) - 1.0).abs() < 0.15, "{p:?} {}", law(p.rate));
+    }
+}
+
+#[test]
+fn recordings_that_show_no_friction_are_refused_with_what_to_do() {
+    let [_, step, _] = &recordings(&SETS[0], 1, 0.0, ASYMMETRY)[..] else { panic!("three runs") };
+    let said = |recording: Recording| fit(&[recording], &options()).unwrap_err().to_string();
+    let short = said(step.between(5.0, 5.8));
+    assert!(short.contains("it lasts") && short.contains("Record a ramp"), "{short}");
+    let free = said(Recording { torque: vec![0.0; step.time.len()], ..step.clone() });
+    assert!(free.contains("the torque is 0 in every row"), "{free}");
+    let still = said(Recording { torque: vec![0.003; 200], ..step.between(0.0, 3.99) });
+    assert!(still.contains("does not move") && still.contains("3.0e-3 N·m"), "{still}");
+}
+
+/// A push and the free decay after it: c and d go with 1 + asymmetry alone.
+#[test]
+fn a_hub_that_turns_one_way_determines_the_friction_of_that_way_alone() {
+    for way in [1.0, -1.0] {
+        let found = fit(&[push(1, way)], &options()).unwrap();
+        assert!(found.fits == Some(true), "{:?}", found.verdict);
+        is_one_way(&found.parameters, &found.details.combinations, &found.verdict, way);
+    }
+}
+
+/// A sweep of a bench with a rigid liquid, and the encoder's angle.
+fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
+    let torque = Torque::Profile(torque.parse().unwrap());
+    let settings = [&[("slosh.model", "frozen")], settings].concat();
+    let mut one =
+        fmu_twin::record(fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
+    let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+    let setup = Setup {
+        settings: settings.iter().map(text).collect(),
+        intersample: Intersample::FirstOrderHold,
+    };
+    one.angle = Some(setup.run(fmu, &[], &one, 0.0).unwrap().angle);
+    one
+}
+
+/// A torque that is held comes half a row late, 8.6° of phase at 2.4 Hz: taken as linear it would turn inertia into friction.
+#[test]
+fn a_torque_that_is_held_is_recognised() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque =
+        Torque::Profile("lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=100".parse().unwrap());
+    let settings = vec![("slosh.model".to_string(), "frozen".to_string())];
+    let twin = Twin { settings, intersample: Intersample::ZeroOrderHold, ..Twin::default() };
+    let recordings = [twin.record(&fmu, &torque, Some(3)).unwrap()];
+    let found = fit(&recordings, &options()).unwrap();
+    for (name, truth) in [("hub.I", 0.322414), ("friction.b", 0.03793)] {
+        let p = &found.parameters[name];
+        // four standard deviations: one false alarm in 16,000 draws, and the seed is fixed
+        assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
+    }
+    assert_eq!(found.fits, Some(true), "{:?}", found.verdict);
+}
+
+#[test]
+fn liquid_that_moves_does_not_fit_a_rigid_one() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=150";
+    let found = fit(&[rigid(&fmu, &[("slosh.model", "linear")], torque)], &options()).unwrap();
+    assert!(found.fits == Some(false) && found.verdict.iter().any(|l| l.starts_with(DOES_NOT_FIT)));
+}
+
+#[test]
+fn the_preferential_direction_shows_in_free_decay() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let bench = [("friction.asymmetry", "0.15"), ("friction.forward_cos1", "0.2")];
+    // pulses in turn, and 5 s of decay after each
+    let (mut time, mut tau) = (Vec::new(), Vec::new());
+    for k in 0..7_500 {
+        let t = 0.02 * f64::from(k);
+        let (number, within) = ((t / 10.0) as usize, t % 10.0);
+        // 0.8 rad/s turns the hub by radians, so that all angles come by
+        let sign =
+            if (number / 2).is_multiple_of(2) == number.is_multiple_of(2) { 1.0 } else { -1.0 };
+        time.push(t);
+        tau.push(if within < 1.5 { 0.2 * sign } else { 0.0 });
+    }
+    let torque = Torque::rows(&time, &tau, None, false).unwrap();
+    let settings = [&[("slosh.model", "frozen")], &bench[..]].concat();
+    let mut one =
+        fmu_twin::record(&fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
+    let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+    let setup = Setup {
+        settings: settings.iter().map(text).collect(),
+        intersample: Intersample::FirstOrderHold,
+    };
+    one.angle = Some(setup.run(&fmu, &[], &one, 0.0).unwrap().angle);
+    let found = friction::identify(&fmu, &[one], &options(), &mut |_| {}).unwrap();
+    let [ahead, back] = &found.details.braking[..] else { panic!("{:?}", found.details.braking) };
+    // forwards it brakes harder: the preferential direction is backwards
+    assert!(-ahead.coefficients[0] > back.coefficients[0], "{ahead:?} {back:?}");
+}
