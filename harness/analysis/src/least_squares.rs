@@ -30,24 +30,9 @@ pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector
     a.svd(true, true).solve(b, least).ok()
 }
 
-/// Returns the minimum of the sum of squares near `x`.
+/// Returns the minimum of the sum of squares near `x`. It evaluates derivatives only where residuals were evaluated last.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
-    minimise_by(&tolerances(1e-9, 1e-9), residuals, derivatives, x)
-}
-
-/// Returns the method with relative tolerances of the sum of squares and of x.
-pub fn tolerances(cost: f64, x: f64) -> LevenbergMarquardt<f64> {
-    LevenbergMarquardt::new().with_ftol(cost).with_xtol(x)
-}
-
-/// Works like [`minimise`] with other tolerances. It evaluates derivatives only where residuals
-/// were evaluated last.
-pub fn minimise_by(
-    method: &LevenbergMarquardt<f64>,
-    residuals: Residuals,
-    derivatives: Derivatives,
-    x: &[f64],
-) -> Minimum {
+    let method = LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9);
     let search = Search { residuals, derivatives, x: DVector::from_column_slice(x) };
     let (search, report) = method.minimize(search);
     Minimum {

@@ -7,7 +7,6 @@ use host::causality::Causality;
 use host::fmu::{Fmu, Instance};
 use names::hubslosh::{G_AXIAL, TAU_CMD, fluid, friction, hub, slosh, tank};
 
-use crate::estimate::prose;
 use crate::tuning::COARSEST;
 
 /// Known values of the bench without the recording.
@@ -81,30 +80,10 @@ pub fn warnings(fmu: &Fmu, settings: &[(String, String)]) -> Result<Vec<String>>
     Ok(instance.take_warnings())
 }
 
-/// Returns values of the FMU in words, each with its source: a setting, or the FMU's own default.
-///
-/// # Errors
-/// If the FMU refuses the settings or lacks a name.
-pub fn assumed(fmu: &Fmu, settings: &[(String, String)], names: &[&str]) -> Result<String> {
-    let mut instance = initialised(fmu, settings)?;
-    let one = |name: &&str| -> Result<String> {
-        let unit = prose(fmu.description().unit(fmu.description().variable(name)?));
-        let source = match settings.iter().any(|(set, _)| set == name) {
-            true => "as set",
-            false => "the FMU's default",
-        };
-        Ok(format!("{name} = {} {unit} ({source})", instance.real(name)?))
-    };
-    Ok(names.iter().map(one).collect::<Result<Vec<String>>>()?.join(", "))
-}
-
 /// Returns true if the settings state how much liquid is in the tank, or that there is none.
 pub fn states_liquid(settings: &[(String, String)]) -> bool {
     settings.iter().any(|(name, _)| [tank::H, fluid::RHO].contains(&name.as_str()))
 }
-
-/// Parameters from which the mass of the liquid and its distance from the axis follow.
-pub const LIQUID: [&str; 4] = [tank::H, tank::D, tank::R, fluid::RHO];
 
 /// Settings in which a damping ratio counts: `slosh.zeta` turns `slosh.zeta_from_correlation` off, unless the settings say what
 /// that is.
