@@ -1,6 +1,6 @@
 //! `hubslosh identify`: which parameters explain recordings, and how sure they are.
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
@@ -238,6 +238,7 @@ const REMOVED: [(&str, &str); 6] = [
 /// If a removed option is there, with what replaces it.
 pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     const KINDS: [&str; 7] = ["bench", "fmu", "decay", "friction", "help", "--help", "-h"];
+    const FLAGS: [&str; 5] = ["--messages", "--quiet", "-q", "--strict", "--parse-only"];
     let Some(place) = arguments.iter().position(|argument| argument == "identify") else {
         return Ok(arguments);
     };
@@ -247,7 +248,9 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     if !before {
         return Ok(arguments);
     }
-    let own: Vec<&str> = arguments[place + 1..].iter().filter_map(|a| a.to_str()).collect();
+    let own: Vec<String> =
+        arguments[place + 1..].iter().map(|a| a.to_string_lossy().into_owned()).collect();
+    let own: Vec<&str> = own.iter().map(String::as_str).collect();
     for (k, argument) in own.iter().enumerate() {
         let (option, value) = argument.split_once('=').unwrap_or((argument, ""));
         match option {
@@ -267,11 +270,14 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
             _ => {}
         }
     }
-    let is_named = own.first().is_none_or(|first| KINDS.contains(first));
-    if !is_named {
-        let is_free = own.iter().any(|a| *a == "--free" || a.starts_with("--free="));
-        arguments.insert(place + 1, OsStr::new(if is_free { "fmu" } else { "bench" }).into());
-    }
+    // flags of the program may be between the command and the kind, which they follow from here on
+    let Some(k) = own.iter().position(|word| !FLAGS.contains(word)) else { return Ok(arguments) };
+    let kind = match KINDS.contains(&own[k]) {
+        true => arguments.remove(place + 1 + k),
+        false if own.iter().any(|a| *a == "--free" || a.starts_with("--free=")) => "fmu".into(),
+        false => "bench".into(),
+    };
+    arguments.insert(place + 1, kind);
     Ok(arguments)
 }
 
