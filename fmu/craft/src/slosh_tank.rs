@@ -1404,18 +1404,6 @@ impl SloshTank {
         SloshTankOutputs { impulse: [0.0; 6], ..self.outputs_from(dx, parts) }
     }
 
-    /// Returns the derivative of the outputs by time, along the inputs' ramps, with which a host
-    /// can extrapolate bias and added mass over its own step.
-    pub fn output_slopes(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
-        let dx = self.derivatives(inputs);
-        let mut du = [0.0; TANK_INPUTS];
-        du[..3].copy_from_slice(&inputs.a.slope);
-        du[3..6].copy_from_slice(&inputs.omega_dot.value);
-        du[6..9].copy_from_slice(&inputs.omega_dot.slope);
-        du[9] = inputs.mass_flow.slope;
-        self.output_derivatives(inputs, &dx, &du)
-    }
-
     /// Applies an impulse of the host to the bobs, which keep their velocities across their rods.
     /// The impulse changes the velocity of O by `dv`, m/s, and the host's angular velocity by `dw`,
     /// rad/s, host axes.

@@ -387,13 +387,6 @@ pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     )
 }
 
-/// Box, `length` along the motion and `width` across it, first mode (Keulegan 1959). The laminar
-/// layer has the closed form beta = 2/a + 2/w + 2 k (1 - 2 h/a)/sinh 2 k h, k = pi/a.
-pub fn keulegan(length: f64, width: f64, fill: f64, nu: f64, g: f64) -> Formula {
-    let axis = crate::closed_form::box_axis(length, width, fill, 1.0, 1);
-    laminar(&axis.modes[0], nu, g)
-}
-
 /// A flat ring baffle at the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ring {

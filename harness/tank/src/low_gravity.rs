@@ -128,13 +128,6 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     Monotone::new(&places, &values).at(bond.ln_1p())
 }
 
-/// The published formula for 10 < Bo < 100 (NASA SP-106, chapter 11, after Satterlee and Reynolds 1964): Omega_1^2 =
-/// 6.26 + 1.84 Bo - 4.76 cos(angle). It is below the table by 0.6 % at Bo = 100 and by up to 4 % at 10 (17 % at 3).
-/// [`cylinder_omega2`] is more accurate everywhere.
-pub fn satterlee_reynolds(bond: f64, contact_angle: f64) -> f64 {
-    6.26 + 1.84 * bond - 4.76 * contact_angle.to_radians().cos()
-}
-
 /// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2
 /// of the deep cylinder's meniscus, times tanh(xi h/R), is added to [`flat`]. At 90 degrees, and without surface
 /// tension, the result is exactly [`flat`]. Outside 0 to 90 degrees the nearer end is used.

@@ -10,7 +10,7 @@ use craft::{
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
 use super::ball::{V, askew, rotation, thrust, v, with_states};
-use super::random::Random;
+use super::random::{Random, output_slopes};
 
 type Six = SVector<f64, 6>;
 
@@ -239,7 +239,7 @@ impl Craft {
     fn exchange(&mut self, u: &Inputs, h: f64) {
         let given = self.inputs(u);
         let now = self.tank.outputs_held(&given);
-        let slopes = self.tank.output_slopes(&given);
+        let slopes = output_slopes(&mut self.tank, &given);
         let along = |t: f64| {
             let bias: [f64; 6] = std::array::from_fn(|i| now.bias[i] + slopes.bias[i] * t);
             let added: [f64; 21] =

@@ -803,11 +803,6 @@ impl Outcome {
         self.record.as_ref().map_or(Features::default(), |record| record.spa.features)
     }
 
-    /// Features of the H1 response.
-    pub fn h1_features(&self) -> Features {
-        self.record.as_ref().map_or(Features::default(), |record| record.h1.features)
-    }
-
     /// The fitted linear model.
     pub fn fit(&self) -> Option<ModelFit> {
         Some(self.record.as_ref()?.fit.as_ref()?.0)

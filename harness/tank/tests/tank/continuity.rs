@@ -209,5 +209,6 @@ fn a_wall_that_is_one_shape_has_its_published_correlation() {
     let torus = at(&of(shape), 0.86 * 0.127, [nu, g]);
     close(torus.modes[0].zeta, damping::torus(0.0635, 0.86 * 0.127, nu, g).zeta);
     let wave = at(&of("box = [0.8, 0.5]"), 0.4, SLOW).modes[0];
-    close(wave.zeta, 1.45 * damping::keulegan(0.8, 0.5, 0.4, SLOW[0], SLOW[1]).zeta);
+    let layer = &hubslosh_tank::closed_form::box_axis(0.8, 0.5, 0.4, 1.0, 1).modes[0];
+    close(wave.zeta, 1.45 * damping::laminar(layer, SLOW[0], SLOW[1]).zeta);
 }

@@ -53,7 +53,10 @@ fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
         let period = 2.0 * pi / omega;
         let bracket = 1.0 + w / a + pi * w / a * (1.0 - 2.0 * h / a) / (2.0 * pi * h / a).sinh();
         let decrement = (pi * 1e-6 * period).sqrt() / w * bracket;
-        let zeta = damping::keulegan(a, w, h, 1e-6, 9.81).zeta;
+        let zeta = {
+            let along = hubslosh_tank::closed_form::box_axis(a, w, h, 1.0, 1);
+            damping::laminar(&along.modes[0], 1e-6, 9.81).zeta
+        };
         assert!((zeta * 2.0 * pi / decrement - 1.0).abs() < 1e-12, "{h}");
         // the layer is thin against the wave: 0.6 mm in water, 0.6 m in a liquid a million times as viscous
         assert_eq!(damping::laminar(mode, 1e-6, 9.81).outside, [""; 0]);
@@ -337,14 +340,11 @@ fn curved_meniscus_is_smooth_between_its_values() {
         let slopes = [(at_5 - at_15) / (cos(5.0) - cos(15.0)), (at_0 - at_5) / (1.0 - cos(5.0))];
         assert!((slopes[1] / slopes[0] - 1.0).abs() < 1e-9, "{bond} {slopes:?}");
     }
-    // the published formula's terms, and its distance: 0.6 % at 100, 4 % at 10
-    for (angle, cosine) in [(90.0, 0.0), (60.0, 0.5), (0.0, 1.0)] {
-        let by_hand = 6.26 + 1.84 * 50.0 - 4.76 * cosine;
-        assert!((low_gravity::satterlee_reynolds(50.0, angle) - by_hand).abs() < 1e-13, "{angle}");
-    }
+    // The published formula for 10 < Bo < 100 (NASA SP-106, chapter 11, after Satterlee and Reynolds 1964) is within 0.6 % of the
+    // table at Bo = 100 and within 4 % at 10.
+    let published = |bond: f64| 6.26 + 1.84 * bond - 4.76 * cos(5.0);
     for (bond, most) in [(30.0, 0.003), (100.0, 0.007), (10.0, 0.045)] {
-        let ratio =
-            low_gravity::satterlee_reynolds(bond, 5.0) / low_gravity::cylinder_omega2(bond, 5.0);
+        let ratio = published(bond) / low_gravity::cylinder_omega2(bond, 5.0);
         assert!((ratio - 1.0).abs() < most, "{bond} {ratio}");
     }
     let mode = &solve(BENCH, 0.2, 1).modes[0];
