@@ -52,11 +52,36 @@ def _like(q: Any, names: tuple[str, ...], values: Real) -> Any:
 
 
 def angles(q: "ArrayLike | pd.DataFrame") -> Any:
-    """Return roll, pitch and yaw (rad) of a quaternion, of rows of them, or of a table of a run.
+    """Return roll, pitch and yaw of a quaternion, of rows of them, or of a table of a run.
 
-    About x, y, z: the craft is turned by yaw about z, then by pitch about its new y, then by roll
-    about its new x (3-2-1, Tait and Bryan). Pitch is from -90° to 90°; there roll is 0. A table
-    gives a table with the columns ``roll``, ``pitch``, ``yaw``.
+    The craft is turned by yaw about z, then by pitch about its new y, then by roll about its
+    new x (3-2-1, Tait–Bryan). At a pitch of ±90° roll and yaw turn about the same axis; roll is
+    then 0.
+
+    Parameters
+    ----------
+    q : array_like, shape (4,) or (n, 4), or DataFrame
+        Quaternions from body to inertial axes, scalar first, of any length but 0; or a table
+        with the columns ``q[1]`` to ``q[4]``.
+
+    Returns
+    -------
+    ndarray, shape (3,) or (n, 3), or DataFrame
+        Roll, pitch and yaw, rad; pitch is from -π/2 to π/2. For a table: a table with the
+        columns ``roll``, ``pitch`` and ``yaw``.
+
+    Raises
+    ------
+    FmuError
+        If a quaternion is 0, not finite, or not of four numbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hubslosh import attitude
+    >>> q = attitude.quaternion(yaw=np.radians(90))
+    >>> np.degrees(attitude.angles(q)).round(6) + 0.0
+    array([ 0.,  0., 90.])
     """
     from scipy.spatial.transform import Rotation
 
@@ -68,9 +93,29 @@ def angles(q: "ArrayLike | pd.DataFrame") -> Any:
 
 
 def quaternion(roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0, yaw: ArrayLike = 0.0) -> Real:
-    """Return the quaternion (scalar first) of roll, pitch and yaw, rad; see `angles`.
+    """Return the quaternion of roll, pitch and yaw, the inverse of `angles`.
 
-    Arrays give one row per element.
+    Parameters
+    ----------
+    roll, pitch, yaw : array_like
+        Angles about x, y and z, rad. Arrays of one shape, or which numpy broadcasts to one.
+
+    Returns
+    -------
+    ndarray, shape (4,) or (n, 4)
+        Unit quaternions from body to inertial axes, scalar first and not negative.
+
+    Raises
+    ------
+    FmuError
+        If an angle is no number, or the shapes do not fit together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hubslosh import attitude
+    >>> attitude.quaternion(yaw=np.radians(90)).round(4)
+    array([0.7071, 0.    , 0.    , 0.7071])
     """
     from scipy.spatial.transform import Rotation
 
@@ -82,7 +127,30 @@ def quaternion(roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0, yaw: ArrayLike = 0
 
 
 def rotation_vector(q: "ArrayLike | pd.DataFrame") -> Any:
-    """Return axis times angle (rad, 0 to π) of a quaternion, of rows of them, or of a table."""
+    """Return axis times angle of a quaternion, of rows of them, or of a table of a run.
+
+    Parameters
+    ----------
+    q : array_like, shape (4,) or (n, 4), or DataFrame
+        Quaternions from body to inertial axes, scalar first, as for `angles`.
+
+    Returns
+    -------
+    ndarray, shape (3,) or (n, 3), or DataFrame
+        Rotation vectors, rad, with lengths from 0 to π. For a table: a table with the columns
+        ``angle[1]`` to ``angle[3]``.
+
+    Raises
+    ------
+    FmuError
+        If a quaternion is 0, not finite, or not of four numbers.
+
+    Examples
+    --------
+    >>> from hubslosh import attitude
+    >>> attitude.rotation_vector(attitude.about((0, 0, 1), 0.2)).round(6)
+    array([0. , 0. , 0.2])
+    """
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.from_quat(_of(q), scalar_first=True).as_rotvec()
@@ -90,7 +158,32 @@ def rotation_vector(q: "ArrayLike | pd.DataFrame") -> Any:
 
 
 def about(axis: ArrayLike, angle: ArrayLike) -> Real:
-    """Return the quaternion of a turn by ``angle`` (rad) about ``axis``; of arrays a row each."""
+    """Return the quaternion of a turn about an axis.
+
+    Parameters
+    ----------
+    axis : array_like, shape (3,)
+        Axis, of any length but 0. It has the same components in body and inertial axes.
+    angle : array_like
+        Angle, rad; an array gives a quaternion for each element.
+
+    Returns
+    -------
+    ndarray, shape (4,) or (n, 4)
+        Unit quaternions, scalar first.
+
+    Raises
+    ------
+    FmuError
+        If the axis is 0, or the axis or an angle is not of finite numbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hubslosh import attitude
+    >>> attitude.about((0, 1, 0), np.pi).round(6)
+    array([0., 0., 1., 0.])
+    """
     unit = vector(axis, 3, "an axis")
     length = np.linalg.norm(unit)
     if not length > 0:
@@ -103,9 +196,32 @@ def about(axis: ArrayLike, angle: ArrayLike) -> Real:
 
 
 def error(q: "ArrayLike | pd.DataFrame", wanted: "ArrayLike | pd.DataFrame") -> Any:
-    """Return the remaining rotation from ``q`` to ``wanted``: a rotation vector in body axes, rad.
+    """Return the rotation that is left from one attitude to another, the shorter way round.
 
-    It is the shorter of the two rotations.
+    Parameters
+    ----------
+    q : array_like, shape (4,) or (n, 4), or DataFrame
+        Present attitude, as for `angles`.
+    wanted : array_like, shape (4,) or (n, 4), or DataFrame
+        Attitude to reach: one, or as many as ``q`` has rows.
+
+    Returns
+    -------
+    ndarray, shape (3,) or (n, 3), or DataFrame
+        Rotation vectors in body axes, rad. If ``q`` is a table: a table with the columns
+        ``error[1]`` to ``error[3]``.
+
+    Raises
+    ------
+    FmuError
+        If a quaternion is 0, not finite, or not of four numbers.
+
+    Examples
+    --------
+    >>> from hubslosh import attitude
+    >>> now, later = attitude.quaternion(yaw=0.1), attitude.quaternion(yaw=0.3)
+    >>> attitude.error(now, later).round(6) + 0.0
+    array([0. , 0. , 0.2])
     """
     from scipy.spatial.transform import Rotation
 
@@ -124,15 +240,54 @@ def slew(
     step: float = 0.1,
     stop: float | None = None,
 ) -> "pd.DataFrame":
-    """Return the reference of a slew from rest to rest: a table for `closed_loop`.
+    """Return the reference of a slew from rest to rest, for `closed_loop`.
 
-    From ``start`` on the craft turns by ``angle`` (rad) about ``axis`` within ``duration`` (s), its
-    acceleration one period of a sine. Columns: ``time``, ``q[1]`` … ``q[4]``, ``omega[1]`` …
-    ``omega[3]`` and, given the ``inertia`` (kg·m², about the axis or 3 × 3), the torque that it
-    takes, ``torque[1]`` … ``torque[3]``.
+    The craft turns about a fixed axis. Its acceleration is one period of a sine, so that the
+    torque begins and ends at 0, without a jump.
 
-    * ``step``: Time between rows, s.
-    * ``stop``: Time of the last row, s.
+    Parameters
+    ----------
+    angle : float
+        Angle of the slew, rad.
+    duration : float
+        Time from rest to rest, s.
+    axis : array_like, shape (3,)
+        Axis in body axes, of any length but 0.
+    inertia : array_like, shape () or (3, 3), optional
+        Moment of inertia about the axis, or inertia matrix in body axes, kg·m². If given, the
+        table also has the torque that the slew of a rigid craft takes.
+    start : float
+        Time at which the slew begins, s.
+    step : float
+        Time between rows, s.
+    stop : float, optional
+        Time of the last row, s; by default, and at the earliest, the end of the slew.
+
+    Returns
+    -------
+    DataFrame
+        Columns ``time`` (s), ``q[1]`` to ``q[4]`` (body to inertial axes), ``omega[1]`` to
+        ``omega[3]`` (rad/s, body axes) and, with ``inertia``, ``torque[1]`` to ``torque[3]``
+        (N·m, body axes).
+
+    Raises
+    ------
+    FmuError
+        If ``duration`` or ``step`` is not positive, the axis is 0, or ``inertia`` has another
+        shape.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hubslosh import attitude
+    >>> slew = attitude.slew(np.radians(30), 20, axis=(0, 0, 1), inertia=400.0, step=5)
+    >>> slew[["time", "omega[3]", "torque[3]"]].round(4)
+       time  omega[3]  torque[3]
+    0   0.0    0.0000     0.0000
+    1   5.0    0.0262     3.2899
+    2  10.0    0.0524     0.0000
+    3  15.0    0.0262    -3.2899
+    4  20.0    0.0000    -0.0000
     """
     import pandas as pd
 

@@ -13,16 +13,30 @@ from .progress import Progress
 
 @dataclass(frozen=True)
 class Finding:
-    """A place where an FMU breaks a rule."""
+    """A place where an FMU breaks a rule.
+
+    Attributes
+    ----------
+    rule : str
+        Identifier of the rule, such as ``zip.names``.
+    severity : {"error", "warning"}
+        "error": the standard forbids it, or hosts fail. "warning": some importers fail on it.
+    place : str
+        Location: a file, a line, a variable, a call.
+    text : str
+        The fault, and what is allowed.
+
+    Examples
+    --------
+    >>> from hubslosh import Finding
+    >>> Finding("xml.units", "error", "line 12", "unit kg.m3 of I (allowed: kg.m2)")
+    error xml.units: line 12: unit kg.m3 of I (allowed: kg.m2)
+    """
 
     rule: str
-    """Identifier of the rule, such as ``zip.names``."""
     severity: Literal["error", "warning"]
-    """error: the standard forbids it, or hosts fail. warning: some importers fail on it."""
     place: str
-    """Location: a file, a line, a variable, a call."""
     text: str
-    """The fault, and what is allowed."""
 
     def __repr__(self) -> str:
         """Return the line of the command's report, shortened."""
@@ -32,20 +46,38 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckedRule:
-    """Result of one rule."""
+    """The result of one rule of `check`.
+
+    Attributes
+    ----------
+    rule : str
+        Identifier of the rule, such as ``zip.names``.
+    title : str
+        The demand in words.
+    source : str
+        Section of the standard, or the hosts that demand it.
+    findings : tuple of Finding
+        The findings, at most 1000.
+    skipped : str or None
+        Reason why the rule was not checked; None if it was.
+    seconds : float
+        Elapsed time, s.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> checked = hubslosh.check("HubSlosh", only=["zip.names"])
+    >>> rule = checked.rules[0]
+    >>> rule.rule, len(rule.findings), rule.skipped is None
+    ('zip.names', 0, True)
+    """
 
     rule: str
-    """Identifier."""
     title: str
-    """The demand."""
     source: str
-    """Section of the standard, or the hosts that demand it."""
     findings: tuple[Finding, ...]
-    """The findings, at most 1000."""
     skipped: str | None
-    """Reason why the rule was not checked; None if it was."""
     seconds: float
-    """Elapsed time, s."""
 
     def __repr__(self) -> str:
         """Return the demand and the number of findings."""
@@ -55,16 +87,31 @@ class CheckedRule:
 
 @dataclass(frozen=True)
 class Checked:
-    """Result of `check`."""
+    """The result of `check`.
+
+    Attributes
+    ----------
+    fmu : Path
+        File of the FMU.
+    errors : int
+        Number of errors.
+    warnings : int
+        Number of warnings.
+    rules : tuple of CheckedRule
+        All selected rules, those that were skipped too.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> checked = hubslosh.check("HubSlosh", only=["zip"])
+    >>> checked.errors, checked.findings
+    (0, ())
+    """
 
     fmu: Path
-    """The FMU."""
     errors: int
-    """Number of errors."""
     warnings: int
-    """Number of warnings."""
     rules: tuple[CheckedRule, ...]
-    """All selected rules, those that were skipped too."""
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -91,19 +138,42 @@ def check(
     progress: Progress = None,
     program: str | Path | None = None,
 ) -> Checked:
-    """Check an FMU against the FMI standard and constraints of importers.
+    """Check an FMU against the FMI standard and the constraints of importers.
 
-    * ``fmu``: File of an FMU 2.0 or 3.0, of other makers too, or the name of one of this package.
-    * ``arguments``: Further flags of ``hubslosh check``, such as ``"--junit", "check.xml"``.
-    * ``only``: Rules (``"zip.names"``) or groups of rules (``"zip"``); by default all.
-    * ``limit``: Time that the calls of one rule may take, s.
-    * ``progress``: Shows a line on stderr, by default on a terminal and in a notebook; or a
-      function that takes the line.
+    Each rule of calls runs in a process of its own, so that an FMU that crashes is a finding
+    and does not end Python. The FMU's binary runs with your privileges.
 
-    Each rule of calls runs in a process of its own, so an FMU that crashes is a finding. A binary
-    runs with your privileges.
+    Parameters
+    ----------
+    fmu : str or Path
+        File of an FMU 2.0 or 3.0, of other makers too, or the name of one of this package.
+    *arguments : str
+        Further flags of ``hubslosh check``, such as ``"--junit", "check.xml"``.
+    only : sequence of str
+        Rules (``"zip.names"``) or groups of rules (``"zip"``); by default all.
+    limit : float
+        Time that the calls of one rule may take, s.
+    progress : bool or callable, optional
+        True shows a line on stderr, which is the default on a terminal and in a notebook; a
+        function receives the line as text.
+    program : str or Path, optional
+        The program ``hubslosh``; by default that of this package.
 
-    Raises FmuError if no selected rule could be checked.
+    Returns
+    -------
+    Checked
+        The findings, and the rules that were skipped; ``print`` shows the first findings.
+
+    Raises
+    ------
+    FmuError
+        If no selected rule could be checked, for example because the file is no FMU.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> hubslosh.check("SloshTank", only=["zip", "values.start"]).errors
+    0
     """
     flags = [*(["--only", ",".join(only)] if only else []), "--limit", repr(float(limit))]
     report: dict[str, Any] = call(

@@ -41,14 +41,64 @@ def _columns(table: "pd.DataFrame") -> dict[str, Any]:
 
 
 def to_csv(table: "pd.DataFrame", path: str | Path) -> None:
-    """Write a table as .csv, every digit; the file appears complete or not at all."""
+    """Write a table as .csv, with every digit.
+
+    The file appears complete or not at all.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The table, for example of `simulate`.
+    path : str or Path
+        File whose name ends in .csv.
+
+    Raises
+    ------
+    FmuError
+        If the arguments are exchanged, the name has another ending, or the file cannot be
+        written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import hubslosh
+    >>> run = hubslosh.simulate(stop=1, step=0.5, outputs="omega")
+    >>> hubslosh.to_csv(run, "run.csv")
+    >>> Path("run.csv").read_text().splitlines()[:2]
+    ['time,omega', '0.0,0.0']
+    """
     path = _checked(table, path, ".csv")
     with temporary.output(path) as new:
         table.to_csv(new, index=False)
 
 
 def to_parquet(table: "pd.DataFrame", path: str | Path) -> None:
-    """Write a table as .parquet, its units in the metadata as ``unit:NAME``; needs pyarrow."""
+    """Write a table as .parquet; needs pyarrow.
+
+    Units are in the file's metadata as ``unit:NAME``. The file appears complete or not at all.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The table, for example of `simulate`.
+    path : str or Path
+        File whose name ends in .parquet.
+
+    Raises
+    ------
+    FmuError
+        If the arguments are exchanged, the name has another ending, or the file cannot be
+        written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import hubslosh
+    >>> run = hubslosh.simulate(stop=1, step=0.5, outputs="omega")
+    >>> hubslosh.to_parquet(run, "run.parquet")
+    >>> hubslosh.read_table(Path("run.parquet"), ["time"])["time"]
+    array([0. , 0.5, 1. ])
+    """
     path = _checked(table, path, ".parquet")
     units = {f"unit:{name}": str(unit) for name, unit in table.attrs.get("units", {}).items()}
     write_table(path, _columns(table), units)
@@ -60,15 +110,37 @@ def to_mat(
 ) -> None:
     """Write a table or a model as .mat (version 5) for MATLAB and Octave.
 
-    * A table: one column vector per column, and ``units``, a struct of the units.
+    * A table: one column vector for each column, and ``units``, a struct of the units.
     * Parameters by name, as `Craft.parameters` returns them: a variable for each.
-    * A `LinearModel`: ``A``, ``B``, ``C``, ``D``, the names ``states``, ``inputs`` and ``outputs``,
-      and ``period`` (s; 0: continuous time).
-    * A family: several models in a sequence, or by name, which `ss` takes as an array. Each matrix
-      has a third dimension; ``points`` are the names.
+    * A `LinearModel`: ``A``, ``B``, ``C``, ``D``, the names ``states``, ``inputs`` and
+      ``outputs``, and ``period`` (s; 0: continuous time).
+    * A family: several models in a sequence, or by name, which MATLAB's ``ss`` takes as an
+      array. Each matrix has a third dimension; ``points`` are the names.
     * An `UncertainModel`: see `UncertainModel.as_dict`.
 
-    Brackets, commas and dots of names become underscores (``q[1]`` is ``q_1``).
+    Brackets, commas and dots of names become underscores, so ``q[1]`` is ``q_1``.
+
+    Parameters
+    ----------
+    table : DataFrame, mapping, LinearModel, sequence of LinearModel, or UncertainModel
+        The table, the parameters or the models.
+    path : str or Path
+        File whose name ends in .mat.
+
+    Raises
+    ------
+    FmuError
+        If the arguments are exchanged, the name has another ending, two names become the same,
+        or the file cannot be written.
+
+    Examples
+    --------
+    >>> from scipy.io import loadmat
+    >>> import hubslosh
+    >>> model = hubslosh.linearize(parameters={"friction.model": "viscous"})
+    >>> hubslosh.to_mat(model, "bench.mat")
+    >>> loadmat("bench.mat")["A"].shape == model.A.shape
+    True
     """
     from .linearization import LinearModel
     from .uncertainty import UncertainModel

@@ -62,11 +62,29 @@ class DefinedUnit(str):
 def fmu_path(model: str | Path) -> Path:
     """Return the file of an FMU by its name, for other simulators and tools.
 
-    This package contains ``HubSlosh``, ``SloshTank`` and ``Spacecraft``, each for FMI 2.0 and, with
-    ``-fmi3``, for FMI 3.0.
-    A file ``….fmu`` is returned as an absolute path.
+    This package contains ``HubSlosh``, ``SloshTank`` and ``Spacecraft``, each for FMI 2.0 and,
+    with ``-fmi3`` at the end of its name, for FMI 3.0.
 
-    Raises FmuError with the names of the FMUs that exist.
+    Parameters
+    ----------
+    model : str or Path
+        Name of an FMU of this package, or a file ``….fmu``.
+
+    Returns
+    -------
+    Path
+        The file; for a given file its absolute path.
+
+    Raises
+    ------
+    FmuError
+        If no such FMU exists; the message has the names of those that do.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> hubslosh.fmu_path("Spacecraft").name
+    'Spacecraft.fmu'
     """
     if not isinstance(model, str | Path):
         raise FmuError(
@@ -101,9 +119,40 @@ def did_you_mean(wrong: str, names: Iterable[str]) -> str:
 
 
 class Fmu:
-    """An FMU, unpacked for its first instance until the program ends.
+    """An FMU: its file and its variables.
 
-    `open` reads a file once per program, as long as it does not change.
+    It is unpacked for its first instance, and removed when the program ends. Use `open`, which
+    reads a file once per program as long as the file does not change.
+
+    Parameters
+    ----------
+    path : Path
+        File of an FMU 2.0 or 3.0.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    native : object
+        The FMU in the compiled half of this package.
+    is_fmi3 : bool
+        True for FMI 3.0.
+    name : str
+        ``modelName`` of the FMU.
+    variables : dict
+        Variables by name, in the order of modelDescription.xml.
+
+    Raises
+    ------
+    FmuError
+        If the file is no FMU that can be read.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> fmu = hubslosh.Fmu.open("HubSlosh")
+    >>> fmu.name, fmu.is_fmi3, len(fmu.names("input"))
+    ('HubSlosh', False, 3)
     """
 
     _opened: ClassVar[dict[tuple[Path, int, int], "Fmu"]] = {}
@@ -128,7 +177,29 @@ class Fmu:
 
     @classmethod
     def open(cls, model: str | Path) -> "Fmu":
-        """Return the FMU of a model; see `fmu_path`."""
+        """Return the FMU of a model; a file that has not changed is read once per program.
+
+        Parameters
+        ----------
+        model : str or Path
+            Name or file of the FMU, as for `fmu_path`.
+
+        Returns
+        -------
+        Fmu
+            The FMU.
+
+        Raises
+        ------
+        FmuError
+            If no such FMU exists, or it cannot be read.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Fmu.open("SloshTank").names("input")[:3]
+        ['a[1]', 'a[2]', 'a[3]']
+        """
         path = fmu_path(model)
         stat = path.stat()
         key = (path, stat.st_mtime_ns, stat.st_size)
@@ -137,13 +208,44 @@ class Fmu:
         return cls._opened[key]
 
     def names(self, *causalities: str) -> list[str]:
-        """Return the names of the variables with these causalities ("output", "local", …)."""
+        """Return the names of the variables with one of these causalities.
+
+        Parameters
+        ----------
+        *causalities : str
+            Causalities of FMI: "parameter", "input", "output", "local", ….
+
+        Returns
+        -------
+        list of str
+            Names, in the order of modelDescription.xml.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Fmu.open("HubSlosh").names("input")
+        ['tau_cmd', 'tau_ext', 'g_axial']
+        """
         return [v.name for v in self.variables.values() if v.causality in causalities]
 
     def components(self, names: Iterable[str]) -> list[str]:
-        """Return names in which that of a vector, ``"omega"``, stands for all its components.
+        """Replace the names of vectors and matrices by the names of their elements.
 
-        A matrix gives its elements row after row. Other names stay as they are.
+        Parameters
+        ----------
+        names : iterable of str
+            Names of variables, or of vectors and matrices without their brackets.
+
+        Returns
+        -------
+        list of str
+            Names with one for each element, a matrix row after row. Other names stay as they are.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Fmu.open("Spacecraft").components(["omega", "mass"])
+        ['omega[1]', 'omega[2]', 'omega[3]', 'mass']
         """
         parts: list[str] = []
         for name in names:
@@ -160,26 +262,115 @@ class Fmu:
         return found
 
     def variable(self, name: str) -> Variable:
-        """Return a variable by its name."""
+        """Return a variable by its name.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+
+        Returns
+        -------
+        Variable
+            Its description: ``name``, ``reference``, ``kind``, ``causality``, ``variability``,
+            ``unit``, ``start`` and ``description``.
+
+        Raises
+        ------
+        FmuError
+            If the FMU has no such variable; the message suggests a similar name.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Fmu.open("HubSlosh").variable("tank.h").causality
+        'parameter'
+        """
         if name not in self.variables:
             hint = did_you_mean(name, self.variables)
             raise FmuError(f"the FMU has no variable {name}{hint}")
         return self.variables[name]
 
     def kind(self, name: str) -> str:
-        """Return a variable's type, Real, Integer, Boolean, String or Enumeration."""
+        """Return the type of a variable.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+
+        Returns
+        -------
+        str
+            "Real", "Integer", "Boolean", "String" or "Enumeration".
+
+        Raises
+        ------
+        FmuError
+            If the FMU has no such variable.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Fmu.open("HubSlosh").kind("slosh.model")
+        'Enumeration'
+        """
         return self.variable(name).kind
 
     def unit(self, name: str) -> str:
-        """Return the unit in which a variable is exchanged; empty if it has none."""
+        """Return the unit in which a variable is exchanged with the FMU.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+
+        Returns
+        -------
+        str
+            The unit by its name in the FMU, such as "N.m"; empty if the variable has none.
+
+        Raises
+        ------
+        FmuError
+            If the FMU has no such variable.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Fmu.open("HubSlosh").unit("tau_cmd")
+        'N.m'
+        """
         return self.variable(name).unit
 
     def convert(self, name: str, value: Quantity) -> Value:
         """Return a value in the type and unit of a variable.
 
-        Enumerations take an item's name or number, Booleans also the texts true and false, Reals
-        also a number with its unit, ``(50, "mm")`` or ``"50 mm"``: the variable's own or one of its
-        display units.
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+        value : float, int, bool, str or tuple
+            For a Real a number in the variable's unit, or a number with its unit, ``(50, "mm")`` or
+            ``"50 mm"``: the variable's own unit or one of its display units. For an Enumeration an
+            item's name or number. For a Boolean also the texts "true" and "false".
+
+        Returns
+        -------
+        float, int, bool or str
+            The value as the FMU receives it.
+
+        Raises
+        ------
+        FmuError
+            If the FMU has no such variable, or the value is none of its type.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> fmu = hubslosh.Fmu.open("HubSlosh")
+        >>> fmu.convert("tank.h", "50 mm"), fmu.convert("slosh.model", "spherical")
+        (0.05, 4)
         """
         variable, kind = self.variable(name), self.kind(name)
         converters: dict[str, Callable[[Any], Value]] = {
@@ -209,7 +400,35 @@ class Fmu:
         return _finite((float(value[0]) - offset) / factor)
 
     def scale(self, name: str, unit: str) -> tuple[float, float]:
-        """Return (factor, offset) of a unit: a number in it is factor · value + offset."""
+        """Return factor and offset of a unit of a variable.
+
+        A value in this unit is factor · (value in the variable's own unit) + offset.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+        unit : str
+            Its own unit, or one of its display units.
+
+        Returns
+        -------
+        tuple of float
+            Factor and offset.
+
+        Raises
+        ------
+        FmuError
+            If the FMU has no such variable.
+        ValueError
+            If the variable has no such unit.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Fmu.open("HubSlosh").scale("tank.h", "mm")
+        (1000.0, 0.0)
+        """
         variable = self.variable(name)
         base = variable.unit
         if isinstance(unit, DefinedUnit) and variable.base is not None:

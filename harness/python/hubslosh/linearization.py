@@ -42,28 +42,51 @@ def split_delay(delay: float, period: float) -> tuple[int, float]:
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """x' = A x + B u, y = C x + D u: deviations from the point of linearisation, SI units.
+    """A linear model x' = A x + B u, y = C x + D u of deviations from an operating point.
 
-    With a ``period``, x_{k+1} = A x_k + B u_k instead: see `sampled`. ``A, B, C, D = model`` works
-    as well.
+    With a ``period`` it is x_{k+1} = A x_k + B u_k instead, see `sampled`. All values are in SI
+    units. ``A, B, C, D = model`` works as well.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n, n)
+        Effect of the states on their derivatives.
+    B : ndarray, shape (n, m)
+        Effect of the inputs on the states' derivatives.
+    C : ndarray, shape (p, n)
+        Effect of the states on the outputs.
+    D : ndarray, shape (p, m)
+        Effect of the inputs on the outputs.
+    states : tuple of str
+        Names of x.
+    inputs : tuple of str
+        Names of u.
+    outputs : tuple of str
+        Names of y.
+    period : float, optional
+        Sampling period, s; None is continuous time.
+
+    Examples
+    --------
+    A double integrator of 40 kg·m² from torque to angle:
+
+    >>> import numpy as np
+    >>> from hubslosh import LinearModel
+    >>> A, B = np.array([[0.0, 1], [0, 0]]), np.array([[0.0], [1 / 40]])
+    >>> C, D = np.array([[1.0, 0]]), np.zeros((1, 1))
+    >>> model = LinearModel(A, B, C, D, ("theta", "omega"), ("tau_cmd",), ("theta",))
+    >>> model
+    LinearModel, continuous: 2 states (theta, omega), 1 inputs (tau_cmd), 1 outputs (theta)
     """
 
     A: Matrix
-    """States × states."""
     B: Matrix
-    """States × inputs."""
     C: Matrix
-    """Outputs × states."""
     D: Matrix
-    """Outputs × inputs."""
     states: tuple[str, ...]
-    """Names of x."""
     inputs: tuple[str, ...]
-    """Names of u."""
     outputs: tuple[str, ...]
-    """Names of y."""
     period: float | None = None
-    """Sampling period, s; None: continuous time."""
 
     def __iter__(self) -> Iterator[Matrix]:
         """Yield A, B, C, D."""
@@ -96,9 +119,31 @@ class LinearModel:
         return poles[np.argsort(np.abs(poles))]
 
     def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
-        """Return C (sI − A)⁻¹ B + D at frequencies in Hz: frequencies × outputs × inputs.
+        """Return the frequency response C (sI − A)⁻¹ B + D.
 
-        s = jω, or z = exp(jωT) in its place if the model is sampled.
+        Parameters
+        ----------
+        frequency : array_like, shape (n,)
+            Frequencies, Hz. s = 2πj · frequency; for a sampled model z = exp(s · period) takes its
+            place.
+
+        Returns
+        -------
+        ndarray of complex, shape (n, p, m)
+            Response from each of m inputs to each of p outputs, SI units.
+
+        Raises
+        ------
+        FmuError
+            If the frequencies are no numbers.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> model = hubslosh.linearize(
+        ...     parameters={"friction.model": "viscous"}, inputs="tau_cmd", outputs="omega")
+        >>> abs(model.response([0.5, 2.0])[:, 0, 0]).round(3)
+        array([0.74, 0.15])
         """
         try:
             s: NDArray[np.complex128] = 2j * np.pi * np.atleast_1d(floats(frequency))
@@ -111,11 +156,40 @@ class LinearModel:
         return np.asarray(self.C @ states + self.D, np.complex128)
 
     def sampled(self, period: float, latency: int = 0, delay: float = 0.0) -> "LinearModel":
-        """Return the model as a controller sees it that works in cycles of ``period`` seconds.
+        """Return the model as a controller sees it that works in cycles.
 
-        The inputs are held for a cycle, ``latency`` cycles and ``delay`` seconds (any, not only
-        whole cycles) after the controller gave them; those on the way are further states. Exact at
-        the sampling instants; an output that follows an input at once is that just after.
+        The inputs are held for a cycle and act late; the inputs on the way are further states. The
+        result is exact at the sampling instants. An output that follows an input at once has the
+        value just after the new input acts.
+
+        Parameters
+        ----------
+        period : float
+            Period of the cycle, s.
+        latency : int
+            Delay from command to plant in whole cycles.
+        delay : float
+            Further delay, s; any, not only whole cycles. The two add up.
+
+        Returns
+        -------
+        LinearModel
+            The model in discrete time, with ``period``.
+
+        Raises
+        ------
+        FmuError
+            If the model is sampled already, a number is out of range, or the delay makes more
+            states than a computer should hold.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> model = hubslosh.linearize(
+        ...     parameters={"friction.model": "viscous"}, inputs="tau_cmd", outputs="omega")
+        >>> sampled = model.sampled(0.1, delay=0.04)
+        >>> sampled.period, sampled.states[-1]
+        (0.1, 'tau_cmd[-1]')
         """
         from scipy.signal import cont2discrete
 
@@ -173,11 +247,27 @@ class LinearModel:
         )
 
     def modes(self, below: float = 1.0) -> "pd.DataFrame":
-        """Return the oscillatory modes with a damping ratio below ``below``, by frequency.
+        """Return the oscillatory modes by frequency.
 
-        Columns: ``frequency`` (Hz, undamped: the pole's magnitude), ``zeta`` (damping ratio), and
-        ``states``: the names of those that take part, most first, by participation factors
-        (Pérez-Arriaga, Verghese and Schweppe 1982) of a fifth of the largest or more.
+        Parameters
+        ----------
+        below : float
+            Damping ratio below which a mode is listed.
+
+        Returns
+        -------
+        DataFrame
+            Columns ``frequency`` (Hz, undamped: the pole's magnitude), ``zeta`` (damping ratio)
+            and ``states``: the names of the states with participation factors (Pérez-Arriaga,
+            Verghese and Schweppe 1982) of at least a fifth of the largest, largest first.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> model = hubslosh.linearize(parameters={"friction.model": "viscous"})
+        >>> model.modes()[["frequency", "zeta"]].round(4)
+           frequency    zeta
+        0      2.456  0.0034
         """
         return mode_table(self._modes(below))
 
@@ -200,7 +290,25 @@ class LinearModel:
         return rows
 
     def to_control(self) -> Any:
-        """Return it as ``control.StateSpace``, with names; needs the package control."""
+        """Return the model as ``control.StateSpace``, with its names; needs the package control.
+
+        Returns
+        -------
+        control.StateSpace
+            The same matrices, in continuous time or with the period.
+
+        Raises
+        ------
+        FmuError
+            If the package control is not installed.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> model = hubslosh.linearize(parameters={"friction.model": "viscous"}, outputs="omega")
+        >>> model.to_control().output_labels
+        ['omega']
+        """
         return control_package().StateSpace(
             *self,
             0 if self.period is None else self.period,
@@ -285,18 +393,44 @@ def linearize(
 ) -> LinearModel:
     """Linearise an FMU where its parameters start it, by its directional derivatives.
 
-    * ``model``, ``parameters``: As for `simulate`. Start values among the parameters
-      (``init.omega``) and values of inputs (``g_axial``) are the point of linearisation. The FMU
-      must offer Model Exchange and directional derivatives.
-    * ``inputs``, ``outputs``: Real variables by name, a vector by its name (``"omega"``); by
-      default all inputs and all outputs of that type.
-    * ``all_states``: Keep states that no output depends on, directly or through other states. By
-      default they are left out, which approximates nothing: examples are unused modes and the
-      work done.
+    A hub that dry friction holds does not move: linearise with ``friction.model`` "none" or
+    "viscous", or in motion. The function warns if no output depends on any input, and if
+    Spacecraft turns faster and faster at the point.
 
-    Warns if no output depends on any input; a hub that dry friction holds does not move. Linearise
-    with ``friction.model`` none or viscous, or in motion. Warns also if Spacecraft turns faster and
-    faster at the point, with its angular acceleration.
+    Parameters
+    ----------
+    model : str or Path
+        Name or file of the FMU, as for `simulate`. It must offer Model Exchange and directional
+        derivatives.
+    parameters : mapping, str or Path, optional
+        As for `simulate`. Start values among the parameters (``init.omega``) and values of
+        inputs (``g_axial``) are the point of linearisation.
+    inputs : str or sequence of str, optional
+        Real inputs by name, a vector by its name; by default all Real inputs.
+    outputs : str or sequence of str, optional
+        Real variables by name, a vector by its name (``"omega"``); by default all Real outputs.
+    all_states : bool
+        Keep states that no output depends on, directly or through other states, such as unused
+        modes and the work done. By default they are left out, which is exact.
+
+    Returns
+    -------
+    LinearModel
+        The model in continuous time, SI units.
+
+    Raises
+    ------
+    FmuError
+        If the FMU offers no derivatives, or a name or value is wrong.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> model = hubslosh.linearize(
+    ...     parameters={"friction.model": "viscous"}, inputs="tau_cmd", outputs="omega")
+    >>> A, B, C, D = model
+    >>> A.shape, model.modes()["frequency"].round(2).tolist()
+    ((3, 3), [2.46])
     """
     fmu = Fmu.open(model)
     if not fmu.native.differentiates:

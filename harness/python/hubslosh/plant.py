@@ -25,7 +25,26 @@ COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
 
 
 class RunError(FmuError):
-    """A run that stopped on its way."""
+    """A run that stopped on its way.
+
+    Parameters
+    ----------
+    sentence : str
+        The message.
+    time : float
+        Start of the step that failed, s.
+    columns : dict of ndarray
+        Record up to this time, with ``time``.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> try:
+    ...     hubslosh.simulate(parameters={"solver.max_steps": 1}, stop=1)
+    ... except hubslosh.RunError as error:
+    ...     print(error.time, len(error.columns["time"]))
+    0.0 1
+    """
 
     def __init__(self, sentence: str, time: float, columns: dict[str, np.ndarray]) -> None:
         """Store the message, the time and the record."""
@@ -72,20 +91,91 @@ class Instance:
     def close(self) -> None:
         """Free the instance; a call in another thread ends first.
 
-        Raises FmuError within a run, where a controller might call it.
+        Raises
+        ------
+        FmuError
+            Within a run, where a controller might call it.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> plant = hubslosh.Plant("HubSlosh")
+        >>> plant.close()
         """
         self.native.close()
 
     def names(self, *causalities: str) -> list[str]:
-        """Return the names of the variables with these causalities ("output", "local", …)."""
+        """Return the names of the variables with one of these causalities.
+
+        Parameters
+        ----------
+        *causalities : str
+            Causalities of FMI: "parameter", "input", "output", "local", ….
+
+        Returns
+        -------
+        list of str
+            Names, in the order of modelDescription.xml.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> with hubslosh.Plant("HubSlosh") as plant:
+        ...     plant.names("input")
+        ['tau_cmd', 'tau_ext', 'g_axial']
+        """
         return self.fmu.names(*causalities)
 
     def set(self, name: str, value: Quantity) -> None:
-        """Set a parameter or an input: a value as `Fmu.convert` takes it."""
+        """Set an input, or a parameter that may still change.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+        value : float, int, bool, str or tuple
+            Its value, as `Fmu.convert` takes it.
+
+        Raises
+        ------
+        FmuError
+            If the value is refused.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> with hubslosh.Plant("HubSlosh") as plant:
+        ...     plant.set("tau_cmd", 0.1)
+        ...     plant.get(["tau_cmd"])
+        [0.1]
+        """
         self.native.set(name, self.fmu.convert(name, value))
 
     def get(self, names: Sequence[str]) -> list[float]:
-        """Return the present values of numeric variables; booleans as 0 and 1."""
+        """Return the present values of numeric variables.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Names of variables.
+
+        Returns
+        -------
+        list of float
+            Values in the variables' own units; Booleans as 0 and 1, enumerations by number.
+
+        Raises
+        ------
+        FmuError
+            If a variable does not exist, or is a text.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> with hubslosh.Plant("HubSlosh", {"tank.h": (50, "mm")}) as plant:
+        ...     plant.get(["tank.h", "omega"])
+        [0.05, 0.0]
+        """
         self._must_be_numbers(names)
         return self.native.get(list(names))
 
@@ -99,7 +189,51 @@ _DTYPES = {"Real": float, "Integer": np.intc, "Enumeration": np.intc, "Boolean":
 
 
 class Plant(Instance):
-    """One Co-Simulation instance of an FMU, ready for its first step."""
+    """An instance of an FMU for Co-Simulation, initialised and ready for its first step.
+
+    Use it in a ``with`` statement, which frees the instance. Calls from several threads follow
+    one another. The FMUs of this package start at rest, unless the settings say otherwise.
+
+    Parameters
+    ----------
+    fmu : str or Path
+        File of an FMU, or the name of one of this package.
+    settings : mapping, optional
+        Values of parameters and start values by name, as `Fmu.convert` takes them.
+    tolerance : float, optional
+        Relative tolerance of the FMU's solver; by default its own choice.
+    start : float
+        Start time, s.
+    stop : float, optional
+        Stop time that the FMU is given, s; by default none.
+    inputs : mapping of float, optional
+        Values of inputs at the start, in their own units.
+    torque : float, optional
+        Value of ``tau_cmd`` at the start, N·m; for HubSlosh.
+
+    Attributes
+    ----------
+    time : float
+        Present time, s.
+    fmu : Fmu
+        The FMU.
+    native : object
+        The instance in the compiled half of this package.
+
+    Raises
+    ------
+    FmuError
+        If a setting is refused, or the FMU cannot be instantiated or initialised.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> with hubslosh.Plant("HubSlosh", {"friction.model": "none"}, torque=0.1) as plant:
+    ...     plant.step(1.0)
+    ...     rate = plant.get(["omega"])[0]
+    >>> round(rate, 4)
+    0.234
+    """
 
     def __init__(
         self,
@@ -112,15 +246,7 @@ class Plant(Instance):
         inputs: Mapping[str, float] | None = None,
         torque: float | None = None,
     ) -> None:
-        """Instantiate and initialise.
-
-        * ``fmu``: File of an FMU, or the name of one in this package.
-        * ``settings``: Values of parameters and inputs by name.
-        * ``tolerance``: Relative tolerance of the FMU's solver; None: its own choice.
-        * ``start``, ``stop``: Start and stop time, s.
-        * ``inputs``: Values at the start.
-        * ``torque``: Value of ``tau_cmd`` at the start, N·m.
-        """
+        """Instantiate and initialise."""
         super().__init__(Fmu.open(fmu))
         self.time = start
         """Present time, s."""
@@ -138,10 +264,31 @@ class Plant(Instance):
             raise
 
     def step(self, end: float, torque: float | None = None, slope: float | None = None) -> None:
-        """Go on to the time ``end`` (s).
+        """Advance to a time.
 
-        * ``torque``: Value at the beginning of the step, N·m; None: unchanged.
-        * ``slope``: Its derivative during the step, N·m/s; None: the torque is held.
+        Parameters
+        ----------
+        end : float
+            Time after the step, s.
+        torque : float, optional
+            Value of ``tau_cmd`` at the beginning of the step, N·m; by default unchanged. Other
+            inputs are set with `set`.
+        slope : float, optional
+            Derivative of ``tau_cmd`` during the step, N·m/s; by default the torque is held.
+
+        Raises
+        ------
+        FmuError
+            If the FMU refuses the step.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> with hubslosh.Plant("HubSlosh", {"friction.model": "none"}) as plant:
+        ...     for k in range(50):
+        ...         plant.step(0.02 * (k + 1), torque=0.1)
+        ...     round(plant.get(["omega"])[0], 4)
+        0.234
         """
         if torque is not None:
             self.set(TORQUE, torque)
@@ -151,7 +298,29 @@ class Plant(Instance):
         self.time = end
 
     def set_slope(self, name: str, slope: float) -> None:
-        """Set the derivative of a Real input for the next step, per s."""
+        """Set the derivative of a Real input during the next step.
+
+        Parameters
+        ----------
+        name : str
+            Name of the input.
+        slope : float
+            Its derivative, in the input's unit per s.
+
+        Raises
+        ------
+        FmuError
+            If the FMU does not interpolate this input.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> with hubslosh.Plant("HubSlosh", {"friction.model": "none"}) as plant:
+        ...     plant.set_slope("tau_cmd", 0.1)
+        ...     plant.step(1.0)
+        ...     round(plant.get(["omega"])[0], 4)
+        0.117
+        """
         self.native.set_slope(name, slope)
 
     def run(
@@ -162,16 +331,44 @@ class Plant(Instance):
         columns: Sequence[str],
         feedback: Feedback | None = None,
     ) -> dict[str, np.ndarray]:
-        """Step from row to row in one call and return ``columns`` at every row.
+        """Step from row to row in one call, and record variables at every row.
 
-        * ``time``: Communication points from the present one on, ascending, s.
-        * ``inputs``: By name, their values from each row to the next.
-        * ``slopes``: Derivatives of the Real inputs, per s; None: inputs are held.
-        * ``feedback``: Controller that sets other inputs.
+        Rows are read before their inputs are set, so that an output that follows an input at once
+        shows a jump of this input in the next row.
 
-        Returns an array per column: floats, integers (enumerations by number) or bools. Rows are
-        read before inputs are set, so an output with direct feedthrough shows a jump of an input
-        in the next row.
+        Parameters
+        ----------
+        time : ndarray, shape (n,)
+            Communication points from the present time on, ascending, s.
+        inputs : mapping of ndarray, shape (n,)
+            Values of inputs by name, each from its row to the next.
+        slopes : mapping of ndarray, shape (n,), or None
+            Derivatives of Real inputs from each row to the next, in their unit per s; None holds
+            the inputs.
+        columns : sequence of str
+            Numeric variables to record.
+        feedback : Feedback, optional
+            Controller that sets further inputs; `closed_loop` makes it.
+
+        Returns
+        -------
+        dict of ndarray
+            A column of n values for each name: floats, integers (enumerations by number) or bools.
+
+        Raises
+        ------
+        RunError
+            If the FMU stops the run; the error has the record up to that time.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hubslosh
+        >>> time = np.linspace(0, 1, 51)
+        >>> with hubslosh.Plant("HubSlosh", {"friction.model": "none"}) as plant:
+        ...     run = plant.run(time, {"tau_cmd": np.full(51, 0.1)}, None, ["omega"])
+        >>> run["omega"].shape, round(float(run["omega"][-1]), 4)
+        ((51,), 0.234)
         """
         self._must_be_numbers(columns)
         time = np.ascontiguousarray(time, float)
@@ -205,11 +402,54 @@ class Plant(Instance):
         raise RunError(sentence, self.time, {"time": time[rows]} | result)
 
     def save(self) -> tuple[float, bytes]:
-        """Return the time (s) and the serialized state, for `restore` of any instance."""
+        """Return the present time and state.
+
+        Returns
+        -------
+        tuple of float and bytes
+            Time, s, and the FMU's serialized state, for `restore` of this or another instance.
+
+        Raises
+        ------
+        FmuError
+            If the FMU cannot serialize its state.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> with hubslosh.Plant("HubSlosh") as plant:
+        ...     plant.step(1.0, torque=0.1)
+        ...     saved = plant.save()
+        ...     plant.step(2.0)
+        ...     plant.restore(saved)
+        ...     plant.time
+        1.0
+        """
         return self.time, self.native.save()
 
     def restore(self, saved: tuple[float, bytes]) -> None:
-        """Go back to what `save` returned, here or in another instance."""
+        """Go back to a saved time and state.
+
+        Parameters
+        ----------
+        saved : tuple of float and bytes
+            Result of `save`, of this or another instance of the same FMU with the same parameters.
+
+        Raises
+        ------
+        FmuError
+            If the FMU refuses the state.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> with hubslosh.Plant("HubSlosh") as plant:
+        ...     saved = plant.save()
+        ...     plant.step(1.0, torque=0.1)
+        ...     plant.restore(saved)
+        ...     plant.get(["omega"])
+        [0.0]
+        """
         self.native.restore(saved[1])
         self.time = saved[0]
 
@@ -225,17 +465,45 @@ def drive(
     hold: bool = False,
     columns: Sequence[str] = COLUMNS,
 ) -> dict[str, np.ndarray]:
-    """Drive a new instance through a torque history, one step from row to row.
+    """Drive a new instance of HubSlosh through a torque history, one step from row to row.
 
-    * ``time``: Communication points, ascending, s.
-    * ``torque``: ``tau_cmd`` there, N·m.
-    * ``slope``: Its derivative from each row to the next, N·m/s; None: straight lines between the
-      rows.
-    * ``hold``: The torque is held from row to row, whatever the slope.
-    * ``settings``, ``tolerance``: As for `Plant`.
+    Parameters
+    ----------
+    fmu : str or Path
+        File of an FMU with the input ``tau_cmd``, or the name of one of this package.
+    time : array_like, shape (n,)
+        Communication points, ascending, s; two or more.
+    torque : array_like, shape (n,)
+        ``tau_cmd`` at these times, N·m.
+    settings : mapping, optional
+        Values of parameters by name, as for `Plant`.
+    slope : array_like, shape (n,), optional
+        Derivative of the torque from each row to the next, N·m/s; by default the slope of
+        straight lines between the rows.
+    tolerance : float, optional
+        Relative tolerance of the FMU's solver; by default its own choice.
+    hold : bool
+        Hold the torque from row to row, whatever the slope.
+    columns : sequence of str
+        Numeric variables to record.
 
-    Returns the columns ``time``, ``tau_cmd`` and ``columns`` as floats, one row per communication
-    point.
+    Returns
+    -------
+    dict of ndarray, shape (n,)
+        ``time``, ``tau_cmd`` and ``columns`` as floats.
+
+    Raises
+    ------
+    FmuError
+        If the lengths differ, or the FMU refuses a value. A `RunError`, which is an FmuError,
+        has the record if the run stopped on its way.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> run = hubslosh.drive("HubSlosh", [0, 1, 2], [0.1, 0.1, 0.0], {"friction.model": "none"})
+    >>> run["omega"].round(4)
+    array([0.    , 0.234 , 0.3495])
     """
     t, tau = floats(time), floats(torque)
     if len(t) != len(tau) or len(t) < 2:

@@ -10,10 +10,45 @@ from .viewing import View, view
 class Run(ShortTable):
     """Time histories of one run, as `simulate` and `closed_loop` return them.
 
-    Everything that a pandas.DataFrame is: parts of it (``run[run["time"] < 1]``) are runs too, a
-    column is a Series. A part without the columns that are drawn by is refused by `view`, by name.
+    It is a pandas.DataFrame in every respect: parts of it (``run[run["time"] < 1]``) are runs
+    too, and a column is a Series. `view` refuses a part without the columns that it needs to
+    draw the run, and names them.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> run = hubslosh.simulate(stop=1.0, step=0.5, outputs="omega")
+    >>> len(run), run.attrs["units"]
+    (3, {'time': 's', 'omega': 'rad/s'})
     """
 
     def view(self, out: str | Path | None = None, **options: Any) -> View:
-        """Show the run in 3-D, as `hubslosh.view` does: the same options."""
+        """Show the run in 3-D, with plots that follow the time; see `hubslosh.view`.
+
+        Parameters
+        ----------
+        out : str or Path, optional
+            Also write the page to this .html file.
+        **options
+            ``model``, ``parameters``, ``tanks``, ``start``, ``stop`` and ``program``, as for
+            `hubslosh.view`.
+
+        Returns
+        -------
+        View
+            The page; a notebook shows it.
+
+        Raises
+        ------
+        FmuError
+            If the run lacks columns that are needed to draw it.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> run = hubslosh.simulate(parameters={"init.slosh_angle": 0.1}, stop=2)
+        >>> page = run.view("run.html")
+        >>> page.path.name
+        'run.html'
+        """
         return view(self, out, **options)

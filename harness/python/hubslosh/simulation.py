@@ -52,36 +52,75 @@ def simulate(
     tolerance: float | None = None,
     hold: bool = False,
 ) -> Run:
-    """Simulate an FMU by its own solver (Co-Simulation) and return what it shows over time.
+    """Simulate an FMU by its own solver (Co-Simulation) and return its outputs over time.
 
-    * ``model``: The name of an FMU of this package (see `fmu_path`), ``"HubSlosh"`` or, of FMI 3.0,
-      ``"HubSlosh-fmi3"``; or the file of any FMU 2.0 or 3.0 for Co-Simulation. Both versions give
-      the same bits if inputs are held; with interpolated inputs the last digits may differ.
-    * ``parameters``: Values of parameters and inputs by name, in SI units or with one of the
-      variable's own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of
-      them, as ``hubslosh tank --parameters`` writes it, see `read_parameters`.
-    * ``inputs``: A table with the column ``time`` (s, growing; two rows at one time are a jump) and
-      one column per input; straight lines between the rows. SI, or with the units of
-      ``inputs.attrs["units"]``, such as ``{"wheel_speed": "rpm"}``, each one of the input's own.
-      ``tau_slope``, as ``hubslosh torque`` writes it, is the slope of ``tau_cmd``.
-    * ``stop``, ``start``: Times, s; by default those of the inputs, otherwise the FMU's suggestion.
-    * ``step``: Time between the rows of the result, s; by default the rows of the inputs, otherwise
-      the FMU's suggestion. The FMU steps to every row of the inputs whatever the step.
-    * ``outputs``: Variables to record, a vector by its name (``"omega"``); by default all outputs,
-      and of the six-axis FMUs the slosh angles of the tanks in use (and of tanks that drain
-      ``liquid``), by which `view` draws the run.
-    * ``tolerance``: Relative tolerance of the FMU's solver; by default its own choice.
-    * ``hold``: Hold inputs from row to row.
+    A row of the result has the inputs from its time on, and the outputs just before these
+    inputs act: if an output follows an input at once, then a jump of the input shows in the
+    next row. ``.attrs["rows"]`` and ``.attrs["inputs"]`` say so, too.
 
-    Returns a pandas table with the columns ``time``, the inputs and ``outputs``; enumerations by
-    number.
-    A row has the inputs from its time on and the outputs just before these inputs act: an output
-    that follows an input at once shows a jump of it, or the next value of a held one, in the next
-    row (``.attrs["rows"]``, ``.attrs["inputs"]``). An FMU that cannot interpolate its inputs is
-    refused unless they are constant from row to row. Units are in ``.attrs["units"]``, what was
-    simulated in ``.attrs["model"]`` and ``.attrs["parameters"]``; ``.view()`` shows it in 3-D.
+    Parameters
+    ----------
+    model : str or Path
+        Name of an FMU of this package (see `fmu_path`), such as "HubSlosh" or, of FMI 3.0,
+        "HubSlosh-fmi3"; or the file of any FMU 2.0 or 3.0 for Co-Simulation. Both versions give
+        the same bits if inputs are held; with interpolated inputs the last digits may differ.
+    parameters : mapping, str or Path, optional
+        Values of parameters and inputs by name, in SI units or with one of the variable's own
+        units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of
+        parameters, see `read_parameters`.
+    inputs : DataFrame, optional
+        A table with the column ``time`` (s, growing; two rows at one time are a jump) and one
+        column for each input, with straight lines between the rows. Values are in SI units, or
+        in those of ``inputs.attrs["units"]``, such as ``{"wheel_speed": "rpm"}``, each one of
+        the input's own units. ``tau_slope``, which ``hubslosh torque`` writes, is the slope of
+        ``tau_cmd``.
+    stop : float, optional
+        Time of the last row, s; by default the last time of the inputs, otherwise the FMU's
+        suggestion.
+    step : float, optional
+        Time between the rows of the result, s; by default the rows of the inputs, otherwise the
+        FMU's suggestion. The FMU steps to every row of the inputs whatever the step.
+    outputs : str or sequence of str, optional
+        Variables to record, a vector by its name (``"omega"``). By default all outputs, and for
+        the six-axis FMUs also the slosh angles of the tanks in use and the liquid of tanks that
+        drain, by which `view` draws the run.
+    start : float, optional
+        Time of the first row, s; by default the first time of the inputs, otherwise the FMU's
+        suggestion.
+    tolerance : float, optional
+        Relative tolerance of the FMU's solver; by default its own choice.
+    hold : bool
+        Hold inputs from row to row instead of straight lines. An FMU that cannot interpolate
+        its inputs needs it, unless they are constant from row to row.
 
-    Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
+    Returns
+    -------
+    Run
+        A pandas table with the columns ``time``, the inputs and ``outputs``; enumerations by
+        number. Units are in ``.attrs["units"]``, and the simulated FMU and its parameters in
+        ``.attrs["model"]`` and ``.attrs["parameters"]``. ``.view()`` shows the run in 3-D.
+
+    Raises
+    ------
+    FmuError
+        With everything that is wrong with the arguments, or with the FMU's message.
+
+    Examples
+    --------
+    A torque turns the bench for a second. Then the liquid swings, and the hub with it:
+
+    >>> import pandas as pd
+    >>> import hubslosh
+    >>> torque = pd.DataFrame({"time": [0, 1, 1, 3], "tau_cmd": [0.3, 0.3, 0, 0]})
+    >>> run = hubslosh.simulate(
+    ...     parameters={"slosh.model": "spherical", "tank.h": (50, "mm")},
+    ...     inputs=torque, step=1.0, outputs=["omega", "slosh_angle"])
+    >>> run[["time", "tau_cmd", "omega", "slosh_angle"]].round(3)
+       time  tau_cmd  omega  slosh_angle
+    0   0.0      0.3  0.000        0.000
+    1   1.0      0.0  0.755       -0.015
+    2   2.0      0.0  0.666       -0.010
+    3   3.0      0.0  0.596        0.013
     """
     fmu = Fmu.open(model)
     parameters = parameters_of(parameters)

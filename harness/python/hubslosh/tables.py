@@ -13,10 +13,35 @@ from .fmu import DefinedUnit, FmuError, Quantity, Value
 
 
 def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
-    """Read columns of numbers from a .csv or .parquet file.
+    r"""Read columns of numbers from a .csv or .parquet file; needs pyarrow.
 
-    A column ``time`` of dates or durations is read in seconds, dates from the first row. Integers
-    of a Parquet file are refused as times: their unit is not known.
+    A column ``time`` of dates or durations is read in seconds, dates from the first row on.
+    Integers as times of a Parquet file are refused, because their unit is not known.
+
+    Parameters
+    ----------
+    path : Path
+        File whose name ends in .csv or .parquet.
+    columns : sequence of str
+        Names of the columns to read.
+
+    Returns
+    -------
+    dict of ndarray
+        Columns as floats by name.
+
+    Raises
+    ------
+    FmuError
+        If the file cannot be read, lacks a column, or a column is not of numbers.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import hubslosh
+    >>> _ = Path("log.csv").write_text("time,omega\n0,0.1\n0.02,0.2\n")
+    >>> hubslosh.read_table(Path("log.csv"), ["time", "omega"])
+    {'time': array([0.  , 0.02]), 'omega': array([0.1, 0.2])}
     """
     import pyarrow.csv
     import pyarrow.parquet
@@ -61,13 +86,36 @@ def _numbers(path: Path, name: str, column: Any) -> np.ndarray:
 
 
 def read_parameters(path: str | Path) -> dict[str, Quantity]:
-    """Read a file of parameters: .toml, .ssv or .json.
+    r"""Read a file of parameters: .toml, .ssv or .json.
 
-    ``"name" = value`` as TOML (nested tables are names with dots), SSP 1.0's parameter set
-    (``hubslosh tank --parameters`` writes both), or what ``hubslosh identify --out`` writes.
+    The file has ``"name" = value`` as TOML, where nested tables are names with dots; or the
+    parameter set of SSP 1.0, .ssv; or it is a result of ``hubslosh identify --out``. ``hubslosh
+    tank --parameters`` writes the first two.
 
-    A parameter of a .ssv with a unit is a pair (number, unit). The unit is that of the file's
-    definitions, otherwise one of the FMU's; `Fmu.convert` converts it or refuses it.
+    Parameters
+    ----------
+    path : str or Path
+        The file; its ending says which format it has.
+
+    Returns
+    -------
+    dict
+        Values by name, for `simulate` and `Loop`. A parameter of a .ssv with a unit is a pair
+        (number, unit), where the unit is that of the file's definitions if it has one,
+        otherwise one of the FMU's. `Fmu.convert` converts or refuses it.
+
+    Raises
+    ------
+    FmuError
+        If the file cannot be read, or is none of parameters.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import hubslosh
+    >>> _ = Path("bench.toml").write_text('tank.h = 0.05\n"slosh.model" = "spherical"\n')
+    >>> hubslosh.read_parameters("bench.toml")
+    {'tank.h': 0.05, 'slosh.model': 'spherical'}
     """
     if not isinstance(path, str | Path):
         raise FmuError(f"the file of parameters must be a path, not {path!r}")
@@ -89,10 +137,33 @@ def _with_unit(value: Value, unit: str | None, base: tuple | None) -> Quantity:
 def write_table(
     path: Path, table: Mapping[str, np.ndarray], notes: Mapping[str, str] | None = None
 ) -> None:
-    """Write columns of numbers to a .csv or .parquet file without loss of digits.
+    """Write columns of numbers to a .csv or .parquet file, with every digit; needs pyarrow.
 
-    * ``notes``: Key-value metadata of a Parquet file. The file appears complete or not at all: it
-      is written to a temporary folder next to its place, then moved.
+    The file appears complete or not at all: it is written in a temporary folder next to its
+    place, then moved.
+
+    Parameters
+    ----------
+    path : Path
+        File whose name ends in .csv or .parquet.
+    table : mapping of ndarray
+        Columns of one length by name.
+    notes : mapping of str, optional
+        Key-value metadata of a Parquet file; a .csv has none.
+
+    Raises
+    ------
+    FmuError
+        If the name has another ending, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import hubslosh
+    >>> hubslosh.write_table(Path("rate.csv"), {"time": np.arange(3) / 2, "omega": np.zeros(3)})
+    >>> Path("rate.csv").read_text().splitlines()[-1]
+    '1,0'
     """
     import pyarrow.csv
     import pyarrow.parquet
@@ -114,7 +185,29 @@ def ending_of(path: Path) -> str:
 
 
 def setting(text: str) -> tuple[str, str]:
-    """Return name and value of an argument NAME=VALUE."""
+    """Return name and value of a command line's argument NAME=VALUE.
+
+    Parameters
+    ----------
+    text : str
+        The argument.
+
+    Returns
+    -------
+    tuple of str
+        Name and value, without blanks around them.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If the argument has no equals sign.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> hubslosh.setting("tank.h=50 mm")
+    ('tank.h', '50 mm')
+    """
     name, equals, value = text.partition("=")
     if not equals:
         raise argparse.ArgumentTypeError(f'"{text}" is not of the form name=value')

@@ -116,11 +116,35 @@ def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path
         assert done.returncode == 0, f"{code}\n{done.stderr}"
 
 
+DOCTESTS = """
+import doctest, importlib, pkgutil, hubslosh
+found = doctest.TestResults(0, 0)
+for info in pkgutil.iter_modules(hubslosh.__path__, "hubslosh."):
+    if not info.name.rpartition(".")[2].startswith("_"):
+        more = doctest.testmod(importlib.import_module(info.name), globs={})
+        found = doctest.TestResults(found.failed + more.failed, found.attempted + more.attempted)
+assert not found.failed and found.attempted > 100, found
+"""
+"""Runs the examples of every docstring; none sees the names of its module."""
+
+
+def test_the_examples_in_docstrings_give_what_they_show(
+    wheel: Path, tmp_path: Path, request
+) -> None:
+    """In a folder of their own, with the wheel."""
+    run_with_wheel(DOCTESTS, wheel, tmp_path, request)
+
+
 def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str:
-    """Run pages of the book as one program, with the wheel, matplotlib and the harness's binary."""
+    """Run pages of the book as one program."""
+    code = "\n".join(block for page in pages for block in python_in(ROOT / "book" / f"{page}.md"))
+    return run_with_wheel(code, wheel, folder, request)
+
+
+def run_with_wheel(code: str, wheel: Path, folder: Path, request) -> str:
+    """Run a program with the wheel, matplotlib and the harness's binary."""
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "wheel")
-    code = "\n".join(block for page in pages for block in python_in(ROOT / "book" / f"{page}.md"))
     surroundings = os.environ | {
         "PYTHONPATH": str(folder / "wheel"),
         "HUBSLOSH": str(option(request, "--hubslosh")),
@@ -131,7 +155,7 @@ def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str
         [sys.executable, "-c", code],
         cwd=folder, env=surroundings, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
