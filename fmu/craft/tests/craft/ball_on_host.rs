@@ -10,7 +10,8 @@ use craft::{
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
 use super::ball::{V, askew, rotation, thrust, v, with_states};
-use super::random::{Random, output_slopes};
+use super::equations::output_slopes;
+use super::random::Random;
 
 type Six = SVector<f64, 6>;
 

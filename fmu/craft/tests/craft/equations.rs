@@ -5,7 +5,7 @@ use craft::{
     SloshTankOutputs, Spacecraft, TANK_INPUTS, TANK_STATES, TankInputs, TankParameters, index,
 };
 
-use super::random::{Random, draining_tank, output_slopes};
+use super::random::{Random, draining_tank};
 
 fn ramps(u: &Inputs) -> [Ramp; 3] {
     [u.force, u.torque, u.h_wheels]
@@ -231,4 +231,15 @@ fn a_tank_s_directional_derivatives_are_those_by_differences() {
         let exact = flat_tank(&output_slopes(&mut tank, &u));
         assert_same(&exact, &slopes, &now[1], &format!("{seed} slope"));
     }
+}
+
+/// Returns the derivative of the outputs by time, along the inputs' ramps.
+pub fn output_slopes(tank: &mut SloshTank, inputs: &TankInputs) -> SloshTankOutputs {
+    let dx = tank.derivatives(inputs);
+    let mut du = [0.0; TANK_INPUTS];
+    du[..3].copy_from_slice(&inputs.a.slope);
+    du[3..6].copy_from_slice(&inputs.omega_dot.value);
+    du[6..9].copy_from_slice(&inputs.omega_dot.slope);
+    du[9] = inputs.mass_flow.slope;
+    tank.output_derivatives(inputs, &dx, &du)
 }

@@ -2,7 +2,7 @@
 
 use craft::{
     Craft, DampingLaw, FillTable, Inertia, Init, Inputs, Line, Mount, POINTS, Parameters, Pivot,
-    PivotFriction, Ramp, SloshTank, SloshTankOutputs, TANK_INPUTS, TANKS, Tank, TankInputs,
+    PivotFriction, Ramp, TANKS, Tank,
 };
 
 pub struct Random(fastrand::Rng);
@@ -221,15 +221,4 @@ pub fn draining_craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
         *flow = Line { value: random.between(1.0, 5.0), slope: random.between(-2.0, 4.0) };
     }
     (p, u)
-}
-
-/// Returns the derivative of the outputs by time, along the inputs' ramps.
-pub fn output_slopes(tank: &mut SloshTank, inputs: &TankInputs) -> SloshTankOutputs {
-    let dx = tank.derivatives(inputs);
-    let mut du = [0.0; TANK_INPUTS];
-    du[..3].copy_from_slice(&inputs.a.slope);
-    du[3..6].copy_from_slice(&inputs.omega_dot.value);
-    du[6..9].copy_from_slice(&inputs.omega_dot.slope);
-    du[9] = inputs.mass_flow.slope;
-    tank.output_derivatives(inputs, &dx, &du)
 }
