@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use files::temporary;
 use zip::CompressionMethod;
 
-use super::Findings;
+use super::findings::Findings;
 
 /// Entries allowed at the top level of an FMU.
 const AT_THE_TOP: [&str; 9] = [

@@ -3,7 +3,7 @@
 
 use anyhow::Result;
 
-use super::Findings;
+use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest};
 use host::description::Type;
 use host::fmi2::guarded::Lists;

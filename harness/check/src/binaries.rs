@@ -1,7 +1,9 @@
 //! The files under `binaries/` (FMI 2.0.5, section 2.3), read as files, whichever platform they are
 //! for.
 
-use super::{Archive, Description, Findings};
+use super::archive::Archive;
+use super::description::Description;
+use super::findings::Findings;
 use host::binary::{Binary, Kind};
 use host::fmi2::{Fmu, PLATFORM};
 

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Findings;
 use super::description::Description;
+use super::findings::Findings;
 use host::xml::{Element, Fault};
 
 /// `xml.well_formed`
-pub fn well_formed(archive: &super::Archive, findings: &mut Findings) {
+pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
     match archive.file("modelDescription.xml") {
         None => findings.skip("there is no modelDescription.xml that can be unpacked"),
         Some(bytes) => {

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::Findings;
 use super::description::{Unknown, Variable};
+use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest, start_value};
 use super::values::items;
 use host::causality::Causality;

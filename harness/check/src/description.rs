@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 use std::str::FromStr;
 
-use super::Findings;
+use super::findings::Findings;
 use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::xml::Element;

@@ -8,10 +8,10 @@
 
 use anyhow::Result;
 
-use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
 use super::exchange::continuous;
+use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, STEPS, Session, Sight};
 
 /// Starts from which runs are made: the first as declared, then with other parameters.

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::Findings;
+use super::findings::Findings;
 use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest};
 

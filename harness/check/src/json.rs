@@ -5,7 +5,8 @@ use std::io::Write;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::{Finding, Outcome, Report, Severity};
+use super::findings::{Finding, Severity};
+use super::report::{Outcome, Report};
 
 /// The file as a whole.
 #[derive(Serialize)]

@@ -5,7 +5,8 @@ use std::io::Write;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::{Outcome, Report, Severity};
+use super::findings::Severity;
+use super::report::{Outcome, Report};
 
 #[derive(Serialize)]
 #[serde(rename = "testsuites")]
@@ -128,7 +129,9 @@ fn legal(text: &str) -> String {
 mod tests {
     use std::time::Duration;
 
-    use super::super::{Findings, Outcome, RULES};
+    use super::super::findings::Findings;
+    use super::super::report::Outcome;
+    use super::super::rules::fmi2::RULES;
     use super::*;
     use host::xml::Element;
 

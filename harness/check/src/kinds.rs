@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::Findings;
 use super::dependencies::moved;
 use super::description::{Unknown, Variable};
+use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
 
 /// Starts at which factors are measured: the first as declared, then with other parameters.

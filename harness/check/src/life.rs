@@ -3,7 +3,7 @@
 
 use anyhow::Result;
 
-use super::Findings;
+use super::findings::Findings;
 use super::loaded::{Life, Readings, STEPS, UnderTest, Unusable};
 use super::under_test::{FmuUnderTest, Interface, Reading, Session, Stage};
 use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Status, file_uri};

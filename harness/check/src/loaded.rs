@@ -12,7 +12,7 @@ use host::c_abi::version::{Fmu, Instance, Interface, Version};
 use host::guard;
 use host::xml::Element;
 
-use super::Findings;
+use super::findings::Findings;
 use super::trace::{self, Crash};
 
 /// Steps of a short run.

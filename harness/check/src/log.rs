@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::Findings;
+use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, STEPS, UnderTest};
 use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 
-use super::Findings;
+use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, UnderTest};
 
 /// Calls of a window.

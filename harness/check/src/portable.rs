@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::archive::Archive;
 use super::binaries::PLATFORMS;
-use super::{Archive, Findings};
+use super::findings::Findings;
 
 /// Characters that Windows does not allow in names; `/` separates and control characters are a rule
 /// of their own.

@@ -10,10 +10,15 @@ use anyhow::{Context, Result};
 use host::guard::{self, Cause, Limits, Output};
 use host::xml::Element;
 
+use super::description::Description;
+use super::findings::Findings;
 use super::loaded::Unusable;
+use super::options::Options;
+use super::rule::{Check, Rule};
+use super::rules::fmi2::RULES;
 use super::trace::{self, Answer, Crash};
 use super::under_test::FmuUnderTest;
-use super::{Check, Description, Findings, Options, RULES, Rule, life, v3};
+use super::{life, v3};
 
 /// The hidden subcommand of `hubslosh`.
 pub const SUBCOMMAND: &str = "check-calls";

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
+use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use super::values::{items, mentions};
 use host::description::Type;

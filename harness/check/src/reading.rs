@@ -3,7 +3,8 @@
 
 use host::xml::{Element, Fault};
 
-use super::{Archive, Findings};
+use super::archive::Archive;
+use super::findings::Findings;
 
 const NAME: &str = "modelDescription.xml";
 

@@ -5,7 +5,8 @@ use std::io::Write;
 use anyhow::Result;
 use serde_json::json;
 
-use super::{Report, Severity};
+use super::findings::Severity;
+use super::report::Report;
 
 /// A path as a reference of RFC 3986: an absolute one is a file's address.
 fn uri(path: &str) -> String {

@@ -2,7 +2,8 @@
 //! attributes they have and how those are written. The table of FMI 2.0 (2.0.5, section 2.2) is here, that of 3.0 in
 //! `v3/schema.rs`.
 
-use super::{Description, Findings};
+use super::description::Description;
+use super::findings::Findings;
 use host::xml::{Element, double};
 
 /// Format of an attribute's value.

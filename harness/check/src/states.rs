@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::Findings;
+use super::findings::Findings;
 use super::loaded::{Life, Mark, Readings, STEPS, UnderTest, Unusable};
 use super::under_test::{FmuUnderTest, Stage};
 

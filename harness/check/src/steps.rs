@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 
-use super::Findings;
 use super::dependencies::elsewhere;
 use super::description::Variable;
+use super::findings::Findings;
 use super::life::expect_refusal;
 use super::under_test::{
     FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest, Unusable,

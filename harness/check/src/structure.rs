@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use host::causality::Causality;
 
-use super::Findings;
 use super::description::{Description, Unknown, Variable};
+use super::findings::Findings;
 
 /// Reports entries that are missing, repeated or not allowed.
 fn compare(

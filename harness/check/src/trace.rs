@@ -4,7 +4,7 @@ use anyhow::Result;
 use host::guard;
 use serde::{Deserialize, Serialize};
 
-use super::Findings;
+use super::findings::Findings;
 
 /// Meaning of a crash or hang during the next call.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -3,8 +3,8 @@
 
 use anyhow::Result;
 
-use super::Findings;
 use super::description::Variable;
+use super::findings::Findings;
 use super::under_test::{
     FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest, start_value,
 };

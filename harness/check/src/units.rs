@@ -8,7 +8,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::{Description, Findings};
+use super::description::Description;
+use super::findings::Findings;
 use host::xml::Element;
 
 /// Base units of FMI 2.0 in the schema's order. The radian is the last: it has dimension 1, and

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::Findings;
 use super::description::Variable;
+use super::findings::Findings;
 use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use host::causality::{Causality, Variability};

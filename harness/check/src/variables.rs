@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 
-use super::Findings;
 use super::description::{Common, Description, Initials, Variable, each, initials};
+use super::findings::Findings;
 use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::xml::{Element, double};

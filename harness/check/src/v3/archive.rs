@@ -1,9 +1,10 @@
 //! Content of the archive of an FMU 3.0 (FMI 3.0.2, sections 2.5 and 2.6), and its binaries.
 
-use super::Description;
+use super::description::Description;
+use crate::archive::Archive;
 use crate::archive::folders_of;
 use crate::binaries::tuple;
-use crate::{Archive, Findings};
+use crate::findings::Findings;
 use host::binary::{Binary, Kind};
 use host::fmi3::{Fmu, PLATFORM};
 use host::xml::Element;

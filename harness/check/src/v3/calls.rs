@@ -2,10 +2,11 @@
 
 use anyhow::Result;
 
-use super::Subject;
+use super::subject::Subject;
 use super::subject::{STEPS, Session, Use, start_values};
+use crate::findings::Findings;
 use crate::loaded::{Life as _, UnderTest as _};
-use crate::{Findings, life, states};
+use crate::{life, states};
 use host::c_abi::{CallError, Status, foreign_environments};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type, Value};
@@ -106,8 +107,9 @@ pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
 /// `values.set`
 pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using = subject.plain_uses()[0];
-    let wanted =
-        |v: &&super::Variable| v.is_set_by_hosts() && v.causality != Causality::StructuralParameter;
+    let wanted = |v: &&super::description::Variable| {
+        v.is_set_by_hosts() && v.causality != Causality::StructuralParameter
+    };
     for v in subject.readable().filter(wanted) {
         let Some(mut values) = start_values(v) else { continue };
         let (min, max) = v.bounds();
@@ -249,7 +251,7 @@ pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
 pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = subject.plain_uses().first().copied() else { return Ok(()) };
     let mut any = false;
-    let wanted = |v: &&super::Variable| {
+    let wanted = |v: &&super::description::Variable| {
         v.causality == Causality::Parameter
             && v.variability == Variability::Fixed
             && v.c_type == CType::Float64
@@ -391,7 +393,7 @@ fn exchanging<'s>(subject: &'s Subject, findings: &mut Findings) -> Result<Optio
 pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
     let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
-    let length = |r: u32| d.at(r).map_or(0, super::Variable::length);
+    let length = |r: u32| d.at(r).map_or(0, super::description::Variable::length);
     let states: usize = d.states().into_iter().map(length).sum();
     let indicators = d.unknowns("EventIndicator").filter_map(|u| u.reference);
     let indicators: usize = indicators.map(length).sum();

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::description::Description;
-use crate::Findings;
 use crate::definitions::{experiment_numbers, identifiers, stop_before_start, unique_names};
+use crate::findings::Findings;
 use host::description::Type;
 use host::xml::Element;
 

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::ops::Deref;
 
-use crate::Findings;
 use crate::description::{Common, each, number, words};
+use crate::findings::Findings;
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 use host::xml::Element;

@@ -7,8 +7,8 @@ use crate::schema::{
     Written, kind,
 };
 
-use super::Description;
-use crate::Findings;
+use super::description::Description;
+use crate::findings::Findings;
 
 const CAUSALITY: Written = OneOf(&[
     "parameter",

@@ -3,9 +3,10 @@
 
 use anyhow::Result;
 
+use super::description::Variable;
+use super::subject::Subject;
 use super::subject::{STEPS, Session, Use};
-use super::{Subject, Variable};
-use crate::Findings;
+use crate::findings::Findings;
 use crate::loaded::{Life as _, UnderTest as _};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Value};

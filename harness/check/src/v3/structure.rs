@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::description::{Description, Unknown, Variable};
-use crate::Findings;
+use crate::findings::Findings;
 use host::causality::{Causality, Variability};
 use host::description::Type;
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::definitions::items;
 use super::description::{Description, Variable, initials};
-use crate::Findings;
+use crate::findings::Findings;
 use crate::variables::{
     not_finite, out_of_range, unstructured, wrong_causality, wrong_initial, wrong_start,
 };
