@@ -49,23 +49,42 @@ MOST_TANKS = 4
 
 @dataclass(frozen=True, eq=False)
 class MountedTank:
-    """A tank of a `Craft`: its drawing, its place, its liquid."""
+    """A tank of a `Craft`: its drawing, its place and its liquid.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        Drawing: a tank file (.toml), or a dict with its content, as for `tank`.
+    position : sequence of float, shape (3,)
+        Position of the tank's zero (of a ``shape`` its lowest point) from the craft's origin O,
+        body axes, m.
+    axis : sequence of float, shape (3,) or (4,)
+        Upward direction of the tank's axis in body axes, of any length; or the tank's attitude
+        as a quaternion, scalar first, from tank to body axes.
+    modes : int
+        Number of slosh modes, 1 to 3.
+    nu : float, optional
+        Kinematic viscosity, m²/s, for damping ratios; without it the modes are undamped.
+    sigma : float, optional
+        Surface tension, N/m, for centring stiffnesses.
+    contact_angle : float, optional
+        Contact angle between surface and wall, deg.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    >>> hubslosh.MountedTank(sphere, (0, 0, 0.2), nu=0.9e-6)
+    MountedTank(sphere, 1010 kg/m³, at (0, 0, 0.2) m, axis (0, 0, 1), modes=2)
+    """
 
     source: str | Path | Mapping[str, Any]
-    """Drawing: a tank file, or a dict with its content, as for `tank`."""
     position: Sequence[float]
-    """Position of the tank's zero (of a ``shape`` its lowest point) from O, body axes, m."""
     axis: Sequence[float] = (0.0, 0.0, 1.0)
-    """Upwards along the tank's axis, body axes; or the tank's attitude as a quaternion, scalar
-    first, tank to body axes."""
     modes: int = 2
-    """Number of slosh modes, 1 to 3."""
     nu: float | None = None
-    """Kinematic viscosity for damping ratios, m²/s."""
     sigma: float | None = None
-    """Surface tension for centring stiffnesses, N/m."""
     contact_angle: float | None = None
-    """Contact angle between surface and wall, deg."""
 
     @property
     def q(self) -> Vector:
@@ -88,7 +107,20 @@ class MountedTank:
         )
 
     def problems(self) -> list[str]:
-        """Return everything that is wrong with it, but for its drawing."""
+        """Return everything that is wrong with the tank, except with its drawing.
+
+        Returns
+        -------
+        list of str
+            Sentences; none if all is right.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=7).problems()
+        ['modes must be 1, 2 or 3, not 7']
+        """
         found = []
         for name, lengths in (("position", (3,)), ("axis", (3, 4))):
             try:
@@ -115,7 +147,20 @@ class MountedTank:
         return f"MountedTank({self.describe()})"
 
     def describe(self) -> str:
-        """Return the tank in a few words."""
+        """Return drawing, place and number of modes in a few words.
+
+        Returns
+        -------
+        str
+            The words.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> hubslosh.MountedTank(sphere, (0, 0, 0.2)).describe()
+        'sphere, 1010 kg/m³, at (0, 0, 0.2) m, axis (0, 0, 1), modes=2'
+        """
         given = self.source
         if isinstance(given, Mapping):
             drawn = next(iter(given.get("shape", ())), None)
@@ -131,15 +176,29 @@ _DRAWINGS = ("profile", "box", "points", "svg")
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """Mass, centre of mass and inertia of a `Craft` at a fill."""
+    """Mass, centre of mass and inertia of a `Craft` at a fill.
+
+    Attributes
+    ----------
+    mass : float
+        Mass, kg.
+    center_of_mass : ndarray, shape (3,)
+        Centre of mass from O, body axes, m.
+    inertia : ndarray, shape (3, 3)
+        Inertia about the centre of mass, body axes, kg·m². Products of inertia are minus the
+        integral of x y dm.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> dry = hubslosh.Craft(mass=900, inertia=[400, 380, 300])
+    >>> dry.mass_properties("50%").mass
+    900.0
+    """
 
     mass: float
-    """Mass, kg."""
     center_of_mass: Vector
-    """Centre of mass from O, body axes, m."""
     inertia: Vector
-    """Inertia about the centre of mass, body axes, kg·m²; products of inertia are minus the
-    integral of x y dm."""
 
     def __str__(self) -> str:
         """Return it in five lines."""
@@ -158,27 +217,58 @@ Liquid = Literal["effective", "rigid"]
 class Craft:
     """A spacecraft with tanks: one object for all fills.
 
-    Body axes have the origin O. Nothing is computed before it is asked for, and each fill once.
+    Body axes have the origin O. All arguments are checked at construction, except the drawings
+    of the tanks, which are read when they are first needed. Each fill is solved once.
+
+    Parameters
+    ----------
+    mass : float
+        Dry mass, kg.
+    inertia : array_like, shape (3, 3) or (3,)
+        Inertia of the dry craft about its centre of mass, body axes, kg·m²: a symmetric matrix,
+        whose products of inertia are minus the integral of x y dm, or its diagonal.
+    center_of_mass : sequence of float, shape (3,)
+        Centre of mass of the dry craft from O, body axes, m.
+    tanks : mapping of MountedTank
+        Up to four tanks by name. Their order gives the numbers of the FMU's tanks.
+    thrust : float or sequence of float, shape (3,)
+        Force at O, body axes, N; a number is along z.
+    wheels : sequence of float, shape (3,)
+        Angular momentum of the wheels relative to the body, body axes, N·m·s.
+    gravity : float, optional
+        Specific force along the tanks' axes, m/s², for frequencies and damping; by default
+        thrust over mass at the fill.
+    model : str or Path
+        Name or file of the FMU, as for `simulate`.
+
+    Raises
+    ------
+    FmuError
+        With everything that is wrong with the arguments.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    >>> craft = hubslosh.Craft(
+    ...     mass=900, inertia=[400, 380, 300], thrust=50,
+    ...     tanks={"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))})
+    >>> print(craft.mass_properties("60%"))
+    mass 1062.458 kg, centre of mass (0, 0, 0.0733128) m
+    inertia about it, kg·m²:
+      (433.8291, 0, 0)
+      (0, 413.8291, 0)
+      (0, 0, 300)
     """
 
     mass: float
-    """Dry mass, kg."""
     inertia: ArrayLike
-    """Inertia of the dry craft about its centre of mass, body axes, kg·m²: a symmetric matrix
-    (products of inertia are minus the integral of x y dm), or its diagonal."""
     center_of_mass: Sequence[float] = (0.0, 0.0, 0.0)
-    """Centre of mass of the dry craft from O, m."""
     tanks: Mapping[str, MountedTank] = field(default_factory=dict)
-    """Up to four tanks by name. Their order gives the FMU's numbers."""
     thrust: float | Sequence[float] = 0.0
-    """Force at O, body axes, N; a number is along z."""
     wheels: Sequence[float] = (0.0, 0.0, 0.0)
-    """Angular momentum of the wheels relative to the body, N·m·s."""
     gravity: float | None = None
-    """Specific force along the tanks' axes for frequencies and damping, m/s²; by default thrust
-    over mass at the fill."""
     model: str | Path = "Spacecraft"
-    """The FMU, by name or file, as for `simulate`."""
     _known: dict[Any, Any] = field(default_factory=dict, init=False)
     _said: list[str] = field(default_factory=list, init=False)
 
@@ -239,7 +329,32 @@ class Craft:
         return vector(self.thrust, 3, "thrust")
 
     def fills(self, fill: Fill) -> dict[str, Any]:
-        """Return the fill of each tank by name."""
+        """Return the fill of each tank by name.
+
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            One fill for all tanks; or one for each, by name or in their order. A fill is a height
+            (m), a share of the volume (``"60%"``), a mass (``(120, "kg")``), or 0.
+
+        Returns
+        -------
+        dict
+            Fills by the tanks' names.
+
+        Raises
+        ------
+        FmuError
+            If a tank is missing or unknown.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {name: hubslosh.MountedTank(sphere, (0, 0, 0)) for name in ("fuel", "oxidiser")}
+        >>> hubslosh.Craft(900, [400, 380, 300], tanks=tanks).fills(["60%", (100, "kg")])
+        {'fuel': '60%', 'oxidiser': (100, 'kg')}
+        """
         return self._by_tank(fill, "fill")
 
     def _by_tank(self, given: Any, what: str) -> dict[str, Any]:
@@ -321,11 +436,57 @@ class Craft:
             raise FmuError(f"tank {name}: {error}") from None
 
     def tank_at(self, fill: Fill) -> dict[str, Tank]:
-        """Return the tanks that are not empty at a fill, by name, as `tank` gives them."""
+        """Return the solved tanks at a fill, without those that are empty.
+
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+
+        Returns
+        -------
+        dict of Tank
+            Tanks by name, as `tank` returns them.
+
+        Raises
+        ------
+        FmuError
+            If a drawing or a fill is wrong, or the thrust does not hold the liquid at the bottom.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> round(craft.tank_at("60%")["main"].mass, 2)
+        162.46
+        """
         return self._at([fill])[0]
 
     def solve(self, fills: Sequence[Fill]) -> None:
-        """Solve the tanks at several fills at once, on all cores; later calls find them solved."""
+        """Solve the tanks at several fills at once, on all cores.
+
+        Later calls at these fills need no more time.
+
+        Parameters
+        ----------
+        fills : sequence of fills
+            Fills of the craft, each as for `fills`.
+
+        Raises
+        ------
+        FmuError
+            If a drawing or a fill is wrong, or the thrust does not hold the liquid at the bottom.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> craft.solve(["60%", "70%"])
+        """
         self._at(fills)
 
     def _at(self, fills: Sequence[Fill]) -> list[dict[str, Tank]]:
@@ -361,10 +522,34 @@ class Craft:
             warnings.warn(text, FmuWarning, stacklevel=caller())
 
     def mass_properties(self, fill: Fill, liquid: Liquid = "effective") -> MassProperties:
-        """Return mass, centre of mass and inertia at a fill, every surface at rest.
+        """Return mass, centre of mass and inertia at a fill, with every surface at rest.
 
-        * ``liquid``: "effective", with the inertia that it has under a lid, without friction (about
-          the axis of a body of revolution: 0), as the FMU has it; "rigid", as if it were solid.
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        liquid : {"effective", "rigid"}
+            "effective" has the inertia of liquid under a lid without friction, as the FMU has it
+            (about the axis of a body of revolution: 0); "rigid" that of solid liquid.
+
+        Returns
+        -------
+        MassProperties
+            Of dry craft and liquid, body axes; ``print`` shows them.
+
+        Raises
+        ------
+        FmuError
+            If a drawing, a fill or ``liquid`` is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> craft.mass_properties("60%").center_of_mass.round(4)
+        array([0.    , 0.    , 0.0733])
         """
         if liquid not in ("effective", "rigid"):
             raise FmuError(f'liquid must be "effective" or "rigid", not {liquid!r}')
@@ -395,17 +580,48 @@ class Craft:
     ) -> dict[str, Quantity]:
         """Return the parameters of Spacecraft at a fill, its thrust through the centre of mass.
 
-        * ``parameters``: Further parameters, which override those of the craft, with the same
-          names in every method: a tank by its name or number, ``NTO.frequency[1]`` or
-          ``tank[1].frequency[1]`` (Hz, under the thrust that acts; the bob stays), ``zeta[1]``,
-          ``mass[1]`` and ``bob[1]`` (its height, m; mass, centre and inertia of the liquid stay);
-          ``craft.Jxx``, … and every other parameter of the FMU.
-        * ``trimmed``: See `trim`. False leaves the thrust at O, with a warning if it turns the
-          craft.
-        * ``rigid``: Liquid without slosh, with its effective inertia.
-        * ``detach``: Liquid may leave the bottom, by `travel`; it then sloshes as a pendulum,
-          without the coefficients of finite amplitude.
-        * ``mass_flow``: Tanks drain, see `drain`.
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        parameters : mapping, optional
+            Further parameters, which override those of the craft, with the same names in every
+            method. A tank has its name or number: ``NTO.frequency[1]`` or ``tank[1].frequency[1]``
+            (Hz, under the thrust that acts; the height of the slosh mass stays), ``zeta[1]``,
+            ``mass[1]`` (kg) and ``bob[1]`` (height of the slosh mass, m; mass, centre and inertia
+            of the liquid stay). ``craft.Jxx``, … and every other parameter of the FMU are
+            allowed, too.
+        trimmed : bool
+            Trim the craft, see `trim`. False leaves the thrust at O, with a warning if it turns the
+            craft.
+        rigid : bool
+            Liquid without slosh, with its effective inertia.
+        detach : bool
+            Liquid may leave the bottom, see `travel`. It then sloshes as a pendulum, without the
+            coefficients of finite amplitude.
+        mass_flow : float, mapping or sequence of float, optional
+            Outflow of the tanks, kg/s, see `drain`.
+        between : sequence of two fills
+            Ends of the fill table of a tank that drains, see `drain`.
+
+        Returns
+        -------
+        dict
+            Values by the FMU's names, for `simulate`, `linearize` and `Loop`.
+
+        Raises
+        ------
+        FmuError
+            If a fill or a parameter is wrong, or options exclude each other.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> round(craft.parameters("60%")["tank[1].mass[1]"], 2)
+        82.38
         """
         options: dict[str, Any] = {
             "rigid": rigid, "detach": detach, "mass_flow": mass_flow, "between": between,
@@ -421,9 +637,35 @@ class Craft:
         """Return the operating point at a fill; ``print`` says which accelerations are left.
 
         The thrust acts through the centre of mass, as after trimming: O, and with it the thrust,
-        moves across the thrust, while its direction stays. Every method of a craft uses this
-        point. What further ``parameters`` do, such as a constant torque, is left; so is a
-        specific force across the axis of a tank that leans.
+        moves across the thrust, while its direction stays. Every method of a craft uses this point.
+        The effect of further parameters, such as a constant torque, is left, and so is a specific
+        force across the axis of a tank that leans.
+
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        parameters : mapping, optional
+            Further parameters, see `parameters`.
+
+        Returns
+        -------
+        OperatingPoint
+            Parameters of the trimmed craft, the way of O, and the accelerations that are left.
+
+        Raises
+        ------
+        FmuError
+            If a fill or a parameter is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0.1, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> craft.trim("60%").shift.round(4) + 0.0
+        array([0.0153, 0.    , 0.    ])
         """
         return self._point(fill, parameters)[0]
 
@@ -556,19 +798,67 @@ class Craft:
     ) -> dict[str, Quantity]:
         """Return the parameters of Spacecraft with tanks that drain from a fill on.
 
-        * ``mass_flow``: Outflow of each tank, kg/s; one value, or one for each tank as in `fills`.
-          A tank with outflow gets a fill table with the ends ``between``, which takes some 5 s of
-          CPU time and is kept. The FMU stops where liquid leaves the table. The table has damping
-          ratios and third-order coefficients at every fill; a warning names fills at which the
-          coefficients are not known and are bounded by those of other fills.
+        The FMU stops where the liquid leaves the fill table. The table has damping ratios and
+        third-order coefficients at every fill; a warning names the fills at which the coefficients
+        are not known and are bounded by those of other fills.
+
+        Parameters
+        ----------
+        mass_flow : float, mapping or sequence of float
+            Outflow of the tanks, kg/s: one value for all, or one for each, as in `fills`.
+        fill : fill, mapping, or sequence of fills
+            Fill at the start, as for `fills`.
+        between : sequence of two fills
+            Ends of the fill table of each tank with outflow. It takes some 5 s of CPU time, once.
+
+        Returns
+        -------
+        dict
+            Values by the FMU's names.
+
+        Raises
+        ------
+        FmuError
+            If a tank with outflow is empty, or a fill is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> craft.drain(0.0, "60%") == craft.parameters("60%")
+        True
         """
         return self.parameters(fill, mass_flow=mass_flow, between=between)
 
     def travel(self, fill: Fill) -> dict[str, float]:
-        """Return the way of detached liquid in each tank that is not empty, m.
+        """Return how far detached liquid can move in each tank that is not empty.
 
-        That is the distance between the liquid's centres at the bottom and at the top of a closed
-        tank, ``ball.travel`` of the FMU: see the page on thrust that reverses.
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+
+        Returns
+        -------
+        dict of float
+            Distance between the liquid's centres of mass at the bottom and at the top of the closed
+            tank, m, by name: ``ball.travel`` of the FMU.
+
+        Raises
+        ------
+        FmuError
+            If a drawing or a fill is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> round(craft.travel("60%")["main"], 4)
+        0.2411
         """
         ways = {}
         for name, tank in self.tank_at(fill).items():
@@ -590,10 +880,39 @@ class Craft:
         parameters: Mapping[str, Quantity] | None = None,
         rigid: bool = False,
     ) -> LinearModel:
-        """Return the linear model at a fill, at rest under thrust, trimmed; see `trim`.
+        """Return the linear model at a fill, at rest under thrust and trimmed, see `trim`.
 
-        * ``inputs``, ``outputs``: See `hubslosh.linearize`.
-        * ``parameters``: Further parameters, which override those of the craft; see `parameters`.
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        inputs : str or sequence of str
+            Inputs of the FMU, as for `hubslosh.linearize`.
+        outputs : str or sequence of str
+            Outputs of the FMU, as for `hubslosh.linearize`.
+        parameters : mapping, optional
+            Further parameters, see `parameters`.
+        rigid : bool
+            Liquid without slosh.
+
+        Returns
+        -------
+        LinearModel
+            The model in continuous time, SI units.
+
+        Raises
+        ------
+        FmuError
+            If a fill, a name or a parameter is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> craft.linearize("60%").modes()["frequency"].round(4).tolist()
+        [0.0753, 0.0754, 0.1271, 0.1271]
         """
         point, late = self._point(fill, parameters, rigid=rigid)
         if late is not None:
@@ -615,13 +934,56 @@ class Craft:
         mass_flow: Any = None,
         between: Sequence[float | str] = ("2%", "98%"),
     ) -> Loop:
-        """Return the loop of a sampled controller around the craft at a fill, trimmed; see `Loop`.
+        """Return the loop of a sampled controller around the trimmed craft at a fill.
 
-        Small angles: ``q[2]``, ``q[3]``, ``q[4]`` are half the angles about the body axes.
+        The default measurements ``q[2]``, ``q[3]`` and ``q[4]`` are half the small angles about the
+        body axes.
 
-        * ``parameters``: Further parameters, which override those of the craft; see `parameters`.
-          ``"delay"`` among them replaces ``delay``.
-        * ``mass_flow``, ``between``: Tanks drain during the simulation, see `drain`.
+        Parameters
+        ----------
+        controller : callable, array_like, LinearModel or system of python-control
+            Controller, as for `Loop`.
+        period : float
+            Period of the controller's cycle, s.
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        measured : str or sequence of str
+            Measured variables, as for `Loop`.
+        command : str or sequence of str
+            Commanded inputs, as for `Loop`.
+        latency : int
+            Delay from measurement to command in whole cycles.
+        delay : float
+            Further delay, s.
+        parameters : mapping, optional
+            Further parameters, see `parameters`; ``"delay"`` among them replaces ``delay``.
+        rigid : bool
+            Liquid without slosh.
+        mass_flow : float, mapping or sequence of float, optional
+            Outflow of the tanks during a simulation, kg/s, see `drain`.
+        between : sequence of two fills
+            Ends of the fill table of a tank that drains.
+
+        Returns
+        -------
+        Loop
+            The loop, for `margins` and `Loop.simulate`.
+
+        Raises
+        ------
+        FmuError
+            If a fill or a parameter is wrong.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), nu=0.9e-6)}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> gains = np.hstack([2 * 10 * np.eye(3), 80 * np.eye(3)])
+        >>> hubslosh.margins(craft.loop(gains, 0.1, "60%")).stable
+        True
         """
         point, late = self._point(
             fill, parameters, rigid=rigid, mass_flow=mass_flow, between=between
@@ -650,24 +1012,65 @@ class Craft:
     ) -> "Review":
         """Return the design review of a linear sampled controller over fills.
 
-        * ``controller``, ``period``, ``measured``, ``command``, ``latency``, ``delay``,
-          ``parameters``: See `loop`.
-        * ``fills``: List of fills.
-        * ``damping``: "interval" varies the damping of each tank over the interval of its
-          correlation; "nominal" does not.
-        * ``frequency``: Range of the slosh frequencies of each tank, all its modes together, as a
-          share of the nominal ones; "nominal" does not vary them. A frequency changes alone: the
-          bob stays.
-        * ``uncertain``: Ranges by name: (low, high) in SI units, or a share of the nominal value
-          such as "5%". Names as for `parameters`, and "delay". A mode whose frequency or damping
-          ratio is named here, or whose damping ratio is among ``parameters``, leaves ``frequency``
-          or ``damping`` of its tank. ``craft.mass`` changes the acceleration.
-        * ``draws``: Number of random points over all fills, uniform within the ranges.
-        * ``seed``: Seed of the draws.
+        Each point is trimmed, so that it is a steady state. A search finds the worst case; there
+        the nonlinear FMU is simulated at the gain margin, or as it is if it is unstable.
 
-        Each point is trimmed as in `trim`, so that it is a steady state.
-        The worst case is found by search. There the nonlinear FMU is simulated at the gain margin,
-        or as it is if it is unstable.
+        Parameters
+        ----------
+        controller : array_like, LinearModel or system of python-control
+            Linear controller, as for `Loop`.
+        period : float
+            Period of the controller's cycle, s.
+        fills : sequence of fills
+            Fills to review, each as for `fills`.
+        damping : {"interval", "nominal"}
+            "interval" varies the damping of each tank over the interval of its correlation;
+            "nominal" does not vary it.
+        frequency : str
+            Range of the slosh frequencies of each tank, all its modes together, as a share of the
+            nominal ones, such as "10%"; "nominal" does not vary them. The height of the slosh mass
+            stays.
+        uncertain : mapping, optional
+            Ranges by name: (low, high) in SI units, or a share of the nominal value such as "5%".
+            Names are as for `parameters`, and "delay". If the frequency or damping ratio of a mode
+            is named here, or its damping ratio is among ``parameters``, then ``frequency`` or
+            ``damping`` of its tank does not vary it. ``craft.mass`` changes the acceleration.
+        draws : int
+            Number of random points over all fills, uniform within the ranges.
+        seed : int
+            Seed of the draws.
+        measured : str or sequence of str
+            Measured variables, as for `Loop`.
+        command : str or sequence of str
+            Commanded inputs, as for `Loop`.
+        latency : int
+            Delay from measurement to command in whole cycles.
+        delay : float
+            Further delay, s.
+        parameters : mapping, optional
+            Further parameters, see `parameters`.
+
+        Returns
+        -------
+        Review
+            Margins at every point, the worst case and a suggestion; ``print`` gives the answer.
+
+        Raises
+        ------
+        FmuError
+            If the controller is not linear, or a fill, a range or a parameter is wrong.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=1, nu=0.9e-6)}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
+        >>> gains = np.hstack([2 * 10 * np.eye(3), 80 * np.eye(3)])
+        >>> review = craft.review(gains, 0.1, ["50%"], draws=5)
+        >>> bool(review.points["stable"].all())
+        True
         """
         from .review import review
 
@@ -686,10 +1089,41 @@ class Craft:
         parameters: Mapping[str, Quantity] | None = None,
         **options: Any,
     ) -> "UncertainModel":
-        """Return the craft at a fill with uncertain parameters, (M, Δ); see `hubslosh.uncertain`.
+        """Return the trimmed craft at a fill with uncertain parameters; see `hubslosh.uncertain`.
 
-        The craft is trimmed, see `trim`. ranges: names as for `parameters`. The range of a damping
-        ratio may be ``"interval"``, that of its correlation, if the tank has ``nu``.
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        ranges : mapping
+            Ranges by name: (low, high) in SI units, or a share such as "5%" on both sides. Names
+            are as for `parameters`. The range of a damping ratio may be "interval", the interval of
+            its correlation, if the tank has ``nu``.
+        outputs : str or sequence of str
+            Components of q and omega.
+        parameters : mapping, optional
+            Further parameters, see `parameters`.
+        **options
+            ``inputs``, ``covariance`` and ``sigmas``, as for `hubslosh.uncertain`.
+
+        Returns
+        -------
+        UncertainModel
+            The linear fractional transformation (M, Δ).
+
+        Raises
+        ------
+        FmuError
+            If a fill, a range or a parameter is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=1)}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
+        >>> craft.uncertain("50%", {"main.frequency[1]": "10%"}).deltas
+        ('tank[1].frequency[1]',)
         """
         from .uncertainty import uncertain
 
@@ -715,14 +1149,66 @@ class Craft:
         return uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
 
     def columns(self, fill: Fill) -> list[str]:
-        """Return the columns by which `view` draws craft and liquid, for ``outputs``."""
+        """Return the names of the variables by which `view` draws craft and liquid.
+
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+
+        Returns
+        -------
+        list of str
+            Names for ``outputs`` of `simulate` and `closed_loop`.
+
+        Raises
+        ------
+        FmuError
+            If a fill is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Craft(900, [400, 380, 300]).columns("50%")[:4]
+        ['q[1]', 'q[2]', 'q[3]', 'q[4]']
+        """
         fmu = Fmu.open(self.model)
         names = outputs_of(fmu, None, self.parameters(fill), [])
         drawn = ("q[", "tank[")
         return [name for name in names if name.startswith(drawn)]
 
     def view(self, run: "pd.DataFrame", out: str | Path | None = None, **options: Any) -> "View":
-        """Show a run in 3-D with the tanks as they are drawn; options as for `hubslosh.view`."""
+        """Show a run in 3-D with the tanks as they are drawn.
+
+        Parameters
+        ----------
+        run : DataFrame
+            A run of Spacecraft with the parameters of this craft.
+        out : str or Path, optional
+            Also write the page to this .html file.
+        **options
+            ``model``, ``parameters``, ``start``, ``stop`` and ``program``, as for `hubslosh.view`.
+
+        Returns
+        -------
+        View
+            The page; a notebook shows it.
+
+        Raises
+        ------
+        FmuError
+            If the run lacks columns that are needed to draw it; `columns` returns them.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=1)}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
+        >>> run = hubslosh.simulate("Spacecraft", craft.parameters("50%"), stop=1)
+        >>> craft.view(run, "craft.html").path.name
+        'craft.html'
+        """
         from .viewing import view
 
         with temporary.folder() as folder:

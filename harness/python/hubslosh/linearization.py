@@ -135,7 +135,7 @@ class LinearModel:
         Raises
         ------
         FmuError
-            If the frequencies are no numbers.
+            If the frequencies are not numeric.
 
         Examples
         --------
