@@ -41,15 +41,34 @@ def _own(shape: str, mass: float, size: Any) -> float:
 def bottom_up(parts: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """Add up the inertia of HubSlosh's hub and dry tank about the bearing axis.
 
-    * ``parts``: Mappings by name, each with ``mass`` (kg), ``position`` and one of `SHAPES`:
-      ``{"plate": {"mass": 2.1, "box": (0.5, 0.3)}}``. ``position`` is (x, y) of the part's centre
-      from the bearing axis, m: x radial towards the tank, y towards +theta; by default (0, 0). A
-      part may have ``inertia`` about the bearing axis instead, as from CAD; its ``mass`` is then 0
-      by default.
+    Parameters
+    ----------
+    parts : mapping or sequence of mappings
+        Parts by name, each a mapping with ``mass`` (kg), ``position`` and one of `SHAPES`, for
+        example ``{"plate": {"mass": 2.1, "box": (0.5, 0.3)}}``. ``position`` is (x, y) of the
+        part's centre from the bearing axis, m: x radial towards the tank, y towards +theta; by
+        default (0, 0). A part may have ``inertia`` (kg·m², about its own centre, parallel to the
+        bearing axis), for example from CAD; its ``mass`` is then 0 by default.
 
-    Returns a row for each part: ``mass``, ``own`` inertia, ``offset`` (m r^2), their sum
-    ``inertia`` and its ``share``. ``.attrs["parameters"]`` has HubSlosh's ``hub.I``,
-    ``hub.imbalance`` and ``hub.imbalance_angle``, for `simulate`.
+    Returns
+    -------
+    DataFrame
+        A row for each part: ``mass`` (kg), ``own`` inertia, ``offset`` (m r²), their sum
+        ``inertia`` (kg·m²) and its ``share``. ``.attrs["parameters"]`` has HubSlosh's ``hub.I``,
+        ``hub.imbalance`` and ``hub.imbalance_angle``, for `simulate`.
+
+    Raises
+    ------
+    FmuError
+        If there are no parts, or one has a wrong key or number.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> parts = {"plate": {"mass": 2.0, "box": (0.6, 0.3)},
+    ...          "motor": {"mass": 1.0, "position": (0.2, 0.0)}}
+    >>> hubslosh.bottom_up(parts)["inertia"].round(4).to_dict()
+    {'plate': 0.075, 'motor': 0.04}
     """
     if not isinstance(parts, Mapping):
         parts = {str(part.get("name", k)): part for k, part in enumerate(parts, 1)}

@@ -38,20 +38,39 @@ QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A sampled controller around an FMU: what `closed_loop` simulates and `margins` looks at.
+    """A sampled controller around an FMU: `closed_loop` simulates it, `margins` analyses it.
 
-    * ``controller``: A function of time (s) and the values of ``measured`` that returns a command,
-      or one for each of several. Or a linear controller of the error, reference − measured: a
-      matrix of gains (commands × measured), a `LinearModel`, or a state space or transfer function
-      of python-control. A discrete one must have the period of the loop; a continuous one is
-      discretised by Tustin's rule, which moves a frequency f to atan(π f T)/(π T).
-    * ``period``: Period of the controller's cycle, s.
-    * ``model``, ``parameters``: As for `simulate`.
-    * ``measured``, ``command``: Variables and inputs of the FMU by name, one or several;
-      ``"omega"`` of Spacecraft is all three components.
-    * ``latency``, ``delay``: Delay from measurement to command, in whole cycles and in s (any); the
-      two add up. A command is held until the next one acts: a continuous design sees half a cycle
-      more.
+    Parameters
+    ----------
+    controller : callable, array_like, LinearModel or system of python-control
+        A function of time (s) and the values of ``measured`` that returns a command, or one for
+        each of several commands. Or a linear controller of the error, reference − measured: a
+        matrix of gains (commands × measured), a `LinearModel`, or a state space or transfer
+        function of python-control. A discrete controller must have the period of the loop; a
+        continuous one is discretised by Tustin's rule, which moves a frequency f to
+        atan(π f T)/(π T).
+    period : float
+        Period of the controller's cycle, s.
+    model : str or Path
+        Name or file of the FMU, as for `simulate`.
+    parameters : mapping, str or Path, optional
+        Parameters of the FMU, as for `simulate`.
+    measured : str or sequence of str
+        Measured variables of the FMU; ``"omega"`` of Spacecraft is all three components.
+    command : str or sequence of str
+        Inputs of the FMU that the controller commands.
+    latency : int
+        Delay from measurement to command in whole cycles.
+    delay : float
+        Further delay, s; any. The two add up. Each command is held until the next one acts, so
+        that a continuous design sees half a cycle more.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "none"})
+    >>> loop.names
+    (['theta', 'omega'], ['tau_cmd'])
     """
 
     controller: Any
@@ -82,7 +101,19 @@ class Loop:
         )
 
     def problems(self) -> list[str]:
-        """Return everything that is wrong with it."""
+        """Return everything that is wrong with the loop.
+
+        Returns
+        -------
+        list of str
+            Sentences; none if all is right.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Loop([[4.0]], 0.1, measured="theta").problems()
+        []
+        """
         return self._examined()[0]
 
     def _examined(self) -> tuple[list[str], LinearModel | None]:
@@ -116,7 +147,18 @@ class Loop:
         return found, controller
 
     def check(self) -> None:
-        """Raise FmuError with everything that is wrong with it."""
+        """Raise an error if anything is wrong with the loop.
+
+        Raises
+        ------
+        FmuError
+            With everything that is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Loop([[4.0, 2.0]], 0.1).check()
+        """
         if found := self.problems():
             raise FmuError("; ".join(found))
 
@@ -128,7 +170,24 @@ class Loop:
         return fmu.components(measured), fmu.components(command)
 
     def linear(self) -> LinearModel | None:
-        """Return the controller as a sampled linear model; None if it is a function."""
+        """Return the controller as a sampled linear model.
+
+        Returns
+        -------
+        LinearModel or None
+            The controller with the loop's period; None if it is a function.
+
+        Raises
+        ------
+        FmuError
+            If the controller's size or period does not fit the loop.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> hubslosh.Loop([[4.0, 2.0]], 0.1).linear().D
+        array([[4., 2.]])
+        """
         measured, command = self.names
         return _linear(self.controller, self.period, measured, command)
 
@@ -153,7 +212,28 @@ class Loop:
     def plant(self, parameters: Mapping[str, Quantity] | None = None) -> LinearModel:
         """Return the FMU's linear model from commands to measurements, in continuous time.
 
-        * ``parameters``: Further parameters, such as ``{"friction.model": "viscous"}``.
+        Parameters
+        ----------
+        parameters : mapping, optional
+            Further parameters, such as ``{"friction.model": "viscous"}``, which override those of
+            the loop.
+
+        Returns
+        -------
+        LinearModel
+            The model, SI units.
+
+        Raises
+        ------
+        FmuError
+            If the FMU offers no derivatives, or a parameter is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1)
+        >>> loop.plant({"friction.model": "viscous"}).outputs
+        ('theta', 'omega')
         """
         measured, command = self.names
         every = parameters_of(self.parameters) | parameters_of(parameters)
@@ -164,7 +244,31 @@ class Loop:
     ) -> LinearModel:
         """Return the loop gain L from commands round to commands; the loop closes with u = -L u.
 
-        It is exact at the sampling instants, delay included. more_delay: s, added.
+        It is exact at the sampling instants, delay included.
+
+        Parameters
+        ----------
+        parameters : mapping, optional
+            Further parameters, which override those of the loop.
+        more_delay : float
+            Delay in addition to that of the loop, s.
+
+        Returns
+        -------
+        LinearModel
+            The loop gain in discrete time.
+
+        Raises
+        ------
+        FmuError
+            If the controller is a function, or anything is wrong with the loop.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "viscous"})
+        >>> loop.gain().period
+        0.1
         """
         K = self._must_be_linear()
         return self._gain(self.plant(parameters), K, more_delay)
@@ -196,9 +300,42 @@ class Loop:
         substeps: int = 1,
         tolerance: float | None = None,
     ) -> Run:
-        """Simulate the loop from time 0 to ``stop``, s; see `closed_loop`.
+        """Simulate the loop from time 0 on.
 
-        * ``parameters``: Further parameters, which override those of the loop.
+        Parameters
+        ----------
+        stop : float
+            Time at which the last whole cycle ends, s.
+        parameters : mapping, optional
+            Further parameters, which override those of the loop.
+        reference : DataFrame, optional
+            Reference of a linear controller, as for `closed_loop`.
+        inputs : DataFrame, optional
+            Histories of other inputs, as for `closed_loop`.
+        outputs : str or sequence of str, optional
+            Variables to record, as for `simulate`.
+        substeps : int
+            Rows of the result per cycle.
+        tolerance : float, optional
+            Relative tolerance of the FMU's solver; by default its own choice.
+
+        Returns
+        -------
+        Run
+            The table of `closed_loop`.
+
+        Raises
+        ------
+        FmuError
+            With everything that is wrong with the arguments, or with the FMU's message.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "none"})
+        >>> run = loop.simulate(10, {"init.theta": (5, "deg")}, outputs=["theta"])
+        >>> round(abs(float(run["theta"].iloc[-1])), 3)
+        0.0
         """
         fmu = Fmu.open(self.model)
         problems = out_of_range(period=self.period, stop=stop, substeps=substeps)
@@ -315,27 +452,66 @@ def closed_loop(
     substeps: int = 1,
     tolerance: float | None = None,
 ) -> Run:
-    """Simulate an FMU under a sampled controller from time 0 to ``stop``, s.
+    """Simulate an FMU under a sampled controller from time 0 on.
 
-    * ``controller``, ``period``, ``measured``, ``command``, ``latency``, ``delay``: See `Loop`. In
-      every cycle of ``period`` seconds the controller gets the values of ``measured``. What it
-      commands is set ``delay`` seconds (and ``latency`` cycles) later and held for one cycle; until
-      the first arrives, commands are 0.
-    * ``reference``: For a linear controller, a table with the column ``time`` and any of
-      ``measured`` (what is wanted of it, otherwise 0) and of the commands (added to them:
-      feedforward); straight lines between the rows. With the four columns q[1], …, q[4] the error
-      of q[2], q[3], q[4] is the vector part of q⁻¹ ⊗ q_reference: half of what is left to turn
-      about each body axis.
-    * ``inputs``: Histories of other inputs, as for `simulate`; straight lines between the rows,
-      followed from substep to substep.
-    * ``substeps``: Rows of the result per cycle.
-    * ``model``, ``parameters``, ``outputs``, ``tolerance``: As for `simulate`.
+    In every cycle the controller receives the values of ``measured``. Its command acts ``delay``
+    seconds and ``latency`` cycles later and is held for one cycle; until the first one acts,
+    commands are 0. With a linear controller the whole loop is compiled code; a function is
+    called once per cycle.
 
-    Returns a table with the columns ``time``, the commands (as they are from that time on), the
-    inputs and ``outputs``; its last row ends the last whole cycle. Units: ``.attrs["units"]``.
-    With a linear controller the whole loop is compiled code; a function is called once per cycle.
+    Parameters
+    ----------
+    controller : callable, array_like, LinearModel or system of python-control
+        Controller, as for `Loop`.
+    period : float
+        Period of the controller's cycle, s.
+    stop : float
+        Time at which the last whole cycle ends, s.
+    model : str or Path
+        Name or file of the FMU, as for `simulate`.
+    parameters : mapping, str or Path, optional
+        Parameters of the FMU, as for `simulate`.
+    measured : str or sequence of str
+        Measured variables, as for `Loop`.
+    command : str or sequence of str
+        Commanded inputs, as for `Loop`.
+    latency : int
+        Delay from measurement to command in whole cycles.
+    delay : float
+        Further delay, s.
+    reference : DataFrame, optional
+        For a linear controller: a table with the column ``time`` (s) and any of ``measured``
+        (reference values, otherwise 0) and of the commands (added to them: feedforward), with
+        straight lines between the rows. With the four columns q[1], …, q[4] the error of q[2],
+        q[3], q[4] is the vector part of q⁻¹ ⊗ q_reference: half the rotation that is left about
+        each body axis.
+    inputs : DataFrame, optional
+        Histories of other inputs, as for `simulate`, with straight lines between the rows.
+    outputs : str or sequence of str, optional
+        Variables to record, as for `simulate`.
+    substeps : int
+        Rows of the result per cycle.
+    tolerance : float, optional
+        Relative tolerance of the FMU's solver; by default its own choice.
 
-    Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
+    Returns
+    -------
+    Run
+        A table with the columns ``time``, the commands (as they are from this time on), the
+        inputs and ``outputs``. Units are in ``.attrs["units"]``.
+
+    Raises
+    ------
+    FmuError
+        With everything that is wrong with the arguments, or with the FMU's message.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> start = {"friction.model": "none", "init.theta": (5, "deg")}
+    >>> run = hubslosh.closed_loop([[4.0, 2.0]], 0.1, 10, parameters=start, outputs=["theta"])
+    >>> round(abs(float(run["theta"].iloc[-1])), 3)
+    0.0
     """
     loop = Loop(controller, period, model, parameters, measured, command, latency, delay)
     return loop.simulate(

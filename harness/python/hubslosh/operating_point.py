@@ -25,18 +25,35 @@ LEFT = 1e-7
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OperatingPoint:
-    """Spacecraft with its thrust through the centre of mass, and what accelerations are left."""
+    """Spacecraft with its thrust through the centre of mass, and the accelerations that are left.
+
+    Attributes
+    ----------
+    model : str or Path
+        Name or file of the FMU.
+    parameters : dict
+        Parameters of the FMU at this point.
+    shift : ndarray, shape (3,)
+        Way of O, where the thrust acts, across the thrust to the centre of mass, body axes, m.
+    before : ndarray, shape (3,)
+        Angular acceleration before trimming, body axes, rad/s².
+    tanks : tuple of str
+        Names of the tanks in the FMU's order.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> craft = hubslosh.Craft(900, [400, 380, 300], center_of_mass=(0.1, 0, 0), thrust=50)
+    >>> print(craft.trim("0%"))
+    O, where the thrust acts, moves by (0.1, 0, 0) m to the centre of mass
+    angular acceleration: 0.01316 rad/s² before, 0 rad/s² left
+    """
 
     model: str | Path
-    """The FMU."""
     parameters: dict[str, Quantity]
-    """Parameters of the FMU at this point."""
     shift: Vector
-    """Way of O, where the thrust acts, across the thrust to the centre of mass, body axes, m."""
     before: Vector
-    """Angular acceleration before trimming, body axes, rad/s²."""
     tanks: tuple[str, ...]
-    """Names of the tanks in the FMU's order."""
 
     @cached_property
     def _left(self) -> tuple[Vector, dict[str, float]]:

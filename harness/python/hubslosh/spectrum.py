@@ -27,24 +27,57 @@ def frequency_response(
 ) -> pd.DataFrame:
     """Estimate the frequency response from one column of a time history to another.
 
-    * ``data``: A table with the column ``time`` (s, in equal steps), as `simulate` returns it.
-    * ``resolution``: Half the width of the smoothing, Hz; by default three lines of the spectrum. A
-      wider window reduces noise more, but flattens a narrow resonance: keep it below ζ f.
-    * ``band``: Lowest and highest frequency, Hz; by default all.
-    * ``hold``: True if the input is held from row to row; otherwise it is linear between rows.
+    The estimate is H1 = S_uy / S_uu with the spectra of the whole record smoothed over frequency
+    by a Hann window (Ljung, *System Identification*, section 6.4). The record must contain the
+    whole motion: it begins at rest, and ends at rest or is much longer than the decay time. The
+    estimate is corrected for the input between rows: by sinc²(f Δt) for lines, by sinc(f Δt) and
+    half a step's delay if held. For a held input an error of about f Δt remains, from the power
+    of its steps above half the sampling rate.
 
-    The estimate is H1 = S_uy / S_uu with the spectra of the whole record smoothed over frequency by
-    a Hann window (Ljung, *System Identification*, section 6.4). The record must contain the whole
-    motion: it begins at rest, and ends at rest or is much longer than the decay time. The estimate
-    is corrected for the input between rows: by sinc²(f Δt) for lines, by sinc(f Δt) and half a
-    step's delay if held. For a held input an error of about f Δt remains, from its steps' power
-    above half the sampling rate. Frequencies with less than 1e-4 of the input's largest power are
-    left out.
+    Parameters
+    ----------
+    data : DataFrame
+        A table with the column ``time`` (s, in equal steps), as `simulate` returns it.
+    input : str
+        Column of the input.
+    output : str
+        Column of the output.
+    resolution : float, optional
+        Half the width of the smoothing, Hz; by default three lines of the spectrum. A wider
+        window reduces noise more, but flattens a narrow resonance: keep it below ζ f.
+    band : tuple of float, optional
+        Lowest and highest frequency, Hz; by default all.
+    hold : bool
+        True if the input is held from row to row; otherwise it is linear between rows.
 
-    Returns a table with the columns ``frequency`` (Hz), ``real`` and ``imag`` (unit of the output
-    per unit of the input), ``gain`` (their magnitude), ``phase`` (deg, unwrapped), ``coherence``
-    (0 to 1) and ``gain_std``, the gain's standard deviation gain·√((1 − γ²) / (2 n γ²)) for an
-    average over n lines (Bendat and Piersol, *Random Data*, chapter 9).
+    Returns
+    -------
+    DataFrame
+        Columns ``frequency`` (Hz), ``real`` and ``imag`` (unit of the output per unit of the
+        input), ``gain`` (magnitude), ``phase`` (deg, unwrapped), ``coherence`` (γ², 0 to 1) and
+        ``gain_std``, the standard deviation of the gain, gain·√((1 − γ²) / (2 n γ²)) for an
+        average over n lines (Bendat and Piersol, *Random Data*, chapter 9). Frequencies with
+        less than 1e-4 of the input's largest power are left out.
+
+    Raises
+    ------
+    FmuError
+        If a column is missing or not finite, time does not grow in equal steps, or the input
+        has no power in the band.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> import hubslosh
+    >>> time = np.arange(0, 200, 0.05)
+    >>> torque = np.where(time < 100, 0.1 * np.sin(2 * np.pi * time * (0.2 + 0.01 * time)), 0)
+    >>> run = hubslosh.simulate(
+    ...     parameters={"friction.model": "viscous"},
+    ...     inputs=pd.DataFrame({"time": time, "tau_cmd": torque}), outputs="omega")
+    >>> response = hubslosh.frequency_response(run, band=(1.0, 1.1))
+    >>> round(float(response["coherence"].min()), 2)
+    1.0
     """
     from scipy import fft, signal
 

@@ -39,25 +39,44 @@ MOVED = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """Result of `margins`; ``print`` shows a verdict in words and the main rows of the table."""
+    """The result of `margins`; ``print`` shows a verdict in words and the main rows of the table.
+
+    Attributes
+    ----------
+    crossings : DataFrame
+        A row for each crossing, by frequency: ``loop`` (the command at which it was broken),
+        ``crossing`` ("gain": the magnitude of the loop gain is 1; "phase": it is negative real),
+        ``frequency`` (Hz), ``gain_margin`` (dB by which the gain may grow, or shrink if
+        negative, until this phase crossing passes through -1), ``phase_margin`` (deg, from -180
+        to 180), ``delay_margin`` (s, phase margin from 0 to 360° over frequency) and ``near``:
+        the lightly damped modes of the plant within a fifth of their frequency, by tank or by
+        the states that take most part.
+    stable : bool
+        True if the closed loop is stable; for a `Loop`, its controllable and observable part.
+    poles : ndarray of complex
+        Poles of the closed loop by magnitude: rad/s, or in the z plane.
+    modulus_margin : float
+        Least distance of the loop gain to -1.
+    delay_margin : float
+        Further delay of all commands, s, at which the loop becomes unstable; 0 if it already is.
+    modes : DataFrame
+        Modes of the plant with damping ratios below 0.2: see `LinearModel.modes`.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "viscous"})
+    >>> found = hubslosh.margins(loop)
+    >>> found.stable, round(found.phase_margin)
+    (True, 45)
+    """
 
     crossings: "pd.DataFrame"
-    """A row for each crossing, by frequency: ``loop`` (the command at which it was broken),
-    ``crossing`` ("gain": the loop gain is 1; "phase": it is negative real), ``frequency`` (Hz),
-    ``gain_margin`` (dB, by which the gain may grow, < 0: shrink, until this phase crossing passes
-    through -1), ``phase_margin`` (deg, from -180 to 180), ``delay_margin`` (s, phase margin from 0
-    to 360 deg over frequency), ``near``: the lightly damped modes of the plant within a fifth of
-    its frequency, of which tank or by the states that take most part."""
     stable: bool
-    """True if the closed loop is stable; for a `Loop`, its controllable and observable part."""
     poles: NDArray[np.complex128]
-    """Poles of the closed loop by magnitude: rad/s, or in the z plane."""
     modulus_margin: float
-    """Least distance of the loop gain to -1."""
     delay_margin: float
-    """Further delay of all commands, s, at which the loop becomes unstable; 0 if it already is."""
     modes: "pd.DataFrame"
-    """Modes of the plant with damping ratios below 0.2: see `LinearModel.modes`."""
 
     @property
     def gain_margins(self) -> tuple[float, float]:
@@ -120,15 +139,36 @@ def margins(
 ) -> Margins:
     """Return every gain and phase crossing of a loop, its margins, and whether it is stable.
 
-    * ``loop``: A `Loop`, whose sampled loop gain is exact, delay included. Or a loop gain L that is
-      closed with u = -L u: a `LinearModel` or a system of python-control, continuous or discrete.
-      With several commands each loop is broken in turn while the others are closed.
-    * ``parameters``: Parameters of the FMU in addition to the loop's own.
+    No frequency grid decides what is found: poles and zeros bound slope and curvature of the
+    loop gain, and intervals of frequency are halved until each has one crossing at most.
+    Crossings are then refined in the state space to rounding. A phase crossing with a loop gain
+    below 1e-12 or above 1e8 is left out.
 
-    No frequency grid decides what is found: poles and zeros bound slope and curvature of the loop
-    gain, and intervals of frequency are halved until each has one crossing at most. Crossings are
-    then refined in the state space to rounding. A phase crossing with a loop gain below 1e-12 or
-    above 1e8 is left out.
+    Parameters
+    ----------
+    loop : Loop, LinearModel or system of python-control
+        A `Loop` with a linear controller, whose sampled loop gain is exact, delay included. Or a
+        loop gain L that is closed with u = -L u, continuous or discrete. With several commands
+        each loop is broken in turn while the others are closed.
+    parameters : mapping, optional
+        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+
+    Returns
+    -------
+    Margins
+        Crossings, margins, poles and modes.
+
+    Raises
+    ------
+    FmuError
+        If the controller is a function, or anything is wrong with the loop.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "viscous"})
+    >>> hubslosh.margins(loop).stable
+    True
     """
     return margins_and_gain(loop, parameters)[0]
 
