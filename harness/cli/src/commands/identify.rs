@@ -238,7 +238,7 @@ const REMOVED: [(&str, &str); 6] = [
 /// If a removed option is there, with what replaces it.
 pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     const KINDS: [&str; 7] = ["bench", "fmu", "decay", "friction", "help", "--help", "-h"];
-    const FLAGS: [&str; 5] = ["--messages", "--quiet", "-q", "--strict", "--parse-only"];
+    const FLAGS: [&str; 4] = ["--messages", "--quiet", "-q", "--strict"];
     let Some(place) = arguments.iter().position(|argument| argument == "identify") else {
         return Ok(arguments);
     };

@@ -189,9 +189,9 @@ fn a_command_without_a_kind_of_recording_has_the_usual_one() {
         assert!(parsed(&[kind, &["a.csv", "--free", "mu=1", "--outputs", "x"]].concat()).is_ok());
     }
     for place in [0, 1] {
-        let mut all = vec!["friction", "a.csv", "--out", "a.json", "--parse-only"];
+        let mut all = vec!["friction", "a.csv"];
         all.insert(place, "-q");
-        assert!(hubslosh(folder.path(), &[&["identify"], &all[..]].concat()).is_ok(), "{place}");
+        assert!(parsed(&all).is_ok(), "{place}");
     }
     // an option of another kind of recording is refused
     let error = parsed(&["friction", "a.csv", "--model", "linear"]).unwrap_err();
