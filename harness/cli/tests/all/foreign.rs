@@ -154,8 +154,7 @@ fn booleans_are_driven_from_a_file_and_held() {
     );
     let error = run("0,0,true\n1,true,true\n2,0,true\n").unwrap_err();
     assert!(error.contains("line 3, column u: \"true\" is not a number"), "{error}");
-    let error = run("0,0,0\r2,0,0\r").unwrap_err();
-    assert!(error.contains("line 2 has a carriage return within it"), "{error}");
+    assert_eq!(run("0,0,0\r2,0,0\r").unwrap(), run("0,0,0\n2,0,0\n").unwrap());
     // the date changes, and nothing shows whether days or months come first
     let error = run("01/02/2026 23:59:59,0,0\n02/02/2026 00:00:01,0,0\n").unwrap_err();
     assert!(
