@@ -24,8 +24,8 @@ const LINES: usize = 2 * SIDE + 1;
 const UNKNOWNS: usize = 7;
 
 /// Returns the two-sided power spectral density of V (unit of the output squared, times s) at
-/// frequencies (Hz) of signals sampled every `step` s; NaN where there is no estimate. It is the mean of five residuals, at the
-/// frequency and beside it, because a single one has six degrees of freedom, from which a deviation is known to 20 %.
+/// frequencies (Hz) of signals sampled every `step` s; NaN where there is no estimate. It is the mean of five residuals around
+/// the frequency, because a single one has six degrees of freedom, from which a deviation is known to 20 %.
 pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> Vec<f64> {
     // N steps have N + 1 samples. N is usually a round number, with a transform twice as fast
     let count = input.len() / 2 * 2;

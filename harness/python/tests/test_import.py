@@ -1,6 +1,7 @@
 """`import hubslosh` imports nothing large, and offers what its type checkers see."""
 
 import ast
+import inspect
 import re
 import subprocess
 import sys
@@ -58,6 +59,30 @@ def test_every_name_is_in_the_books_reference() -> None:
     page = Path(__file__).parents[3] / "book" / "api.md"
     listed = re.findall(r"^(?:   |\.\. autodata:: hubslosh\.\w+\.)(\w+)$", page.read_text(), re.M)
     assert sorted(listed) == sorted(hubslosh.__all__)
+
+
+PENDING = (
+    "fitting", "liquid", "mcmc", "modes", "plot", "program", "recordings", "review", "sampling",
+    "tanks", "uncertainty", "viewing",
+)  # fmt: skip
+"""Modules whose docstrings do not yet have the form of numpydoc."""
+
+
+def test_functions_have_docstrings_of_numpydoc_with_examples() -> None:
+    """Parameters in their order, the result, and an example, which ``test_wheel.py`` runs."""
+    for name in hubslosh.__all__:
+        item = getattr(hubslosh, name)
+        if not inspect.isfunction(item) or item.__module__.rpartition(".")[2] in PENDING:
+            continue
+        text = inspect.getdoc(item) or ""
+        assert "\nExamples\n--------\n" in text, name
+        signature = inspect.signature(item)
+        section = text.partition("\nParameters\n----------\n")[2].partition("\n\n")[0]
+        described = re.findall(r"^(\*{0,2}\w+(?:, \w+)*) : ", section, re.M)
+        found = [one.lstrip("*") for names in described for one in names.split(", ")]
+        assert found == list(signature.parameters), name
+        returns = signature.return_annotation in (None, "None")
+        assert returns or "\nReturns\n-------\n" in text, name
 
 
 def test_a_misspelt_name_is_an_error_to_type_checkers() -> None:
