@@ -75,7 +75,7 @@ impl Clock {
     }
 
     /// Returns a clock from 0 whose steps in Co-Simulation are as long as this clock's to the last bit.
-    fn from_zero(&self) -> Clock {
+    fn started_at_zero(&self) -> Clock {
         Clock { origin: self.origin, ..Clock::new(self.kind, 0.0, self.tick) }
     }
 
@@ -159,7 +159,7 @@ fn compare<M: Model, V: Values>(
         let start = *data.choose(&[0.0, 0.1, -3.0, 1e9]).unwrap_or(&1e9);
         let clock = Clock::new(kind, start, tick);
         let has_own_steps = kind == Kind::Differences && interface == Interface::CoSimulation;
-        let same_steps = has_own_steps.then(|| play(clock.from_zero()));
+        let same_steps = has_own_steps.then(|| play(clock.started_at_zero()));
         let same_steps = same_steps.as_ref().unwrap_or(&even_steps);
         let off = play(clock);
         let what =
