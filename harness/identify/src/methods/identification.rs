@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::friction::{Braking, FrictionPoint};
+use super::braking::{Braking, FrictionPoint};
 use crate::fit::bench::candidate::ModelFit;
 use crate::fit::bench::start::Response;
 use crate::model::bench::nominal::Start;

@@ -1,5 +1,6 @@
 //! Methods of identification, one a file: what each is given, what it needs of that, and what all return.
 
+pub mod braking;
 pub mod free_decay;
 pub mod friction;
 pub mod identification;

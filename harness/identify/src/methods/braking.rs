@@ -1,0 +1,78 @@
+//! Results of friction runs: measured friction over the rate, and deceleration over the hub's angle.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+/// Mean of torque less inertia times acceleration over rows of similar rate.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct FrictionPoint {
+    /// Mean rate, rad/s.
+    pub rate: f64,
+    /// Mean friction torque, N·m; positive if it brakes a positive rate.
+    pub torque: f64,
+    /// Number of rows.
+    pub rows: usize,
+}
+
+/// Deceleration over the hub's angle: β_0 + Σ β_h^s sin hθ + β_h^c cos hθ of one direction, where no torque acts (thesis 5.4).
+#[derive(Clone, Debug, Serialize)]
+pub struct Braking {
+    /// `counter-clockwise` (forwards) or `clockwise`.
+    pub direction: &'static str,
+    /// Speed to which the fit belongs, rad/s: the mean of both directions. A parabola takes the dependence on the speed.
+    pub speed: f64,
+    /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
+    pub coefficients: Vec<f64>,
+    /// Their standard deviations, rad/s².
+    pub std: Vec<f64>,
+    /// Root mean square of the residual, rad/s².
+    pub rmse: f64,
+    /// Coefficient of determination.
+    pub r_squared: f64,
+    /// Rows.
+    pub rows: usize,
+    /// Stretches of these rows: parts of one decay within one revolution of the hub.
+    pub stretches: usize,
+    /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
+    #[serde(skip)]
+    pub points: Vec<(f64, f64)>,
+    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`].
+    #[serde(skip)]
+    pub(super) covariance: Option<DMatrix<f64>>,
+}
+
+/// Regressors of [`Braking`] at an angle: 1, then cos hθ and sin hθ of each harmonic.
+pub(super) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
+    let each = (1..=harmonics).flat_map(|h| {
+        let (sin, cos) = (angle * h as f64).sin_cos();
+        [cos, sin]
+    });
+    [1.0].into_iter().chain(each).collect()
+}
+
+impl Braking {
+    /// Returns the half-width of the fit's simultaneous 95 % band at an angle, rad/s²: with this probability the whole curve
+    /// lies in the band. The residuals of one stretch count as one value, because deceleration also depends on the rate,
+    /// which changes slowly within a stretch. `None` if there are too few
+    /// stretches. Liang and Zeger, Biometrika 73 (1986) 13,
+    /// with Scheffé's factor.
+    pub fn half_width(&self, angle: f64) -> Option<f64> {
+        /// 95 % quantile of χ² with five degrees of freedom.
+        const CHI_SQUARE: f64 = 11.070;
+        let width = self.coefficients.len();
+        let row = DVector::from_vec(harmonics_at(angle, (width - 1) / 2));
+        let variance = (row.transpose() * self.covariance.as_ref()? * &row)[(0, 0)];
+        let few = (self.stretches - 1) as f64 / (self.stretches - width - 2) as f64;
+        Some((CHI_SQUARE * few * variance).sqrt())
+    }
+
+    /// Returns the fitted acceleration at an angle, rad/s².
+    pub fn at(&self, angle: f64) -> f64 {
+        let [mean, harmonics @ ..] = &self.coefficients[..] else { return 0.0 };
+        let each = harmonics.chunks(2).zip(1..).map(|(pair, h)| {
+            let (sin, cos) = (f64::from(h) * angle).sin_cos();
+            pair[0] * cos + pair[1] * sin
+        });
+        mean + each.sum::<f64>()
+    }
+}
