@@ -133,7 +133,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
     for fmu in fmus:
         print(run(program, "check", fmu)[0].strip().splitlines()[-1])
     for command in ([program], [python, "-m", "hubslosh"]):
-        address = run(*command, "book")[0].strip()
+        address = run(*command, "book")[0].splitlines()[0]
         if not address.endswith("/book/index.md"):
             sys.exit(f"error: hubslosh book does not say where the book is: {address}")
     drawing = ROOT / "harness" / "tank" / "examples" / "capsule.toml"

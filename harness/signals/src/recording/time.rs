@@ -68,6 +68,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, String> {
     let bytes = field.as_bytes();
     let decimal = field.rfind(',').filter(|at| {
         *at > colon
+            && !field[colon..].contains('.')
             && bytes.get(at + 1).is_some_and(u8::is_ascii_digit)
             && bytes[at - 1].is_ascii_digit()
     });
