@@ -75,6 +75,10 @@ class Bench:
         return table["time"], table["tau_cmd"], table["omega"]
 
 
+Draws = Callable[[Bench, int], Iterator[Result]]
+"""Makes so many draws of a method; the results of one are its intervals."""
+
+
 def ends(found: dict[str, object], truth: float) -> tuple[float, float, float]:
     """Return truth and ends; an end that is null is open."""
     low, high = found["interval"]  # type: ignore[misc]
@@ -169,52 +173,53 @@ def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
     return {"hub.I": ends(found["hub.I"], inertia), "friction.b": ends(found["friction.b"], b)}
 
 
-def campaign(friction: str) -> Callable[[Bench, np.random.Generator], Result]:
-    """Return a method: features of slow sweeps whose gyro has another seed each.
+def campaign(friction: str) -> Draws:
+    """Return a source of draws: features of slow sweeps, whose gyro has another seed in each.
 
     The truth is the feature of the run without a gyro.
     """
-    rows: list[dict[str, str]] = []
 
-    def method(bench: Bench, rng: np.random.Generator) -> Result:
-        del rng  # the draws are the campaign's
-        if not rows:
-            seeds = ", ".join(str(seed) for seed in range(1, DRAWS[0] + 1))
-            plan = f"""title = "Intervals"
+    def draw(bench: Bench, draws: int) -> Iterator[Result]:
+        plan = f"""title = "Intervals"
 profile = "lin-sweep:amplitude=0.02,f0=2.0,f1=2.6,duration=720"
 [set]
 slosh.model = "linear"
 friction.model = "{friction}"
 """
-            (bench.folder / "clean.toml").write_text(plan)
-            (bench.folder / "noisy.toml").write_text(
-                f"{plan}imu.enabled = true\n[vary]\nimu.seed = [{seeds}]\n"
-            )
-            for name in ("clean", "noisy"):
-                out = f"{name}-{friction}"
-                bench.call("campaign", "--fmu", bench.fmu, "--plan", f"{name}.toml", "--out", out)
-                for estimate in ("features.csv", "features_spa.csv"):
-                    with (bench.folder / out / estimate).open() as file:
-                        TABLES[out, estimate] = list(csv.DictReader(file))
-            rows.extend(TABLES[f"noisy-{friction}", "features.csv"])
-        k = len(rows) - DRAWS[0]
-        rows.append({})
-        result = {}
-        for estimate in ("features.csv", "features_spa.csv"):
-            row = TABLES[f"noisy-{friction}", estimate][k]
-            truths = TABLES[f"clean-{friction}", estimate][0]
-            for feature in ("f_res", "f_dip"):
-                value = float(row[f"{feature}_hz"])
-                half = 1.96 * float(row[f"{feature}_std_hz"])
-                name = f"{feature}_hz, {estimate}"
-                result[name] = (float(truths[f"{feature}_hz"]), value - half, value + half)
-        return result
+        seeds = list(range(1, draws + 1))
+        noise = f"imu.enabled = true\n[vary]\nimu.seed = {seeds}\n"
+        features = ("features.csv", "features_spa.csv")
+        runs = {}
+        for name, text in (("clean", plan), ("noisy", plan + noise)):
+            (bench.folder / f"{name}.toml").write_text(text)
+            out = f"{name}-{friction}"
+            bench.call("campaign", "--fmu", bench.fmu, "--plan", f"{name}.toml", "--out", out)
+            for table in features:
+                with (bench.folder / out / table).open() as file:
+                    runs[name, table] = list(csv.DictReader(file))
+        for k in range(draws):
+            result = {}
+            for table in features:
+                for feature in ("f_res", "f_dip"):
+                    truth = float(runs["clean", table][0][f"{feature}_hz"])
+                    value = float(runs["noisy", table][k][f"{feature}_hz"])
+                    half = 1.96 * float(runs["noisy", table][k][f"{feature}_std_hz"])
+                    result[f"{feature}_hz, {table}"] = (truth, value - half, value + half)
+            yield result
 
-    return method
+    return draw
 
 
-DRAWS = [100]
-TABLES: dict[tuple[str, str], list[dict[str, str]]] = {}
+def each(method: Callable[[Bench, np.random.Generator], Result]) -> Draws:
+    """Return the draws of a method, which have the seeds 0, 1 and so on."""
+
+    def draw(bench: Bench, draws: int) -> Iterator[Result]:
+        for seed in range(draws):
+            yield method(bench, np.random.default_rng(seed))
+
+    return draw
+
+
 CLEAN: dict[str, tuple[Vector, Vector, Vector]] = {}
 
 
@@ -225,11 +230,11 @@ def clean(bench: Bench, *settings: str, profile: str) -> tuple[Vector, Vector, V
     return CLEAN[profile]
 
 
-METHODS: dict[str, Callable[[Bench, np.random.Generator], Result]] = {
-    "identify decay": free_decay,
-    "gyro --recording": gyro,
-    "identify friction": friction,
-    "identify --free": any_fmu,
+METHODS: dict[str, Draws] = {
+    "identify decay": each(free_decay),
+    "gyro --recording": each(gyro),
+    "identify friction": each(friction),
+    "identify --free": each(any_fmu),
     "campaign (viscous)": campaign("viscous"),
     "campaign (stribeck)": campaign("stribeck"),
 }
@@ -242,8 +247,8 @@ def census(bench: Bench, only: str, draws: int) -> Iterator[str]:
             continue
         found: dict[str, list[tuple[float, float, float]]] = {}
         refused = 0
-        for seed in range(draws):
-            for parameter, interval in method(bench, np.random.default_rng(seed)).items():
+        for result in method(bench, draws):
+            for parameter, interval in result.items():
                 found.setdefault(parameter, []).append(interval)
         for parameter, intervals in found.items():
             given = [(t, low, high) for t, low, high in intervals if np.isfinite(high - low)]
@@ -266,7 +271,6 @@ def main() -> None:
     parser.add_argument("--fmu", default="dist/HubSlosh.fmu")
     parser.add_argument("--only", default="")
     args = parser.parse_args()
-    DRAWS[0] = args.draws
     print("| command | quantity | held | width, of the truth | without an interval |")
     print("| --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as folder:

@@ -191,9 +191,9 @@ fn compare<M: Model, V: Values>(
     Ok(())
 }
 
-/// Returns the difference that output n of two hosts may have: 1e-9 of its size. Where the host's clock places
-/// the ends of steps (Model Exchange, samples), its last digits times the output's fastest change are added; at 1e9 s a unit in the last place is
-/// 1.2e-7 s.
+/// Returns the difference that output n of two hosts may have: 1e-9 of its size. Where the host's clock places the
+/// ends of steps (Model Exchange, samples), its last digits times the output's fastest change are added, because a unit in the
+/// last place is 1.2e-7 s at 1e9 s.
 fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64 {
     let size = rows.iter().fold(1.0f64, |most, row| most.max(row[n].abs()));
     let pairs = rows.windows(2).map(|pair| (pair[1][n] - pair[0][n]).abs());

@@ -598,18 +598,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
 ];
 
 /// The models of the liquid.
+static SLOSH_MODEL_ITEMS: [Item; SloshModel::ITEMS.len()] = Item::list(SloshModel::ITEMS);
+
 static SLOSH_MODEL: Enumeration = Enumeration {
     name: "SloshModel",
     description: "Mechanical models of the liquid",
-    items: &{
-        let mut items = [Item::new("", ""); SloshModel::ALL.len()];
-        let mut i = 0;
-        while i < items.len() {
-            items[i] = Item::new(SloshModel::ALL[i].name(), SloshModel::ALL[i].description());
-            i += 1;
-        }
-        items
-    },
+    items: &SLOSH_MODEL_ITEMS,
 };
 
 /// Source of the modal parameters.
@@ -663,7 +657,7 @@ static REGIME: Enumeration = Enumeration {
     ],
 };
 
-static LIMITED_BY_ITEMS: [Item; 8] = Item::list(LimitedBy::ITEMS);
+static LIMITED_BY_ITEMS: [Item; LimitedBy::ITEMS.len()] = Item::list(LimitedBy::ITEMS);
 
 static LIMITED_BY: Enumeration = Enumeration {
     name: "LimitedBy",

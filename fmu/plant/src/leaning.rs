@@ -22,7 +22,7 @@
 //!                     F = M/[(1 - n^2)/(1 + H u^2) + n^2/(1 + 3 H u^2)]
 //! ```
 //!
-//! H l'^-2 is the coefficient of the quartic spring, sigma that of the vertical inertia (`third_order.rs`). M is e.(M^-1
+//! H l'^-2 is the coefficient of the quartic spring, sigma is the coefficient of the vertical inertia (`third_order.rs`). M is e.(M^-1
 //! e), and F is its ratio to e.(K^-1 e), for the two equations of small motions, with e the tangent. Hence l' = l F/f
 //! and m' = m f/M.
 //!

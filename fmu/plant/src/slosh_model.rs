@@ -18,18 +18,12 @@ macro_rules! models {
             /// All models in the order of their numbers.
             pub const ALL: [SloshModel; [$($number),+].len()] = [$(SloshModel::$name),+];
 
+            /// Values of `slosh.model` with their descriptions, in the order of their numbers.
+            pub const ITEMS: [(&str, &str); SloshModel::ALL.len()] = [$(($item, $description)),+];
+
             /// Returns the model's value of `slosh.model`.
             pub const fn name(self) -> &'static str {
-                match self {
-                    $(SloshModel::$name => $item,)+
-                }
-            }
-
-            /// Returns the description of that value.
-            pub const fn description(self) -> &'static str {
-                match self {
-                    $(SloshModel::$name => $description,)+
-                }
+                SloshModel::ITEMS[self as usize - 1].0
             }
         }
     };

@@ -510,7 +510,7 @@ static REGIME: Enumeration = Enumeration {
     ],
 };
 
-static LIMITED_BY_ITEMS: [Item; 8] = Item::list(LimitedBy::ITEMS);
+static LIMITED_BY_ITEMS: [Item; LimitedBy::ITEMS.len()] = Item::list(LimitedBy::ITEMS);
 
 static LIMITED_BY: Enumeration = Enumeration {
     name: "LimitedBy",

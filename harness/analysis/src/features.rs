@@ -24,14 +24,14 @@ pub struct Deviations {
 }
 
 impl Features {
-    /// Returns the standard deviations of the features, from the response, its relative standard deviation at each
-    /// frequency, and the relative rate at which its error changes along the frequency, 1/Hz. In responses with another error of this
-    /// kind added, 95 % of the features' shifts are below 1.96 deviations.
+    /// Returns the standard deviations of the features, from the response, its relative standard deviation
+    /// `relative` at each frequency, and the relative rate `slope` at which its error changes along the frequency, 1/Hz. In
+    /// responses with another error of this kind added, 95 % of the features' shifts are below 1.96 deviations.
     ///
-    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. Normal sₖ with the
-    /// rate as deviation make its correlation that of a Gaussian window, exp(−s²Δf²/2). A quotient of the slope of the error
-    /// and of the curvature of ln |H| would do only where the error is small against the response, which it is not at
-    /// an antiresonance.
+    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are normal numbers
+    /// whose deviation is the rate s, so that errors at frequencies Δf apart have the correlation exp(−s²Δf²/2) of a Gaussian
+    /// window. The slope of the error over the curvature of ln |H| would be simpler, but it holds only where the error is
+    /// small against the response, which it is not at an antiresonance.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,

@@ -265,7 +265,7 @@ fn read_csv(path: &Path, wanted: &[&str]) -> Result<Table> {
 }
 
 fn read_parquet(path: &Path, wanted: &[&str]) -> Result<Table> {
-    let time = wanted.iter().position(|name| *name == "time").map(|place| (place, false));
+    let time = wanted.iter().position(|name| *name == "time").map(|place| (place, None));
     let found = parquet_file::read(path, |names| positions(names, wanted), time, &[])?;
     Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), found.columns))
 }

@@ -1,8 +1,7 @@
 //! A mode to third order in its amplitude: a mass on the paraboloid z = |q|^2/(2 l) with a quartic spring, whose coefficients s
 //! and kappa give the liquid's shifts of frequency in planar and in circular motion (`formulas::third_order`). q = (x, y) is the
-//! position of the bob relative to the hinge, m, in the hub's frame. With N = l^2/s + |q|^2, h = kappa/(2 l^2) and the hub's
-//! Coriolis and centrifugal
-//! accelerations a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
+//! position of the bob relative to the hinge, m, in the hub's frame. With N = l^2/s + |q|^2, h = kappa/(2 l^2) and the
+//! hub's Coriolis and centrifugal accelerations a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
 //!
 //! ```text
 //! mu   = [ q.a + |q'|^2 + g (l/s) (1 + h |q|^2) ] / N

@@ -41,7 +41,7 @@ pub struct IdentifyArgs {
     kind: Kind,
 }
 
-/// Kinds of recordings.
+/// Kind of the recordings, which decides what is fitted to them.
 #[derive(clap::Subcommand)]
 enum Kind {
     /// The slosh bench: tank, hub, bearing and sensors from torque and rate.
@@ -93,7 +93,7 @@ struct DataArgs {
     report: Option<PathBuf>,
 }
 
-/// What is known of a bench.
+/// Options that state known properties of a bench and of its sensors.
 #[derive(clap::Args)]
 struct KnownArgs {
     /// Sets what is known of the bench by its FMU name; it is then not estimated.
@@ -144,7 +144,7 @@ pub struct BenchArgs {
         value_name = "NAME,…",
         value_delimiter = ',',
         default_value = "frozen,linear,planar,spherical",
-        value_parser = ["frozen", "linear", "planar", "spherical", "paraboloid"]
+        value_parser = ["frozen", "linear", "planar", "spherical"]
     )]
     model: Vec<String>,
     /// Friction laws to try, the first with all slosh models, the others with the one that is chosen.
@@ -365,14 +365,18 @@ impl BenchArgs {
             breaking: self.breaking,
             ..self.known.options()?
         };
-        self.known.answer(OutputError { options: options.clone() }, &options, &self.data)
+        self.known.identify_and_print(
+            OutputError { options: options.clone() },
+            &options,
+            &self.data,
+        )
     }
 }
 
 impl FrictionArgs {
     fn run(&self) -> Result<()> {
         let options = self.known.options()?;
-        self.known.answer(Friction { options: options.clone() }, &options, &self.data)
+        self.known.identify_and_print(Friction { options: options.clone() }, &options, &self.data)
     }
 }
 
@@ -427,8 +431,13 @@ impl KnownArgs {
         })
     }
 
-    /// Reads and identifies.
-    fn answer<M: Method>(&self, method: M, options: &Options, data: &DataArgs) -> Result<()> {
+    /// Reads the recordings, fits them by `method` and prints the result.
+    fn identify_and_print<M: Method>(
+        &self,
+        method: M,
+        options: &Options,
+        data: &DataArgs,
+    ) -> Result<()> {
         data.check()?;
         let source = data.source(trim(&self.trim)?)?;
         let fmu: Fmu = open(&self.fmu)?;

@@ -426,5 +426,5 @@ pub fn lines(found: &Identification) -> Vec<String> {
 
 /// The page, in HTML.
 pub fn page(found: &Identification) -> String {
-    page::of(found)
+    page::write(found)
 }

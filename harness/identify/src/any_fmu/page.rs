@@ -8,7 +8,7 @@ use crate::estimate::prose;
 use crate::words::page::{self, Sections};
 
 /// The page.
-pub fn of(found: &Identification) -> String {
+pub fn write(found: &Identification) -> String {
     let outputs = found.details.outputs.iter().map(|o| {
         vec![
             format!("{}, {}", o.recording, o.name),

@@ -23,20 +23,20 @@ pub struct Braking {
     pub speed: f64,
     /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
     pub coefficients: Vec<f64>,
-    /// Their standard deviations, rad/s².
+    /// Standard deviations of the coefficients, rad/s².
     pub std: Vec<f64>,
     /// Root mean square of the residual, rad/s².
     pub rmse: f64,
-    /// Coefficient of determination.
+    /// Share of the acceleration's variance that the fit explains.
     pub r_squared: f64,
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Stretches of these rows: parts of one decay within one revolution of the hub.
+    /// Number of stretches of these rows: parts of one decay within one revolution of the hub.
     pub stretches: usize,
     /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
-    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`].
+    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`](super::friction::LEAST_STRETCHES).
     #[serde(skip)]
     pub(super) covariance: Option<DMatrix<f64>>,
 }

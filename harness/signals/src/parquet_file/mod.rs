@@ -33,8 +33,8 @@ enum Kind {
 }
 
 impl Kind {
-    /// The type of a column; `None` for one that is not read here.
-    fn of(column: &ColumnDescriptor) -> Option<Kind> {
+    /// Returns the type of a column; `None` for one that is not read here.
+    fn from_column(column: &ColumnDescriptor) -> Option<Kind> {
         let logical = match (column.logical_type_ref(), column.converted_type()) {
             (Some(LogicalType::Timestamp(stamp)), _) => Some(Kind::Date(match stamp.unit {
                 TimeUnit::MILLIS => 1_000,
@@ -95,15 +95,16 @@ pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
 
-/// Reads the columns at the places that `positions` finds among the names of all. `time` is the place of the time among them, and true
-/// if a unit is stated for it, so that it may be integers. Those at which `booleans` is true may hold true and false.
+/// Reads the columns at the places that `positions` finds among the names of all. `time` is the place of the time among them, with the
+/// seconds of the unit that is stated for it: integers need one, and timestamps have their own. Columns at which `booleans` is true
+/// may hold true and false.
 ///
 /// # Errors
-/// If the file cannot be read; [`Foreign`] for types that are not read here.
+/// If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for types that are not read here.
 pub fn read(
     path: &Path,
     positions: impl Fn(&[String]) -> Result<Vec<usize>>,
-    time: Option<(usize, bool)>,
+    time: Option<(usize, Option<f64>)>,
     booleans: &[bool],
 ) -> Result<Found> {
     guarded(|| {
@@ -119,10 +120,18 @@ pub fn read(
         let mut kinds = Vec::new();
         for (k, &position) in positions.iter().enumerate() {
             let column = schema.column(position);
-            let kind = Kind::of(&column);
-            let is_fine = match (kind, time.filter(|(place, _)| *place == k)) {
+            let kind = Kind::from_column(&column);
+            let time = time.filter(|(place, _)| *place == k);
+            if let (Some(Kind::Date(ticks)), Some((_, Some(unit)))) = (kind, time) {
+                ensure!(
+                    (unit * ticks as f64 - 1.0).abs() < 1e-9,
+                    "column {} holds timestamps, which have a unit, but another one is stated for it, of {unit} s: leave the unit out",
+                    names[position]
+                );
+            }
+            let is_fine = match (kind, time) {
                 (Some(Kind::Real), _) | (Some(Kind::Date(_)), Some(_)) => true,
-                (Some(Kind::Integer { .. }), time) => time.is_none_or(|(_, is_stated)| is_stated),
+                (Some(Kind::Integer { .. }), time) => time.is_none_or(|(_, unit)| unit.is_some()),
                 (Some(Kind::Boolean), _) => booleans.get(k) == Some(&true),
                 _ => false,
             };
@@ -130,7 +139,7 @@ pub fn read(
                 let kind = column
                     .logical_type_ref()
                     .map_or(column.physical_type().to_string(), |of| format!("{of:?}"));
-                let allowed = match time.is_some_and(|(place, _)| place == k) {
+                let allowed = match time.is_some() {
                     true => {
                         "timestamps, floating-point numbers in s, integers of a unit that is stated"
                     }

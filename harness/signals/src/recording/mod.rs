@@ -39,8 +39,8 @@ struct Header {
 }
 
 impl Header {
-    /// From names and a row of units.
-    fn of(names: Vec<String>, row: Option<&Vec<String>>) -> Header {
+    /// Makes a header of the names of all columns and of a row of units.
+    fn from_names(names: Vec<String>, row: Option<&Vec<String>>) -> Header {
         let mut header = Header { names: Vec::new(), full: Vec::new(), row: Vec::new() };
         for (k, name) in names.into_iter().enumerate() {
             let below = row.and_then(|row| row.get(k)).map_or("", |unit| unit.as_str());
@@ -237,7 +237,7 @@ pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Resul
 /// Python package converts.
 ///
 /// # Errors
-/// As [`read`].
+/// If a file of these kinds cannot be read so. The error lists all faults of its columns.
 pub fn read_here(
     path: &Path,
     name: &Path,
@@ -277,8 +277,8 @@ enum File {
 impl File {
     fn open(path: &Path) -> Result<File> {
         Ok(match foreign::kind(path)? {
-            Kind::Text => File::Text(text::Layout::of(path)?),
-            Kind::Parquet => File::Parquet(Header::of(parquet_file::names(path)?, None)),
+            Kind::Text => File::Text(text::Layout::detect(path)?),
+            Kind::Parquet => File::Parquet(Header::from_names(parquet_file::names(path)?, None)),
         })
     }
 
@@ -416,13 +416,8 @@ fn read_as(
             layout.read(path, &places, timed, &booleans, done)?
         }
         File::Parquet(_) => {
-            let is_stated = half.is_some() || stated.is_some();
-            parquet_file::read(
-                path,
-                |_| Ok(places.clone()),
-                timed.then_some((0, is_stated)),
-                &booleans,
-            )?
+            let unit = half.map(|_| 1.0).or(stated);
+            parquet_file::read(path, |_| Ok(places.clone()), timed.then_some((0, unit)), &booleans)?
         }
     };
     done(format!("columns used: {}", used.join(", ")));

@@ -45,8 +45,8 @@ impl Value {
         !matches!(self, Value::Missing | Value::Other)
     }
 
-    /// The value of a field; `decimal` is the decimal sign of the fields before.
-    fn of(field: &str, separator: u8, decimal: &mut Option<char>) -> Value {
+    /// Reads a field; `decimal` is the decimal sign of the fields before.
+    fn parse(field: &str, separator: u8, decimal: &mut Option<char>) -> Value {
         match number(field, separator, decimal) {
             Ok(Some(number)) => Value::Number(number),
             Ok(None) if field.is_empty() => Value::Missing,
@@ -179,7 +179,7 @@ struct Sample {
     /// The comment before the first line.
     comment: Vec<String>,
     width: usize,
-    /// Columns of text.
+    /// Places of the columns that hold text, not numbers or times.
     texts: Vec<usize>,
     /// Places of the rows.
     rows: Vec<usize>,
@@ -187,7 +187,7 @@ struct Sample {
 
 impl Sample {
     /// Reads the first lines; rows have at least `least` fields.
-    fn of(path: &Path, separator: (u8, &'static str), least: usize) -> Result<Sample> {
+    fn read(path: &Path, separator: (u8, &'static str), least: usize) -> Result<Sample> {
         let mut file = Lines::open(path, separator.0)?;
         let (mut lines, mut comment) = (Vec::new(), Vec::new());
         while lines.len() < SAMPLE && file.next()? {
@@ -196,7 +196,7 @@ impl Sample {
             }
             let fields: Vec<String> = file.fields().iter().map(|field| field.to_string()).collect();
             let values =
-                fields.iter().map(|field| Value::of(field, separator.0, &mut None)).collect();
+                fields.iter().map(|field| Value::parse(field, separator.0, &mut None)).collect();
             lines.push((file.number(), fields, values));
         }
         // lines with a value somewhere are rows, or a row of units with a 1
@@ -239,19 +239,19 @@ pub(super) struct Layout {
     above: usize,
     /// Notes on the detected layout.
     pub notes: Vec<String>,
-    /// Columns of text, for the message that a column is missing.
+    /// Names of the columns that hold text, as the end of the message that a column is missing.
     pub texts: String,
 }
 
 impl Layout {
     /// Detects the layout of a file.
-    pub fn of(path: &Path) -> Result<Self> {
+    pub fn detect(path: &Path) -> Result<Self> {
         // a table of times alone has one column
         let mut tried = Vec::new();
         for (separator, least) in
             SEPARATORS.map(|of| (of, 2)).into_iter().chain([(SEPARATORS[2], 1)])
         {
-            tried.push(Sample::of(path, separator, least)?);
+            tried.push(Sample::read(path, separator, least)?);
         }
         ensure!(tried.iter().any(|sample| !sample.lines.is_empty()), "it is empty");
         let start = |fields: &[String], separator: u8| {
@@ -337,7 +337,7 @@ impl Layout {
             notes.push(format!("its columns are separated by {}", separator.1));
         }
         names.truncate(width);
-        let mut header = Header::of(names, units.map(|(_, fields, _)| fields));
+        let mut header = Header::from_names(names, units.map(|(_, fields, _)| fields));
         header.widen(width);
         let row = &lines[at];
         let example = |k: &usize| {
@@ -400,7 +400,7 @@ impl Layout {
             for (k, &place) in places.iter().enumerate() {
                 let (is_time, field) = (times && k == 0, &*fields[place]);
                 let begins = columns[k].is_empty();
-                let parsed = match Value::of(field, self.separator, &mut decimal) {
+                let parsed = match Value::parse(field, self.separator, &mut decimal) {
                     Value::Number(number) if !is_time || stamps.is_empty() => Ok(number),
                     Value::Missing => Ok(f64::NAN),
                     Value::Time(moment) if is_time && (begins || !stamps.is_empty()) => {
