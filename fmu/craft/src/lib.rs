@@ -26,6 +26,7 @@
 //! `handover.rs` its impulses on the carrier. `outputs.rs` has energy and momentum. `contents.rs` describes a tank that
 //! drains by a table (`table.rs`), `draining.rs` a craft with such tanks. The crate `taylor` integrates.
 
+#![warn(missing_docs)]
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;

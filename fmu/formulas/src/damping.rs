@@ -54,7 +54,6 @@ impl Mode {
 
 /// Shapes with measurements of the first mode's damping; lengths in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub enum Shape {
     /// Upright, with a flat bottom.
     Cylinder {

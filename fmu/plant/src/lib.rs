@@ -10,6 +10,7 @@
 //! `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `suspension.rs`, `wheel.rs` and `imu.rs` have
 //! the parts. The integrator and the power series are in the crate `taylor`.
 
+#![warn(missing_docs)]
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;

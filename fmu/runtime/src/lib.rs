@@ -9,6 +9,8 @@
 //! An FMU is a crate with a table, an implementation of [`Model`] and two lines:
 //! `runtime::export_fmi2!(TheModel);` and `runtime::export_fmi3!(TheModel);`.
 
+#![warn(missing_docs)]
+
 pub mod c_abi;
 pub mod call;
 pub mod clock;

@@ -1,5 +1,3 @@
-//! The file itself: a zip archive (FMI 2.0.5, section 2.3).
-
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
@@ -10,7 +8,7 @@ use zip::CompressionMethod;
 
 use super::findings::Findings;
 
-/// Entries allowed at the top level of an FMU.
+/// Files and folders that FMI 2.0 allows at the top level of an FMU.
 const AT_THE_TOP: [&str; 9] = [
     "modelDescription.xml",
     "model.png",
@@ -23,41 +21,36 @@ const AT_THE_TOP: [&str; 9] = [
     "terminalsAndIcons",
 ];
 
-/// An entry of the archive's directory.
 pub struct Entry {
-    /// Name as written, invalid characters replaced.
+    /// Name as it stands in the archive; bytes that are not UTF-8 are replaced.
     pub name: String,
     method: CompressionMethod,
     encrypted: bool,
     link: bool,
-    /// Content of the file, if a rule asks for it.
+    /// Bytes of the file if [`is_read`] is true for its name, otherwise empty.
     content: Vec<u8>,
-    /// Reason why it cannot be unpacked.
+    /// Reason why this entry cannot be unpacked.
     fault: Option<String>,
 }
 
-/// An archive, unpacked.
 pub struct Archive {
-    /// Entries in the order of the zip directory, repeated names included.
     pub entries: Vec<Entry>,
-    /// Reason why the directory could not be read to its end, or is too large to unpack.
     broken: Option<String>,
-    /// Reason why no command opens the archive.
+    /// Reason why the other commands of `hubslosh` do not open the archive.
     refusal: Option<String>,
     directory: temporary::Folder,
 }
 
-/// True if a rule asks for the content of this file.
 fn is_read(name: &str) -> bool {
     name == host::archive::DESCRIPTION || name == INDEX || name.starts_with("binaries/")
 }
 
-/// The first page of the documentation.
 const INDEX: &str = "documentation/index.html";
 
 impl Archive {
-    /// Reads as much as possible and unpacks the files that hosts would find into a temporary directory. It skips links and names
-    /// that lead out of it; the rules report them.
+    /// Reads the archive and unpacks into a temporary folder what hosts would find there. Links and names
+    /// that lead out of the folder are left out, because other rules report them. A damaged entry is noted in
+    /// `fault`, so that all the other entries are still checked.
     pub fn read(path: &Path) -> Result<Archive> {
         let from = host::archive::Archive::open(path)?;
         let directory = temporary::Folder::new()?;
@@ -87,8 +80,9 @@ impl Archive {
         Ok(archive)
     }
 
-    /// Unpacks an entry: to its place if it has one, to `content` if a rule asks for it, and in any
-    /// case to the end, where its size and checksum show.
+    /// Unpacks one entry to its place in the folder. Every entry is decompressed to its end, even if nothing
+    /// needs its content, because only then a wrong size or checksum shows. `content` receives the bytes if a
+    /// rule reads this file.
     fn unpack(
         &self,
         from: &host::archive::Archive,
@@ -101,9 +95,9 @@ impl Archive {
         let is_placed = !entry.link && !entry.is_folder() && name_faults(&entry.name).is_empty();
         let path = self.directory.path().join(&entry.name);
         let folder = path.parent().unwrap_or(self.directory.path());
-        // A file where another entry wants a folder: hosts could not unpack it either.
+        // A file whose name another entry uses as a folder cannot be unpacked by a host either.
         let place = match is_placed && std::fs::create_dir_all(folder).is_ok() {
-            // of files in the same place the first, which rules read, too
+            // Of two entries for the same file the first one is kept, because rules read the first one too.
             true => File::create_new(&path).ok(),
             false => None,
         };
@@ -113,30 +107,31 @@ impl Archive {
         }
     }
 
-    /// Content of a file that rules read, if it exists and could be unpacked.
+    /// Returns the content of a file that rules read, or `None` if it does not exist or could not be
+    /// unpacked.
     pub fn file(&self, name: &str) -> Option<&[u8]> {
         let entry = self.entries.iter().find(|entry| entry.name == name && is_read(name))?;
         entry.fault.is_none().then_some(entry.content.as_slice())
     }
 
-    /// Names of the files below a folder (`binaries/`), without the folder's own entries.
+    /// Lists the files below `folder`, for example `binaries/`, without entries for folders.
     pub fn below<'a>(&'a self, folder: &'a str) -> impl Iterator<Item = &'a str> {
         let files = self.entries.iter().filter(|entry| !entry.name.ends_with('/'));
         files.map(|entry| entry.name.as_str()).filter(move |name| name.starts_with(folder))
     }
 
-    /// Reason why no command opens the archive, if none does.
+    /// Returns the reason why the other commands of `hubslosh` refuse this archive, or `None` if they open
+    /// it.
     pub fn refusal(&self) -> Option<String> {
         self.refusal.clone()
     }
 
-    /// Directory into which it is unpacked.
     pub fn directory(&self) -> &Path {
         self.directory.path()
     }
 }
 
-/// Faults of a name, each as part of a sentence.
+/// Lists what is wrong with an entry's name; each item completes the sentence "the name …".
 fn name_faults(name: &str) -> Vec<&'static str> {
     let mut faults = Vec::new();
     if name.is_empty() {
@@ -151,7 +146,7 @@ fn name_faults(name: &str) -> Vec<&'static str> {
     if name.split(['/', '\\']).any(|part| part == "..") {
         faults.push("leads out of the archive by \"..\"");
     }
-    // an entry for the folder itself, which some tools write, is unpacked everywhere
+    // Some tools write an entry for the folder itself; every unpacker accepts it.
     if name != "./"
         && name.trim_end_matches('/').split('/').any(|part| part.is_empty() || part == ".")
     {
@@ -163,7 +158,6 @@ fn name_faults(name: &str) -> Vec<&'static str> {
     faults
 }
 
-/// `zip.readable`
 pub fn readable(archive: &Archive, findings: &mut Findings) {
     if let Some(why) = &archive.broken {
         findings.add("the archive", format!("its directory cannot be read: {why}"));
@@ -186,7 +180,6 @@ fn is_common(method: CompressionMethod) -> bool {
     matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated)
 }
 
-/// `zip.methods`
 pub fn methods(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
         if entry.encrypted {
@@ -202,7 +195,6 @@ pub fn methods(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.names`
 pub fn names(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
         let faults = name_faults(&entry.name);
@@ -216,21 +208,19 @@ pub fn names(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.links`
 pub fn links(archive: &Archive, findings: &mut Findings) {
     for entry in archive.entries.iter().filter(|entry| entry.link) {
         findings.add(&entry.name, "it is a symbolic link (allowed: files and folders)");
     }
 }
 
-/// `zip.duplicates`
 pub fn duplicates(archive: &Archive, findings: &mut Findings) {
     let mut seen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for name in archive.entries.iter().map(|entry| entry.name.as_str()) {
-        // that a file is a folder is a rule of its own
+        // An entry that is a file and another that is a folder of the same name break a rule of their own.
         let folder = if name.ends_with('/') { "/" } else { "" };
         let names = seen.entry(host::archive::place(name) + folder).or_default();
-        // a folder that is there twice hides nothing
+        // A repeated entry for a folder hides no content.
         if !(name.ends_with('/') && names.contains(&name)) {
             names.push(name);
         }
@@ -248,7 +238,6 @@ pub fn duplicates(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.description`
 pub fn description(archive: &Archive, findings: &mut Findings) {
     const NAME: &str = "modelDescription.xml";
     if archive.entries.iter().any(|entry| entry.name == NAME) {
@@ -265,7 +254,6 @@ pub fn description(archive: &Archive, findings: &mut Findings) {
     findings.add(NAME, format!("it is not at the root of the archive{hint}"));
 }
 
-/// `zip.description_first`
 pub fn description_first(archive: &Archive, findings: &mut Findings) {
     let place = archive.entries.iter().position(|entry| entry.name == "modelDescription.xml");
     if let Some(place) = place.filter(|place| *place > 0) {
@@ -276,7 +264,6 @@ pub fn description_first(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.documentation`
 pub fn documentation(archive: &Archive, findings: &mut Findings) {
     match archive.file(INDEX) {
         None if archive.entries.iter().any(|entry| entry.name == INDEX) => {
@@ -290,19 +277,17 @@ pub fn documentation(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.licenses`
 pub fn licenses(archive: &Archive, findings: &mut Findings) {
     if archive.below("documentation/licenses/").next().is_none() {
         findings.add("documentation/licenses/", "no licence is in it");
     }
 }
 
-/// `zip.folders`
 pub fn folders(archive: &Archive, findings: &mut Findings) {
     folders_of("2.0", &AT_THE_TOP, archive, findings);
 }
 
-/// Names at the top that a version of FMI does not have.
+/// Reports the names at the top level that FMI `version` does not allow.
 pub fn folders_of(version: &str, allowed: &[&str], archive: &Archive, findings: &mut Findings) {
     let mut unknown: Vec<&str> = archive
         .entries

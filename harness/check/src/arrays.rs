@@ -1,5 +1,5 @@
-//! Writes of an FMU outside the arrays that it is given (FMI 2.0.5, section 2.1.7: their length is
-//! in the call).
+//! Detects FMUs that write outside the arrays that the host passes. The length of each array is an argument
+//! of the call (FMI 2.0.5, section 2.1.7).
 
 use anyhow::Result;
 
@@ -8,7 +8,7 @@ use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTe
 use host::description::Type;
 use host::fmi2::guarded::Lists;
 
-/// Variables of some types, by value reference.
+/// Returns the value references of all variables of the types `kinds`.
 fn references(fmu: &FmuUnderTest, kinds: &[Type]) -> Vec<u32> {
     let all = fmu.variables().iter().filter(|v| kinds.contains(&v.kind));
     all.map(|v| v.reference).collect()
@@ -61,7 +61,6 @@ fn lists(session: &mut Session) -> Result<Lists> {
     Ok(lists)
 }
 
-/// `host.arrays`
 pub fn arrays(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
         let mut session = fmu.running(interface)?;

@@ -1,14 +1,12 @@
-//! The files under `binaries/` (FMI 2.0.5, section 2.3), read as files, whichever platform they are
-//! for.
-
 use super::archive::Archive;
 use super::description::Description;
 use super::findings::Findings;
 use host::binary::{Binary, Kind};
 use host::fmi2::{Fmu, PLATFORM};
 
-/// Folders of FMI 2.0, the ending of the binary in each, and what can be read of it here. Names with 32
-/// and 64 are for x86; a tuple of FMI 3.0 names any other processor.
+/// Folders under `binaries/` in FMI 2.0, the file ending of the binary in each, and the format that this
+/// check can read (`None`: not read). Names with 32 and 64 are for x86; other processors have platform tuples
+/// as in FMI 3.0.
 pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
     ("win32", ".dll", None),
     ("win64", ".dll", Some(Kind::Windows)),
@@ -19,21 +17,22 @@ pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
     ("aarch64-linux", ".so", Some(Kind::LinuxArm)),
 ];
 
-/// Architectures of the platform tuples of FMI 3.0 (section 2.5.1.4.1). FMI 2.0.4 uses them too, except for its own names with 32
-/// and 64.
+/// Architectures in the platform tuples of FMI 3.0 (section 2.5.1.4.1). FMI 2.0.4 allows these tuples too,
+/// except where it has names with 32 and 64 of its own.
 const ARCHITECTURES: [&str; 8] =
     ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
 
-/// The ending of the binary in a folder, and what can be read of it here; none of a folder that a
-/// vendor has named.
+/// Returns the file ending of the binary in `folder` and its readable format, or `None` for a folder whose
+/// name a vendor has invented.
 fn platform(folder: &str) -> Option<(&'static str, Option<Kind>)> {
     let known = PLATFORMS.iter().find(|(known, ..)| *known == folder);
     known.map(|(_, ending, kind)| (*ending, *kind)).or_else(|| tuple(folder))
 }
 
-/// The ending of the binary in the folder of a platform tuple, and what can be read of it here.
+/// Returns the file ending and the readable format of the binary in the folder of a platform tuple, for
+/// example `x86_64-linux`.
 pub(crate) fn tuple(folder: &str) -> Option<(&'static str, Option<Kind>)> {
-    // arch-sys or arch-sys-abi
+    // architecture-system or architecture-system-ABI
     let mut parts = folder.splitn(3, '-');
     let (architecture, system) = (parts.next()?, parts.next()?);
     if !ARCHITECTURES.contains(&architecture) {
@@ -54,41 +53,39 @@ pub(crate) fn tuple(folder: &str) -> Option<(&'static str, Option<Kind>)> {
     }
 }
 
-/// An interface that the description declares, and what its binary must be.
+/// An interface that the description declares, with the functions that its binary must export.
 struct Declared {
-    /// The element, ModelExchange or CoSimulation.
     interface: &'static str,
     identifier: String,
-    /// Functions its binary must export.
+    /// Functions that the binary of this interface must export.
     wanted: Vec<&'static str>,
 }
 
-/// A binary in its place.
 struct Placed {
     name: String,
-    /// Name without the ending.
+    /// File name without its ending, to compare with modelIdentifier.
     identifier: String,
     folder: String,
     kind: Option<Kind>,
     binary: Result<Binary, String>,
 }
 
-/// All binaries of an FMU.
 pub struct Binaries {
     /// Binaries in the folders where hosts look for them.
     placed: Vec<Placed>,
-    /// Number of binaries with the model's name in folders that vendors have named.
+    /// Number of binaries with the model's name in folders whose names vendors have invented.
     of_vendors: usize,
-    /// Files in folders of FMI 2.0 that no host will find, each with the names it looks for.
+    /// Files in folders of FMI 2.0 that no host finds because of their name, each with the names that hosts
+    /// look for.
     elsewhere: Vec<(String, String)>,
-    /// The interfaces that are declared and name a binary.
     declared: Vec<Declared>,
     has_sources: bool,
     described: bool,
 }
 
 impl Binaries {
-    /// Reads all there are.
+    /// Reads the headers of all binaries in the archive and compares their names with the interfaces of
+    /// `description`.
     pub fn new(archive: &Archive, description: Option<&Description>) -> Binaries {
         let interfaces = description.into_iter().flat_map(|d| {
             let exchange = d.model_exchange.as_ref();
@@ -123,7 +120,7 @@ impl Binaries {
             let [_, folder, file] = parts[..] else { continue };
             let Some((ending, kind)) = platform(folder) else {
                 let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-                // that of a standard folder in other capitals is not a name of a vendor
+                // A standard folder in other capitals is a mistake, not a vendor's own name.
                 let is_vendors = platform(&folder.to_lowercase()).is_none();
                 let is_named = identifiers.iter().any(|name| name == stem);
                 all.of_vendors += usize::from(is_vendors && is_named);
@@ -131,7 +128,7 @@ impl Binaries {
             };
             let names: Vec<String> =
                 identifiers.iter().map(|identifier| format!("{identifier}{ending}")).collect();
-            // Windows takes capitals for small letters
+            // File names on Windows do not depend on capitals.
             let is_file = |name: &String| match ending {
                 ".dll" => name.eq_ignore_ascii_case(file),
                 _ => name == file,
@@ -149,17 +146,17 @@ impl Binaries {
         all
     }
 
-    /// The name of the binary for the platform this program runs on.
+    /// Returns the name of the binary for the platform on which this check runs.
     pub fn own(&self) -> Option<&str> {
         self.placed.iter().find(|p| p.folder == PLATFORM).map(|p| p.name.as_str())
     }
 
-    /// Returns the binaries that could be read.
+    /// Lists the names and contents of the binaries that could be parsed.
     fn read(&self) -> impl Iterator<Item = (&str, &Binary)> {
         self.placed.iter().filter_map(|p| Some((p.name.as_str(), p.binary.as_ref().ok()?)))
     }
 
-    /// Looks at each that could be read; says so if there is none.
+    /// Calls `look` for each binary that could be parsed. The rule is skipped if there is none.
     fn each(&self, findings: &mut Findings, look: impl Fn(&str, &Binary, &mut Findings)) {
         if self.read().next().is_none() {
             findings.skip("no binary can be read here");
@@ -170,7 +167,6 @@ impl Binaries {
     }
 }
 
-/// `bin.present`
 pub fn present(binaries: &Binaries, findings: &mut Findings) {
     if !binaries.described {
         return findings.skip("without a description nobody knows what the binary is called");
@@ -187,7 +183,6 @@ pub fn present(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
-/// `bin.each_interface`
 pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
     let mut folders: Vec<&str> = binaries.placed.iter().map(|p| p.folder.as_str()).collect();
     folders.dedup();
@@ -211,7 +206,6 @@ pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
-/// `bin.this_platform`
 pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
     if !binaries.described {
         return findings.skip("without a description nobody knows what the binary is called");
@@ -225,9 +219,8 @@ pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
-/// `bin.name`
 pub fn name(binaries: &Binaries, findings: &mut Findings) {
-    // Further libraries next to the binary are fine; a folder without the binary is not.
+    // Further libraries next to the binary are allowed; a folder without the model's binary is not.
     let empty = |folder: &str| !binaries.placed.iter().any(|p| p.name.starts_with(folder));
     for (name, expected) in &binaries.elsewhere {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
@@ -242,7 +235,6 @@ pub fn name(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
-/// `bin.format`
 pub fn format(binaries: &Binaries, findings: &mut Findings) {
     let mut looked = false;
     for placed in &binaries.placed {
@@ -262,13 +254,12 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
-/// `bin.symbols`
 pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
     binaries.each(findings, |name, binary, findings| {
         let of = binaries.placed.iter().find(|p| p.name == name).map(|p| p.identifier.as_str());
         let interfaces = binaries.declared.iter().filter(|d| of == Some(d.identifier.as_str()));
         let mut wanted: Vec<&str> = interfaces.flat_map(|d| d.wanted.iter().copied()).collect();
-        // those that every FMU has are wanted by both interfaces
+        // Functions that both interfaces need are named only once.
         let mut seen = std::collections::BTreeSet::new();
         wanted.retain(|symbol| seen.insert(*symbol));
         if let Some(fault) = binary.lacking(&wanted) {
@@ -277,7 +268,6 @@ pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
     });
 }
 
-/// `bin.extra_symbols`
 pub fn extra_symbols(binaries: &Binaries, findings: &mut Findings) {
     binaries.each(findings, |name, binary, findings| {
         if let Some(fault) = binary.surplus() {
@@ -286,7 +276,6 @@ pub fn extra_symbols(binaries: &Binaries, findings: &mut Findings) {
     });
 }
 
-/// `bin.system`
 pub fn system(binaries: &Binaries, findings: &mut Findings) {
     binaries.each(findings, |name, binary, findings| {
         for fault in binary.loading_faults() {

@@ -1,4 +1,5 @@
-//! Head and definitions of modelDescription.xml (FMI 2.0.5, section 2.2): interfaces, capabilities, units, types.
+//! Rules of the head and the definitions of modelDescription.xml (FMI 2.0.5, section 2.2): interfaces,
+//! capabilities, units, types.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,14 +7,13 @@ use super::description::Description;
 use super::findings::Findings;
 use host::xml::{Element, Fault};
 
-/// `xml.well_formed`
 pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
     match archive.file("modelDescription.xml") {
         None => findings.skip("there is no modelDescription.xml that can be unpacked"),
         Some(bytes) => {
             let read = Element::read(bytes);
             if let Err(Fault::TooLarge(_) | Fault::Doctype(_)) = read {
-                // rules of their own
+                // Files that are too large or have a DOCTYPE break `xml.size` or `xml.doctype`.
                 findings.skip("modelDescription.xml is not read to its end");
             } else if let Err(why) = read {
                 findings.add("modelDescription.xml", format!("line and column {why}"));
@@ -22,7 +22,6 @@ pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
     }
 }
 
-/// `xml.fmi_version`
 pub fn fmi_version(d: &Description, findings: &mut Findings) {
     if let Some(other) = d.other_version() {
         return findings.add(
@@ -39,14 +38,12 @@ pub fn fmi_version(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.guid`
 pub fn guid(d: &Description, findings: &mut Findings) {
     if d.root.get("guid").is_none_or(|guid| guid.trim().is_empty()) {
         findings.add("guid", "it is missing or empty");
     }
 }
 
-/// `xml.date`
 pub fn date(d: &Description, findings: &mut Findings) {
     if let Some(date) = d.root.get("generationDateAndTime")
         && !(date.len() == 20 && date.ends_with('Z') && date.as_bytes().get(10) == Some(&b'T'))
@@ -58,19 +55,17 @@ pub fn date(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.interfaces`
 pub fn interfaces(d: &Description, findings: &mut Findings) {
     if d.interfaces().next().is_none() {
         findings.add("fmiModelDescription", "neither ModelExchange nor CoSimulation is there");
     }
 }
 
-/// `xml.model_identifier`
 pub fn model_identifier(d: &Description, findings: &mut Findings) {
     identifiers(d.interfaces(), findings);
 }
 
-/// Reports model identifiers that cannot be part of a C name.
+/// Reports each interface whose modelIdentifier cannot be the start of a C function's name.
 pub(crate) fn identifiers<'d>(
     interfaces: impl Iterator<Item = &'d Element>,
     findings: &mut Findings,
@@ -92,7 +87,6 @@ pub(crate) fn identifiers<'d>(
     }
 }
 
-/// `xml.capabilities`
 pub fn capabilities(d: &Description, findings: &mut Findings) {
     for interface in d.interfaces() {
         if interface.flag("canSerializeFMUstate") && !interface.flag("canGetAndSetFMUstate") {
@@ -119,7 +113,6 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.state_capability`
 pub fn state_capability(d: &Description, findings: &mut Findings) {
     for interface in d.interfaces() {
         for flag in ["canGetAndSetFMUstate", "canSerializeFMUstate"] {
@@ -133,7 +126,6 @@ pub fn state_capability(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.default_experiment`
 pub fn default_experiment(d: &Description, findings: &mut Findings) {
     let Some(experiment) = experiment_numbers(&d.root, findings) else { return };
     let number = |name| experiment.number(name);
@@ -150,7 +142,8 @@ pub fn default_experiment(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// Reports numbers that no experiment can have. Returns the element, if it is there.
+/// Reports times, tolerances and step sizes of DefaultExperiment that are not finite or not positive. Returns
+/// the element; if it is missing, the rule is skipped.
 pub(crate) fn experiment_numbers<'d>(
     root: &'d Element,
     findings: &mut Findings,
@@ -172,7 +165,6 @@ pub(crate) fn experiment_numbers<'d>(
     Some(experiment)
 }
 
-/// `xml.stop_time`
 pub fn stop_time(d: &Description, findings: &mut Findings) {
     match d.root.child("DefaultExperiment") {
         None => findings.skip("there is no DefaultExperiment"),
@@ -180,7 +172,6 @@ pub fn stop_time(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// Reports an experiment that ends before it starts.
 pub(crate) fn stop_before_start(experiment: &Element, findings: &mut Findings) {
     let start = experiment.number("startTime").unwrap_or(0.0);
     if let Some(stop) = experiment.number("stopTime").filter(|stop| *stop < start) {
@@ -191,12 +182,12 @@ pub(crate) fn stop_before_start(experiment: &Element, findings: &mut Findings) {
     }
 }
 
-/// `xml.unique`
 pub fn unique(d: &Description, findings: &mut Findings) {
     unique_names(&d.root, "SimpleType", |simple| simple.list("Enumeration").collect(), findings);
 }
 
-/// Reports definitions of one name, and items of one name or value, which `items` finds in a type.
+/// Reports definitions (of units and types) whose names are repeated, and types two of whose items have the
+/// same name or value. `items` returns the items of a type's element.
 pub(crate) fn unique_names(
     root: &Element,
     of_type: &str,
@@ -229,7 +220,6 @@ pub(crate) fn unique_names(
     }
 }
 
-/// `xml.units`
 pub fn units(d: &Description, findings: &mut Findings) {
     let units: BTreeMap<&str, &Element> =
         d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
@@ -253,7 +243,6 @@ pub fn units(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.types`
 pub fn types(d: &Description, findings: &mut Findings) {
     let types: BTreeMap<&str, &str> = d
         .root

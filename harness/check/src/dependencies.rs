@@ -1,6 +1,9 @@
-//! Rules that compare the dependencies in modelDescription.xml with the binary (FMI 2.0.5, sections 2.2.8 and 2.1.9). They change
-//! everything that a variable may depend on, and check whether the variable changes. At the start as declared, and at many
-//! others, since what a variable depends on depends on parameters, and a state that is 0 hides a product.
+//! Rules that compare the dependencies in modelDescription.xml with the binary (FMI 2.0.5, sections 2.2.8 and
+//! 2.1.9).
+//!
+//! Each input and state is changed alone, and the outputs and derivatives that follow are the observed
+//! dependencies. This is repeated from many initial points, because a dependency may show only for some
+//! parameters, and a state that is 0 hides a product.
 
 use std::collections::BTreeSet;
 
@@ -13,19 +16,26 @@ use super::values::items;
 use host::causality::Causality;
 use host::description::Type;
 
-/// Starts that are looked at before a declared feedthrough counts as not there.
+/// Largest number of initial points that are tried before a declared feedthrough counts as missing in the
+/// binary.
 const STARTS: u64 = 600;
-/// Starts that are looked at at the least, to find dependencies that are not declared.
+/// Smallest number of initial points, which is enough to find most dependencies that are not declared.
 const AT_LEAST: u64 = 40;
-/// Tries to find them: parameters drawn at random may not go together.
+/// Largest number of attempts to reach these initial points. More attempts than points are needed, because
+/// the FMU may refuse parameters drawn at random.
 const TRIES: u64 = 16 * STARTS;
-/// Part of the starts other than 0 that are made a hundredth of what they are.
+/// Probability with which a start value is divided by 100.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// A change below this share of a variable's size is rounding, and no dependency.
+/// Relative change below which a difference is rounding and not a dependency.
 const ROUNDING: f64 = 1e-9;
 
-/// An instance with parameters somewhere else; the 0th try leaves them as they are.
-pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> Result<Session<'f>> {
+/// Returns an instance whose parameters, inputs and start values are drawn at random with the seed `attempt`.
+/// Attempt 0 keeps the declared values.
+pub fn randomised<'f>(
+    fmu: &'f FmuUnderTest,
+    interface: Interface,
+    attempt: u64,
+) -> Result<Session<'f>> {
     let mut session = fmu.session(interface)?;
     if attempt == 0 {
         return Ok(session);
@@ -35,7 +45,7 @@ pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> R
     let parameters = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     for v in parameters {
         let Some(start) = start_value(v) else { continue };
-        // Some things happen only where other numbers are as the author left them, zeros above all.
+        // Some effects show only while the other values are at their defaults, for example at zero.
         let kept = match attempt % 3 {
             0 => 0.0,
             1 => 1.0,
@@ -54,7 +64,7 @@ pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> R
                 Reading::Real(moved.max(min).min(max.max(min)))
             }
             Reading::Real(x) => {
-                // Some things happen only where a start is next to nothing, such as rest.
+                // Some effects show only near zero, for example friction at rest.
                 let share = if random.f64() < NEXT_TO_NOTHING { 0.01 } else { 1.0 };
                 let moved = share * x * (0.7 + 0.6 * random.f64());
                 Reading::Real(moved.max(min).min(max.max(min)))
@@ -66,7 +76,7 @@ pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> R
                     None => continue,
                 }
             }
-            // the bounds more often than what lies between
+            // Bounds are drawn more often than values between them.
             Reading::Integer(_) if max - min <= 1e6 => {
                 let inside = min + ((max - min + 1.0) * random.f64()).floor();
                 let all = [min, max, max, inside];
@@ -75,32 +85,30 @@ pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> R
             Reading::Boolean(_) => Reading::Boolean(random.bool().into()),
             _ => continue,
         };
-        // One that is refused keeps its value.
+        // A value that the FMU refuses keeps its old value.
         let _ = session.set(v, &value);
     }
     Ok(session)
 }
 
-/// True if two values differ by more than rounding.
+/// Returns true if two readings of `v` differ by more than rounding.
 fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
     match (a, b) {
         (Reading::Real(a), Reading::Real(b)) => {
             let size = a.abs().max(b.abs()).max(1e-3 * v.nominal());
             (a - b).abs() > ROUNDING * size
         }
-        (a, b) => !a.is(b),
+        (a, b) => !a.is_identical(b),
     }
 }
 
-/// Dependencies that were observed.
+/// Dependencies that were observed by changing one known variable at a time.
 struct Seen {
-    /// (unknown, known), by index.
     pairs: BTreeSet<(usize, usize)>,
-    /// Pairs that changed by at least the last bit.
+    /// Pairs whose values differ in at least one bit.
     traces: BTreeSet<(usize, usize)>,
-    /// Known variables that could be moved at all.
+    /// Known variables (inputs and states) whose value could be changed.
     moved: BTreeSet<usize>,
-    /// Number of starts that were tried.
     starts: u64,
 }
 
@@ -118,7 +126,7 @@ impl Seen {
     ) {
         self.moved.insert(known.index);
         for ((unknown, before), after) in unknowns.iter().zip(before).zip(after) {
-            if !before.is(after) {
+            if !before.is_identical(after) {
                 self.traces.insert((unknown.index, known.index));
             }
             if has_moved(unknown, before, after) {
@@ -127,13 +135,14 @@ impl Seen {
         }
     }
 
-    /// True if every declared feedthrough has been observed.
+    /// Returns true if every pair of `feedthrough` has been observed, be it in the last bit only.
     fn is_complete(&self, feedthrough: &BTreeSet<(usize, usize)>) -> bool {
         feedthrough.iter().all(|pair| self.traces.contains(pair))
     }
 
-    /// Reports dependencies that were seen but are not declared, except of a state on itself.
-    fn tell(&self, fmu: &FmuUnderTest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
+    /// Reports the observed dependencies that the description does not declare. A state's dependency on
+    /// itself is left out.
+    fn report(&self, fmu: &FmuUnderTest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
         for unknown in lists {
             let Some(declared) = &unknown.dependencies else { continue };
             let missing = self
@@ -159,17 +168,15 @@ fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> 
     variables.iter().map(|v| Ok(session.get(v)?)).collect()
 }
 
-/// `dependencies.running`
 pub fn running(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
     if let Some(seen) = watch(fmu, findings, &BTreeSet::new())? {
-        seen.tell(fmu, &lists, "while running", findings);
+        seen.report(fmu, &lists, "while running", findings);
     }
     Ok(())
 }
 
-/// `dependencies.feedthrough`
 pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
@@ -200,7 +207,9 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Moves inputs and states one by one at many starts, until what is wanted has been seen.
+/// Changes inputs and states one by one, from many initial points, and returns the observed dependencies of
+/// outputs and derivatives. Stops early when all pairs of `wanted` have been observed. Returns `None`, and
+/// skips the rule, if there is nothing to observe.
 fn watch(
     fmu: &FmuUnderTest,
     findings: &mut Findings,
@@ -220,25 +229,25 @@ fn watch(
     let states = fmu.states();
     let mut seen = Seen::nothing();
     for attempt in 0..TRIES {
-        let mut session = moved(fmu, interface, attempt)?;
+        let mut session = randomised(fmu, interface, attempt)?;
         fmu.doing(format!("initialising with other parameters, try {attempt}"));
-        // Parameters that do not go together are another try's luck.
+        // The FMU refused these parameters: the next attempt draws others.
         if session.initialise().is_err() || session.is_ended() {
             continue;
         }
         session.count = attempt as usize;
-        // At rest with inputs as they are every other time.
+        // Every second attempt starts at rest with the inputs unchanged.
         let steps = if attempt % 2 == 0 { 0 } else { attempt as usize % 8 };
         if session.advance(steps).is_err() || session.is_ended() {
             continue;
         }
-        // Small changes at two tries, large ones at the next two.
+        // Two attempts with small changes alternate with two attempts with large changes.
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
         fmu.doing(format!("moving inputs one by one, try {attempt}"));
         let before = read(&mut session, &unknowns)?;
         for v in &inputs {
             let start = session.get(v)?;
-            let Some(other) = elsewhere(fmu, v, &start, share) else { continue };
+            let Some(other) = displaced(fmu, v, &start, share) else { continue };
             if session.set(v, &other).is_ok() {
                 let after = read(&mut session, &unknowns)?;
                 seen.compare(&unknowns, v, &before, &after);
@@ -252,7 +261,7 @@ fn watch(
             for (n, (_, state)) in states.iter().enumerate() {
                 let mut there = x.clone();
                 there[n] += share * x[n].abs().max(0.1 * state.nominal());
-                // Outside what the model can compute: another try.
+                // The model cannot be evaluated at this point, so that another attempt is needed.
                 if session.instance.set_continuous_states(&there).is_ok()
                     && let Ok(after) = read(&mut session, &unknowns)
                 {
@@ -269,8 +278,9 @@ fn watch(
     Ok(Some(seen))
 }
 
-/// Another value of a known, by about `share` of its size.
-pub fn elsewhere(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
+/// Returns another allowed value for `v`, about `share` of its magnitude away, or `None` if its bounds leave
+/// no room.
+pub fn displaced(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
     let Reading::Real(x) = now else { return super::values::other_value(fmu, v, now) };
     let (min, max) = v.bounds();
     let step = share * x.abs().max(0.1 * v.nominal().min(max.abs()));
@@ -278,7 +288,6 @@ pub fn elsewhere(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) ->
     (there >= min && there != *x).then_some(Reading::Real(there))
 }
 
-/// `dependencies.initial`
 pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
     let lists: Vec<&Unknown> = d.initial_unknowns.iter().collect();
@@ -291,7 +300,7 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first()?;
     let mut seen = Seen::nothing();
     for attempt in 0..AT_LEAST {
-        let mut session = moved(fmu, interface, attempt)?;
+        let mut session = randomised(fmu, interface, attempt)?;
         let begun = session.instance.setup_experiment(None, session.time, None);
         match begun.and_then(|()| session.instance.enter_initialization_mode()) {
             Err(_) if attempt > 0 => continue, // these parameters may have no solution
@@ -302,7 +311,7 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
         for v in &knowns {
             let start = session.get(v)?;
-            let Some(other) = elsewhere(fmu, v, &start, share) else { continue };
+            let Some(other) = displaced(fmu, v, &start, share) else { continue };
             if session.set(v, &other).is_ok() {
                 if let Ok(after) = read(&mut session, &unknowns) {
                     seen.compare(&unknowns, v, &before, &after);
@@ -311,14 +320,14 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         }
     }
-    seen.tell(fmu, &lists, "in initialization mode", findings);
+    seen.report(fmu, &lists, "in initialization mode", findings);
     Ok(())
 }
 
-/// `dependencies.directional`
 pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Allowed deviation of the FMU's derivatives from finite differences, relative to the largest derivative of the
-    /// unknown: differences lose half of the digits, and more where the function is curved.
+    /// Allowed deviation of the FMU's directional derivatives from finite differences, relative to the
+    /// largest derivative of the unknown. Finite differences lose half of the digits, and more where the
+    /// function is curved.
     const AGREE: f64 = 1e-3;
     let d = fmu.description();
     if !fmu.interfaces().contains(&Interface::ModelExchange)
@@ -377,7 +386,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for (n, unknown) in unknowns.iter().enumerate() {
             let (right, left) = ((above[n] - centre[n]) / h, (centre[n] - below[n]) / h);
             let rounding = 1e-13 * centre[n].abs().max(1e-3 * unknown.nominal()) / h;
-            // A state that is an output as well; a corner, which has no derivative.
+            // Left out: a state that is also an output, and a kink, where no derivative exists.
             if unknown.index == v.index {
                 continue;
             }

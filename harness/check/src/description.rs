@@ -1,4 +1,5 @@
-//! modelDescription.xml (FMI 2.0.5, section 2.2): what it says, read without judging.
+//! Reads modelDescription.xml (FMI 2.0.5, section 2.2) without judging it, so that rules can report what is
+//! wrong.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
@@ -9,28 +10,20 @@ use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::xml::Element;
 
-/// The parts of modelDescription.xml that rules need, read without judging.
+/// The parts of modelDescription.xml that rules need. Faults are not reported here but by the rules.
 pub struct Description {
-    /// All of it.
     pub root: Element,
-    /// The element ModelExchange.
     pub model_exchange: Option<Element>,
-    /// The element CoSimulation.
     pub co_simulation: Option<Element>,
-    /// Variables in the order of the file.
     pub variables: Vec<Variable>,
-    /// ModelStructure's Outputs, as written.
     pub outputs: Vec<Unknown>,
-    /// ModelStructure's Derivatives, as written.
     pub derivatives: Vec<Unknown>,
-    /// ModelStructure's InitialUnknowns, as written.
     pub initial_unknowns: Vec<Unknown>,
 }
 
-/// A ScalarVariable.
 #[derive(Clone, Debug)]
 pub struct Variable {
-    /// Place among the variables, counted from 1, as ModelStructure counts.
+    /// Position among the variables, counted from 1 as in ModelStructure.
     pub index: usize,
     read: Common,
 }
@@ -43,53 +36,54 @@ impl Deref for Variable {
     }
 }
 
-/// A variable as far as FMI 2.0 and 3.0 agree. In `typed` the attributes of the declared type are filled in.
+/// The attributes of a variable that FMI 2.0 and 3.0 have in common. In `typed` the attributes that the
+/// variable inherits from its declaredType are filled in.
 #[derive(Clone, Debug)]
 pub struct Common {
-    /// Line of the file.
     pub line: u64,
-    /// Name.
     pub name: String,
-    /// Value reference; 0 if that cannot be read.
+    /// Value reference; 0 if the attribute is missing or not a number.
     pub reference: u32,
-    /// Causality as written, or the default "local".
+    /// Causality as written, or the standard's default "local".
     pub causality: Causality,
-    /// Variability as written, or the default for causality and type.
+    /// Variability as written, or the standard's default for this causality and type.
     pub variability: Variability,
-    /// Attribute `initial` as written, or the default for causality and variability, if there is one.
+    /// Attribute `initial` as written, or the standard's default for this causality and variability; `None`
+    /// if there is no default.
     pub initial: Option<String>,
-    /// Type.
     pub kind: Type,
-    /// The element of its type: in FMI 2.0 that within the ScalarVariable, in FMI 3.0 the variable's own.
+    /// The element with the type's attributes (start, min, unit …): in FMI 2.0 the child of ScalarVariable,
+    /// in FMI 3.0 the variable's own element.
     pub typed: Element,
-    /// The element of the variable as written.
+    /// The variable's element as it stands in the file, without inherited attributes.
     pub(crate) written: Element,
 }
 
-/// Allowed values of `initial`, the default first (FMI 2.0.5, section 2.2.7; FMI 3.0.2, section 2.4.7.5). `None`: causality and
-/// variability do not go together. An empty list: `initial` must not be written.
+/// Function that returns the allowed values of `initial`, the default first (FMI 2.0.5, section 2.2.7; FMI
+/// 3.0.2, section 2.4.7.5). `None` means that the standard forbids this pair of causality and variability; an
+/// empty list means that `initial` must not be written.
 pub(crate) type Initials = fn(&Causality, &Variability) -> Option<&'static [&'static str]>;
 
-/// An Unknown of ModelStructure.
+/// An element Unknown of ModelStructure.
 #[derive(Clone, Debug)]
 pub struct Unknown {
-    /// Line of the file.
     pub line: u64,
-    /// Place of the variable, counted from 1; 0 if that cannot be read.
+    /// Position of the variable, counted from 1; 0 if the attribute is missing or not a number.
     pub index: usize,
-    /// Indices that this unknown depends on; `None` if the attribute is missing: it may depend on everything.
+    /// Positions of the variables that this unknown depends on. `None` if the attribute is missing, which
+    /// means that it may depend on everything.
     pub dependencies: Option<Vec<usize>>,
-    /// Kinds of these dependencies.
     pub kinds: Option<Vec<String>>,
 }
 
 impl Variable {
-    /// Index of the state whose derivative it is.
+    /// Returns the position of the state of which this variable is the derivative.
     pub fn derivative_of(&self) -> Option<usize> {
         self.typed.get("derivative")?.trim().parse().ok()
     }
 
-    /// True for a parameter or an input, which a host sets.
+    /// Returns true for inputs and for parameters that are not constant, because only these are set by a
+    /// host.
     pub fn is_set_by_hosts(&self) -> bool {
         self.causality == Causality::Input
             || (self.causality == Causality::Parameter && self.variability != Variability::Constant)
@@ -97,7 +91,8 @@ impl Variable {
 }
 
 impl Common {
-    /// Reads the variable of an element. `default` is the variability of a parameter and of others without one.
+    /// Reads the attributes of a variable. `types` are the declared types by name, from which missing
+    /// attributes are inherited. `default` is the variability if the attribute is missing.
     pub(crate) fn read(
         element: &Element,
         (kind, mut typed): (Type, Element),
@@ -129,45 +124,41 @@ impl Common {
         }
     }
 
-    /// Position in the file, for findings.
+    /// Returns "line N, NAME", the place of this variable in findings.
     pub fn place(&self) -> String {
         format!("line {}, {}", self.line, self.name)
     }
 
-    /// True for a floating-point number.
     pub fn is_real(&self) -> bool {
         self.kind == Type::Real
     }
 
-    /// True for a floating-point number that may change at any time.
     pub fn is_continuous(&self) -> bool {
         self.is_real() && self.variability == Variability::Continuous
     }
 
-    /// Returns the order of magnitude.
+    /// Returns the attribute nominal, or 1 if it is missing or not positive.
     pub fn nominal(&self) -> f64 {
         let nominal = self.typed.number("nominal").filter(|n| n.is_finite() && *n > 0.0);
         nominal.unwrap_or(1.0)
     }
 
-    /// Returns the bounds; infinite where there are none.
+    /// Returns the attributes min and max; a missing bound is infinite.
     pub fn bounds(&self) -> (f64, f64) {
         let bound = |name, none| self.typed.number(name).filter(|x| !x.is_nan()).unwrap_or(none);
         (bound("min", f64::NEG_INFINITY), bound("max", f64::INFINITY))
     }
 }
 
-/// A whole number of an attribute.
 pub(crate) fn number<T: FromStr>(element: &Element, attribute: &str) -> Option<T> {
     element.get(attribute)?.trim().parse().ok()
 }
 
-/// The words of an attribute.
-pub(crate) fn words(element: &Element, attribute: &str) -> Option<Vec<String>> {
+pub(crate) fn split_attribute(element: &Element, attribute: &str) -> Option<Vec<String>> {
     Some(element.get(attribute)?.split_whitespace().map(str::to_string).collect())
 }
 
-/// Adds a finding for each variable that breaks something, as `wrong` tells.
+/// Adds a finding for each variable for which `wrong` returns a text.
 pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
     variables: impl IntoIterator<Item = &'v V>,
     findings: &mut Findings,
@@ -180,7 +171,7 @@ pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
     }
 }
 
-/// See [`Initials`].
+/// Returns the allowed values of `initial` in FMI 2.0; see [`Initials`].
 pub(crate) fn initials(
     causality: &Causality,
     variability: &Variability,
@@ -203,15 +194,15 @@ pub(crate) fn initials(
 }
 
 impl Description {
-    /// Reads the file.
+    /// Parses the bytes of modelDescription.xml.
     ///
     /// # Errors
-    /// If it is not well-formed, with the line.
+    ///
+    /// If the file is not well-formed XML; the text has the line.
     pub fn read(bytes: &[u8]) -> Result<Description, String> {
         Ok(Description::new(Element::parse(bytes)?))
     }
 
-    /// Returns the description with this root element.
     pub fn new(root: Element) -> Description {
         let types: BTreeMap<&str, &Element> = root
             .list("TypeDefinitions")
@@ -235,32 +226,30 @@ impl Description {
         }
     }
 
-    /// Returns true for a description of FMI 3.
     pub fn is_fmi3(&self) -> bool {
         let version = self.root.get("fmiVersion").map(str::trim);
-        // a draft, such as 3.0-beta.3, has rules of its own
+        // A draft version such as 3.0-beta.3 has rules of its own, which are not checked here.
         version.is_some_and(|version| version.starts_with("3.") && !version.contains('-'))
     }
 
-    /// The version of FMI, 1.0 or 3.0, that it is of in place of 2.0.
+    /// Returns fmiVersion if it is a version 1 or 3 instead of 2.0.
     pub fn other_version(&self) -> Option<&str> {
         let version = self.root.get("fmiVersion").map(str::trim);
         version.filter(|version| version.starts_with("1.") || version.starts_with("3."))
     }
 
-    /// The variable at a place counted from 1.
     pub fn at(&self, index: usize) -> Option<&Variable> {
         self.variables.get(index.checked_sub(1)?)
     }
 
-    /// The two interfaces, those there are.
     pub fn interfaces(&self) -> impl Iterator<Item = &Element> {
         self.model_exchange.iter().chain(&self.co_simulation)
     }
 
-    /// Indices of the continuous states: the variables whose derivatives Derivatives lists. The attribute derivative
-    /// alone makes no state; inputs, outputs and dummy derivatives may have it (FMI 2.0.5, section 2.2.7). An FMU for
-    /// Co-Simulation alone need not have the list, and then the attribute is all there is.
+    /// Returns the positions of the continuous states: the variables whose derivatives are listed in
+    /// ModelStructure's Derivatives. The attribute `derivative` does not make a state, because inputs,
+    /// outputs and dummy derivatives may have it too (FMI 2.0.5, section 2.2.7). However, an FMU for only
+    /// Co-Simulation may leave the list out, and then the attribute is used.
     pub fn states(&self) -> BTreeSet<usize> {
         if self.derivatives.is_empty() && self.model_exchange.is_none() {
             return self.variables.iter().filter_map(Variable::derivative_of).collect();
@@ -269,7 +258,7 @@ impl Description {
         listed.filter_map(Variable::derivative_of).collect()
     }
 
-    /// Adds a finding for each variable that breaks something, as `wrong` tells.
+    /// Adds a finding for each variable for which `wrong` returns a text.
     pub(crate) fn each<'d>(
         &'d self,
         findings: &mut Findings,
@@ -306,9 +295,9 @@ fn unknown(element: &Element) -> Unknown {
     Unknown {
         line: element.line,
         index: number(element, "index").unwrap_or(0),
-        dependencies: words(element, "dependencies")
+        dependencies: split_attribute(element, "dependencies")
             .map(|words| words.iter().map(|word| word.parse().unwrap_or(0)).collect()),
-        kinds: words(element, "dependenciesKind"),
+        kinds: split_attribute(element, "dependenciesKind"),
     }
 }
 

@@ -1,35 +1,37 @@
-//! Events in Model Exchange (FMI 2.0.5, sections 3.1.1 and 3.2.2): the FMU must report each one and what it changes.
+//! Rules about events in Model Exchange (FMI 2.0.5, sections 3.1.1 and 3.2.2): the FMU must report every
+//! event and every value that it changes.
 //!
-//! A host may enter event mode whenever it likes. Where no event indicator has changed its sign, no
-//! time event is due and fmi2CompletedIntegratorStep has not asked for it, there is no event, and
-//! nothing changes. What changes nevertheless is an event that a host would have missed. An FMU may notice in
-//! fmi2CompletedIntegratorStep that the host has passed an event, and ask for event mode. If its indicators never change, this is
-//! its only way, and events come up to one step of the host late.
+//! A host may enter event mode at any time. If no event indicator has changed its sign, no time event is due
+//! and fmi2CompletedIntegratorStep has not requested event mode, then there is no event and no value may
+//! change. A value that changes nevertheless shows an event that a host would have missed.
+//!
+//! An FMU may notice in fmi2CompletedIntegratorStep that the host has passed an event, and request event
+//! mode. If the event indicators of an FMU never change, this is its only way to report events, which are
+//! then up to one integrator step late.
 
 use anyhow::Result;
 
-use super::dependencies::moved;
+use super::dependencies::randomised;
 use super::description::Variable;
 use super::exchange::continuous;
 use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, STEPS, Session, Sight};
 
-/// Starts from which runs are made: the first as declared, then with other parameters.
+/// Number of initial points: the first one as declared, the others with parameters drawn at random.
 const STARTS: u64 = 12;
-/// A share of a value below which a change is rounding.
+/// Relative change of a value below which it is rounding.
 const ROUNDING: f64 = 1e-9;
-/// An event in time that is nearer than this share of a step may be due.
+/// A time event nearer than this fraction of the step counts as due.
 const NEARLY_DUE: f64 = 1e-6;
 
-/// `exchange.events`
-pub fn told(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if continuous(fmu, findings)?.is_none() {
         return Ok(());
     }
     let (mut vary, mut step_event) = (false, None);
     for start in 0..STARTS {
-        let mut session = moved(fmu, Interface::ModelExchange, start)?;
-        // Parameters that do not go together, or run into trouble, are another start's luck.
+        let mut session = randomised(fmu, Interface::ModelExchange, start)?;
+        // A start with parameters that the FMU refuses or cannot simulate is left out.
         if session.initialise().is_err() || session.is_ended() {
             continue;
         }
@@ -60,18 +62,19 @@ pub fn told(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Runs the FMU, enters event mode after each step, and returns the first change there: time, variable and both values. `vary`
-/// becomes true if an event indicator changes its value.
+/// Simulates, enters event mode after each step, and returns the first value that changes there although no
+/// event was due: time, name of the variable, and both values as text. Sets `vary` to true if an event
+/// indicator changes its value.
 fn missed_event<'f>(
     session: &mut Session<'f>,
     vary: &mut bool,
 ) -> Result<Option<(f64, &'f str, String)>> {
     let fmu = session.fmu;
     let indicators = session.read_indicators()?;
-    // a model without any has no such events
+    // A model without event indicators has no state events.
     *vary |= indicators.is_empty();
     for _ in 0..2 * STEPS {
-        // inputs jump, which is an event
+        // The inputs jump here, which is an event.
         session.instance.enter_event_mode()?;
         session.stimulate()?;
         session.leave_event()?;
@@ -87,24 +90,23 @@ fn missed_event<'f>(
         if session.next_event().is_some_and(|next| next - session.time < near) {
             continue;
         }
-        let before = Sight::of(session)?;
+        let before = Sight::read(session)?;
         fmu.doing(format!("entering event mode at t = {:?} s, without an event", session.time));
         session.event()?;
         if session.is_ended() {
             break;
         }
-        let after = Sight::of(session)?;
+        let after = Sight::read(session)?;
         let Some((name, change)) = before.change(&after, fmu) else { continue };
-        // what changes whenever there is an event counts them
+        // A variable that changes in every event mode counts events.
         session.event()?;
-        if !session.is_ended() && after.change(&Sight::of(session)?, fmu).is_none() {
+        if !session.is_ended() && after.change(&Sight::read(session)?, fmu).is_none() {
             return Ok(Some((session.time, name, change)));
         }
     }
     Ok(None)
 }
 
-/// `exchange.values_changed`
 pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if continuous(fmu, findings)?.is_none() {
         return Ok(());
@@ -114,11 +116,11 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         return Ok(());
     }
     for start in 0..STARTS {
-        let mut session = moved(fmu, Interface::ModelExchange, start)?;
+        let mut session = randomised(fmu, Interface::ModelExchange, start)?;
         if session.initialise().is_err() {
             continue;
         }
-        // how far it comes is the business of exchange.run
+        // Failures to get this far are reported by `exchange.run`.
         let _ = session.advance(2 * STEPS);
         if let Some((time, n, before, after)) = session.hidden_jump() {
             findings.add(
@@ -136,7 +138,6 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-/// `exchange.nominals`
 pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     let states = fmu.states();

@@ -1,4 +1,4 @@
-//! Model Exchange (FMI 2.0.5, section 3.2).
+//! Rules of Model Exchange (FMI 2.0.5, section 3.2).
 
 use anyhow::Result;
 
@@ -6,7 +6,7 @@ use super::findings::Findings;
 use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest};
 
-/// An instance in continuous-time mode, or the reason why there is none.
+/// Returns an instance in continuous-time mode, or skips the rule if the FMU has no Model Exchange.
 pub fn continuous<'f>(
     fmu: &'f FmuUnderTest,
     findings: &mut Findings,
@@ -18,7 +18,6 @@ pub fn continuous<'f>(
     fmu.running(Interface::ModelExchange).map(Some)
 }
 
-/// `exchange.run`
 pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     session.advance(2 * STEPS)?;
@@ -33,14 +32,12 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `exchange.event_iteration`
 pub fn event_iteration(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    // whatever else goes wrong is the business of other rules
+    // Other failures are reported by other rules.
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     session.advance(2 * STEPS)
 }
 
-/// `exchange.next_event_time`
 pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     session.advance(2 * STEPS)?;
@@ -53,7 +50,6 @@ pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()
     Ok(())
 }
 
-/// `exchange.terminate_simulation`
 pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
         findings.skip("it offers no Model Exchange");
@@ -61,10 +57,9 @@ pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Resu
     }
     let mut session = fmu.session(Interface::ModelExchange)?;
     session.initialise()?;
-    super::steps::tell_end(&mut session, findings)
+    super::steps::report_early_end(&mut session, findings)
 }
 
-/// `exchange.vectors`
 pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     let (nx, ni) = (fmu.states().len(), session.indicators());
@@ -75,7 +70,7 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let (mut x, mut dx, mut nominals, mut z) =
             (vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; ni]);
         fmu.doing(format!("the vectors of {nx} states and {ni} event indicators"));
-        // hosts do not ask for what is not there
+        // Hosts do not ask for states or indicators if there are none.
         if nx > 0 {
             session.instance.continuous_states(&mut x)?;
             session.instance.derivatives(&mut dx)?;
@@ -104,7 +99,6 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `exchange.lengths`
 pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     let (nx, ni) = (fmu.states().len(), session.indicators());
@@ -126,7 +120,6 @@ pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `exchange.variables`
 pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     let states = fmu.states();
@@ -144,7 +137,7 @@ pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             [(state, x[n], "fmi2GetContinuousStates"), (derivative, dx[n], "fmi2GetDerivatives")]
         {
             let read = session.get(v)?;
-            if !read.is(&Reading::Real(vector)) {
+            if !read.is_identical(&Reading::Real(vector)) {
                 findings.add(
                     v.place(),
                     format!("it reads {read}, but {call} gives {vector:?} in place {}", n + 1),

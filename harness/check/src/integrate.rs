@@ -1,8 +1,8 @@
-//! The integrator with which the check plays a host of Model Exchange.
+//! The integrator with which the check simulates an FMU for Model Exchange.
 //!
-//! Any FMU must do: stiff or not, with or without Jacobian, at a step of a microsecond or of an hour.
-//! The method is the Rosenbrock pair of Shampine and Reichelt (The MATLAB ODE Suite, SIAM J. Sci.
-//! Comput. 18, 1997, "ode23s"), of second order whatever matrix stands for the Jacobian J:
+//! It must cope with any FMU: stiff or not, with or without states, at steps of a microsecond or of an hour.
+//! The method is the Rosenbrock pair of Shampine and Reichelt (The MATLAB ODE Suite, SIAM J. Sci. Comput. 18,
+//! 1997, "ode23s"), which is of second order for any matrix J in place of the Jacobian:
 //!
 //! ```text
 //! W = I - h d J,   d = 1/(2 + √2),   e = 6 + √2
@@ -13,10 +13,10 @@
 //! error = h/6 (k1 - 2 k2 + k3)
 //! ```
 //!
-//! With J = 0 it is the explicit midpoint rule, which is tried first and costs three evaluations a
-//! step. Where that needs many steps the FMU is stiff, and J is taken from differences; the method is
-//! then L-stable. How far it comes is bounded by a number of steps, not by time on the clock, so that
-//! the same run gives the same bits.
+//! With J = 0 it is the explicit midpoint rule, which costs three evaluations a step and is tried first. If
+//! the midpoint rule needs many steps, the FMU is stiff, and J is computed by finite differences; the method
+//! is then L-stable. The work is bounded by a number of steps and not by elapsed time, so that the same run
+//! always gives the same bits.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
@@ -24,36 +24,37 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use super::under_test::{Session, Unusable};
 use host::fmi2::{CallError, Status};
 
-/// Relative tolerance of a step; the FMU shall live, not be followed closely.
+/// Relative tolerance of a step. It is loose, because the check needs a plausible trajectory and not an
+/// accurate one.
 const TOLERANCE: f64 = 1e-3;
-/// Steps of the explicit rule that are tried for one communication step before the FMU counts as
-/// stiff.
+/// Number of explicit steps in one communication step after which the FMU counts as stiff.
 const EXPLICIT_STEPS: usize = 40;
-/// Largest number of integrator steps for one communication step. The host then accepts the state that
-/// it has reached: FMI does not prescribe an accuracy.
+/// Largest number of integrator steps in one communication step. The host then accepts the state that it has
+/// reached, because FMI prescribes no accuracy.
 const MOST_STEPS: usize = 100;
-/// States up to which a Jacobian is taken from differences.
+/// Largest number of states for which a Jacobian is computed by finite differences.
 const MOST_STATES: usize = 200;
-/// Steps in which a communication step is begun.
+/// The first integrator step is the communication step divided by this number.
 const PARTS: f64 = 8.0;
-/// A crossing of an event indicator is located to this share of the communication step.
+/// Accuracy with which an event indicator's zero crossing is located, as a fraction of the communication
+/// step.
 const LOCATED: f64 = 1e-3;
-/// A step is not divided further than to this share of the communication step.
+/// Shortest integrator step, as a fraction of the communication step.
 const SHORTEST: f64 = 1e-12;
 
-/// Result of a trial step.
 enum Trial {
-    /// The new states and the error relative to what is allowed.
+    /// The new states, and the estimated error divided by the allowed error.
     Done(DVector<f64>, f64),
-    /// A stage left what the FMU can compute (fmi2Discard, or values that are not finite).
+    /// The FMU could not be evaluated at a stage (fmi2Discard, or values that are NaN or infinite).
     Impossible(String),
 }
 
 impl Session<'_> {
-    /// Integrates to `end`, or as far as the number of steps allows; events are handled.
+    /// Integrates to `end`, or as far as the allowed number of steps goes, and handles events on the way.
     ///
     /// # Errors
-    /// If a call is refused, or the states cannot be followed further.
+    ///
+    /// If the FMU refuses a call, or no step is short enough.
     pub(super) fn integrate(&mut self, end: f64) -> Result<()> {
         let (n, start) = (self.states(), self.time);
         let whole = end - start;
@@ -65,17 +66,17 @@ impl Session<'_> {
                 break;
             }
             if step == EXPLICIT_STEPS && n <= MOST_STATES {
-                // from here on with a Jacobian, and with a fresh guess of the step
+                // Begin again with a Jacobian and with a new initial step.
                 h = (end - self.time) / PARTS;
             }
             let (t, x) = (self.time, self.read_states(n)?);
             if step >= EXPLICIT_STEPS && n <= MOST_STATES {
                 jacobian = Some(self.jacobian(t, &x)?);
             }
-            // The smallest step that was tried last says why if none is possible.
+            // If no step is possible, the reason is that of the shortest step, which was tried last.
             let mut why = String::new();
             loop {
-                // neither past the end nor past an event in time that the FMU has told
+                // A step ends neither after `end` nor after a time event that the FMU has announced.
                 let limit = self.next_event().filter(|next| *next > t).unwrap_or(end).min(end);
                 let last = t + h * 1.01 >= limit;
                 let to = if last { limit } else { t + h };
@@ -108,7 +109,7 @@ impl Session<'_> {
                     continue;
                 }
                 self.time = to;
-                // a step that was cut at its end says nothing against longer ones
+                // A step that was shortened to end in time gives no reason to shorten the next one.
                 h = if last { h.max((to - t) * factor) } else { (to - t) * factor };
                 self.complete_step(crossed)?;
                 z = if crossed { self.read_indicators()? } else { z_new };
@@ -118,7 +119,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// One step of the method from (t, x).
+    /// Tries one step of the Rosenbrock method of length `h` from (t, x). Without `jacobian` this is the
+    /// explicit midpoint rule.
     fn trial(
         &mut self,
         t: f64,
@@ -162,7 +164,8 @@ impl Session<'_> {
         Ok(Trial::Done(x_new, worst))
     }
 
-    /// The derivatives at a point, or why there are none.
+    /// Evaluates the derivatives at (t, x). The inner error is the reason why the FMU cannot be evaluated
+    /// there, for example fmi2Discard.
     fn derivatives_at(&mut self, t: f64, x: &DVector<f64>) -> Result<Result<DVector<f64>, String>> {
         if let Some(i) = x.iter().position(|x| !x.is_finite()) {
             return Ok(Err(format!("state {} becomes {}", i + 1, x[i])));
@@ -174,7 +177,7 @@ impl Session<'_> {
         });
         match asked {
             Ok(()) => {}
-            // "the FMU cannot compute this": the host shall try a shorter step (section 2.1.3)
+            // fmi2Discard means that the host should try a shorter step (section 2.1.3).
             Err(error) if error.status == Status::Discard => return Ok(Err(error.to_string())),
             Err(error) => return Err(error.into()),
         }
@@ -184,7 +187,8 @@ impl Session<'_> {
         })
     }
 
-    /// Computes the Jacobian by differences. A column whose difference fails is 0: the method then only converges more slowly.
+    /// Computes the Jacobian by forward differences. A column that cannot be evaluated is set to 0, which
+    /// only makes the method converge more slowly.
     fn jacobian(&mut self, t: f64, x: &DVector<f64>) -> Result<DMatrix<f64>> {
         let n = x.len();
         let mut jacobian = DMatrix::zeros(n, n);

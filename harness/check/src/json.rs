@@ -1,5 +1,3 @@
-//! The report as JSON, for programs.
-
 use std::io::Write;
 
 use anyhow::Result;
@@ -8,29 +6,22 @@ use serde::Serialize;
 use super::findings::{Finding, Severity};
 use super::report::{Outcome, Report};
 
-/// The file as a whole.
 #[derive(Serialize)]
 struct File<'r> {
-    /// The FMU.
     fmu: String,
-    /// Number of errors.
     errors: usize,
-    /// Number of warnings.
     warnings: usize,
-    /// The error that no selected rule was checked; null if one was.
     unchecked: Option<&'r str>,
-    /// One for each rule that was looked at or skipped, in the table's order.
     rules: Vec<Rule<'r>>,
 }
 
-/// Result of a rule.
 #[derive(Serialize)]
 struct Rule<'r> {
     rule: &'static str,
     title: &'static str,
     source: &'static str,
     findings: &'r [Finding],
-    /// Reason why it was not checked; null if it was.
+    /// Reason why the rule was not checked; null if it was.
     skipped: Option<String>,
     seconds: f64,
 }
@@ -48,16 +39,12 @@ impl<'r> Rule<'r> {
     }
 }
 
-/// Writes the report.
-///
-/// # Errors
-/// If it cannot be written.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
     let rules = report.outcomes.iter().map(Rule::new).collect();
     let file = File {
         fmu: report.path.display().to_string(),
-        errors: report.count(Severity::Error),
-        warnings: report.count(Severity::Warning),
+        errors: report.count_findings(Severity::Error),
+        warnings: report.count_findings(Severity::Warning),
         unchecked: report.unchecked.as_deref(),
         rules,
     };

@@ -1,4 +1,4 @@
-//! The report as JUnit XML: one test case for each rule, so that any CI shows it.
+//! Writes the report as JUnit XML with one test case per rule, so that any CI server can show it.
 
 use std::io::Write;
 
@@ -62,8 +62,8 @@ struct Text {
     text: Option<String>,
 }
 
-/// Writes the report. Rules are test cases, classed by their group; errors fail them, warnings are
-/// their output.
+/// Writes the report. Each rule is a test case, classed by the rule's group; errors fail the test case, and
+/// warnings are its output.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
     let mut cases: Vec<_> = report.outcomes.iter().map(case).collect();
     cases.extend(report.unchecked.as_deref().map(unchecked));
@@ -105,8 +105,8 @@ fn case(outcome: &Outcome) -> TestCase {
     }
 }
 
-/// A test case of its own for the error that no rule was checked: viewers take a suite that is skipped as a whole
-/// for a success.
+/// Returns a separate test case for the error that no rule was checked, because viewers show a suite that is
+/// skipped as a whole as a success.
 fn unchecked(why: &str) -> TestCase {
     TestCase {
         name: "check",
@@ -119,7 +119,6 @@ fn unchecked(why: &str) -> TestCase {
     }
 }
 
-/// The characters of a text that XML may have.
 fn legal(text: &str) -> String {
     let allowed = |c: &char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
     text.chars().filter(allowed).collect()

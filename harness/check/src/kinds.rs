@@ -1,24 +1,23 @@
-//! The attribute dependenciesKind (FMI 2.0.5, section 2.2.8), against what the binary does.
+//! Rules of the attribute dependenciesKind (FMI 2.0.5, section 2.2.8), compared with the binary.
 //!
-//! `dependent` says nothing. In the other kinds the unknown is linear in the known. The factor is constant always (`constant`),
-//! after initialisation (`fixed`), until a tunable parameter is set (`tunable`) or between two events (`discrete`). The factor is
-//! measured by differences, small and large, at points that differ in the states, and at other parameters.
+//! The kind `dependent` promises nothing. All other kinds promise that the unknown is linear in the known,
+//! with a factor that never changes (`constant`), changes only before initialisation has ended (`fixed`),
+//! when a tunable parameter is set (`tunable`) or at events (`discrete`). The factor is measured by small and
+//! large finite differences, at several states and parameters.
 
 use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::dependencies::moved;
+use super::dependencies::randomised;
 use super::description::{Unknown, Variable};
 use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
 
-/// Starts at which factors are measured: the first as declared, then with other parameters.
 const STARTS: u64 = 12;
-/// Allowed difference of two measured factors, relative to the larger one.
+/// Allowed relative difference of two measured factors.
 const AGREE: f64 = 1e-4;
 
-/// An unknown and a known that are declared to be linear in each other.
 struct Pair<'d> {
     list: &'static str,
     line: u64,
@@ -28,7 +27,7 @@ struct Pair<'d> {
 }
 
 impl Pair<'_> {
-    fn tell(&self, findings: &mut Findings, a: Factor, b: Factor, when: &str) {
+    fn report(&self, findings: &mut Findings, a: Factor, b: Factor, when: &str) {
         findings.add(
             format!("line {}, {}, {}", self.line, self.list, self.unknown.name),
             format!(
@@ -54,7 +53,7 @@ fn pairs<'d>(fmu: &'d FmuUnderTest, list: &'static str, unknowns: &'d [Unknown])
     pairs
 }
 
-/// A measured factor and how much of it may be rounding.
+/// A measured factor, and the part of it that may be rounding.
 #[derive(Clone, Copy)]
 struct Factor {
     value: f64,
@@ -68,8 +67,8 @@ impl Factor {
     }
 }
 
-/// Puts a known to a value; false if the FMU does not take it there.
-fn put(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
+/// Sets a known variable to `x`. Returns false if the FMU refuses or changes the value.
+fn set_known(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
     let fmu = session.fmu;
     if session.interface == Interface::ModelExchange
         && let Some(n) = fmu.states().iter().position(|(_, state)| state.index == known.index)
@@ -82,18 +81,19 @@ fn put(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
     Ok(session.set(known, &Reading::Real(x)).is_ok())
 }
 
-/// The factors of a pair where the session stands, by differences of `share` of the known's size.
+/// Measures the factor of a pair at the present point of the session, by a finite difference of `share` of
+/// the known's magnitude.
 fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Factor>> {
     let here = session.real(pair.known)?;
     let before = session.real(pair.unknown)?;
     let (min, max) = pair.known.bounds();
     let step = share * here.abs().max(0.1 * pair.known.nominal());
     let there = if here + step <= max { here + step } else { here - step };
-    if there < min || there == here || !put(session, pair.known, there)? {
+    if there < min || there == here || !set_known(session, pair.known, there)? {
         return Ok(None);
     }
     let after = session.real(pair.unknown)?;
-    put(session, pair.known, here)?;
+    set_known(session, pair.known, here)?;
     let dx = there - here;
     let size = before.abs().max(after.abs());
     let value = (after - before) / dx;
@@ -102,8 +102,8 @@ fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Facto
         .then_some(Factor { value, rounding: 1e3 * f64::EPSILON * size / dx.abs() }))
 }
 
-/// Factors of all pairs at points of one session; the first pair that does not hold its factor is reported.
-/// Returns the factors of the first point.
+/// Measures the factors of all pairs at three points of one session and reports each pair whose factor
+/// changes; `wrong` has the pairs that were already reported. Returns the factors at the first point.
 fn at_points(
     session: &mut Session,
     pairs: &[Pair],
@@ -121,7 +121,7 @@ fn at_points(
             session.advance(2)?;
         }
         if point > 0 && exchange && !initializing {
-            // other states, between the same events
+            // Other states, with no event in between.
             let states = fmu.states();
             let mut x = vec![0.0; states.len()];
             session.instance.continuous_states(&mut x)?;
@@ -143,7 +143,7 @@ fn at_points(
                     None => first_factors[n] = Some(now),
                     Some(known) if now.differs(&known) => {
                         wrong.insert(n);
-                        pair.tell(findings, known, now, "at two points of one run");
+                        pair.report(findings, known, now, "at two points of one run");
                         break;
                     }
                     Some(_) => {}
@@ -154,7 +154,6 @@ fn at_points(
     Ok(first_factors)
 }
 
-/// `dependencies.kinds`
 pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
     let initial = pairs(fmu, "InitialUnknowns", &d.initial_unknowns);
@@ -163,7 +162,7 @@ pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut interface = Interface::ModelExchange;
     if !fmu.interfaces().contains(&interface) {
         interface = Interface::CoSimulation;
-        // Between two steps there may be events.
+        // Between two steps of Co-Simulation there may be events, which may change the factor.
         running.retain(|pair| pair.kind != "discrete");
     }
     if !running.is_empty() && fmu.interfaces().contains(&interface) {
@@ -185,7 +184,7 @@ fn look(
     let mut wrong = BTreeSet::new();
     let mut always: Vec<Option<Factor>> = vec![None; pairs.len()];
     for start in 0..STARTS {
-        let mut session = moved(fmu, interface, start)?;
+        let mut session = randomised(fmu, interface, start)?;
         fmu.doing(format!("measuring how unknowns follow knowns, start {start}"));
         let ready = if initializing {
             session
@@ -194,11 +193,11 @@ fn look(
                 .and_then(|()| session.instance.enter_initialization_mode())
                 .is_ok()
         } else {
-            // at rest every other time
+            // Every second start is at rest.
             session.initialise().is_ok()
                 && session.advance(if start % 2 == 0 { 3 } else { 0 }).is_ok()
         };
-        // Parameters that do not go together are another start's luck.
+        // A start with parameters that the FMU refuses is left out.
         if !ready || session.is_ended() {
             continue;
         }
@@ -211,7 +210,7 @@ fn look(
                 None => always[n] = Some(now),
                 Some(known) if now.differs(&known) && !wrong.contains(&n) => {
                     wrong.insert(n);
-                    pair.tell(findings, known, now, "with other parameters");
+                    pair.report(findings, known, now, "with other parameters");
                 }
                 Some(_) => {}
             }

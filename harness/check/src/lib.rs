@@ -1,8 +1,9 @@
-//! `hubslosh check`: does an FMU keep the rules of FMI 2.0 or 3.0, and those that hosts add?
+//! Checks an FMU against the rules of FMI 2.0 or 3.0 and against what hosts expect (`hubslosh check`).
 //!
-//! Every rule is an entry of a table, [`RULES`] for FMI 2.0, [`rules::fmi3::RULES`] for 3.0, with the function that looks. Rules of the
-//! archive, the description and the binaries look at the file. Rules of calls load the binary for this platform and call it as
-//! hosts do. Each runs in a process of its own: a crash or a hang is a finding, not the end of the check.
+//! Every rule is an entry of a table, [`RULES`] for FMI 2.0 and [`rules::fmi3::RULES`] for FMI 3.0, together
+//! with the function that checks it. Rules of the archive, the description and the binaries only read the
+//! file. Rules of calls load the binary for this platform and call it as hosts do. Each of these runs in a
+//! process of its own, so that a crash or a hang is a finding and not the end of the check.
 
 pub mod archive;
 pub mod arrays;
@@ -64,7 +65,7 @@ pub use self::rule::{Check, Rule};
 pub use self::rules::fmi2::RULES;
 pub use self::under_test::FmuUnderTest;
 
-/// Results of rules, for programs.
+/// A rule as `hubslosh check --list --json` and the package print it.
 #[derive(Debug, serde::Serialize)]
 pub struct Statement {
     fmi: &'static str,
@@ -74,7 +75,6 @@ pub struct Statement {
     severity: &'static str,
 }
 
-/// All rules.
 pub fn rules() -> Vec<Statement> {
     let statement = |fmi, rule: &Rule| Statement {
         fmi,
@@ -87,8 +87,8 @@ pub fn rules() -> Vec<Statement> {
     second.chain(fmi3::RULES.iter().map(|rule| statement("3.0", rule))).collect()
 }
 
-/// Rules that say why a file cannot be opened as an FMU. If it cannot, those that are broken are in the report even
-/// if they are not selected.
+/// Rules that explain why a file cannot be opened as an FMU. If the file cannot be opened, those that are
+/// broken are reported even if they were not selected.
 const OPENING: [&str; 10] = [
     "zip.readable",
     "zip.methods",
@@ -102,12 +102,13 @@ const OPENING: [&str; 10] = [
     "xml.doctype",
 ];
 
-/// Looks at all rules, or those asked for; `progress` is called after each rule of calls with their
-/// number.
+/// Checks all rules, or those that `options` selects. `progress` is called after each rule of calls with the
+/// number of such rules so far.
 ///
 /// # Errors
-/// If the file cannot be read, a rule asked for is unknown, or there is no place to unpack. Whatever
-/// is wrong with the FMU is not an error but a finding.
+///
+/// If the file cannot be read, a selected rule does not exist, or a temporary folder cannot be written.
+/// Faults of the FMU are findings, not errors.
 pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) -> Result<Report> {
     let known = |name: &str| RULES.iter().chain(fmi3::RULES).any(|rule| is_selected(rule, name));
     let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
@@ -131,7 +132,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     };
     let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
 
-    // An FMU of FMI 3 keeps rules of its own. One of FMI 1 keeps others: one rule tells it.
+    // FMI 3 has rules of its own. A file of FMI 1 breaks one rule, which says so.
     let third = description.as_ref().ok().filter(|d| d.is_fmi3());
     let third = third.map(|d| v3::Description::new(d.root.clone()));
     let libraries = v3::Binaries::new(&archive, third.as_ref());
@@ -172,7 +173,8 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         match (&rule.check, &description) {
             (Check::Archive(check), _) => check(&archive, &mut findings),
             (Check::Description(check), Ok(description)) => check(description, &mut findings),
-            // That it is missing or not well-formed is a rule of its own.
+            // `zip.description` and `xml.well_formed` report a description that is missing or not
+            // well-formed.
             (Check::Description(_), Err(why)) => findings.skip(why.clone()),
             (Check::Binaries(check), _) => check(&binaries, &mut findings),
             (Check::Description3(check), _) => match &third {
@@ -196,7 +198,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     };
     let mut outcomes: Vec<Outcome> = selected.par_iter().map(one).collect();
     name_each_cause_once(&mut outcomes);
-    tell_what_nobody_tells(&mut outcomes);
+    restore_unreported_faults(&mut outcomes);
     let unchecked = unchecked(&outcomes, &options.only);
     let unopened = archive.refusal().or(description.as_ref().err().cloned());
     if let Some(why) = unopened {
@@ -220,7 +222,8 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     Ok(Report { path: path.to_path_buf(), outcomes, unchecked, bug })
 }
 
-/// Writes the packed description to a file in a temporary folder, for the processes of rules.
+/// Writes the parsed description to a file in a temporary folder, from which the processes of the rules read
+/// it.
 fn packed(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
     let folder = temporary::Folder::new()?;
     let path = folder.path().join("description");
@@ -230,7 +233,8 @@ fn packed(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
     Ok((folder, path))
 }
 
-/// The error that no rule of `outcomes`, those selected by `only`, was checked.
+/// Returns the error that no rule was checked, or `None` if at least one of the rules in `outcomes` was
+/// checked. `only` are the selected rules, for the text.
 fn unchecked(outcomes: &[Outcome], only: &[String]) -> Option<String> {
     let is_skipped = |o: &Outcome| o.findings.skipped.is_some() && o.findings.list.is_empty();
     if !outcomes.iter().all(is_skipped) {
@@ -250,7 +254,8 @@ fn unchecked(outcomes: &[Outcome], only: &[String]) -> Option<String> {
     })
 }
 
-/// Begin of a call, and the rule that makes it in an ordinary life: its fault stops the other rules at the same call.
+/// The beginning of a call's description, and the rule that owns this call. If the call fails, only its owner
+/// reports the fault, and the other rules that need the call are skipped.
 const OWNERS: [(&str, &str); 6] = [
     ("fmi2Instantiate", "load.instance"),
     ("fmi2SetupExperiment", "load.initialises"),
@@ -260,11 +265,12 @@ const OWNERS: [(&str, &str); 6] = [
     ("a step from", "exchange.run"),
 ];
 
-/// A call that crashes or is refused stops every rule that makes it. The rule that owns the call names the fault; the
-/// others are skipped because of it. Without an owner, the first rule that stops at the very same call names it.
+/// Reports each failing call only once. A call that crashes or is refused stops every rule that makes it: the
+/// rule that owns the call keeps the finding, and the others are skipped because of that rule. For a call
+/// without an owner, the first rule that stopped there keeps the finding.
 fn name_each_cause_once(outcomes: &mut [Outcome]) {
     let alike = |text: &str| text.replace(|c: char| c.is_ascii_digit() || ".-+e".contains(c), "");
-    // rules that found nothing but that they had to stop, by table place
+    // Rules whose only finding is the call at which they stopped, by position in the table.
     let stopped: Vec<(usize, String, String)> = (outcomes.iter().enumerate())
         .filter_map(|(n, outcome)| {
             let [finding] = &outcome.findings.list[..] else { return None };
@@ -290,16 +296,16 @@ fn name_each_cause_once(outcomes: &mut [Outcome]) {
     }
 }
 
-/// A rule that was skipped for a fault that another rule tells becomes a finding if that rule was
-/// looked at and found nothing: the fault shows only here.
-fn tell_what_nobody_tells(outcomes: &mut [Outcome]) {
+/// Turns a skipped rule into a finding if the rule that should have reported the cause was checked and found
+/// nothing, because otherwise nobody would report the fault.
+fn restore_unreported_faults(outcomes: &mut [Outcome]) {
     let silent: Vec<&str> = outcomes
         .iter()
         .filter(|o| o.findings.list.is_empty() && o.findings.skipped.is_none())
         .map(|o| o.rule.id)
         .collect();
     for findings in outcomes.iter_mut().map(|outcome| &mut outcome.findings) {
-        if findings.told_by.as_deref().is_some_and(|rule| silent.contains(&rule))
+        if findings.reported_by.as_deref().is_some_and(|rule| silent.contains(&rule))
             && let Some(why) = findings.skipped.take()
         {
             findings.add("a run of this rule", why);
@@ -311,7 +317,7 @@ fn is_selected(rule: &Rule, name: &str) -> bool {
     rule.id == name || rule.id.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'))
 }
 
-/// The table of rules of one version as Markdown, as the documentation shows it.
+/// Renders the rules of one FMI version as Markdown tables, one per group, for the book.
 pub fn table(rules: &[Rule]) -> String {
     let mut text = String::new();
     let mut group = "";

@@ -1,5 +1,5 @@
-//! Loading, instances and their lives (FMI 2.0.5, sections 2.1.5, 2.1.6 and 4.2.4), and what an FMU
-//! must leave alone in its host.
+//! Rules about loading, instantiation and the life cycle of instances (FMI 2.0.5, sections 2.1.5, 2.1.6 and
+//! 4.2.4), and about the state of the host process that an FMU must not change.
 
 use anyhow::Result;
 
@@ -8,7 +8,8 @@ use super::loaded::{Life, Readings, STEPS, UnderTest, Unusable};
 use super::under_test::{FmuUnderTest, Interface, Reading, Session, Stage};
 use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Status, file_uri};
 
-/// `load.opens`: what came before is the check, but for the second binary of two.
+/// `load.opens`: a binary that cannot be loaded has ended the check before. Only if the two interfaces have
+/// two binaries can the second one still be broken here.
 pub fn opens<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     for why in fmu.broken() {
         findings.add("the binary of one interface", why);
@@ -16,7 +17,6 @@ pub fn opens<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `load.types_platform`
 pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     fmu.doing("fmi2GetTypesPlatform");
     for binary in fmu.binaries() {
@@ -28,13 +28,12 @@ pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-/// `load.version`
 pub fn version<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let call = format!("{}GetVersion", F::FMI);
     fmu.doing(&call);
     for binary in fmu.binaries() {
         let answer = binary.version();
-        // of FMI 3.0 there are bug fixes: 3.0.1
+        // FMI 3.0 has bug-fix versions such as 3.0.1.
         let is_fixed = F::NUMBER == "3.0" && answer.starts_with("3.0.");
         if answer != F::NUMBER && !is_fixed {
             findings.add(&call, format!("{answer:?} (allowed: {:?})", F::NUMBER));
@@ -43,7 +42,6 @@ pub fn version<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `load.instance`
 pub fn instance<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         fmu.session(using)?;
@@ -55,7 +53,6 @@ pub fn instance<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `load.initialises`
 pub fn initialises<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         fmu.running(using)?;
@@ -63,7 +60,6 @@ pub fn initialises<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `load.again`
 pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut runs = Vec::new();
     for copy in ["one", "one", "two"] {
@@ -86,7 +82,6 @@ pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `instantiate.guid`
 pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first()?;
     let wrong = format!("{}x", fmu.binary(interface)?.description().guid);
@@ -108,10 +103,9 @@ fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, Ca
     }
 }
 
-/// `instantiate.arguments`
 pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first()?;
-    // the standard asks for a URI: only a FMU that needs no resources can do without
+    // The standard requires a URI, so that only an FMU that needs no resources can do without.
     let place = "fmi2Instantiate with the resource location NULL";
     let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
     let answer = fmu.left_open(place, findings, || fmu.instantiate(interface, &with))?;
@@ -120,7 +114,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     {
         findings.add(place, error.to_string());
     }
-    // what no host may pass, so that the standard does not say what happens
+    // No host may pass these arguments, so that the standard does not say what happens.
     for (what, with) in [
         ("the instance name NULL", Instantiation { name: None, ..fmu.arguments(interface)? }),
         ("an empty instance name", Instantiation { name: Some(""), ..fmu.arguments(interface)? }),
@@ -133,7 +127,6 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-/// `instantiate.resources`
 pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let resources = fmu.directory().join("resources");
     if !resources.is_dir() {
@@ -154,11 +147,12 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.initialise()?;
         session.advance(STEPS)?;
         let mut all = session.readings()?;
-        // a text may be a path
+        // A text variable may contain the path of the resources and differ for this reason.
         all.retain(|reading| !matches!(reading, Reading::Text(_)));
         Ok(all)
     };
-    let is_same = |one: &[Reading], two: &[Reading]| one.iter().zip(two).all(|(a, b)| a.is(b));
+    let is_same =
+        |one: &[Reading], two: &[Reading]| one.iter().zip(two).all(|(a, b)| a.is_identical(b));
     let usual = run(None)?;
     is_deterministic(fmu, interface)?;
     let folder = tempfile::tempdir()?;
@@ -186,18 +180,17 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Makes a call that must be refused, with the usual callbacks, and returns true if a message says why. If the call
-/// crashes even so, `values.unknown` reports it.
+/// Makes a call that the FMU must refuse, with the usual callbacks. Returns true if the FMU logs the reason.
+/// If the call crashes, `values.unknown` reports it.
 fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
     let mut session = fmu.running(interface)?;
-    let answer = fmu.told_by("values.unknown", || {
+    let answer = fmu.with_crash_reported_by("values.unknown", || {
         fmu.doing("fmi2GetReal of an unknown value reference");
         session.instance.get_real(&[u32::MAX], &mut [0.0])
     });
     Ok(answer.is_err_and(|error| !error.messages.is_empty()))
 }
 
-/// `instantiate.callbacks`
 pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first()?;
     if !fmu.can(interface, "canNotUseMemoryManagementFunctions") {
@@ -209,17 +202,21 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     fmu.doing(place);
     let with = Instantiation { callbacks: Callbacks::Logger, ..fmu.arguments(interface)? };
     let made = fmu.instantiate(interface, &with)?;
-    match made.map_err(anyhow::Error::from).and_then(|instance| live(fmu, instance)) {
+    match made
+        .map_err(anyhow::Error::from)
+        .and_then(|instance| initialise_and_refuse(fmu, instance))
+    {
         Ok(()) => {}
         Err(error) => {
             findings.add(place, format!("{error} (allowed: an instance that initialises)"))
         }
     }
-    // Hosts must give a logger: without one it may refuse, and should not crash.
+    // Hosts must pass a logger. Without one the FMU may refuse, but should not crash.
     let with = Instantiation { callbacks: Callbacks::Empty, ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with callbacks that are all NULL";
     let answer = fmu.left_open(place, findings, || {
-        fmu.instantiate(interface, &with)?.map_or(Ok(()), |instance| live(fmu, instance))
+        fmu.instantiate(interface, &with)?
+            .map_or(Ok(()), |instance| initialise_and_refuse(fmu, instance))
     });
     if let Err(error) = answer {
         findings.add(fmu.now(), format!("{error} (allowed: no instance, or one that works)"));
@@ -227,8 +224,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// A refused call and an initialisation.
-fn live(fmu: &FmuUnderTest, mut instance: Instance) -> Result<()> {
+fn initialise_and_refuse(fmu: &FmuUnderTest, mut instance: Instance) -> Result<()> {
     let experiment = fmu.experiment();
     fmu.doing("fmi2SetupExperiment to fmi2ExitInitializationMode without callbacks");
     instance.setup_experiment(None, experiment.start, None)?;
@@ -239,7 +235,6 @@ fn live(fmu: &FmuUnderTest, mut instance: Instance) -> Result<()> {
     Ok(())
 }
 
-/// `instantiate.copies`
 pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first()?;
     let logs = refuse_as_usual(fmu, interface)?;
@@ -256,7 +251,7 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `instantiate.free_null`: a crash is the finding.
+/// `instantiate.free_null`: the rule is broken if the call crashes.
 pub fn free_null<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
     fmu.doing(format!("{}FreeInstance(NULL)", F::FMI));
     for binary in fmu.binaries() {
@@ -265,7 +260,6 @@ pub fn free_null<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `instantiate.null`
 pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for binary in fmu.binaries() {
         let answers = fmu.left_open("a call with the instance NULL", findings, || {
@@ -283,7 +277,6 @@ pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `life.instances`
 pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         let alone = {
@@ -308,7 +301,6 @@ pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `life.deterministic`
 pub fn deterministic<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         if let Some(text) = differs_when_run_again(fmu, using)? {
@@ -318,7 +310,7 @@ pub fn deterministic<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<(
     Ok(())
 }
 
-/// Makes the same run twice and returns the first difference.
+/// Simulates the same run twice and describes the first difference between the results.
 fn differs_when_run_again<F: UnderTest>(fmu: &F, using: F::Use) -> Result<Option<String>> {
     let run = || -> Result<_> {
         let mut session = fmu.running(using)?;
@@ -331,7 +323,8 @@ fn differs_when_run_again<F: UnderTest>(fmu: &F, using: F::Use) -> Result<Option
     Ok(session.difference(&second, &first))
 }
 
-/// Fails if the same run differs: then a comparison of runs says nothing, and `life.deterministic` reports it.
+/// Returns an error if two equal runs differ, because comparing runs then proves nothing.
+/// `life.deterministic` reports this fault.
 pub fn is_deterministic<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
     match differs_when_run_again(fmu, using)? {
         None => Ok(()),
@@ -339,7 +332,6 @@ pub fn is_deterministic<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
     }
 }
 
-/// `life.reset`
 pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let call = format!("{}Reset", F::FMI);
     for using in fmu.uses() {
@@ -362,7 +354,6 @@ pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// All values after initialisation and after a run.
 fn history<'f, F: UnderTest + 'f>(session: &mut F::Session<'f>) -> Result<Vec<Readings<'f, F>>> {
     session.initialise()?;
     let mut all = vec![session.readings()?];
@@ -371,7 +362,6 @@ fn history<'f, F: UnderTest + 'f>(session: &mut F::Session<'f>) -> Result<Vec<Re
     Ok(all)
 }
 
-/// `life.reset_anywhere`
 pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
         fmu.running(interface)?; // if that fails, another rule tells
@@ -383,7 +373,7 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         ] {
             let mut session = fmu.session_in(interface, stage)?;
             if stage == Stage::Initialised {
-                fmu.told_by("values.unknown", || {
+                fmu.with_crash_reported_by("values.unknown", || {
                     fmu.doing("fmi2GetReal of an unknown value reference");
                     let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
                 });
@@ -402,7 +392,6 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-/// `life.terminate`
 pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let call = format!("{}Terminate", F::FMI);
     for using in fmu.uses() {
@@ -413,7 +402,8 @@ pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         session.instance().terminate()?;
         fmu.doing(format!("reading values after {call}"));
         let after = session.readings()?;
-        // FMI 3.0: values can be read; those of Dymola's FMUs move a little in fmi3Terminate
+        // FMI 3.0 requires only that values can be read; Dymola's FMUs change them slightly in
+        // fmi3Terminate.
         if F::NUMBER == "2.0"
             && let Some(text) = session.difference(&after, &before)
         {
@@ -423,10 +413,9 @@ pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// A call of the list of [`order`].
+/// Name and closure of a call that rule [`order`] makes in a wrong state.
 type Misplaced = (&'static str, fn(&mut Session) -> Result<(), CallError>);
 
-/// `life.order`
 pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let setup: Misplaced =
         ("fmi2SetupExperiment", |s| s.instance.setup_experiment(None, s.time, None));
@@ -456,7 +445,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for (stage, calls) in &common {
             let more: &[Misplaced] = match stage {
                 Stage::Initialised if interface == Interface::CoSimulation => &[],
-                // continuous-time mode allows the first and the last
+                // Continuous-time mode allows the first and the last of these calls.
                 Stage::Initialised => &own[1..3],
                 _ => &own,
             };
@@ -473,7 +462,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// A call that must be refused, with a message.
+/// Adds a finding unless the call is refused with fmi2Error and a message that says why.
 pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(), CallError>) {
     match answer {
         Ok(()) => findings.add(place, "it is accepted (allowed: fmi2Error and a message)"),
@@ -481,7 +470,7 @@ pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(),
             findings.add(place, format!("{error} (allowed: fmi2Error, the instance lives on)"));
         }
         Err(error) if error.messages.iter().all(|m| m.text.trim().is_empty()) => {
-            // the standard asks for the error alone
+            // The standard requires only the error, so that a missing message is a warning.
             findings
                 .warn(place, format!("{error} (expected: fmi2Error and a message that says why)"));
         }
@@ -489,9 +478,6 @@ pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(),
     }
 }
 
-// ---------------------------------------------------------------- the host
-
-/// A life to its end, and one that an error ends.
 fn ordinary_lives(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
     let mut session = fmu.running(interface)?;
     session.advance(STEPS)?;
@@ -501,7 +487,7 @@ fn ordinary_lives(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
     refuse_as_usual(fmu, interface).map(|_| ())
 }
 
-/// `host.silent`: the process that runs this one looks at what is printed.
+/// `host.silent`: the parent process compares what this process prints.
 pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
         ordinary_lives(fmu, interface)?;
@@ -509,10 +495,9 @@ pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Properties of the process that are compared, with their names.
 pub fn surroundings() -> Vec<(&'static str, String)> {
     let state = HostState::now();
-    // under wine there is a /proc, too: that of wine's own process
+    // Wine also has /proc, but it describes Wine's own process.
     let count = |folder: &str| match cfg!(target_os = "linux") {
         true => {
             std::fs::read_dir(folder).map_or(String::new(), |entries| entries.count().to_string())
@@ -527,18 +512,17 @@ pub fn surroundings() -> Vec<(&'static str, String)> {
         ("signal handlers", format!("{:#x}", state.signal_handlers)),
         ("working directory", format!("{:?}", std::env::current_dir().ok())),
         ("environment variables", format!("{environment:?}")),
-        // where the system tells
+        // Left out on systems that do not report it.
         ("number of threads", count("/proc/self/task")),
         ("number of open files", count("/proc/self/fd")),
     ]
 }
 
-/// `host.untouched`
 pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
         ordinary_lives(fmu, interface)?;
     }
-    // from before it was loaded: what its constructors change counts as well
+    // Compared with the state before the binary was loaded, so that changes by its constructors count.
     for ((name, before), (_, after)) in fmu.before.iter().zip(surroundings()) {
         if *before != after {
             let values = match *name {

@@ -1,5 +1,6 @@
-//! The FMU under test in any version of FMI: its binaries, what a rule does with them, and what a crash of that means.
-//! [`UnderTest`] and [`Life`] are what rules for both versions need; `under_test.rs` and `v3/subject.rs` implement them.
+//! The loaded FMU under test for any version of FMI: its binaries, the calls that rules make, and the meaning
+//! of a crash in them. The traits [`UnderTest`] and [`Life`] contain what rules for both versions need;
+//! `under_test.rs` and `v3/subject.rs` implement them.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Deref;
@@ -15,17 +16,17 @@ use host::xml::Element;
 use super::findings::Findings;
 use super::trace::{self, Crash};
 
-/// Steps of a short run.
+/// Number of communication steps of a short run.
 pub const STEPS: usize = 20;
-/// Time for a call that the standard leaves open and that need not return.
+/// Time limit for a call whose effect the standard leaves open, because it may never return.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Most rules cannot be checked: one rule gives the reason, the others are skipped.
+/// Error that makes a rule impossible to check: `rule` reports the reason, and all others that meet it are
+/// skipped.
 #[derive(Debug)]
 pub struct Unusable {
-    /// The rule that tells; empty if it is not a fault.
+    /// The rule that reports the reason; empty if there is no fault of the FMU.
     pub rule: &'static str,
-    /// Reason.
     pub why: String,
 }
 
@@ -37,15 +38,15 @@ impl std::fmt::Display for Unusable {
 
 impl std::error::Error for Unusable {}
 
-/// The loaded binaries of an FMU, and the calls that a rule makes.
+/// The loaded binaries of an FMU, with a record of the call that is being made.
 pub struct Loaded<V: Version> {
-    /// One, or two where modelIdentifier differs between the interfaces.
+    /// One binary, or two if modelIdentifier differs between the interfaces.
     binaries: Vec<Fmu<V>>,
-    /// The interfaces that can be called, Co-Simulation first, and the binary of each.
+    /// The interfaces that can be called, Co-Simulation first, each with the index of its binary.
     interfaces: Vec<(Interface, usize)>,
-    /// The interfaces whose binary cannot be loaded, its modelIdentifier, and the reason.
+    /// The interfaces whose binary cannot be loaded: interface, modelIdentifier and reason.
     broken: Vec<(Interface, String, String)>,
-    /// Rules make no instances after it.
+    /// Time after which rules create no more instances.
     pub deadline: Instant,
     doing: RefCell<String>,
     crash: RefCell<Crash>,
@@ -53,10 +54,11 @@ pub struct Loaded<V: Version> {
 }
 
 impl<V: Version> Loaded<V> {
-    /// Loads the binary of each interface by its modelIdentifier. Rules make no instances after `deadline`.
+    /// Loads the binary of each interface in `declared`, which has their modelIdentifiers, by `load`.
     ///
     /// # Errors
-    /// If none can be loaded.
+    ///
+    /// If no binary can be loaded.
     pub fn new(
         declared: Vec<(Interface, String)>,
         deadline: Instant,
@@ -93,7 +95,8 @@ impl<V: Version> Loaded<V> {
         Ok(loaded)
     }
 
-    /// Leaves interfaces out, and reasons why others cannot be called.
+    /// Removes the interfaces for which `callable` is false, and the unloadable binaries whose
+    /// modelIdentifier `told` rejects.
     pub fn retain(
         &mut self,
         callable: impl Fn(Interface, &Fmu<V>) -> bool,
@@ -103,21 +106,22 @@ impl<V: Version> Loaded<V> {
         self.broken.retain(|(_, name, _)| told(name));
     }
 
-    /// Announces the next call: a crash or a hang is then reported at this place.
+    /// Announces the next call, so that a crash or a hang in it is reported with this text.
     pub fn doing(&self, what: impl Into<String>) {
         let what = what.into();
         trace::doing(&what, self.crash.borrow().clone());
         *self.doing.borrow_mut() = what;
     }
 
-    /// Makes calls whose crash another rule reports, which makes them as well.
-    pub fn told_by<T>(&self, rule: &str, calls: impl FnOnce() -> T) -> T {
-        self.with_crash(Crash::ToldBy(rule.into()), calls)
+    /// Makes calls whose crash is reported by `rule`, which makes the same calls, and not by the present
+    /// rule.
+    pub fn with_crash_reported_by<T>(&self, rule: &str, calls: impl FnOnce() -> T) -> T {
+        self.with_crash(Crash::ReportedBy(rule.into()), calls)
     }
 
-    /// Makes calls of which the standard does not say what they do: a crash is as bad as the rule.
-    /// After [`PATIENCE`] the process tells what was found so far and that they do not return, and
-    /// ends.
+    /// Makes calls whose effect the standard leaves open. A crash has the severity of the rule. If the calls
+    /// take longer than [`PATIENCE`], the process writes the findings so far, adds that the calls do not
+    /// return, and exits.
     pub fn left_open<T>(
         &self,
         what: impl Into<String>,
@@ -132,7 +136,7 @@ impl<V: Version> Loaded<V> {
             if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
                 found
                     .add(place, format!("no end after {PATIENCE:?} (allowed: every call returns)"));
-                // if that cannot be written, the time limit tells
+                // If the findings cannot be written, the time limit of the parent process reports the hang.
                 let _ = trace::done(found);
                 std::process::exit(0);
             }
@@ -145,49 +149,53 @@ impl<V: Version> Loaded<V> {
         answer
     }
 
-    /// Notes that parameters now have values that the check has chosen, with which a model may have no solution. A crash
-    /// or a call without end then ends the rule, and is not a finding.
+    /// Records that the check has chosen parameter values, for which the model may have no solution. A crash
+    /// or hang then ends the rule without a finding.
     pub fn chose_values(&self) {
-        *self.crash.borrow_mut() = Crash::ToldBy(String::new());
+        *self.crash.borrow_mut() = Crash::ReportedBy(String::new());
     }
 
     fn with_crash<T>(&self, crash: Crash, calls: impl FnOnce() -> T) -> T {
         let before = self.crash.replace(crash);
         let answer = calls();
         self.crash.replace(before);
-        // what comes next is no longer that
+        // The next call no longer has the special treatment.
         self.doing(self.now());
         answer
     }
 
-    /// Last announced call.
+    /// Returns the text of the call that was announced last.
     pub fn now(&self) -> String {
         let doing = self.doing.borrow();
         if doing.is_empty() { "a first call".into() } else { doing.clone() }
     }
 
-    /// The binary of an interface, if it can be called.
+    /// Returns the binary of an interface.
+    ///
+    /// # Errors
+    ///
+    /// If the interface cannot be called.
     pub fn binary(&self, interface: Interface) -> Result<&Fmu<V>> {
         let of = self.interfaces.iter().find(|(i, _)| *i == interface);
         of.map(|(_, at)| &self.binaries[*at]).context("no such interface")
     }
 
-    /// The loaded binaries.
     pub fn binaries(&self) -> &[Fmu<V>] {
         &self.binaries
     }
 
-    /// Reasons why interfaces cannot be called although there is a binary.
+    /// Lists the reasons why interfaces cannot be called although a binary exists.
     pub fn broken(&self) -> impl Iterator<Item = &str> {
         self.broken.iter().map(|(.., why)| &why[..])
     }
 
-    /// The interfaces that can be called, Co-Simulation first.
+    /// Returns the interfaces that can be called, Co-Simulation first.
     pub fn interfaces(&self) -> Vec<Interface> {
         self.interfaces.iter().map(|(interface, _)| *interface).collect()
     }
 
-    /// Makes an instance, unless the FMU may have one in a process and had it, or time is over.
+    /// Creates an instance by `make`. The rule is abandoned (outer error) if `is_once` says that a process
+    /// may create only one instance and it already did, or if the deadline has passed.
     pub fn make<T, E>(
         &self,
         is_once: bool,
@@ -207,7 +215,7 @@ impl<V: Version> Loaded<V> {
     }
 }
 
-/// Name of an interface as an element of modelDescription.xml.
+/// Returns the name of the interface's element in modelDescription.xml.
 fn element(interface: Interface) -> &'static str {
     match interface {
         Interface::CoSimulation => "CoSimulation",
@@ -215,98 +223,98 @@ fn element(interface: Interface) -> &'static str {
     }
 }
 
-/// The modelIdentifier of each interface that the FMU declares, Co-Simulation first.
+/// Returns the modelIdentifier of each interface that the FMU declares, Co-Simulation first.
 pub fn declared(root: &Element) -> Vec<(Interface, String)> {
     let all = [Interface::CoSimulation, Interface::ModelExchange].into_iter();
     let identifier = |i: Interface| root.child(element(i))?.get("modelIdentifier");
     all.filter_map(|i| Some((i, identifier(i)?.to_string()))).collect()
 }
 
-/// An FMU under test.
+/// An FMU under test, for rules that hold in FMI 2.0 and in FMI 3.0.
 pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
-    /// The version of FMI that it has.
     type Version: Version;
-    /// Use of an instance: an interface, and in FMI 3.0 what the host allows.
+    /// A way to use an instance: the interface, and in FMI 3.0 also the optional features that the host
+    /// enables.
     type Use: Copy;
-    /// An instance and how far it is.
+    /// An instance together with its present state in the state machine.
     type Session<'f>: Life<'f, Self::Version>
     where
         Self: 'f;
-    /// Begin of the names of calls.
+    /// Prefix of function names, "fmi2" or "fmi3".
     const FMI: &'static str;
-    /// Result of fmi2GetVersion or fmi3GetVersion.
     const NUMBER: &'static str;
 
-    /// A saved state in names of calls and capabilities.
+    /// Word for a saved state in the names of functions and capabilities, "FMUstate" or "FMUState".
     const STATE: &'static str;
 
-    /// The tree of modelDescription.xml.
+    /// Returns the root element of modelDescription.xml.
     fn root(&self) -> &Element;
 
-    /// Every use of the interfaces that the FMU declares.
+    /// Lists the ways in which the FMU declares that it can be used.
     fn uses(&self) -> Vec<Self::Use>;
 
-    /// Name of a use in findings.
+    /// Returns the name of a use in findings.
     fn name(using: Self::Use) -> &'static str;
 
-    /// The interface of a use.
+    /// Returns the interface to which a use belongs.
     fn interface(using: Self::Use) -> Interface;
 
-    /// A new instance.
+    /// Creates an instance.
     fn session(&self, using: Self::Use) -> Result<Self::Session<'_>>;
 
-    /// A new instance, initialised with what the FMU suggests and ready for a step.
+    /// Creates an instance and initialises it with the FMU's default experiment, so that it is ready for a
+    /// step.
     fn running(&self, using: Self::Use) -> Result<Self::Session<'_>>;
 
-    /// Messages of the FMU about mistakes, and how many have the category NULL.
+    /// Provokes errors and returns the messages that the FMU logs, and how many of them have the category
+    /// NULL.
     fn complaints(&self) -> Result<(Vec<Message>, usize)>;
 
-    /// Returns true if an interface declares a capability.
+    /// Returns true if the element of `interface` declares the capability `flag`.
     fn can(&self, interface: Interface, flag: &str) -> bool {
         self.root().child(element(interface)).is_some_and(|element| element.flag(flag))
     }
 }
 
-/// Life of an instance, in the order of the standard's state machines.
+/// Life cycle of an instance, in the order of the standard's state machine.
 pub trait Life<'f, V: Version + 'f> {
-    /// A variable's values as they were read.
+    /// Value of a variable as read from the FMU.
     type Reading;
-    /// The host's place in the simulation, which a saved state does not contain.
+    /// The host's own state (for example time), which a saved FMU state does not contain.
     type Mark;
 
-    /// The instance.
     fn instance(&mut self) -> &mut Instance<'f, V>;
 
-    /// Takes a new instance up to its first step.
+    /// Initialises a new instance, so that it is ready for its first step.
     fn initialise(&mut self) -> Result<()>;
 
-    /// Makes steps of the usual size, inputs changing, until the FMU asks for the end.
+    /// Makes `steps` communication steps of the usual size with changing inputs. Stops early if the FMU
+    /// requests the end of the simulation.
     ///
     /// # Errors
-    /// If one fails, which is the business of a rule of its own.
+    ///
+    /// If a step fails; `steps.run` or `exchange.run` reports this.
     fn advance(&mut self, steps: usize) -> Result<()>;
 
-    /// Every value there is, one call each.
+    /// Reads every variable, each with a call of its own.
     fn readings(&mut self) -> Result<Vec<Self::Reading>>;
 
-    /// The first variable whose value is not the same to the last bit, as a sentence.
+    /// Describes the first variable whose value differs in at least one bit, or returns `None` if all are
+    /// equal.
     fn difference(&self, ours: &[Self::Reading], theirs: &[Self::Reading]) -> Option<String>;
 
-    /// Returns the host's place in the simulation.
+    /// Returns the host's own state, to which [`Life::go_back`] returns later.
     fn mark(&self) -> Self::Mark;
 
-    /// Takes the host back to an earlier place.
     fn go_back(&mut self, to: &Self::Mark);
 
-    /// Leads the instance another way than usual, before a reset.
+    /// Brings the instance away from its usual trajectory, so that a following reset has something to undo.
     fn stray(&mut self) -> Result<()>;
 
-    /// Takes the host back to the start, where the FMU is after a reset.
+    /// Returns the host's own state to the start, which is where the FMU is after a reset.
     fn rewind(&mut self);
 }
 
 type Of<'f, F> = <F as UnderTest>::Session<'f>;
-/// All values of an FMU's variables.
 pub type Readings<'f, F> = Vec<<Of<'f, F> as Life<'f, <F as UnderTest>::Version>>::Reading>;
-/// Place of the host in the simulation of an FMU.
 pub type Mark<'f, F> = <Of<'f, F> as Life<'f, <F as UnderTest>::Version>>::Mark;

@@ -1,4 +1,4 @@
-//! The logger (FMI 2.0.5, section 2.1.5).
+//! Rules about the logger (FMI 2.0.5, section 2.1.5).
 
 use anyhow::Result;
 
@@ -7,10 +7,9 @@ use super::under_test::{FmuUnderTest, Interface, Life, STEPS, UnderTest};
 use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
 
-/// `log.percent`
 pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first()?;
-    // If the text becomes the format, %d prints some number and %% one sign; neither can crash.
+    // If the FMU uses the text as a printf format, %d prints some number and %% one sign; both are harmless.
     const TEXT: &str = "{a%db%%c}";
     let mut told = Vec::new();
     let place = format!("a message about {TEXT:?}");
@@ -41,7 +40,6 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `log.categories`
 pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let declared: Vec<&str> =
         fmu.root().list("LogCategories").filter_map(|c| c.get("name")).collect();
@@ -68,7 +66,6 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
     Ok(())
 }
 
-/// `log.text`
 pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (messages, _) = fmu.complaints()?;
     if messages.is_empty() {
@@ -90,7 +87,8 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Makes an ordinary run with loggingOn and returns its messages.
+/// Simulates with loggingOn and returns the messages. `changing` says whether the inputs change or keep their
+/// start values.
 fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<Vec<Message>> {
     fmu.doing("fmi2Instantiate, loggingOn");
     let with = fmu.arguments(interface)?;
@@ -105,8 +103,8 @@ fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<
     Ok(session.instance.take_messages())
 }
 
-/// `log.quiet`. An ordinary run logs nothing. With changing inputs, warnings are allowed: the check's inputs may lead a model out
-/// of its range.
+/// `log.quiet`: an ordinary run logs nothing. If the inputs change, warnings are allowed, because the check's
+/// inputs may lead a model out of its range.
 pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let runs = [("inputs as they start", false), ("inputs changing", true)];
     for (interface, (inputs, changing)) in
@@ -124,7 +122,6 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `log.environment`
 pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let complaints = fmu.complaints();
     let runs = fmu.interfaces().into_iter().map(|interface| ordinary(fmu, interface, true));
@@ -145,7 +142,6 @@ pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `log.switch`
 pub fn switch(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = fmu.session(fmu.first()?)?;
     let root = &fmu.description().root;

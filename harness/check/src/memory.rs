@@ -1,8 +1,8 @@
-//! Memory that an FMU takes and does not give back (FMI 2.0.5, sections 2.1.5 and 2.1.8).
+//! Rule about memory leaks (FMI 2.0.5, sections 2.1.5 and 2.1.8).
 //!
-//! The same calls are made over and over. What is kept for the next time is taken in the first
-//! window; where each window after it takes more, the memory is lost. The system tells how much the
-//! process can write to (VmData), in portions of some 130 kB.
+//! The same calls are repeated in windows of equal length. Memory that is allocated once and used again is
+//! allocated in the first window. If each later window needs more memory, it leaks. The operating system
+//! reports the writable memory (VmData) in steps of about 130 kB.
 
 use std::time::{Duration, Instant};
 
@@ -11,27 +11,27 @@ use anyhow::Result;
 use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, UnderTest};
 
-/// Calls of a window.
+/// Largest number of calls in a window.
 const MOST: usize = 500;
-/// Time for the first window; the others have as many calls.
+/// Time limit for the first window; the other windows have the same number of calls.
 const LONGEST: Duration = Duration::from_millis(500);
-/// Calls in a window, enough for a result.
+/// Smallest number of calls in a window from which a leak can be concluded.
 const FEWEST: usize = 10;
-/// Windows that must take memory, each, after the first.
+/// Number of windows after the first one, each of which must need more memory.
 const WINDOWS: usize = 3;
-/// Growth of memory that is a finding, bytes a step: an FMU may keep a short history.
+/// Growth that is a finding, bytes per step. Less is allowed, because an FMU may store a short history.
 const PER_STEP: u64 = 1024;
 
-/// Bytes of memory that this process can write to; none where the system does not tell.
-fn data() -> Option<u64> {
+/// Returns the writable memory of this process in bytes, or `None` if the system does not report it.
+fn writable_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmData:"))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(1024 * kilobytes)
 }
 
-/// Bytes that are lost with each of the calls, if every window takes some.
-fn lost(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
+/// Returns how many bytes each `call` leaks, or `None` if at least one window needs no further memory.
+fn leak_per_call(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
     let started = Instant::now();
     let mut count = 0;
     while count < MOST && (count == 0 || started.elapsed() < LONGEST) {
@@ -43,11 +43,12 @@ fn lost(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
     }
     let mut taken = 0;
     for _ in 0..WINDOWS {
-        let before = data();
+        let before = writable_memory();
         for _ in 0..count {
             call()?;
         }
-        let grown = before.zip(data()).map_or(0, |(before, after)| after.saturating_sub(before));
+        let grown =
+            before.zip(writable_memory()).map_or(0, |(before, after)| after.saturating_sub(before));
         if grown == 0 {
             return Ok(None);
         }
@@ -56,9 +57,8 @@ fn lost(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
     Ok(Some(taken / (WINDOWS * count) as u64))
 }
 
-/// `host.memory`
 pub fn memory(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    if data().is_none() {
+    if writable_memory().is_none() {
         findings.skip("this system does not tell how much memory a process has");
         return Ok(());
     }
@@ -76,7 +76,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
         session.instance.take_messages();
         Ok(())
     };
-    if let Some(bytes) = lost(step)?
+    if let Some(bytes) = leak_per_call(step)?
         && bytes >= PER_STEP
     {
         findings.add(
@@ -92,7 +92,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
             Ok(session.instance.free_state(state)?)
         };
         fmu.doing("fmi2GetFMUstate and fmi2FreeFMUstate");
-        if let Some(bytes) = lost(state)? {
+        if let Some(bytes) = leak_per_call(state)? {
             findings.add(
                 format!("fmi2FreeFMUstate ({name})"),
                 format!("{bytes} bytes stay behind with each state (allowed: none)"),
@@ -103,7 +103,8 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
     if fmu.can(interface, "canBeInstantiatedOnlyOncePerProcess") {
         return Ok(());
     }
-    // a life as the standard has it: some free part of their memory in fmi2Terminate
+    // The instance is terminated as the standard prescribes, because some FMUs free part of their memory in
+    // fmi2Terminate.
     let instance = || -> Result<()> {
         let mut session = fmu.running(interface)?;
         session.advance(2)?;
@@ -112,7 +113,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
         }
         Ok(())
     };
-    if let Some(bytes) = lost(instance)? {
+    if let Some(bytes) = leak_per_call(instance)? {
         findings.add(
             format!("fmi2FreeInstance ({name})"),
             format!("{bytes} bytes stay behind with each instance (allowed: none)"),

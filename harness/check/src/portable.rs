@@ -1,4 +1,5 @@
-//! Names that not every file system can hold: an FMU is unpacked on Windows, macOS and Linux.
+//! Rules about names that some file systems cannot store, because an FMU is unpacked on Windows, macOS and
+//! Linux.
 
 use std::collections::BTreeMap;
 
@@ -6,20 +7,20 @@ use super::archive::Archive;
 use super::binaries::PLATFORMS;
 use super::findings::Findings;
 
-/// Characters that Windows does not allow in names; `/` separates and control characters are a rule
-/// of their own.
+/// Characters that Windows does not allow in names. The slash separates folders, and control characters have
+/// a rule of their own.
 const FORBIDDEN: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
-/// Devices of Windows: no file can be called so, whatever its extension.
+/// Names of devices on Windows, which no file may have, with any extension.
 const DEVICES: [&str; 6] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"];
-/// Bytes that one part of a path may have on the usual file systems.
+/// Largest length of one part of a path on the usual file systems, bytes.
 const LONGEST_PART: usize = 255;
-/// Characters of a path on Windows without its terminating zero (MAX_PATH is 260).
+/// Largest length of a path on Windows, characters: MAX_PATH is 260 with the terminating zero.
 const LONGEST_PATH: usize = 259;
-/// Characters that a path inside an FMU may have: what MAX_PATH leaves after a temporary folder such
-/// as `C:\Users\a.long.user.name\AppData\Local\Temp\` and a folder in it named after the instance.
+/// Largest length of a path inside an FMU, characters: the rest of MAX_PATH after a temporary folder such as
+/// `C:\Users\a.long.user.name\AppData\Local\Temp\` and a folder named after the instance.
 const PORTABLE_PATH: usize = 160;
 
-/// Reason why Windows cannot write a part of a path.
+/// Lists the reasons why Windows cannot create a file or folder with the name `part`.
 fn windows_faults(part: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let stem = part.split('.').next().unwrap_or(part).trim_end().to_uppercase();
@@ -41,15 +42,14 @@ fn windows_faults(part: &str) -> Vec<String> {
     faults
 }
 
-/// The parts of a name, without the last, empty one of a folder.
+/// Splits a name at its slashes, without the empty last part of a folder.
 fn parts(name: &str) -> impl Iterator<Item = &str> {
     name.split(['/', '\\']).filter(|part| !part.is_empty())
 }
 
-/// `zip.windows_names`
 pub fn windows_names(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
-        // a drive letter makes the name absolute, which is a rule of its own
+        // A drive letter makes the name absolute, which breaks a rule of its own.
         let is_drive = |part: &str| part.len() == 2 && part.ends_with(':');
         let faults: Vec<String> = parts(&entry.name)
             .enumerate()
@@ -70,13 +70,12 @@ pub fn windows_names(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.path_length`
 pub fn path_length(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
         let start: String = entry.name.chars().take(60).collect();
         let place = format!("{}…", start.escape_debug());
         let longest = parts(&entry.name).map(str::len).max().unwrap_or(0);
-        // Windows counts in UTF-16
+        // Windows counts UTF-16 units.
         let length = entry.name.encode_utf16().count();
         if longest > LONGEST_PART {
             findings.fail(
@@ -103,7 +102,6 @@ pub fn path_length(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.file_and_folder`
 pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
     let files: BTreeMap<String, &str> =
         archive.below("").map(|name| (host::archive::place(name), name)).collect();
@@ -129,12 +127,12 @@ pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// Names that the standard gives, as hosts on Linux look for them.
+/// Names in the standard. Hosts on Linux find them only with exactly these capitals.
 const STANDARD_FOLDERS: [&str; 6] =
     ["binaries", "documentation", "resources", "sources", "extra", "terminalsAndIcons"];
 const STANDARD_FILES: [&str; 3] = ["modelDescription.xml", "model.png", "documentation/index.html"];
 
-/// The name that the standard has for one that differs in capitals only.
+/// Returns the standard's spelling of a name that differs from it only in capitals.
 fn standard_spelling(name: &str) -> Option<String> {
     let parts: Vec<&str> = name.split('/').collect();
     let other = |written: &str, standard: &[&str]| -> Option<String> {
@@ -163,10 +161,9 @@ fn standard_spelling(name: &str) -> Option<String> {
     differs.then(|| right.join("/"))
 }
 
-/// `zip.capitals`
 pub fn capitals(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
-        // together with the right one it is a name twice
+        // If the correct name also exists, the two are duplicates, which is another rule.
         let is_there = |name: &String| archive.entries.iter().any(|e| e.name == *name);
         if let Some(right) = standard_spelling(&entry.name).filter(|right| !is_there(right)) {
             findings.add(

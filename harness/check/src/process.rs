@@ -1,5 +1,6 @@
-//! Rules of calls run in a process of their own, guarded by `host::guard`: an FMU that crashes, hangs
-//! or ends the process is a finding. The process answers what it is about to do and what it found.
+//! Runs each rule of calls in a process of its own, which `host::guard` watches, so that an FMU that crashes,
+//! hangs or exits the process is a finding. The process reports each call before it makes it, and at the end
+//! its findings.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -20,44 +21,44 @@ use super::trace::{self, Answer, Crash};
 use super::under_test::FmuUnderTest;
 use super::{life, v3};
 
-/// The hidden subcommand of `hubslosh`.
+/// The hidden subcommand of `hubslosh` that checks one rule.
 pub const SUBCOMMAND: &str = "check-calls";
-/// Number of endless calls after which the check stops calling.
+/// Number of rules with endless calls after which no further rules of calls are run.
 const HANGS: usize = 2;
-/// Least time that one call may take if the rule has so much, and what part of the limit: [`HANGS`] of them
-/// are not to take more than 10 s.
+/// Time limit of a single call: at least this long if the rule's limit allows it, and otherwise this part of
+/// the rule's limit, so that [`HANGS`] endless calls take at most about 10 s.
 const CALL: Duration = Duration::from_secs(4);
 const PART: f64 = 15.0;
-/// Bytes that a file of an FMU may have: rules run side by side.
+/// Largest file that an FMU may write, bytes. It is small because several rules run at the same time.
 const FILE: u64 = 8 << 20;
-/// The rule that tells what is wrong with loading.
+/// The rule that reports a binary that cannot be loaded.
 const OPENS: &str = "load.opens";
-/// Bytes shown of what an FMU prints.
+/// Number of bytes of the FMU's printed output that a finding quotes.
 const PRINTED: usize = 200;
 
-/// Reasons why other rules were not checked, from the results of those that were.
+/// Results of earlier rules for which later rules need not be run.
 #[derive(Default)]
 pub struct SoFar {
-    /// Rules whose process had to be ended.
+    /// Number of rules whose process had to be killed.
     hung: AtomicUsize,
-    /// Reason why none of them can load the binary.
+    /// Reason why the binary cannot be loaded, which is the same for all rules.
     lost: OnceLock<String>,
-    /// Report of a panic of our own code.
+    /// Report of a panic in this program's own code.
     pub bug: OnceLock<String>,
 }
 
-/// Place of an FMU whose binary is called.
+/// Location of the unpacked FMU whose binary is called.
 #[derive(Clone, Copy, Debug)]
 pub struct Unpacked<'a> {
-    /// Name of the FMU.
     pub path: &'a Path,
-    /// Folder in which it is unpacked.
+    /// Folder into which the FMU is unpacked.
     pub directory: &'a Path,
-    /// File with its description, packed ([`Element::pack`]): a large one takes longer to parse than most rules.
+    /// File with the parsed description ([`Element::pack`]), because parsing a large modelDescription.xml
+    /// takes longer than most rules.
     pub description: &'a Path,
 }
 
-/// Checks one rule in a process of its own.
+/// Checks `rule` in a process of its own and stores its findings. Skips the rule if `so_far` has a reason.
 pub fn check(
     rule: &'static Rule,
     fmu: Unpacked,
@@ -80,7 +81,7 @@ pub fn check(
     }
 }
 
-/// True if it had to be killed.
+/// Runs the process of a rule. Returns true if it had to be killed.
 fn run(
     rule: &'static Rule,
     fmu: Unpacked,
@@ -109,7 +110,7 @@ fn run(
     let hear = |answer: &[u8]| match serde_json::from_slice(answer) {
         Ok(Answer::Doing(what, then)) => (doing, crash) = (what, then),
         Ok(Answer::Done(found)) => done = Some(found),
-        // our own process sends nothing else, unless the FMU has overwritten what it was to send
+        // Our own process sends nothing else, unless the FMU has overwritten its memory.
         Err(_) => is_damaged = true,
     };
     let ended = guard::run(&options.program, arguments, &limits, Output::Kept, hear)?;
@@ -169,33 +170,33 @@ fn run(
                 }
             }
         }
-        // One rule tells it; the others would say the same.
+        // Only one rule reports this; all others would repeat it.
         None if is_lost && rule.id != OPENS => {
             findings.skip_for(OPENS, format!("the process ended while {doing}: {why}"));
         }
-        None => tell_crash(findings, doing, why, crash),
+        None => report_crash(findings, doing, why, crash),
     }
     Ok(was_ended)
 }
 
-fn tell_crash(findings: &mut Findings, doing: String, text: String, crash: Crash) {
+fn report_crash(findings: &mut Findings, doing: String, text: String, crash: Crash) {
     match crash {
         Crash::Error => {
             findings.stopped_at = Some(doing.clone());
             findings.fail(doing, text);
         }
         Crash::Open => findings.add(doing, text),
-        Crash::ToldBy(rule) => findings.skip_for(&rule, format!("{doing}: {text}")),
+        Crash::ReportedBy(rule) => findings.skip_for(&rule, format!("{doing}: {text}")),
     }
 }
 
-/// First task of the process.
 const LOADING: &str = "loading the binary";
 
-/// The other side: looks at the rule and answers with what it finds; it is ended after `limit`.
-pub fn answer(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
+/// Checks the rule `id` inside the process of the rule and sends the findings to the parent process, which
+/// ends this process after `limit`.
+pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     let Unpacked { path, directory, description } = fmu;
-    // it is needed as long as the process lives
+    // The description is needed until the process ends.
     let mut packed: &'static [u8] = std::fs::read(description)?.leak();
     let root = Element::unpack(&mut packed).context("the packed description has changed")?;
     let is_fmi3 = root.get("fmiVersion").is_some_and(|version| version.starts_with("3."));
@@ -204,7 +205,7 @@ pub fn answer(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     trace::doing(LOADING, Crash::Error);
     let before = life::surroundings();
     let mut findings = Findings::new(rule.severity);
-    // a rule that is slow, and not hung, shall tell what it has found by then
+    // A rule that is only slow reports its findings before the time limit.
     let deadline = Instant::now() + limit.mul_f64(0.75);
     let failed = |error: anyhow::Error, now: String, findings: &mut Findings| match error
         .downcast_ref::<Unusable>()
@@ -255,8 +256,8 @@ mod tests {
 
     use super::*;
 
-    /// Argument by which the test knows that it is the process of the rule. For the test harness it is the name of a test
-    /// that is not there.
+    /// Argument that marks the process of the rule. For the test harness it is the name of a test that does
+    /// not exist.
     const CHILD: &str = "process_of_the_rule";
 
     #[test]

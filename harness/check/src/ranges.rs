@@ -1,20 +1,21 @@
-//! Rules that compare ranges and enumeration items in modelDescription.xml with the binary (FMI 2.0.5, sections 2.2.3 and 2.2.7).
+//! Rules that compare the ranges and enumeration items of modelDescription.xml with the binary (FMI 2.0.5,
+//! sections 2.2.3 and 2.2.7).
 
 use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::dependencies::moved;
+use super::dependencies::randomised;
 use super::description::Variable;
 use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use super::values::{items, mentions};
 use host::description::Type;
 
-/// Tolerance of min and max, relative to the bound or the nominal value: an integrator leaves a state slightly off.
+/// Tolerance of min and max, relative to the bound or the nominal value, because an integrator may leave a
+/// state slightly outside its range.
 const OVERSHOOT: f64 = 1e-3;
 
-/// `values.in_range`
 pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let bounded =
         |v: &&Variable| v.bounds() != (f64::NEG_INFINITY, f64::INFINITY) && !v.is_set_by_hosts();
@@ -58,8 +59,8 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Sets a parameter or input before initialisation and initialises; why that was refused, if it was
-/// and no other variable is blamed for it.
+/// Sets `v` before initialisation and initialises. The inner error is the reason why the FMU refused the
+/// value.
 fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(), String>> {
     let mut session = fmu.session(fmu.first()?)?;
     fmu.doing(format!("setting {} to {value} and initialising", v.name));
@@ -69,11 +70,10 @@ fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(
     Ok(session.initialise().map_err(|error| error.to_string()))
 }
 
-/// `values.limits_exact`
 pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Relative distance just outside a bound.
+    /// Relative distance of a value just outside a bound.
     const JUST: f64 = 1e-6;
-    /// Distance of an Integer far outside any range that ends near the bound.
+    /// Distance from a bound at which an Integer is outside any reasonable range.
     const FAR: f64 = 1000.0;
     let mut any = false;
     let settable = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
@@ -98,7 +98,7 @@ pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 Type::Real => Reading::Real(x),
                 _ => Reading::Integer(x as i32),
             };
-            // An FMU that accepts anything breaks another rule, and has no range of its own.
+            // An FMU that accepts every value breaks another rule; it has no exact range to compare.
             if refusal(fmu, v, &at(far))?.is_ok() {
                 continue;
             }
@@ -119,7 +119,6 @@ pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.items`
 pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let all: Vec<&Variable> =
         fmu.variables().iter().filter(|v| v.kind == Type::Enumeration).collect();
@@ -140,7 +139,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     .add(v.place(), format!("{item} is an item of its type, but refused: {why}"));
             }
         }
-        // A type with items beyond those; one that takes any number is another matter.
+        // Reported are types with further items; a type that accepts any number is reported by another rule.
         let beyond = last.saturating_add(1000);
         let takes_any = refusal(fmu, v, &Reading::Integer(beyond))?.is_ok();
         if takes_any {
@@ -186,9 +185,9 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         }
     };
-    // Runs with other parameters, and starts with one parameter far from where it is.
+    // Runs with other parameters, and with one parameter far from its start value.
     for attempt in 0..STEPS as u64 {
-        let mut session = moved(fmu, fmu.first()?, attempt)?;
+        let mut session = randomised(fmu, fmu.first()?, attempt)?;
         fmu.doing(format!("initialising with other parameters, try {attempt}"));
         if session.initialise().is_err() {
             continue;
@@ -215,7 +214,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Values of a parameter or input far from its start and within its bounds.
+/// Lists values of a parameter or input that are far from its start value and within its bounds.
 fn far_values(v: &Variable) -> Vec<f64> {
     let (min, max) = v.bounds();
     let Some(Reading::Real(start)) = start_value(v) else { return Vec::new() };

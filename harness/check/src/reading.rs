@@ -1,4 +1,4 @@
-//! Dangerous content of modelDescription.xml: a host parses it before it knows anything about
+//! Rules about dangerous content of modelDescription.xml, which a host parses before it knows anything about
 //! the FMU.
 
 use host::xml::{Element, Fault};
@@ -8,18 +8,16 @@ use super::findings::Findings;
 
 const NAME: &str = "modelDescription.xml";
 
-/// A document type declaration.
+/// A document type declaration (`<!DOCTYPE …>`).
 pub struct Doctype {
-    /// Line of the file in which it begins.
     pub line: usize,
-    /// Text in the file.
     pub text: String,
 }
 
 impl Doctype {
-    /// Finds the one of a file: only the XML declaration, comments, processing instructions and
-    /// white space may come before it. Looks at the bytes themselves, so that no parser has to
-    /// understand the rest.
+    /// Finds the DOCTYPE of a file. Only the XML declaration, comments, processing instructions and white
+    /// space may precede it. The bytes are searched directly, because a parser might refuse the file for
+    /// other reasons.
     pub fn find(bytes: &[u8]) -> Option<Doctype> {
         let text = String::from_utf8_lossy(bytes);
         let mut rest = text.trim_start_matches('\u{feff}');
@@ -37,7 +35,7 @@ impl Doctype {
             return None;
         }
         let line = text[..text.len() - rest.len()].matches('\n').count() + 1;
-        // to its end, which is after the internal subset if there is one
+        // The declaration ends after its internal subset, if it has one.
         let end = match rest.find(['[', '>']) {
             Some(at) if rest[at..].starts_with('[') => rest.find("]>").map(|at| at + 2),
             at => at.map(|at| at + 1),
@@ -45,7 +43,7 @@ impl Doctype {
         Some(Doctype { line, text: rest[..end.unwrap_or(rest.len())].to_string() })
     }
 
-    /// Effect on a parser.
+    /// Describes what this declaration makes an XML parser do, as part of a sentence.
     pub fn danger(&self) -> &'static str {
         if self.text.contains("SYSTEM") || self.text.contains("PUBLIC") {
             "it makes a parser open another file or address"
@@ -57,7 +55,7 @@ impl Doctype {
     }
 }
 
-/// The encoding that the XML declaration names, if it names one.
+/// Returns the encoding in the XML declaration, or `None` if there is none.
 fn encoding(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(1000)]);
     let declaration = text.trim_start_matches('\u{feff}').strip_prefix("<?xml")?;
@@ -68,7 +66,6 @@ fn encoding(bytes: &[u8]) -> Option<String> {
     Some(value[1..].split_once(quote)?.0.to_string())
 }
 
-/// `xml.encoding`
 pub fn utf8(archive: &Archive, findings: &mut Findings) {
     let Some(bytes) = archive.file(NAME) else {
         return findings.skip("there is no modelDescription.xml that can be unpacked");
@@ -84,7 +81,6 @@ pub fn utf8(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `xml.doctype`
 pub fn doctype(archive: &Archive, findings: &mut Findings) {
     let Some(bytes) = archive.file(NAME) else {
         return findings.skip("there is no modelDescription.xml that can be unpacked");
@@ -103,7 +99,6 @@ pub fn doctype(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `xml.size`
 pub fn size(archive: &Archive, findings: &mut Findings) {
     let Some(bytes) = archive.file(NAME) else {
         return findings.skip("there is no modelDescription.xml that can be unpacked");

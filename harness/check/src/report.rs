@@ -1,5 +1,3 @@
-//! The report of a check.
-
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -7,45 +5,39 @@ use std::time::Duration;
 use crate::findings::{Finding, Findings, Severity};
 use crate::rule::Rule;
 
-/// Findings of one rule that a person is shown; those kept are in the JUnit file.
+/// Largest number of findings of one rule in the text report. The JUnit file has all that were stored.
 const SHOWN: usize = 8;
 
-/// Result of a rule.
 pub struct Outcome {
-    /// The rule.
     pub rule: &'static Rule,
-    /// Findings.
     pub findings: Findings,
-    /// Time that it took.
     pub time: Duration,
 }
 
-/// Everything that was looked at.
 pub struct Report {
-    /// The FMU.
     pub path: PathBuf,
-    /// One for each rule, in the table's order.
+    /// Results of the rules, in the order of the table.
     pub outcomes: Vec<Outcome>,
-    /// The error that no selected rule was checked, if that is so: such a report says nothing about the FMU.
+    /// The error that no selected rule was checked. A report with this error says nothing about the FMU.
     pub unchecked: Option<String>,
-    /// Report of a bug of this program for which a rule could not be checked.
+    /// Report of a bug in this program because of which a rule could not be checked.
     pub bug: Option<String>,
 }
 
 impl Report {
-    /// Number of findings of this severity.
-    pub fn count(&self, severity: Severity) -> usize {
+    /// Counts the findings of one severity, including those beyond the stored ones.
+    pub fn count_findings(&self, severity: Severity) -> usize {
         let more = self.outcomes.iter().map(|outcome| &outcome.findings);
         let more = more.filter(|f| f.severity == severity).map(|f| f.more).sum::<usize>();
         more + self.all().filter(|(_, finding)| finding.severity == severity).count()
     }
 
-    /// All findings, each with its rule.
+    /// Iterates over all stored findings, each with its rule.
     pub fn all(&self) -> impl Iterator<Item = (&'static Rule, &Finding)> {
         self.outcomes.iter().flat_map(|o| o.findings.list.iter().map(move |f| (o.rule, f)))
     }
 
-    /// Returns the report as text: every finding, the skipped rules with reasons, and a summary.
+    /// Renders the report as text: every finding, the skipped rules with their reasons, and a summary.
     pub fn text(&self) -> String {
         let mut text = String::new();
         for outcome in &self.outcomes {
@@ -89,8 +81,8 @@ impl Report {
             text,
             "{}: {} errors, {} warnings; {} rules looked at, {skipped} skipped",
             self.path.display(),
-            self.count(Severity::Error),
-            self.count(Severity::Warning),
+            self.count_findings(Severity::Error),
+            self.count_findings(Severity::Warning),
             self.outcomes.len() - skipped,
         );
         if let Some(why) = &self.unchecked {

@@ -1,5 +1,3 @@
-//! One rule and the function that checks it.
-
 use anyhow::Result;
 
 use crate::archive::Archive;
@@ -9,21 +7,17 @@ use crate::findings::{Findings, Severity};
 use crate::under_test::FmuUnderTest;
 use crate::v3;
 
-/// One rule: what must hold, who says so, and how to look.
+/// A rule: a statement about every FMU, its source in the standard, and the function that checks it.
 pub struct Rule {
-    /// Group and name, `group.name`.
     pub id: &'static str,
-    /// Statement that must hold.
     pub title: &'static str,
-    /// The section of FMI 2.0.5 or 3.0.2, or the host that trips over it.
+    /// The section of FMI 2.0.5 or 3.0.2, or the name of a host that fails if the rule is broken.
     pub source: &'static str,
-    /// Severity when it is broken. A crash or an endless call is always an error.
+    /// Severity of a finding. A crash or an endless call is always an error.
     pub severity: Severity,
-    /// Function that checks it.
     pub check: Check,
 }
 
-/// A rule as a line of a table.
 pub(crate) const fn rule(
     id: &'static str,
     severity: Severity,
@@ -34,26 +28,21 @@ pub(crate) const fn rule(
     Rule { id, title, source, severity, check }
 }
 
-/// The function behind a rule, by what it looks at.
+/// The function that checks a rule, by its input.
 pub enum Check {
-    /// The zip archive.
     Archive(fn(&Archive, &mut Findings)),
-    /// modelDescription.xml.
     Description(fn(&Description, &mut Findings)),
-    /// The files under `binaries/`.
     Binaries(fn(&Binaries, &mut Findings)),
-    /// The loaded FMU, in a process of its own. A call that fails although it must not is a finding.
+    /// For the loaded FMU, in a process of its own. If the function returns an error, the call that failed is
+    /// a finding.
     Calls(fn(&FmuUnderTest, &mut Findings) -> Result<()>),
-    /// modelDescription.xml of FMI 3.0.
     Description3(fn(&v3::Description, &mut Findings)),
-    /// The files under `binaries/` of an FMU 3.0.
     Binaries3(fn(&v3::Binaries, &mut Findings)),
-    /// The loaded FMU 3.0, in a process of its own.
     Calls3(fn(&v3::Subject, &mut Findings) -> Result<()>),
 }
 
 impl Rule {
-    /// True if it calls the FMU.
+    /// Returns true if checking this rule calls the binary.
     pub fn is_of_calls(&self) -> bool {
         matches!(self.check, Check::Calls(_) | Check::Calls3(_))
     }

@@ -1,4 +1,4 @@
-//! The report as SARIF 2.1.0, which code hosts show next to the code.
+//! Writes the report as SARIF 2.1.0, which code hosting services show next to the code.
 
 use std::io::Write;
 
@@ -8,7 +8,7 @@ use serde_json::json;
 use super::findings::Severity;
 use super::report::Report;
 
-/// A path as a reference of RFC 3986: an absolute one is a file's address.
+/// Converts a path to a URI reference (RFC 3986); an absolute path becomes a `file://` address.
 fn uri(path: &str) -> String {
     let mut uri = String::from(if path.starts_with('/') { "file://" } else { "" });
     for byte in path.bytes() {
@@ -22,10 +22,11 @@ fn uri(path: &str) -> String {
     uri
 }
 
-/// Writes the report.
+/// Writes the report in SARIF.
 ///
 /// # Errors
-/// If it cannot be written.
+///
+/// If `out` cannot be written.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
     let fmu = uri(&report.path.display().to_string().replace('\\', "/"));
     let rules: Vec<_> = report
@@ -50,7 +51,7 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
                 "ruleId": rule.id,
                 "level": level,
                 "message": { "text": format!("{}: {}", finding.place, finding.text) },
-                // GitHub asks for a line
+                // GitHub requires a line number.
                 "locations": [{ "physicalLocation": {
                     "artifactLocation": { "uri": fmu }, "region": { "startLine": 1 }
                 } }],

@@ -1,62 +1,50 @@
-//! The schema of modelDescription.xml as a table: which elements stand where and in which order, which
-//! attributes they have and how those are written. The table of FMI 2.0 (2.0.5, section 2.2) is here, that of 3.0 in
-//! `v3/schema.rs`.
+//! The schema of modelDescription.xml as a table: the elements with their parents and order, their
+//! attributes, and the format of each attribute. This file has the table of FMI 2.0 (2.0.5, section 2.2);
+//! `v3/schema.rs` has the table of FMI 3.0.
 
 use super::description::Description;
 use super::findings::Findings;
 use host::xml::{Element, double};
 
-/// Format of an attribute's value.
 #[derive(Clone, Copy)]
 pub enum Written {
-    /// Any text.
     Text,
-    /// true, false, 1, 0.
     Boolean,
-    /// 32 bits.
     Int,
-    /// 32 bits, from 0.
     Unsigned,
-    /// as xs:double.
     Double,
-    /// as xs:dateTime.
     Time,
-    /// 64 bits.
     Long,
-    /// Any number of these with spaces between.
+    /// Any number of such values, separated by spaces.
     List(&'static Written),
-    /// One of these.
     OneOf(&'static [&'static str]),
-    /// Words from a list with spaces between.
+    /// Any number of these words, separated by spaces.
     Words(&'static [&'static str]),
 }
 
 use Written::*;
 
-/// An element: `parent/name`, or `name` if it is the same wherever it stands.
+/// An element of the schema. Its name is `parent/name` if elements of this name differ between parents.
 pub struct Kind {
     name: &'static str,
     needed: Attributes,
     optional: Attributes,
-    /// Optional ones that other elements have too.
+    /// Optional attributes that several elements have in common.
     shared: Attributes,
     children: Children,
 }
 
-/// Attributes with their formats.
 pub type Attributes = &'static [(&'static str, Written)];
 
-/// Children of an element.
 pub enum Children {
-    /// Anything.
     Any,
-    /// Each of these at most once, in this order; those with `!` must be there.
+    /// Each of these elements at most once, in this order; those marked with `!` are required.
     Sequence(&'static [&'static str]),
-    /// Any number of each, in this order.
+    /// Any number of each of these elements, in this order.
     Ordered(&'static [&'static str]),
-    /// One or more of these, in any order.
+    /// One or more of these elements, in any order.
     Many(&'static [&'static str]),
-    /// One of these, then what else there may be.
+    /// Exactly one of the first elements, then any of the second.
     Choice(&'static [&'static str], &'static [&'static str]),
 }
 
@@ -71,7 +59,7 @@ pub(crate) const DEPENDENCY: Written =
     Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
 const TYPES: &[&str] = &["Real", "Integer", "Boolean", "String", "Enumeration"];
 
-/// An element of a table.
+/// Creates an element of the table without shared attributes.
 pub const fn kind(
     name: &'static str,
     needed: Attributes,
@@ -82,7 +70,7 @@ pub const fn kind(
 }
 
 impl Kind {
-    /// Adds attributes that other elements have too.
+    /// Adds optional attributes that several elements have in common.
     pub const fn and(self, shared: Attributes) -> Kind {
         Kind { shared, ..self }
     }
@@ -95,7 +83,7 @@ impl Kind {
 #[rustfmt::skip]
 static KINDS: &[Kind] = &[
     kind("fmiModelDescription",
-        // fmiVersion's value is a rule of its own
+        // A rule of its own checks the value of fmiVersion.
         &[("fmiVersion", Text), ("modelName", Text), ("guid", Text)],
         &[("description", Text), ("author", Text), ("version", Text), ("copyright", Text),
           ("license", Text), ("generationTool", Text), ("generationDateAndTime", Time),
@@ -177,13 +165,9 @@ fn find(kinds: &'static [Kind], parent: &str, name: &str) -> Option<&'static Kin
     kinds.iter().find(|k| k.name == full).or_else(|| kinds.iter().find(|k| k.name == name))
 }
 
-/// Value references or indices.
 pub const INDICES: Written = List(&Unsigned);
-/// Whole numbers of 64 bits.
 pub const LONGS: Written = List(&Long);
-/// Numbers.
 pub const DOUBLES: Written = List(&Double);
-/// Truth values.
 pub const BOOLEANS: Written = List(&Boolean);
 
 impl Written {
@@ -203,7 +187,7 @@ impl Written {
         }
     }
 
-    /// Describes the values that are allowed.
+    /// Describes the allowed values for a finding.
     fn allowed(self) -> String {
         match self {
             Text => "any text".into(),
@@ -223,7 +207,7 @@ impl Written {
     }
 }
 
-/// Returns true for an `xs:dateTime`; fractions of seconds and time zones are allowed.
+/// Returns true if `text` is an `xs:dateTime`; fractions of seconds and time zones are allowed.
 fn is_time(text: &str) -> bool {
     let Some((date, time)) = text.split_once('T') else { return false };
     let date: Vec<Option<u32>> = date.split('-').map(|part| part.parse().ok()).collect();
@@ -263,12 +247,12 @@ fn place(element: &Element) -> String {
     }
 }
 
-/// `xml.schema`: elements and attributes that are there, missing or in the wrong order.
+/// `xml.schema`: reports elements and attributes that are unknown, missing or in the wrong order.
 pub fn structure(description: &Description, findings: &mut Findings) {
     structure_by(KINDS, &description.root, findings);
 }
 
-/// The same by the table of another version.
+/// Checks the tree below `root` against the elements of `kinds`, the table of one FMI version.
 pub fn structure_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings) {
     if root.name != "fmiModelDescription" {
         return findings.add(place(root), "the root element is not fmiModelDescription");
@@ -284,7 +268,7 @@ fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &
     let is_open = !std::ptr::eq(kinds, KINDS) && ANY_ATTRIBUTE.contains(&&*element.name);
     for (attribute, _) in &element.attributes {
         let known = kind.attributes().any(|(name, _)| name == attribute);
-        // xsi:noNamespaceSchemaLocation belongs to XML itself
+        // xsi:noNamespaceSchemaLocation is part of XML Schema itself and always allowed.
         if !known
             && !is_open
             && attribute != "noNamespaceSchemaLocation"
@@ -362,7 +346,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                 if seen.contains(&&*child.name) {
                     findings.add(place(child), "it is there twice (allowed: once)");
                 } else if at < reached && child.name != "ModelExchange" {
-                    // the two interfaces may come in any order
+                    // The two interfaces may come in any order.
                     findings.add(
                         place(child),
                         format!(
@@ -395,7 +379,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
             for child in &element.children {
                 match all.iter().position(|name| *name == child.name) {
                     None => unknown(child, &all, findings),
-                    // the types come first, whichever it is
+                    // The type element comes first, whichever type it is.
                     Some(at) if at.max(choice.len().saturating_sub(1)) < reached => {
                         findings.add(
                             place(child),
@@ -409,12 +393,12 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
     }
 }
 
-/// `xml.values`: how the values of attributes are written.
+/// `xml.values`: reports attributes whose values do not have the required format.
 pub fn values(description: &Description, findings: &mut Findings) {
     values_by(KINDS, &description.root, findings);
 }
 
-/// The same by the table of another version.
+/// Checks the attribute values below `root` against the formats of `kinds`, the table of one FMI version.
 pub fn values_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings) {
     value(kinds, "", root, findings);
 }

@@ -1,4 +1,4 @@
-//! Saved states (FMI 2.0.5, section 2.1.8).
+//! Rules about saved states (FMI 2.0.5, section 2.1.8).
 
 use anyhow::Result;
 
@@ -6,7 +6,8 @@ use super::findings::Findings;
 use super::loaded::{Life, Mark, Readings, STEPS, UnderTest, Unusable};
 use super::under_test::{FmuUnderTest, Stage};
 
-/// Uses whose interface declares a capability, such as "canSerialize" with the word for the state; none is a reason to skip.
+/// Returns the uses whose interface declares the capability `can`, for example "canSerialize", to which the
+/// version's word for a state is appended. Skips the rule if there are none.
 pub fn with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> Vec<F::Use> {
     let flag = format!("{can}{}", F::STATE);
     let mut all = fmu.uses();
@@ -20,7 +21,7 @@ pub fn with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> Vec<F:
 const SAVE: &str = "canGetAndSet";
 const SERIALIZE: &str = "canSerialize";
 
-/// Goes on by some steps from where the host was when it saved the state.
+/// Simulates some steps from the host's state at which the FMU state was saved, and returns the values.
 fn continued<'f, F: UnderTest + 'f>(
     session: &mut F::Session<'f>,
     from: &Mark<'f, F>,
@@ -30,7 +31,8 @@ fn continued<'f, F: UnderTest + 'f>(
     session.readings()
 }
 
-/// Fails if a run from a saved state differs in the instance that has saved it: `states.rollback` reports that.
+/// Returns an error if a repeated run from a saved state differs within one instance. `states.rollback`
+/// reports this.
 fn rolls_back<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
     let mut session = fmu.running(using)?;
     session.advance(3)?;
@@ -45,7 +47,7 @@ fn rolls_back<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
     }
 }
 
-/// `states.rollback`; of FMI 3.0 `states.restore`
+/// `states.rollback`, and in FMI 3.0 `states.restore`.
 pub fn rollback<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let call = |verb: &str| format!("{}{verb}{}", F::FMI, F::STATE);
     for using in with(fmu, SAVE, findings) {
@@ -73,7 +75,6 @@ pub fn rollback<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `states.handle`
 pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in with(fmu, SAVE, findings) {
         let mut session = fmu.running(interface)?;
@@ -96,7 +97,6 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `states.bytes`
 pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in with(fmu, SERIALIZE, findings) {
         let (first, here, bytes) = {
@@ -115,7 +115,8 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let here = session.mark();
             (continued::<FmuUnderTest>(&mut session, &here)?, here, bytes)
         };
-        // One instance that has lived, one that was neither set up nor initialised.
+        // Restored into an instance that has been simulated and into one that was neither set up nor
+        // initialised.
         for lived in [true, false] {
             let mut other = match lived {
                 true => fmu.running(interface)?,
@@ -139,7 +140,6 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `states.garbage`
 pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in with(fmu, SERIALIZE, findings) {
         let mut session = fmu.running(interface)?;
@@ -179,7 +179,7 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 findings.add(place, "it is accepted (allowed: fmi2Error)");
                 break;
             }
-            // After an error it may refuse to be read.
+            // After an error the FMU may refuse to be read.
             if let Ok(after) = session.readings()
                 && let Some(text) = session.difference(&after, &before)
             {
@@ -195,7 +195,6 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `states.modes`
 pub fn modes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in with(fmu, SAVE, findings) {
         for stage in [Stage::Instantiated, Stage::Initialization, Stage::Terminated] {

@@ -1,8 +1,8 @@
-//! Co-Simulation steps (FMI 2.0.5, section 4.2).
+//! Rules about steps of Co-Simulation (FMI 2.0.5, section 4.2).
 
 use anyhow::Result;
 
-use super::dependencies::elsewhere;
+use super::dependencies::displaced;
 use super::description::Variable;
 use super::findings::Findings;
 use super::life::expect_refusal;
@@ -12,7 +12,7 @@ use super::under_test::{
 use host::causality::Causality;
 use host::fmi2::{CallError, Status};
 
-/// A stepping instance, or the reason why there is none.
+/// Returns an initialised instance for Co-Simulation, or skips the rule if the FMU has no Co-Simulation.
 fn stepping<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
     if !fmu.interfaces().contains(&Interface::CoSimulation) {
         findings.skip("it offers no Co-Simulation");
@@ -21,8 +21,11 @@ fn stepping<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option
     fmu.running(Interface::CoSimulation).map(Some)
 }
 
-/// Returns a session of [`stepping`] if three ordinary steps succeed. If they do not, other rules report it.
-fn able<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
+/// Returns an instance for Co-Simulation after three ordinary steps. If they fail, other rules report it.
+fn after_three_steps<'f>(
+    fmu: &'f FmuUnderTest,
+    findings: &mut Findings,
+) -> Result<Option<Session<'f>>> {
     if let Some(mut session) = stepping(fmu, findings)? {
         session.advance(3)?;
         if session.is_ended() {
@@ -33,7 +36,7 @@ fn able<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Ses
     stepping(fmu, findings)
 }
 
-/// Returns true if steps may have any size.
+/// Returns true if the FMU accepts steps of any size; otherwise skips the rule.
 fn variable_steps(fmu: &FmuUnderTest, findings: &mut Findings) -> bool {
     let can = fmu.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize");
     if !can {
@@ -42,7 +45,6 @@ fn variable_steps(fmu: &FmuUnderTest, findings: &mut Findings) -> bool {
     can
 }
 
-/// `steps.run`
 pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
     let Some(mut session) = stepping(fmu, findings)? else { return Ok(()) };
@@ -73,11 +75,10 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.size`
 pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for h in [0.0, -0.01, f64::INFINITY, f64::NAN] {
-        // After an error an FMU may refuse everything: a new instance each time.
-        let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
+        // After an error the FMU may refuse every call, so that each step size needs a new instance.
+        let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
         session.advance(3)?;
         let before = session.readings()?;
         let place = format!("fmi2DoStep with communicationStepSize = {h:?}");
@@ -100,10 +101,9 @@ pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.point`
 pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for off in [2.0, -1.0, f64::NAN] {
-        let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
+        let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
         session.advance(3)?;
         let wrong = session.time + off * session.step;
         let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
@@ -114,13 +114,12 @@ pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.wobble`
 pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
-    let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
+    let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
     let (start, h) = (session.time, session.step);
     for n in 0..LONG {
-        // n·h and t + h differ by ulps; some hosts take one, some the other
+        // n·h and t + h differ by rounding; some hosts pass the first and some the second.
         let product = start + n as f64 * h;
         let wobbled = match n % 3 {
             0 => product,
@@ -140,10 +139,9 @@ pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.start_time`
 pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
-        // if that fails, another rule tells
+        // If this fails, another rule reports it.
         fmu.running(interface)?.advance(STEPS)?;
         for start in [fmu.experiment().start + 1000.0, fmu.experiment().start - 3.0] {
             let mut session = fmu.session(interface)?;
@@ -158,16 +156,15 @@ pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.stop_time`
 pub fn stop_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    if able(fmu, findings)?.is_none() {
+    if after_three_steps(fmu, findings)?.is_none() {
         return Ok(());
     }
     let experiment = fmu.experiment();
     let stop = experiment.start + STEPS as f64 * experiment.step;
     let mut session = fmu.session(Interface::CoSimulation)?;
     session.initialise_at(experiment.start, Some(stop), experiment.tolerance)?;
-    // the sum of the steps differs from the stop time by some ulps
+    // The sum of the steps differs from the stop time by rounding.
     if let Err(error) = session.advance(STEPS) {
         findings.add(
             fmu.now(),
@@ -182,7 +179,6 @@ pub fn stop_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.tolerance`
 pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let start = fmu.experiment().start;
     let mut fails = Vec::new();
@@ -201,7 +197,7 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         }
     }
-    // Where none works, the tolerance is not to blame; another rule tells.
+    // If no tolerance works, the tolerance is not the reason, and another rule reports it.
     for interface in fmu.interfaces() {
         let of_this = fails.iter().filter(|(i, ..)| *i == interface);
         if of_this.clone().count() < 3 {
@@ -213,11 +209,11 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.cut`
 pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Errors of many steps add up, and the tolerance is a step's.
+    /// Allowed multiple of the tolerance, because the errors of many steps add up and the tolerance is for
+    /// one step.
     const SLACK: f64 = 1e3;
-    let Some(session) = able(fmu, findings)? else { return Ok(()) };
+    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
     drop(session);
     if !variable_steps(fmu, findings) {
         return Ok(());
@@ -226,7 +222,7 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.skip("no tolerance is suggested");
         return Ok(());
     };
-    // The same inputs, held over each of the long steps.
+    // The same inputs, held constant during each long step.
     let run = |parts: usize| -> Result<(Vec<f64>, Vec<f64>)> {
         let mut session = fmu.running(Interface::CoSimulation)?;
         let mut scale = vec![0.0f64; fmu.outputs.len()];
@@ -270,15 +266,15 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.lag`
 pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Change of a value with the step, relative to its size, that is more than rounding.
+    /// Relative change of a value with the step above which it is more than rounding.
     const SEEN: f64 = 1e-6;
-    /// Steps after which an FMU that delays constant inputs by a step or two shows them.
+    /// Number of steps after which an FMU that delays constant inputs by one or two steps shows their effect.
     const SETTLED: usize = 4;
-    /// Share of that change by which a value may miss the one of a step earlier.
+    /// Fraction of this change by which a value may differ from that of one step earlier and still count as
+    /// the same.
     const SAME: f64 = 0.02;
-    let Some(session) = able(fmu, findings)? else { return Ok(()) };
+    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
     let usual = session.step;
     drop(session);
     let states: Vec<&Variable> = fmu.states().into_iter().map(|(_, state)| state).collect();
@@ -288,7 +284,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         v.is_continuous() && (shows || is_state(v))
     };
     let watched: Vec<&Variable> = fmu.variables().iter().filter(is_watched).collect();
-    // what the FMU does by itself: that it delays its inputs by a step may be its purpose
+    // Only the FMU's own motion is compared: delaying its inputs by a step may be its purpose.
     let run = |step: f64, count: usize| -> Result<Vec<Vec<f64>>> {
         let mut session = fmu.running(Interface::CoSimulation)?;
         session.stimulate()?;
@@ -304,7 +300,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
         Ok(all)
     };
-    // an FMU may take none but its own step, or multiples of that
+    // The FMU may accept only its own step size or multiples of it.
     let pair = |step: f64, count: usize| -> Result<_> {
         Ok((run(step, count)?, run(step / 2.0, 2 * count)?, step))
     };
@@ -320,12 +316,12 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     };
     let points = long.len().min(short.len() / 2);
     for (i, v) in watched.iter().enumerate() {
-        // short[2k + 1] is at the time of long[k], and short[2k] half a long step before
+        // short[2k + 1] is at the time of long[k], and short[2k] half a long step earlier.
         let off = |k: usize| (long[k][i] - short[2 * k + 1][i]).abs();
         let largest = |of: &dyn Fn(usize) -> f64| (SETTLED..points).map(of).fold(0.0, f64::max);
         let size = largest(&|k| long[k][i].abs()).max(1e-3 * v.nominal());
         let (apart, missed) = (largest(&off), largest(&|k| (long[k][i] - short[2 * k][i]).abs()));
-        // NaN is the business of another rule
+        // NaN is reported by another rule.
         let lags = points > 2 * SETTLED && apart > SEEN * size && missed <= SAME * apart;
         if let Some(k) = (SETTLED..points).find(|k| off(*k) == apart).filter(|_| lags) {
             let time = fmu.experiment().start + (k + 1) as f64 * step;
@@ -346,9 +342,8 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.inputs`
 pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
+    let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_real()).collect();
     if inputs.is_empty() {
@@ -377,13 +372,13 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.input_derivatives`
 pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Change of the input in a step, relative to its size.
+    /// Change of the input within a step, relative to its magnitude.
     const SHARE: f64 = 0.3;
-    /// Effect of a held input that a slope lacks, relative to the former, if the FMU ignores the slope.
+    /// If the difference between a held input and one with a slope is below this fraction of the held input's
+    /// effect, the FMU ignores the slope.
     const IGNORED: f64 = 0.05;
-    if able(fmu, findings)?.is_none() {
+    if after_three_steps(fmu, findings)?.is_none() {
         return Ok(());
     }
     if !fmu.can(Interface::CoSimulation, "canInterpolateInputs") {
@@ -393,7 +388,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     let computed = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let computed: Vec<&Variable> = fmu.variables().iter().filter(computed).collect();
     let mut any = false;
-    // one input may be the derivative of another, which needs no slope then: one that acts is enough
+    // One input may be the derivative of another one, which then needs no slope. Therefore it is enough that
+    // one input has an effect.
     let (mut acts, mut ignored) = (false, Vec::new());
     for &input in &fmu.inputs {
         let running = || -> Result<(Session, Reading)> {
@@ -404,12 +400,13 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         };
         let (_, now) = running()?;
         let (Reading::Real(here), Some(Reading::Real(there))) =
-            (&now, elsewhere(fmu, input, &now, SHARE))
+            (&now, displaced(fmu, input, &now, SHARE))
         else {
             continue;
         };
         any = true;
-        // where a step leads with the input held somewhere, or on a slope from there; the input last
+        // Result of a step with the input held at a value, or with a slope from that value. The input itself
+        // comes last.
         let end = |value: f64, slope: Option<f64>| -> Result<Vec<f64>> {
             let (mut session, _) = running()?;
             fmu.doing(format!("a step with {} = {value:?}, its slope {slope:?}", input.name));
@@ -425,12 +422,13 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         let held = end(*here, None)?;
         let on_average = end(0.5 * (here + there), None)?;
         let on_slope = end(*here, Some((there - here) / step))?;
-        // the FMU moves the input itself: what else follows it may be too little to see
+        // The FMU changes the input itself; other variables may follow too little to be seen.
         if on_slope.last() != held.last() {
             acts = true;
             continue;
         }
-        // the variables that the input visibly changes within a step, and how much of it the slope does
+        // The variables that the input visibly changes within a step, and how much of this change the slope
+        // makes.
         let followed = |n: usize| {
             let (whole, part) = (on_average[n] - held[n], on_slope[n] - held[n]);
             let size = held[n].abs().max(1e-3 * computed[n].nominal());
@@ -459,9 +457,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     Ok(())
 }
 
-/// `steps.output_derivatives`
 pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
+    let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
     let interface = fmu.description().co_simulation.as_ref();
     let order = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if order < 1.0 {
@@ -481,7 +478,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
     if !fmu.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize") {
         return Ok(());
     }
-    // Differences over two short steps, held inputs; where they disagree the output is not smooth.
+    // Differences over two short steps with held inputs. Where the two disagree, the output is not smooth.
     let h = session.step * 1e-3;
     let mut points = Vec::new();
     for n in 0..3 {
@@ -497,7 +494,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
             ((points[1][n] - points[0][n]) / h, (points[2][n] - points[1][n]) / h);
         let at_start = 1.5 * first - 0.5 * second;
         let smooth = (first - second).abs() <= 0.1 * first.abs().max(second.abs());
-        // a hundredth of the value, and what rounding of the values leaves
+        // A hundredth of the value, plus the rounding of the values.
         let rounding = 1e-9 * points[0][n].abs().max(1e-3 * v.nominal()) / h;
         let off = (declared[n] - at_start).abs();
         if declared[n].is_nan() || (smooth && off > 1e-2 * at_start.abs() + rounding) {
@@ -516,13 +513,12 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
 
 const VARIABLE: &str = "canHandleVariableCommunicationStepSize is declared";
 
-/// `steps.small`
 pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Steps that are tried instead of the usual ones, s.
+    /// Step sizes that are tried instead of the usual one, s.
     const SMALL: [f64; 2] = [4e-4, 1e-5];
-    /// Largest number of steps.
+    /// Largest number of steps in one run.
     const MOST: f64 = 5000.0;
-    let Some(session) = able(fmu, findings)? else { return Ok(()) };
+    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
     let usual = session.step;
     drop(session);
     if !variable_steps(fmu, findings) {
@@ -531,8 +527,8 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let experiment = fmu.experiment();
     let continuous = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let all: Vec<&Variable> = fmu.variables().iter().filter(continuous).collect();
-    // Values before and after `count` steps of `h` with the inputs held, or the FMU's message; `None` if the FMU ends the
-    // simulation.
+    // Values before and after `count` steps of `h` with the inputs held, or the FMU's message. `None` if the
+    // FMU ends the simulation.
     type Ends = Option<Result<(Vec<f64>, Vec<f64>), String>>;
     let run = |h: f64, count: usize| -> Result<Ends> {
         let mut session = fmu.running(Interface::CoSimulation)?;
@@ -556,7 +552,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         Ok(Some(Ok((before, read(&mut session)?))))
     };
     for h in SMALL {
-        // the same time in usual steps and in small ones
+        // The same span of time in usual steps and in small steps.
         let longest = (MOST * h).min(1.0);
         let steps = (longest / usual).floor().clamp(1.0, STEPS as f64);
         let time = (steps * usual).min(longest);
@@ -575,7 +571,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let moved = usually[n] - before[n];
             let size = before[n].abs().max(usually[n].abs()).max(1e-3 * v.nominal());
             let visible = 100.0 * experiment.tolerance.unwrap_or(1e-5).max(1e-9) * size;
-            // how exact the one or the other is, is the business of steps.cut
+            // The accuracy of the two runs is the subject of steps.cut.
             let stays = (small[n] - before[n]).abs() <= 0.05 * moved.abs();
             if moved.abs() > visible && stays {
                 findings.add(
@@ -599,9 +595,8 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.output_derivative_order`
 pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(session) = able(fmu, findings)? else { return Ok(()) };
+    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
     drop(session);
     let interface = fmu.description().co_simulation.as_ref();
     let most = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
@@ -612,7 +607,7 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
     let outputs = &fmu.outputs;
     for order in 1..=most.min(10.0) as i32 {
         for v in outputs {
-            // after an error an FMU may refuse everything: a new instance each time
+            // After an error the FMU may refuse every call, so that each order needs a new instance.
             let mut session = fmu.running(Interface::CoSimulation)?;
             session.advance(3)?;
             let place = format!("derivative {order} of {}", v.name);
@@ -634,19 +629,19 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
     Ok(())
 }
 
-/// `steps.terminated`
 pub fn terminated(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = stepping(fmu, findings)? else { return Ok(()) };
-    tell_end(&mut session, findings)
+    report_early_end(&mut session, findings)
 }
 
-/// Runs until the FMU asks for the end, and tells that if it comes before the suggested one.
-pub fn tell_end(session: &mut Session, findings: &mut Findings) -> Result<()> {
+/// Simulates until the FMU requests the end of the simulation, and reports it if that is before the end of
+/// the default experiment.
+pub fn report_early_end(session: &mut Session, findings: &mut Findings) -> Result<()> {
     let experiment = session.fmu.experiment();
     session.advance(2 * STEPS)?;
     let Some((time, call)) = session.ended() else { return Ok(()) };
     let place = format!("{call} at t = {time:?} s");
-    // where no end is suggested, the model may have reached its own
+    // Without a suggested stop time the model may have reached its own end.
     let suggested = match experiment.stop {
         Some(stop) if time < stop - 1e-9 * stop.abs() => format!("stopTime={stop}"),
         None => "no stopTime".into(),

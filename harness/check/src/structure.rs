@@ -1,4 +1,4 @@
-//! ModelStructure of modelDescription.xml (FMI 2.0.5, section 2.2), and dependencies.
+//! Rules about ModelStructure in modelDescription.xml (FMI 2.0.5, section 2.2) and about dependencies.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,8 @@ use host::causality::Causality;
 use super::description::{Description, Unknown, Variable};
 use super::findings::Findings;
 
-/// Reports entries that are missing, repeated or not allowed.
+/// Reports entries of the list named `list` that are missing, repeated or not in `expected`; `why` describes
+/// the allowed entries.
 fn compare(
     d: &Description,
     findings: &mut Findings,
@@ -19,7 +20,7 @@ fn compare(
     let mut seen = BTreeSet::new();
     for unknown in listed {
         let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
-        // An index out of range is another rule's business.
+        // An index out of range is reported by another rule.
         if d.at(unknown.index).is_some() && !expected.contains(&unknown.index) {
             findings.add(&place, format!("it is not allowed here (allowed: {why})"));
         }
@@ -39,13 +40,11 @@ fn indices(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<usiz
     d.variables.iter().filter(|v| wanted(v)).map(|v| v.index).collect()
 }
 
-/// `xml.outputs`
 pub fn outputs(d: &Description, findings: &mut Findings) {
     let expected = indices(d, |v| v.causality == Causality::Output);
     compare(d, findings, "Outputs", &d.outputs, &expected, "every output, once");
 }
 
-/// `xml.derivatives`
 pub fn derivatives(d: &Description, findings: &mut Findings) {
     if d.model_exchange.is_none() && d.derivatives.is_empty() {
         return findings.skip("Co-Simulation alone need not list derivatives");
@@ -73,7 +72,6 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.initial_unknowns`
 pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
     let states = d.states();
     let expected = indices(d, |v| {
@@ -85,7 +83,7 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
                 || v.causality == Causality::CalculatedParameter
                 || state)
     });
-    // What a Co-Simulation FMU says of its states is up to it.
+    // The standard lets an FMU for Co-Simulation list its states or leave them out.
     let expected = match d.derivatives.is_empty() && d.model_exchange.is_none() {
         true => indices(d, |v| {
             expected.contains(&v.index)
@@ -107,7 +105,7 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// The three lists of ModelStructure with their names.
+/// Returns the three lists of ModelStructure with their names.
 fn lists(d: &Description) -> [(&'static str, &[Unknown]); 3] {
     [
         ("Outputs", &d.outputs),
@@ -116,7 +114,6 @@ fn lists(d: &Description) -> [(&'static str, &[Unknown]); 3] {
     ]
 }
 
-/// `xml.indices`
 pub fn indices_in_range(d: &Description, findings: &mut Findings) {
     let count = d.variables.len();
     for (list, unknowns) in lists(d) {
@@ -132,7 +129,6 @@ pub fn indices_in_range(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.dependencies`
 pub fn dependencies(d: &Description, findings: &mut Findings) {
     for (list, unknowns) in lists(d) {
         let initial = list == "InitialUnknowns";
@@ -162,7 +158,6 @@ pub fn dependencies(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.dependencies_known`
 pub fn dependencies_known(d: &Description, findings: &mut Findings) {
     let states = d.states();
     for (list, unknowns) in lists(d) {
@@ -175,7 +170,7 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
                     v.causality == Causality::Input || v.causality == Causality::Independent;
                 match initial {
                     true => common || v.initial.as_deref() == Some("exact"),
-                    // a Co-Simulation FMU may hide its derivatives and still name its states
+                    // An FMU for Co-Simulation may hide its derivatives and still name its states.
                     false => common || states.contains(&v.index) || d.model_exchange.is_none(),
                 }
             };
@@ -191,7 +186,6 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.dependencies_written`
 pub fn dependencies_written(d: &Description, findings: &mut Findings) {
     for unknown in d.outputs.iter().filter(|unknown| unknown.dependencies.is_none()) {
         findings.add(

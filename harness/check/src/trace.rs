@@ -1,4 +1,4 @@
-//! Messages from a rule's process to its parent: the next call and the findings.
+//! Messages from the process of a rule to its parent: the next call, and the findings.
 
 use anyhow::Result;
 use host::guard;
@@ -6,33 +6,32 @@ use serde::{Deserialize, Serialize};
 
 use super::findings::Findings;
 
-/// Meaning of a crash or hang during the next call.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Crash {
-    /// An error, whatever the rule.
+    /// The crash is an error, whatever the severity of the rule.
     Error,
-    /// Same severity as the rule: the standard leaves the call open.
+    /// The crash has the severity of the rule, because the standard leaves the call's effect open.
     Open,
-    /// Reported by this rule.
-    ToldBy(String),
+    /// The crash is reported by the rule of this name, so that the present rule is skipped.
+    ReportedBy(String),
 }
 
-/// An answer.
+/// A message to the parent process.
 #[derive(Serialize, Deserialize)]
 pub(super) enum Answer {
-    /// Announcement of the next call.
+    /// The next call, and the meaning of a crash in it.
     Doing(String, Crash),
-    /// All that was found; the last answer.
+    /// All findings; this is the last message.
     Done(Findings),
 }
 
-/// Announces the next call to the parent.
+/// Tells the parent process which call comes next and what a crash in it would mean.
 pub fn doing(what: &str, crash: Crash) {
-    // without it, the report of a crash does not name the call
+    // If sending fails, the report of a crash does not name the call.
     let _ = send(&Answer::Doing(what.into(), crash));
 }
 
-/// Sends the findings to the parent, as the last message.
+/// Sends the findings to the parent process as the last message.
 pub fn done(findings: Findings) -> Result<()> {
     send(&Answer::Done(findings))
 }

@@ -1,5 +1,5 @@
-//! Tunable parameters (FMI 2.0.5, sections 2.2.7, 3.2.3 and 4.2.4): they may be set between steps, in
-//! Model Exchange in event mode.
+//! Rules about tunable parameters (FMI 2.0.5, sections 2.2.7, 3.2.3 and 4.2.4). They may be set between
+//! steps; in Model Exchange in event mode.
 
 use anyhow::Result;
 
@@ -19,8 +19,8 @@ fn tunables(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
     all.filter_map(|v| Some((v, start_value(v)?)))
 }
 
-/// Sets a value where the standard allows it after initialisation; `Err` if that mode cannot be
-/// entered or left, the inner result is the answer to the setting.
+/// Sets `v` after initialisation in a mode where the standard allows it. The outer error means that the mode
+/// cannot be entered or left; the inner result is the FMU's answer to setting the value.
 fn set_between_steps(session: &mut Session, v: &Variable, value: &Reading) -> Result<Called> {
     if session.interface == Interface::CoSimulation {
         return Ok(session.set(v, value));
@@ -33,7 +33,7 @@ fn set_between_steps(session: &mut Session, v: &Variable, value: &Reading) -> Re
     Ok(answer)
 }
 
-/// Returns true if a value is accepted before initialisation.
+/// Returns true if the FMU accepts `value` for `v` before initialisation.
 fn is_allowed(
     fmu: &FmuUnderTest,
     interface: Interface,
@@ -44,7 +44,6 @@ fn is_allowed(
     Ok(session.set(v, value).is_ok() && session.initialise().is_ok())
 }
 
-/// `values.tunable`
 pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut any = false;
     for interface in fmu.interfaces() {
@@ -64,14 +63,14 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 );
                 fmu.doing(&place);
                 if let Err(error) = set_between_steps(&mut session, v, &value)? {
-                    if value.is(&start) || is_allowed(fmu, interface, v, &value)? {
+                    if value.is_identical(&start) || is_allowed(fmu, interface, v, &value)? {
                         findings.add(place, format!("{error} (allowed: fmi2OK)"));
                         break;
                     }
                     continue;
                 }
                 let read = session.get(v)?;
-                if !read.is(&value) {
+                if !read.is_identical(&value) {
                     findings.add(place, format!("it reads {read} afterwards (allowed: {value})"));
                     break;
                 }
@@ -84,8 +83,9 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// All values at the end of a short run with a parameter changed before initialisation, after it or not at all; none if the
-/// change is refused, which is another rule's business.
+/// Simulates a short run in which one parameter is changed before initialisation (`before`), after it
+/// (`after`) or not at all, and returns all values at the end. Returns `None` if the FMU refuses the change,
+/// which another rule reports.
 fn run(
     fmu: &FmuUnderTest,
     interface: Interface,
@@ -112,7 +112,6 @@ fn run(
     session.readings().map(Some)
 }
 
-/// `values.tunable_effect`
 pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut any = false;
     for interface in fmu.interfaces() {
@@ -125,11 +124,13 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let change = Some((v, &value));
             let runs = (run(fmu, interface, change, None)?, run(fmu, interface, None, change)?);
             let (Some(before), Some(after)) = runs else { continue };
-            // what others than the parameter itself do
+            // The effect on all variables other than the parameter itself.
             let differing = |run: &Vec<Reading>| {
                 let mut all = fmu.variables().iter().zip(run.iter().zip(&plain));
-                all.find(|(o, (a, b))| (o.kind, o.reference) != (v.kind, v.reference) && !a.is(b))
-                    .map(|(o, _)| o.name.as_str())
+                all.find(|(o, (a, b))| {
+                    (o.kind, o.reference) != (v.kind, v.reference) && !a.is_identical(b)
+                })
+                .map(|(o, _)| o.name.as_str())
             };
             let (Some(name), None) = (differing(&before), differing(&after)) else { continue };
             let text = format!(

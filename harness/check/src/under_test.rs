@@ -1,4 +1,4 @@
-//! The FMU under test, loaded and called as hosts do, and what rules need to do so shortly.
+//! The FMU 2.0 under test: loads it, calls it as a host does, and has shortcuts for the rules.
 
 mod sight;
 
@@ -22,28 +22,26 @@ pub use self::sight::Sight;
 pub use super::loaded::{Life, STEPS, UnderTest, Unusable};
 pub use host::fmi3::Interface;
 
-/// Calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
+/// Number of calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
-/// Largest number of events in succession: an FMU that always requests the next one at once is a finding.
+/// Largest number of immediately successive events. An FMU that always requests the next event at once breaks
+/// a rule.
 const IMMEDIATE: usize = 3;
-/// Events for which only fmi2CompletedIntegratorStep asks that are looked at.
+/// Number of events requested only by fmi2CompletedIntegratorStep that are examined.
 const ASKED: usize = 20;
-/// Share of a state below which its change at an event is rounding.
+/// Relative change of a state at an event below which it is rounding.
 const JUMP: f64 = 1e-9;
-/// Order of magnitude of a state that does not tell its own.
+/// Nominal value of a state that declares none.
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
-/// The loaded FMU.
 pub struct FmuUnderTest {
     loaded: Loaded<Fmi2>,
     description: &'static Description,
-    /// The continuous inputs.
     pub inputs: Vec<&'static Variable>,
-    /// The continuous outputs.
     pub outputs: Vec<&'static Variable>,
     directory: PathBuf,
     path: PathBuf,
-    /// State of the process before the binary was loaded.
+    /// State of the process before the binary was loaded, by name; see [`crate::life::surroundings`].
     pub before: Vec<(&'static str, String)>,
 }
 
@@ -55,22 +53,17 @@ impl Deref for FmuUnderTest {
     }
 }
 
-/// A value as it was read.
 #[derive(Clone, Debug)]
 pub enum Reading {
-    /// Value of a Real.
     Real(f64),
-    /// Value of an Integer or an Enumeration.
     Integer(i32),
-    /// Value of a Boolean in C.
     Boolean(i32),
-    /// Value of a String.
     Text(String),
 }
 
 impl Reading {
-    /// Returns true for a bit-identical value.
-    pub fn is(&self, other: &Reading) -> bool {
+    /// Returns true if the two values are bit-identical.
+    pub fn is_identical(&self, other: &Reading) -> bool {
         match (self, other) {
             (Reading::Real(a), Reading::Real(b)) => a.to_bits() == b.to_bits(),
             (Reading::Integer(a), Reading::Integer(b)) => a == b,
@@ -92,21 +85,20 @@ impl std::fmt::Display for Reading {
     }
 }
 
-/// Start, stop, tolerance and step: as the FMU suggests, or what fits most.
+/// Start, stop, tolerance and step as in DefaultExperiment, with defaults for missing values.
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment {
-    /// Start time, s.
     pub start: f64,
-    /// Relative tolerance, if one is suggested.
+    /// Relative tolerance, if DefaultExperiment has one.
     pub tolerance: Option<f64>,
-    /// Suggested end, if there is one.
+    /// Stop time, s, if DefaultExperiment has one.
     pub stop: Option<f64>,
     /// Communication step, s.
     pub step: f64,
 }
 
 impl FmuUnderTest {
-    /// The interface most rules use.
+    /// Returns the interface that most rules use: Co-Simulation if it can be called.
     pub fn first(&self) -> Result<Interface> {
         let why = || Unusable {
             rule: "load.instance",
@@ -115,8 +107,8 @@ impl FmuUnderTest {
         Ok(*self.interfaces().first().ok_or_else(why)?)
     }
 
-    /// Loads the FMU that is unpacked in `directory` and has this model description, which lives as long as the process
-    /// of the rule. Makes no instances after `deadline`.
+    /// Loads the FMU that is unpacked in `directory`. `description` lives as long as the process of the rule.
+    /// No instances are created after `deadline`.
     pub fn open(
         directory: &Path,
         path: &Path,
@@ -127,7 +119,7 @@ impl FmuUnderTest {
         let mut loaded = Loaded::new(declared(root), deadline, |interface| {
             Fmu::load_for(kind(interface), directory, path, root)
         })?;
-        // that one of two is missing is a rule of its own
+        // If only one of two binaries is missing, another rule reports it.
         let is_there = |identifier: &str| {
             let file = format!("binaries/{PLATFORM}/{identifier}{}", std::env::consts::DLL_SUFFIX);
             directory.join(file).exists()
@@ -149,28 +141,27 @@ impl FmuUnderTest {
         })
     }
 
-    /// Copies the unpacked FMU to `directory` and loads the copy: a library of its own.
+    /// Copies the unpacked FMU to `directory` and loads the copy, which the operating system treats as
+    /// another library.
     pub fn copy(&self, directory: &Path) -> Result<FmuUnderTest> {
         copy_files(&self.directory, directory)?;
         FmuUnderTest::open(directory, &self.path, self.description, self.deadline)
     }
 
-    /// The folder of the unpacked FMU.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// Model description of the FMU.
     pub fn description(&self) -> &Description {
         self.description
     }
 
-    /// The variables.
     pub fn variables(&self) -> &[Variable] {
         &self.description.variables
     }
 
-    /// Each derivative with its state, in the order of ModelStructure: that of all state vectors.
+    /// Returns pairs of derivative and state, in the order of ModelStructure, which is the order of all state
+    /// vectors.
     pub fn states(&self) -> Vec<(&Variable, &Variable)> {
         let d = self.description;
         let pair = |index| {
@@ -180,7 +171,6 @@ impl FmuUnderTest {
         d.derivatives.iter().filter_map(|unknown| pair(unknown.index)).collect()
     }
 
-    /// Default experiment of the FMU.
     pub fn experiment(&self) -> Experiment {
         let element = self.description.root.child("DefaultExperiment");
         let number = |name: &str| element.and_then(|e| e.number(name)).filter(|x| x.is_finite());
@@ -189,13 +179,14 @@ impl FmuUnderTest {
         let stop = number("stopTime").filter(|stop| *stop > start);
         let span = stop.map_or(f64::INFINITY, |stop| stop - start);
         let step = number("stepSize").filter(above_0);
-        // a step that leads past the end at once says nothing of the FMU
+        // A step that passes the end at once would show nothing about the FMU.
         let step = step.filter(|step| *step <= span).unwrap_or(span / 500.0);
         let step = if step.is_finite() { step } else { 0.01 };
         Experiment { start, tolerance: number("tolerance").filter(above_0), stop, step }
     }
 
-    /// Instantiates the FMU as `with` says, unless it may have one instance per process and had it.
+    /// Instantiates the FMU with the arguments `with`. The outer error means that the FMU allows only one
+    /// instance in a process and already has had it, or that the deadline has passed.
     pub fn instantiate(
         &self,
         interface: Interface,
@@ -206,20 +197,20 @@ impl FmuUnderTest {
         self.make(is_once, || binary.instantiate_with(with))
     }
 
-    /// The arguments of a plain instance.
+    /// Returns the arguments of an ordinary call of fmi2Instantiate.
     pub fn arguments(&self, interface: Interface) -> Result<Instantiation<'_>> {
         let plain = self.binary(interface)?.instantiation("check");
         Ok(Instantiation { kind: kind(interface), ..plain })
     }
 
-    /// A new instance that is made with these arguments.
+    /// Creates an instance with the arguments `with`.
     pub fn session_with(&self, interface: Interface, with: &Instantiation) -> Result<Session<'_>> {
         let instance = self
             .instantiate(interface, with)?
             .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
         let Experiment { start, stop, step, .. } = self.experiment();
-        // The step is the FMU's wish in Co-Simulation only. A run of Model Exchange ends before the
-        // suggested end, after which a model may do as it likes.
+        // The suggested step size holds for Co-Simulation only. A run of Model Exchange ends before the
+        // suggested stop time, after which a model may do anything.
         let longest = match (interface, stop) {
             (Interface::ModelExchange, Some(stop)) => (stop - start) / (3 * STEPS) as f64,
             _ => f64::INFINITY,
@@ -248,7 +239,7 @@ impl FmuUnderTest {
         })
     }
 
-    /// A new instance in a state of its life.
+    /// Creates an instance and brings it into the state `stage` of the standard's state machine.
     pub fn session_in(&self, interface: Interface, stage: Stage) -> Result<Session<'_>> {
         let mut session = self.session(interface)?;
         match stage {
@@ -323,12 +314,12 @@ impl UnderTest for FmuUnderTest {
             .instance
             .set_debug_logging(true, &[])
             .map_err(|error| Unusable { rule: "log.switch", why: error.to_string() })?;
-        self.told_by("life.order", || {
+        self.with_crash_reported_by("life.order", || {
             self.doing("fmi2ExitInitializationMode in state \"instantiated\"");
             let _ = session.instance.exit_initialization_mode();
         });
         if session.initialise().is_ok() {
-            self.told_by("values.unknown", || {
+            self.with_crash_reported_by("values.unknown", || {
                 self.doing("fmi2GetReal of an unknown value reference");
                 let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
             });
@@ -339,21 +330,17 @@ impl UnderTest for FmuUnderTest {
     }
 }
 
-/// The states of an instance's life in which rules call it.
+/// States of the standard's state machine in which rules call an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Instance after fmi2Instantiate.
     Instantiated,
-    /// Instance after fmi2EnterInitializationMode.
     Initialization,
     /// Ready for a step; in Model Exchange in continuous-time mode.
     Initialised,
-    /// Instance after fmi2Terminate.
     Terminated,
 }
 
 impl Stage {
-    /// Name in findings.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Instantiated => "instantiated",
@@ -364,7 +351,7 @@ impl Stage {
     }
 }
 
-/// `fmi2Type`.
+/// Returns the value of `fmi2Type` for an interface.
 pub fn kind(interface: Interface) -> i32 {
     match interface {
         Interface::CoSimulation => CO_SIMULATION,
@@ -372,42 +359,38 @@ pub fn kind(interface: Interface) -> i32 {
     }
 }
 
-/// An instance and how far it is.
+/// An instance together with the state of the host that simulates it.
 pub struct Session<'f> {
-    /// The FMU.
     pub fmu: &'f FmuUnderTest,
-    /// Interface type of the instance.
     pub interface: Interface,
-    /// The instance.
     pub instance: Instance<'f>,
-    /// Time reached, s.
+    /// Simulation time that has been reached, s.
     pub time: f64,
-    /// Communication step, s.
     pub step: f64,
-    /// Steps made; inputs follow it.
+    /// Number of steps so far, from which the changing inputs follow.
     pub count: usize,
     next_event: Option<f64>,
-    /// Orders of magnitude of the states.
+    /// Nominal values of the continuous states.
     nominals: Vec<f64>,
-    /// Time and call by which the FMU requested the end of the simulation.
+    /// Time and function by which the FMU has requested the end of the simulation.
     ended: Option<(f64, &'static str)>,
-    /// The first time at which the FMU gave a nextEventTime that had passed, and that.
+    /// The first time at which nextEventTime was in the past, and this nextEventTime, s.
     past_event: Option<(f64, f64)>,
-    /// Events in succession after which the next one was to be at once.
+    /// Number of immediately successive events.
     immediate_events: usize,
-    /// Result of the last event iteration: changes of states and of their nominals.
+    /// Result of the last event iteration: whether states, and whether their nominals, have changed.
     values_changed: bool,
     nominals_changed: bool,
-    /// The first state that an event has changed although the FMU told of no change: when, which,
-    /// and both values.
+    /// The first state that an event has changed although valuesOfContinuousStatesChanged was false: time,
+    /// index, and both values.
     hidden_jump: Option<(f64, usize, f64, f64)>,
-    /// Events for which only fmi2CompletedIntegratorStep has asked, those that were looked at.
+    /// Number of events requested only by fmi2CompletedIntegratorStep that were examined so far.
     asked: usize,
-    /// The first of them that has changed something: when, what, and both values.
+    /// The first of these events that has changed a value: time, name, and both values as text.
     step_event: Option<(f64, String, String)>,
 }
 
-/// Position of a host in the simulation.
+/// State of the host that a saved FMU state does not contain.
 #[derive(Clone, Copy, Debug)]
 pub struct Mark {
     time: f64,
@@ -417,7 +400,7 @@ pub struct Mark {
 }
 
 impl<'f> Session<'f> {
-    /// Makes these calls with the given times (s) and tolerance.
+    /// Initialises with these start and stop times (s) and this tolerance.
     pub fn initialise_at(
         &mut self,
         start: f64,
@@ -433,7 +416,7 @@ impl<'f> Session<'f> {
         self.leave_initialisation()
     }
 
-    /// fmi2ExitInitializationMode, and in Model Exchange on to continuous-time mode.
+    /// Calls fmi2ExitInitializationMode, and in Model Exchange goes on to continuous-time mode.
     pub fn leave_initialisation(&mut self) -> Result<()> {
         self.fmu.doing("fmi2ExitInitializationMode");
         self.instance.exit_initialization_mode()?;
@@ -443,8 +426,8 @@ impl<'f> Session<'f> {
         }
     }
 
-    /// Model Exchange: iterates in event mode until nothing is new, then goes on to continuous-time
-    /// mode.
+    /// Iterates events until no new event is requested, and then enters continuous-time mode (Model
+    /// Exchange).
     pub fn leave_event(&mut self) -> Result<()> {
         self.iterate_events()?;
         if self.is_ended() {
@@ -454,7 +437,7 @@ impl<'f> Session<'f> {
         Ok(self.instance.enter_continuous_time_mode()?)
     }
 
-    /// Calls fmi2NewDiscreteStates until nothing is new.
+    /// Calls fmi2NewDiscreteStates until no new iteration is requested.
     fn iterate_events(&mut self) -> Result<()> {
         self.fmu.doing("fmi2NewDiscreteStates");
         (self.values_changed, self.nominals_changed) = (false, false);
@@ -492,37 +475,38 @@ impl<'f> Session<'f> {
         self.ended.get_or_insert((self.time, call));
     }
 
-    /// Returns true if the FMU has requested the end of the simulation; a host makes no more steps then.
+    /// Returns true if the FMU has requested the end of the simulation, after which a host makes no more
+    /// steps.
     pub fn is_ended(&self) -> bool {
         self.ended.is_some()
     }
 
-    /// Time and call of that request.
+    /// Returns the time and the function by which the FMU requested the end of the simulation.
     pub fn ended(&self) -> Option<(f64, &'static str)> {
         self.ended
     }
 
-    /// Returns the first time at which the run had passed a nextEventTime, and that nextEventTime.
+    /// Returns the first time at which nextEventTime was in the past, and this nextEventTime, s.
     pub fn past_event(&self) -> Option<(f64, f64)> {
         self.past_event
     }
 
-    /// The next event in time that the FMU has told.
+    /// Returns the time of the next event that the FMU has announced, s.
     pub(super) fn next_event(&self) -> Option<f64> {
         self.next_event
     }
 
-    /// Number of continuous states.
     pub(super) fn states(&self) -> usize {
         self.fmu.description.states().len()
     }
 
-    /// Order of magnitude of a state.
+    /// Returns the nominal value of a state.
     pub(super) fn nominal(&self, state: usize) -> f64 {
         self.nominals.get(state).copied().unwrap_or(UNKNOWN_NOMINAL)
     }
 
-    /// fmi2CompletedIntegratorStep, and the events that follow from it.
+    /// Calls fmi2CompletedIntegratorStep and handles the events that follow. `crossed` says that an event
+    /// indicator has changed its sign.
     pub(super) fn complete_step(&mut self, crossed: bool) -> Result<()> {
         let completed = self.instance.completed_integrator_step()?;
         if completed.terminate {
@@ -537,23 +521,23 @@ impl<'f> Session<'f> {
             return self.event();
         }
         self.asked += 1;
-        let before = Sight::of(self)?;
+        let before = Sight::read(self)?;
         self.event()?;
         if !self.is_ended()
-            && let Some((name, change)) = before.change(&Sight::of(self)?, self.fmu)
+            && let Some((name, change)) = before.change(&Sight::read(self)?, self.fmu)
         {
             self.step_event = Some((self.time, name.to_string(), change));
         }
         Ok(())
     }
 
-    /// The first event for which only fmi2CompletedIntegratorStep has asked and that has changed
-    /// something: when, what, and both values.
+    /// Returns the first event that only fmi2CompletedIntegratorStep requested and that changed a value:
+    /// time, name, and both values as text.
     pub(super) fn step_event(&self) -> Option<(f64, String, String)> {
         self.step_event.clone()
     }
 
-    /// Event mode and back.
+    /// Enters event mode, iterates, and returns to continuous-time mode.
     pub(super) fn event(&mut self) -> Result<()> {
         let n = self.states();
         let before = self.read_states(n)?;
@@ -573,13 +557,13 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// The first state that an event has changed although the FMU told of no change: when, which,
-    /// and both values.
+    /// Returns the first state that an event has changed although valuesOfContinuousStatesChanged was false:
+    /// time, index, and both values.
     pub(super) fn hidden_jump(&self) -> Option<(f64, usize, f64, f64)> {
         self.hidden_jump
     }
 
-    /// Returns true if the last event changed the nominals of states.
+    /// Returns true if nominalsOfContinuousStatesChanged was set at the last event.
     pub(super) fn nominals_changed(&self) -> bool {
         self.nominals_changed
     }
@@ -594,10 +578,7 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// [`Life::advance`] with unchanged inputs.
-    ///
-    /// # Errors
-    /// The same.
+    /// Advances like [`Life::advance`], but with constant inputs.
     pub fn coast(&mut self, steps: usize) -> Result<()> {
         self.steps(steps, |_| Ok(()))
     }
@@ -620,15 +601,16 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// Returns true if a step was discarded because the FMU wants to end the simulation.
+    /// Returns true if a step was discarded because the FMU requests the end of the simulation
+    /// (fmi2Terminated).
     pub(super) fn has_terminated(&mut self, error: &CallError) -> bool {
         const TERMINATED: i32 = 3; // fmi2Terminated of fmi2StatusKind
         error.status == Status::Discard
             && self.instance.boolean_status(TERMINATED).is_ok_and(|ended| ended)
     }
 
-    /// One step of any size, inputs as they are. In Model Exchange it may end earlier, if the states
-    /// change fast.
+    /// Makes one step of `h` seconds without changing the inputs. In Model Exchange the step may end earlier
+    /// if the states change fast.
     pub fn go(&mut self, h: f64) -> Result<()> {
         self.fmu.doing(format!(
             "a step from {:?} s by {h:?} s ({})",
@@ -647,13 +629,12 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// Number of event indicators.
     pub fn indicators(&self) -> usize {
         let root = &self.fmu.description.root;
         root.number("numberOfEventIndicators").unwrap_or(0.0) as usize
     }
 
-    /// One value.
+    /// Reads one variable.
     pub fn get(&mut self, v: &Variable) -> Called<Reading> {
         let reference = [v.reference];
         Ok(match v.kind {
@@ -672,14 +653,13 @@ impl<'f> Session<'f> {
                 self.instance.get_boolean(&reference, &mut value)?;
                 Reading::Boolean(value[0])
             }
-            // FMI 2.0 has no Binary and no Clock
+            // FMI 2.0 has no Binary and no Clock.
             Type::String | Type::Binary | Type::Clock => {
                 Reading::Text(self.instance.get_string(&reference)?.pop().unwrap_or_default())
             }
         })
     }
 
-    /// Sets one value.
     pub fn set(&mut self, v: &Variable, value: &Reading) -> Called {
         let reference = [v.reference];
         match value {
@@ -690,12 +670,12 @@ impl<'f> Session<'f> {
         }
     }
 
-    /// The value of a Real in an ordinary run.
+    /// Reads a Real in an ordinary run.
     pub fn real(&mut self, v: &Variable) -> Result<f64> {
         Ok(if let Reading::Real(x) = self.read(v)? { x } else { f64::NAN })
     }
 
-    /// One value of an ordinary run; that it cannot be read is a rule of its own.
+    /// Reads a variable in an ordinary run. If this fails, `values.readable` reports it.
     pub fn read(&mut self, v: &Variable) -> Result<Reading> {
         self.get(v).map_err(|error| {
             let why = format!("{} cannot be read: {error}", v.name);
@@ -712,8 +692,7 @@ impl<'f> Life<'f, Fmi2> for Session<'f> {
         &mut self.instance
     }
 
-    /// fmi2SetupExperiment to fmi2ExitInitializationMode, and in Model Exchange on to
-    /// continuous-time mode, with what the FMU suggests.
+    /// Initialises with the FMU's default experiment, and in Model Exchange goes on to continuous-time mode.
     fn initialise(&mut self) -> Result<()> {
         let Experiment { start, tolerance, .. } = self.fmu.experiment();
         self.initialise_at(start, None, tolerance).map_err(|error| match error.downcast() {
@@ -733,7 +712,7 @@ impl<'f> Life<'f, Fmi2> for Session<'f> {
 
     fn difference(&self, ours: &[Reading], theirs: &[Reading]) -> Option<String> {
         let all = self.fmu.variables().iter().zip(ours.iter().zip(theirs));
-        let mut different = all.filter(|(_, (a, b))| !a.is(b));
+        let mut different = all.filter(|(_, (a, b))| !a.is_identical(b));
         let (v, (a, b)) = different.next()?;
         let more = match different.count() {
             0 => String::new(),
@@ -751,7 +730,7 @@ impl<'f> Life<'f, Fmi2> for Session<'f> {
         (self.next_event, self.ended) = (to.next_event, to.ended);
     }
 
-    /// Another time, other parameters, another tolerance.
+    /// Initialises with another start time, other parameters and another tolerance.
     fn stray(&mut self) -> Result<()> {
         let fmu = self.fmu;
         for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
@@ -759,7 +738,7 @@ impl<'f> Life<'f, Fmi2> for Session<'f> {
             let (min, max) = v.bounds();
             let moved = start * 1.01;
             if moved >= min && moved <= max {
-                // one that is refused keeps its value
+                // A value that the FMU refuses keeps its old value.
                 let _ = self.set(v, &Reading::Real(moved));
             }
         }
@@ -775,7 +754,7 @@ impl<'f> Life<'f, Fmi2> for Session<'f> {
     }
 }
 
-/// The value of the `n`th input at a step: within its bounds, around its start.
+/// Returns the value of input number `n` at a step: a sine around its start value, within its bounds.
 pub fn stimulus(v: &Variable, step: usize, n: usize) -> f64 {
     let start = v.typed.number("start").filter(|x| x.is_finite()).unwrap_or(0.0);
     let (min, max) = v.bounds();
@@ -784,11 +763,11 @@ pub fn stimulus(v: &Variable, step: usize, n: usize) -> f64 {
         None => start.abs().max(0.1),
     };
     let moved = start + 0.3 * scale * (0.7 * step as f64 + 1.0 + n as f64).sin();
-    // the bounds first: clamp panics if they are in the wrong order
+    // Checked first, because clamp panics if min is above max.
     moved.max(min).min(max.max(min))
 }
 
-/// Reads the start value that the description gives.
+/// Reads the start value in modelDescription.xml, or returns `None` if there is none or it is not valid.
 pub fn start_value(v: &Variable) -> Option<Reading> {
     let text = v.typed.get("start")?;
     Some(match v.kind {
@@ -804,8 +783,8 @@ pub(super) fn copy_files(from: &Path, to: &Path) -> Result<()> {
     for entry in std::fs::read_dir(from)? {
         let (path, name) = entry.map(|e| (e.path(), e.file_name()))?;
         let copy = to.join(&name);
-        // A library must be a file of its own, or the loader takes it for the same one. Of the others
-        // a second name will do.
+        // A library must be copied, because otherwise the loader takes it for the one that is already
+        // loaded. For all other files a hard link is enough.
         let is_library = path.extension().is_some_and(|e| e == std::env::consts::DLL_EXTENSION);
         if path.is_dir() {
             copy_files(&path, &copy)?;

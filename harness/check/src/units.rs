@@ -1,9 +1,9 @@
-//! Rules for units (FMI 2.0.5, section 2.2.2): UnitDefinitions agrees with the unit's name, and derivatives have the unit of
-//! their state per second.
+//! Rules about units (FMI 2.0.5, section 2.2.2): UnitDefinitions must agree with the name of the unit, and a
+//! derivative must have the unit of its state per second.
 //!
-//! Names are read as Modelica writes them (Modelica 3.6, chapter 19): SI symbols with prefixes,
-//! `.` for products, one `/`, exponents after the symbol, as in `kg.m2/s2`. A name that does not
-//! read so says nothing here.
+//! Names are parsed as Modelica writes them (Modelica 3.6, chapter 19): SI symbols with prefixes, `.` for
+//! products, one `/`, and exponents after the symbol, as in `kg.m2/s2`. A name that cannot be parsed in this
+//! way is not checked.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -12,12 +12,12 @@ use super::description::Description;
 use super::findings::Findings;
 use host::xml::Element;
 
-/// Base units of FMI 2.0 in the schema's order. The radian is the last: it has dimension 1, and
-/// authors write it or leave it out.
+/// Base units of FMI 2.0 in the order of the schema. The radian comes last, because it has dimension 1 and
+/// authors may write it or leave it out.
 const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 const RADIAN: usize = 7;
 
-/// Base unit of `value · factor + offset`.
+/// A unit whose values convert to base units by `value · factor + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Unit {
     exponents: [i32; 8],
@@ -28,7 +28,8 @@ struct Unit {
 impl Unit {
     const ONE: Unit = Unit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
 
-    /// Returns this unit times a power of another one. An offset only counts for a unit by itself.
+    /// Multiplies this unit by `other` to the power `power`. The offset is dropped, because it has a meaning
+    /// only for a unit by itself.
     fn times(self, other: Unit, power: i32) -> Unit {
         let mut exponents = self.exponents;
         for (e, o) in exponents.iter_mut().zip(other.exponents) {
@@ -37,17 +38,17 @@ impl Unit {
         Unit { exponents, factor: self.factor * other.factor.powi(power), offset: 0.0 }
     }
 
-    /// Returns true for the same quantity, radians aside.
+    /// Returns true if both units have the same dimension; radians are ignored.
     fn measures_like(&self, other: &Unit) -> bool {
         (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
     }
 
-    /// Returns true if the radians are those of the other unit, or omitted.
+    /// Returns true if this unit has the radians of the other unit or leaves them out.
     fn has_radians_of(&self, other: &Unit) -> bool {
         [0, other.exponents[RADIAN]].contains(&self.exponents[RADIAN])
     }
 
-    /// Returns the unit in the form of UnitDefinitions.
+    /// Writes the unit as UnitDefinitions does, for example "kg=1, m=2, s=-2".
     fn text(&self) -> String {
         let mut text: Vec<String> = BASE
             .iter()
@@ -65,8 +66,8 @@ impl Unit {
     }
 }
 
-/// A symbol, whether prefixes go with it, exponents of kg, m, s, A, K, mol, cd and rad, factor and
-/// offset. A symbol that stands for several units is there several times.
+/// A unit symbol: its text, whether it may have a prefix, the exponents of kg, m, s, A, K, mol, cd and rad,
+/// factor and offset. A symbol that stands for several units has several entries.
 type Symbol = (&'static str, bool, [i32; 8], f64, f64);
 
 #[rustfmt::skip]
@@ -121,7 +122,7 @@ const SYMBOLS: &[Symbol] = &[
     ("%", false, [0; 8], 0.01, 0.0),
 ];
 
-/// Prefixes in use; the rarest are left out, since "PS" is a horsepower.
+/// Prefixes in common use. The rarest are left out, because for example "PS" is a horsepower.
 const PREFIXES: [(&str, f64); 12] = [
     ("T", 1e12),
     ("G", 1e9),
@@ -137,7 +138,7 @@ const PREFIXES: [(&str, f64); 12] = [
     ("p", 1e-12),
 ];
 
-/// The units a symbol can stand for.
+/// Lists the units for which a symbol can stand, with and without a prefix.
 fn symbol(text: &str) -> Vec<Unit> {
     let unit = |(_, _, exponents, factor, offset): &Symbol, prefix: f64| Unit {
         exponents: *exponents,
@@ -156,7 +157,7 @@ fn symbol(text: &str) -> Vec<Unit> {
     all
 }
 
-/// The units that a name can stand for; none if it is not read.
+/// Lists the units for which a name can stand; the list is empty if the name cannot be parsed.
 fn read(name: &str) -> Vec<Unit> {
     let mut rest = name.trim();
     match quotient(&mut rest) {
@@ -165,13 +166,13 @@ fn read(name: &str) -> Vec<Unit> {
     }
 }
 
-/// `product` or `product/factor`.
+/// Parses `product` or `product/factor`.
 fn quotient(rest: &mut &str) -> Option<Vec<Unit>> {
     let above = product(rest)?;
     let Some(after) = rest.strip_prefix('/') else { return Some(above) };
     *rest = after;
     let below = factor(rest)?;
-    // a/b.c and a/b/c are read in two ways by people
+    // a/b.c and a/b/c are ambiguous for people.
     if rest.starts_with(['.', '*', '/']) {
         return None;
     }
@@ -191,7 +192,7 @@ fn combine(left: &[Unit], right: &[Unit], power: i32) -> Vec<Unit> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.times(*r, power))).collect()
 }
 
-/// A symbol or an expression in parentheses, and its exponent.
+/// Parses a symbol or an expression in parentheses, with its exponent.
 fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     let base = if let Some(inner) = rest.strip_prefix('(') {
         *rest = inner;
@@ -220,7 +221,7 @@ fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     (!base.is_empty()).then(|| base.iter().map(|u| Unit::ONE.times(*u, power)).collect())
 }
 
-/// Unit of an element BaseUnit; `None` if one of its numbers is invalid.
+/// Returns the unit in an element BaseUnit, or `None` if it is missing or one of its numbers is not valid.
 fn declared(unit: &Element) -> Option<Unit> {
     let base = unit.child("BaseUnit")?;
     let mut exponents = [0; 8];
@@ -244,12 +245,11 @@ fn number(element: &Element, attribute: &str, default: f64) -> Option<f64> {
     }
 }
 
-/// Returns true if two factors agree in the digits that authors write.
+/// Returns true if two factors agree in the three digits that authors usually write.
 fn agree(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-3 * a.abs().max(b.abs())
 }
 
-/// `xml.unit_numbers`
 pub fn numbers(d: &Description, findings: &mut Findings) {
     for unit in d.root.list("UnitDefinitions") {
         for child in &unit.children {
@@ -266,7 +266,6 @@ pub fn numbers(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.base_units`
 pub fn base_units(d: &Description, findings: &mut Findings) {
     for unit in d.root.list("UnitDefinitions") {
         let (Some(name), Some(written)) = (unit.get("name"), declared(unit)) else { continue };
@@ -274,7 +273,7 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
         let fits = |m: &&Unit| {
             written.measures_like(m)
                 && written.has_radians_of(m)
-                // people write % with and without its factor
+                // Authors write % with and without its factor of 0.01.
                 && (m.exponents == [0; 8]
                     || agree(written.factor, m.factor)
                         && (written.offset - m.offset).abs() <= 1e-3 * m.offset.abs())
@@ -294,11 +293,10 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.display_units`
 pub fn display_units(d: &Description, findings: &mut Findings) {
     for unit in d.root.list("UnitDefinitions") {
         let Some(name) = unit.get("name") else { continue };
-        // without BaseUnit the name tells what is converted
+        // Without BaseUnit the name says which unit is converted.
         let from = match declared(unit) {
             Some(written) => vec![written],
             None => read(name),
@@ -314,8 +312,8 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
                 continue;
             }
             let place = format!("line {}, DisplayUnit \"{shown_name}\" of \"{name}\"", shown.line);
-            // shown = factor · value + offset, where from.factor · value + from.offset and
-            // to.factor · shown + to.offset are the same in base units
+            // shown = factor · value + offset. Here from.factor · value + from.offset and to.factor · shown
+            // + to.offset are the same number in base units.
             let expected: Vec<(f64, f64)> = from
                 .iter()
                 .flat_map(|f| to.iter().map(move |t| (f, t)))
@@ -351,7 +349,6 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.derivative_units`
 pub fn derivative_units(d: &Description, findings: &mut Findings) {
     let units: BTreeMap<&str, &Element> =
         d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();

@@ -1,5 +1,3 @@
-//! Reading and setting variables (FMI 2.0.5, section 2.1.7).
-
 use std::collections::BTreeSet;
 
 use anyhow::Result;
@@ -12,14 +10,14 @@ use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::fmi2::{Called, Instance};
 
-/// Variables that hosts set, each with its start value.
+/// Lists the variables that hosts set, each with its start value.
 fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
     let all = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     all.filter_map(|v| Some((v, start_value(v)?)))
 }
 
 fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
-    // if it does not initialise, another rule tells
+    // If initialisation fails, another rule reports it.
     fmu.running(fmu.first()?)?;
     let mut session = fmu.session(fmu.first()?)?;
     session.instance.setup_experiment(None, session.time, None)?;
@@ -27,8 +25,8 @@ fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
     Ok(session)
 }
 
-/// Returns true if a value equals the one in modelDescription.xml within half a unit of the 15th digit and the rounding of both:
-/// a double keeps 15 decimal digits.
+/// Returns true if a value equals the value in modelDescription.xml within half a unit of the 15th digit plus
+/// rounding, because a double keeps 15 decimal digits.
 fn has_digits_of(value: &Reading, written: &Reading) -> bool {
     const HALF_A_UNIT: f64 = 5e-15;
     match (value, written) {
@@ -36,11 +34,10 @@ fn has_digits_of(value: &Reading, written: &Reading) -> bool {
             let largest = value.abs().max(written.abs());
             (value - written).abs() <= (HALF_A_UNIT + f64::EPSILON) * largest
         }
-        _ => value.is(written),
+        _ => value.is_identical(written),
     }
 }
 
-/// `values.start`
 pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let starts: Vec<_> = fmu
         .variables()
@@ -51,7 +48,7 @@ pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut wrong = BTreeSet::new();
     let mut look = |session: &mut Session, when: &str, only_parameters: bool| {
         for (v, start) in &starts {
-            // an output or a state that starts from its start value may move on with time
+            // An output or a state may move away from its start value with time.
             if only_parameters && !v.is_set_by_hosts() {
                 continue;
             }
@@ -73,7 +70,6 @@ pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.readable`
 pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
     let mut told = BTreeSet::new();
@@ -100,7 +96,6 @@ pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.booleans`
 pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
     let all: Vec<_> = fmu.variables().iter().filter(|v| v.kind == Type::Boolean).collect();
@@ -124,13 +119,12 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.round_trip`
 pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
     let mut fresh = fmu.session(fmu.first()?)?;
     for (v, start) in settable(fmu) {
         fmu.doing(format!("setting {} to {start}", v.name));
-        // as hosts do that set every start value before they set up
+        // As in hosts that set every start value before fmi2SetupExperiment.
         if let Err(error) = fresh.set(v, &start) {
             findings.add(
                 v.place(),
@@ -142,12 +136,12 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         tried.push(start);
         for value in tried {
             fmu.doing(format!("setting {} to {value}", v.name));
-            // another value than the start may be refused
+            // The FMU may refuse a value other than the start value.
             if session.set(v, &value).is_err() {
                 continue;
             }
             let read = session.get(v)?;
-            if !read.is(&value) {
+            if !read.is_identical(&value) {
                 findings.add(v.place(), format!("set to {value}, it reads {read}"));
                 break;
             }
@@ -156,7 +150,7 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// A value near the start that is allowed.
+/// Returns another allowed value near `start`, or `None` if there is none.
 pub fn other_value(fmu: &FmuUnderTest, v: &Variable, start: &Reading) -> Option<Reading> {
     let (min, max) = v.bounds();
     match start {
@@ -179,7 +173,7 @@ pub fn other_value(fmu: &FmuUnderTest, v: &Variable, start: &Reading) -> Option<
     }
 }
 
-/// Values an enumeration can take.
+/// Lists the values of an enumeration's items.
 pub fn items(fmu: &FmuUnderTest, v: &Variable) -> Vec<i32> {
     let declared = v.typed.get("declaredType");
     let types = fmu.description().root.list("TypeDefinitions");
@@ -188,7 +182,6 @@ pub fn items(fmu: &FmuUnderTest, v: &Variable) -> Vec<i32> {
     items.filter_map(|item| item.get("value")?.trim().parse().ok()).collect()
 }
 
-/// `values.nothing`
 pub fn nothing(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
     fmu.doing("fmi2Get… and fmi2Set… with nvr = 0 and NULL pointers");
@@ -201,7 +194,6 @@ pub fn nothing(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.unknown`
 pub fn unknown(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let taken: BTreeSet<u32> = fmu.variables().iter().map(|v| v.reference).collect();
     let largest = taken.last().copied().unwrap_or(0);
@@ -225,10 +217,11 @@ pub fn unknown(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// A call with one value reference.
+/// Name and closure of a call with one value reference.
 type Call = (&'static str, fn(&mut Instance, u32) -> Called);
 
-/// The call must be refused. Each goes to an instance of its own: after an error some refuse all.
+/// Adds a finding unless the FMU refuses the call. Each call uses its own instance, because after an error
+/// some FMUs refuse every call.
 fn refused(
     fmu: &FmuUnderTest,
     findings: &mut Findings,
@@ -244,9 +237,8 @@ fn refused(
     Ok(())
 }
 
-/// `values.wrong_type`
 pub fn wrong_type(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    // Value references count for each type by itself.
+    // In FMI 2.0 each type has its own value references.
     let of = |kinds: &[Type]| -> BTreeSet<u32> {
         let all = fmu.variables().iter().filter(|v| kinds.contains(&v.kind));
         all.map(|v| v.reference).collect()
@@ -279,7 +271,6 @@ pub fn wrong_type(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.fixed`
 pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let fixed = settable(fmu).filter(|(v, _)| {
         v.causality == Causality::Parameter && v.variability == Variability::Fixed
@@ -294,7 +285,7 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.doing(&place);
         let other = other_value(fmu, v, &start).unwrap_or(start);
         match session.set(v, &other) {
-            Ok(()) => accepted.push((place, session.get(v)?.is(&other))),
+            Ok(()) => accepted.push((place, session.get(v)?.is_identical(&other))),
             answer => {
                 refused = Some(&v.name);
                 expect_refusal(findings, place, answer);
@@ -303,7 +294,7 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     for (place, is_taken) in accepted {
         match refused {
-            // the binary knows which are tunable, and this is one
+            // The binary accepts it, so that this parameter is tunable there.
             Some(other) if is_taken => findings.fail(
                 place,
                 format!(
@@ -320,13 +311,12 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.computed`
 pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let aliases: BTreeSet<_> =
         settable(fmu).map(|(v, _)| (v.kind == Type::Real, v.reference)).collect();
     let mut any = false;
     for causality in [Causality::Output, Causality::Local, Causality::CalculatedParameter] {
-        // Those with initial exact or approx can be set before initialisation, not later.
+        // Variables with initial exact or approx can be set before initialisation, but not later.
         let v = fmu.variables().iter().find(|v| {
             v.causality == causality
                 && v.initial.as_deref() == Some("calculated")
@@ -347,7 +337,6 @@ pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.limits`
 pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut any = false;
     for (v, _) in settable(fmu).filter(|(v, _)| matches!(v.kind, Type::Real | Type::Integer)) {
@@ -373,7 +362,8 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 }
                 Ok(session.initialise().err().map(|error| error.to_string()))
             };
-            // Refused as contradicting another parameter is fine: that one is named as well.
+            // A refusal because of a contradiction with another parameter is allowed; the message then names
+            // that parameter too.
             if let Some(why) = try_at(bound)?
                 && !settable(fmu).any(|(o, _)| o.name != v.name && mentions(&why, &o.name))
             {
@@ -399,7 +389,7 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if a text contains a name as a whole word.
+/// Returns true if `text` contains `name` as a whole word.
 pub fn mentions(text: &str, name: &str) -> bool {
     let part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '[');
     text.match_indices(name).any(|(at, _)| {
@@ -408,9 +398,8 @@ pub fn mentions(text: &str, name: &str) -> bool {
     })
 }
 
-/// `values.not_a_number`
 pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    // inputs have a rule of their own
+    // Inputs have a rule of their own.
     let reals =
         settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != Causality::Input);
     for (v, _) in reals {
@@ -434,7 +423,6 @@ pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.no_warning`
 pub fn no_warning(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
         let mut session = fmu.running(interface)?;

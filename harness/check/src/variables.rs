@@ -1,5 +1,3 @@
-//! Variables of modelDescription.xml (FMI 2.0.5, section 2.2): names, causality, start values, ranges.
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 
@@ -9,7 +7,6 @@ use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::xml::{Element, double};
 
-/// `xml.names`
 pub fn names(d: &Description, findings: &mut Findings) {
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     for v in &d.variables {
@@ -21,12 +18,11 @@ pub fn names(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.structured_names`
 pub fn structured_names(d: &Description, findings: &mut Findings) {
     unstructured(&d.root, &d.variables, findings);
 }
 
-/// Reports names that are not structured as declared.
+/// Reports names that are not structured although the description declares structured names.
 pub(crate) fn unstructured<'d, V: Deref<Target = Common> + 'd>(
     root: &Element,
     variables: impl IntoIterator<Item = &'d V>,
@@ -41,10 +37,11 @@ pub(crate) fn unstructured<'d, V: Deref<Target = Common> + 'd>(
     });
 }
 
-/// The grammar of section 2.2.9.
+/// Returns true if a name follows the grammar of structured names (section 2.2.9).
 fn is_structured(name: &str) -> bool {
     if let Some(inner) = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')) {
-        // A comma after the last index is the order's, one between brackets the indices'.
+        // A comma after the last bracket precedes the order of the derivative; a comma between brackets
+        // separates indices.
         return match inner.rsplit_once(',') {
             Some((path, order)) if !order.contains(']') => {
                 is_structured(path) && order.trim().parse::<u32>().is_ok()
@@ -52,7 +49,7 @@ fn is_structured(name: &str) -> bool {
             _ => is_structured(inner),
         };
     }
-    // An identifier, then indices, then a point and the next one.
+    // An identifier, then indices, then a point and the next identifier.
     let mut rest = name;
     loop {
         let end = match rest.strip_prefix('\'') {
@@ -85,7 +82,6 @@ fn is_structured(name: &str) -> bool {
     }
 }
 
-/// `xml.parameter_names`
 pub fn parameter_names(d: &Description, findings: &mut Findings) {
     const LONGEST: usize = 55;
     d.each(findings, |v| {
@@ -95,11 +91,11 @@ pub fn parameter_names(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.flat_ports`
+/// `xml.flat_ports`: a point in a name makes the variable a member of a structure, and importers that support
+/// structures make one port of all members.
 ///
-/// A point makes a member of a structure of the name, and importers that know such names make one port of all its
-/// members. A name with an index is an element of an array (2.2.9). Importers show it as a vector or as single elements; both can
-/// be wired if no element is missing.
+/// A name with an index is an element of an array (2.2.9), which importers show as a vector or as single
+/// elements. Both can be wired if no element is missing.
 pub fn flat_ports(d: &Description, findings: &mut Findings) {
     let is_structured = d.root.get("variableNamingConvention") == Some("structured");
     let is_port = |v: &&Variable| matches!(v.causality, Causality::Input | Causality::Output);
@@ -134,14 +130,14 @@ pub fn flat_ports(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// Array and indices of `array[1,2]`.
+/// Splits a name such as `array[1,2]` into the array's name and the indices.
 fn indexed(name: &str) -> Option<(&str, Vec<u32>)> {
     let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
     let indices: Option<Vec<u32>> = indices.split(',').map(|i| i.trim().parse().ok()).collect();
     Some((array, indices?))
 }
 
-/// Returns true if these are all indices of an array, each once.
+/// Returns true if `indices` has every index of an array exactly once.
 fn is_whole(indices: &[Vec<u32>]) -> bool {
     let dimensions = indices[0].len();
     if indices.iter().any(|index| index.len() != dimensions || index.contains(&0)) {
@@ -153,12 +149,11 @@ fn is_whole(indices: &[Vec<u32>]) -> bool {
     count == Some(indices.len()) && different.len() == indices.len()
 }
 
-/// `xml.causality`
 pub fn causality(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| wrong_causality(v, initials, "Real"));
 }
 
-/// Returns what is wrong with causality and variability, which are those of `reals` alone if a variable is continuous.
+/// Returns what is wrong with causality and variability. Only the types named in `reals` may be continuous.
 pub(crate) fn wrong_causality(v: &Common, initials: Initials, reals: &str) -> Option<String> {
     let (causality, variability) = (&v.causality, &v.variability);
     if initials(causality, variability).is_none() {
@@ -174,7 +169,6 @@ pub(crate) fn wrong_causality(v: &Common, initials: Initials, reals: &str) -> Op
         .then(|| format!("a continuous {} (allowed: {reals} alone)", v.typed.name))
 }
 
-/// `xml.variability`
 pub fn variability(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         (v.kind != Type::Real && v.written.get("variability").is_none()).then(|| {
@@ -183,7 +177,6 @@ pub fn variability(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.initial`
 pub fn initial(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| wrong_initial(v, initials));
 }
@@ -191,7 +184,7 @@ pub fn initial(d: &Description, findings: &mut Findings) {
 /// Returns what is wrong with the attribute `initial`.
 pub(crate) fn wrong_initial(v: &Common, initials: Initials) -> Option<String> {
     let written = v.written.get("initial")?;
-    // A combination that is not allowed is another rule's business.
+    // A forbidden combination of causality and variability is reported by another rule.
     let allowed = initials(&v.causality, &v.variability)?;
     let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
     (!allowed.contains(&written)).then(|| {
@@ -202,14 +195,14 @@ pub(crate) fn wrong_initial(v: &Common, initials: Initials) -> Option<String> {
     })
 }
 
-/// `xml.start`
 pub fn start(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         wrong_start(v, v.typed.get("start").is_some(), v.causality == Causality::Input)
     });
 }
 
-/// Returns what is wrong with a start value that is there or not, and that the causality may require.
+/// Returns what is wrong with the presence (`is_there`) of a start value. `is_required` says that the
+/// causality requires one.
 pub(crate) fn wrong_start(v: &Common, is_there: bool, is_required: bool) -> Option<String> {
     let initial = v.initial.as_deref();
     let why = |other: String| format!("with {}", initial.map_or(other, |i| format!("initial={i}")));
@@ -223,12 +216,12 @@ pub(crate) fn wrong_start(v: &Common, is_there: bool, is_required: bool) -> Opti
     (needed && !is_there).then(|| format!("no start value {}", why(v.causality.to_string())))
 }
 
-/// `xml.finite`
 pub fn finite(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| not_finite(v, v.typed.number("start")));
 }
 
-/// Returns which number of a Real is not finite.
+/// Returns which of start, min, max and nominal of a floating-point variable is NaN, infinite or (nominal)
+/// not positive.
 pub(crate) fn not_finite(v: &Common, starts: impl IntoIterator<Item = f64>) -> Option<String> {
     let starts = starts.into_iter().map(|start| ("start", start));
     let others = ["min", "max", "nominal"].into_iter();
@@ -241,7 +234,6 @@ pub(crate) fn not_finite(v: &Common, starts: impl IntoIterator<Item = f64>) -> O
     })
 }
 
-/// `xml.range`
 pub fn range(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         let start = v.typed.get("start").and_then(double);
@@ -249,7 +241,7 @@ pub fn range(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// Returns which bound or start value is out of range; `items` finds the items of an enumeration in its type.
+/// Returns which bound or start value is out of range. `items` returns the items of an enumeration's type.
 pub(crate) fn out_of_range<'d>(
     v: &Common,
     starts: &[f64],
@@ -274,14 +266,13 @@ pub(crate) fn out_of_range<'d>(
     Some(format!("start={odd} is not an item (allowed: {})", list.join(", ")))
 }
 
-/// `xml.aliases`
 pub fn aliases(d: &Description, findings: &mut Findings) {
-    // Integers and enumerations share their calls.
+    // Integers and enumerations share their calls and their value references.
     let group = |v: &Variable| match v.kind {
         Type::Real => 0,
         Type::Integer | Type::Enumeration => 1,
         Type::Boolean => 2,
-        // FMI 2.0 has no Binary and no Clock
+        // FMI 2.0 has no Binary and no Clock.
         Type::String | Type::Binary | Type::Clock => 3,
     };
     let mut sets: BTreeMap<(i32, u32), Vec<&Variable>> = BTreeMap::new();
@@ -315,7 +306,6 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.independent`
 pub fn independent(d: &Description, findings: &mut Findings) {
     let all: Vec<_> =
         d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
@@ -327,7 +317,6 @@ pub fn independent(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.multiple_set`
 pub fn multiple_set(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         v.written.get("canHandleMultipleSetPerTimeInstant")?;
@@ -339,7 +328,6 @@ pub fn multiple_set(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.states`
 pub fn states(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         v.typed.get("derivative")?;

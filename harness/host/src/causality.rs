@@ -6,7 +6,6 @@ macro_rules! attribute {
     ($(#[$doc:meta])* $name:ident: $($item:ident $text:literal),+) => {
         $(#[$doc])*
         #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        #[allow(missing_docs)]
         pub enum $name {
             $($item,)+
             /// Any other text; empty if the attribute is missing.

@@ -227,7 +227,6 @@ pub enum Type {
 
 /// Type in which calls exchange a variable, by the names of FMI 3.0. A Real of FMI 2.0 is a Float64, an Integer an Int32.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs)]
 pub enum CType {
     Float32,
     Float64,

@@ -119,7 +119,6 @@ functions! { EventFunctions:
 /// `fmi2EventInfo`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[allow(missing_docs)]
 pub struct EventInfo {
     pub new_discrete_states_needed: c_int,
     pub terminate_simulation: c_int,

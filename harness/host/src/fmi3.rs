@@ -642,7 +642,6 @@ pub const UNWRITTEN: u8 = 0xa5;
 
 /// Results of fmi3UpdateDiscreteStates. Bytes as the FMU wrote them, or [`UNWRITTEN`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct EventInfo {
     pub needs_update: u8,
     pub terminate: u8,

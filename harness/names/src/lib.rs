@@ -63,11 +63,8 @@ macro_rules! enumeration {
     };
 }
 
-#[allow(missing_docs)]
 pub mod hubslosh;
-#[allow(missing_docs)]
 pub mod sloshtank;
-#[allow(missing_docs)]
 pub mod spacecraft;
 
 #[cfg(test)]

@@ -5,6 +5,8 @@
 //! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
 //! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.
 
+#![warn(missing_docs)]
+
 mod crossings;
 mod feedback;
 mod files;

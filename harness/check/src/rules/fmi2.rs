@@ -162,7 +162,7 @@ pub static RULES: &[Rule] = &[
 
     rule("exchange.run", Error, "the states can be integrated, by an adaptive and if need be implicit method, and stay finite", "3.2.2", Calls(exchange::run)),
     rule("exchange.event_iteration", Error, "newDiscreteStatesNeeded becomes false: an event iteration ends within 100 calls", "3.2.2", Calls(exchange::event_iteration)),
-    rule("exchange.events", Error, "event mode changes nothing where no event indicator has changed its sign, no time event is due and fmi2CompletedIntegratorStep has not asked for it", "3.1.1, 3.2.2; hosts miss the event", Calls(events::told)),
+    rule("exchange.events", Error, "event mode changes nothing where no event indicator has changed its sign, no time event is due and fmi2CompletedIntegratorStep has not asked for it", "3.1.1, 3.2.2; hosts miss the event", Calls(events::missed)),
     rule("exchange.values_changed", Error, "valuesOfContinuousStatesChanged is true where an event changes a state", "3.2.2; hosts go on from their own states", Calls(events::values_changed)),
     rule("exchange.nominals", Warning, "nominals of states are those of modelDescription.xml", "2.2.7, 3.2.2; hosts take the one or the other for their tolerance", Calls(events::nominals)),
     rule("exchange.next_event_time", Error, "nextEventTime is not in the past", "3.2.2", Calls(exchange::next_event_time)),

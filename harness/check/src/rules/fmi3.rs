@@ -85,7 +85,7 @@ pub static RULES: &[Rule] = &[
     rule("values.readable", Error, "every variable can be read once it is initialised", "2.2.6.2", Calls3(calls::readable)),
     rule("values.start", Error, "what has initial=exact starts as modelDescription.xml says", "2.4.7.5", Calls3(calls::start)),
     rule("values.set", Error, "what was set before initialization is read, element by element, or refused with a message", "2.2.6.2, 2.2.6.1", Calls3(calls::set)),
-    rule("values.type", Error, "a variable is refused by the calls of another type", "2.2.6.2", Calls3(calls::of_type)),
+    rule("values.type", Error, "a variable is refused by the calls of another type", "2.2.6.2", Calls3(calls::type_mismatch)),
     rule("values.unknown", Error, "a value reference that no variable has is refused", "2.2.6.2", Calls3(calls::unknown)),
     rule("values.counts", Error, "no more than nValues values are written", "2.2.6.2", Calls3(calls::counts)),
     rule("values.booleans", Error, "Booleans are 0 or 1", "2.2.3", Calls3(calls::booleans)),

@@ -1,4 +1,5 @@
-//! The tables of rules, one for each version of FMI. The documentation shows them; a test compares the two.
+//! The tables of rules, one for each version of FMI. The book shows them, and a test compares the book with
+//! the tables.
 
 pub mod fmi2;
 pub mod fmi3;

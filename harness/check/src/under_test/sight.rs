@@ -1,4 +1,4 @@
-//! Quantities that an event may change, before and after it.
+//! Compares the quantities that an event may change before and after an event.
 
 use anyhow::Result;
 use host::causality::{Causality, Variability};
@@ -6,12 +6,12 @@ use host::causality::{Causality, Variability};
 use super::{FmuUnderTest, Reading, Session};
 use crate::description::Variable;
 
-/// A share of a value below which a change is rounding.
+/// Relative change of a value below which it is rounding.
 const ROUNDING: f64 = 1e-9;
-/// A share of a derivative below which its change is what an iteration leaves in it.
+/// Relative change of a derivative below which it may come from an iterative solver.
 const ITERATED: f64 = 1e-2;
 
-/// Quantities that an event may change.
+/// Values of all quantities that an event may change.
 pub struct Sight {
     states: Vec<f64>,
     derivatives: Vec<f64>,
@@ -24,8 +24,8 @@ fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
 }
 
 impl Sight {
-    /// Present values.
-    pub fn of(session: &mut Session) -> Result<Sight> {
+    /// Reads the present values.
+    pub fn read(session: &mut Session) -> Result<Sight> {
         let n = session.states();
         let (mut states, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
         if n > 0 {
@@ -36,7 +36,7 @@ impl Sight {
         Ok(Sight { states, derivatives, discrete })
     }
 
-    /// The first thing that is another one afterwards: its name, and both values.
+    /// Describes the first quantity that differs in `after`: its name, and both values as text.
     pub fn change<'f>(&self, after: &Sight, fmu: &'f FmuUnderTest) -> Option<(&'f str, String)> {
         let jumps = |a: f64, b: f64, share: f64, size: f64| {
             (a - b).abs() > share * a.abs().max(b.abs()).max(size)
@@ -46,7 +46,7 @@ impl Sight {
                 (Reading::Real(a), Reading::Real(b)) => {
                     !jumps(*a, *b, ROUNDING, 1e-3 * v.nominal())
                 }
-                (a, b) => a.is(b),
+                (a, b) => a.is_identical(b),
             };
             if !same {
                 return Some((&v.name, format!("{a} to {b}")));

@@ -1,5 +1,3 @@
-//! Content of the archive of an FMU 3.0 (FMI 3.0.2, sections 2.5 and 2.6), and its binaries.
-
 use super::description::Description;
 use crate::archive::Archive;
 use crate::archive::folders_of;
@@ -9,7 +7,7 @@ use host::binary::{Binary, Kind};
 use host::fmi3::{Fmu, PLATFORM};
 use host::xml::Element;
 
-/// Files and folders at the top of an FMU (2.5.1).
+/// Files and folders that FMI 3.0 allows at the top level of an FMU (2.5.1).
 const AT_THE_TOP: [&str; 7] = [
     "modelDescription.xml",
     "binaries",
@@ -20,7 +18,6 @@ const AT_THE_TOP: [&str; 7] = [
     "terminalsAndIcons",
 ];
 
-/// `zip.folders`
 pub fn folders(archive: &Archive, findings: &mut Findings) {
     folders_of("3.0", &AT_THE_TOP, archive, findings);
 }
@@ -29,7 +26,6 @@ fn has(archive: &Archive, name: &str) -> bool {
     archive.below(name).any(|n| n == name)
 }
 
-/// `zip.licenses`
 pub fn licenses(archive: &Archive, findings: &mut Findings) {
     const FOLDER: &str = "documentation/licenses/";
     if archive.below(FOLDER).next().is_none() {
@@ -42,7 +38,6 @@ pub fn licenses(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.pictures`
 pub fn pictures(archive: &Archive, findings: &mut Findings) {
     for (drawing, picture) in [
         ("terminalsAndIcons/icon.svg", "terminalsAndIcons/icon.png"),
@@ -54,7 +49,6 @@ pub fn pictures(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.terminals`
 pub fn terminals(archive: &Archive, findings: &mut Findings) {
     const FILE: &str = "terminalsAndIcons/terminalsAndIcons.xml";
     let Ok(bytes) = std::fs::read(archive.directory().join(FILE)) else {
@@ -78,7 +72,6 @@ pub fn terminals(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.layered_standards`
 pub fn layered_standards(archive: &Archive, findings: &mut Findings) {
     let manifests: Vec<&str> =
         archive.below("extra/").filter(|name| name.ends_with("/fmi-ls-manifest.xml")).collect();
@@ -102,7 +95,6 @@ pub fn layered_standards(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// `zip.extra`
 pub fn extra(archive: &Archive, findings: &mut Findings) {
     let mut folders: Vec<&str> =
         archive.below("extra/").filter_map(|name| name.split('/').nth(1)).collect();
@@ -119,7 +111,7 @@ pub fn extra(archive: &Archive, findings: &mut Findings) {
 
 // ---------------------------------------------------------------- binaries
 
-/// Folders of FMI 2.0, and the tuple in their place.
+/// Folders of FMI 2.0 under `binaries/`, and the platform tuple that replaces each.
 const OF_FMI_2: [(&str, &str); 6] = [
     ("win32", "x86-windows"),
     ("win64", "x86_64-windows"),
@@ -129,14 +121,13 @@ const OF_FMI_2: [(&str, &str); 6] = [
     ("darwin64", "x86_64-darwin"),
 ];
 
-/// The archive with the names that its binaries have.
+/// The binaries in an archive, with the names that the description gives to them.
 pub struct Binaries<'a> {
     archive: &'a Archive,
     identifiers: Vec<String>,
 }
 
 impl<'a> Binaries<'a> {
-    /// Returns the binaries of an FMU.
     pub fn new(archive: &'a Archive, description: Option<&Description>) -> Binaries<'a> {
         let interfaces = description.into_iter().flat_map(Description::interfaces);
         let mut identifiers: Vec<String> =
@@ -146,12 +137,13 @@ impl<'a> Binaries<'a> {
         Binaries { archive, identifiers }
     }
 
-    /// Returns true if there is a binary for the platform of this program.
+    /// Returns true if there is a binary for the platform on which this check runs.
     pub fn is_callable(&self) -> bool {
         self.placed().iter().any(|(_, folder, ..)| *folder == PLATFORM)
     }
 
-    /// Path, folder, and what must be in it, of the libraries where hosts look for them.
+    /// Lists the libraries in the places where hosts look for them: path, folder, and the format that the
+    /// folder requires.
     fn placed(&self) -> Vec<(&'a str, &'a str, Option<Kind>)> {
         let archive: &'a Archive = self.archive;
         let found = archive.below("binaries/").filter_map(|name| {
@@ -166,10 +158,9 @@ impl<'a> Binaries<'a> {
     }
 }
 
-/// `bin.present`
 pub fn present(binaries: &Binaries, findings: &mut Findings) {
     let sources = binaries.archive.below("sources/buildDescription.xml").next().is_some();
-    // a static library has another ending
+    // Static libraries have other endings.
     let vendors = binaries.archive.below("binaries/").any(|name| {
         let folder = name.split('/').nth(1).unwrap_or_default();
         let is_old = OF_FMI_2.iter().any(|(old, _)| *old == folder);
@@ -184,7 +175,6 @@ pub fn present(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
-/// `bin.tuples`
 pub fn tuples(binaries: &Binaries, findings: &mut Findings) {
     let mut folders: Vec<&str> =
         binaries.archive.below("binaries/").filter_map(|name| name.split('/').nth(1)).collect();
@@ -198,7 +188,6 @@ pub fn tuples(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
-/// `bin.name`
 pub fn name(binaries: &Binaries, findings: &mut Findings) {
     let placed = binaries.placed();
     for name in binaries.archive.below("binaries/") {
@@ -233,7 +222,6 @@ fn each(
     }
 }
 
-/// `bin.format`
 pub fn format(binaries: &Binaries, findings: &mut Findings) {
     each(binaries, findings, |name, kind, binary, findings| match (kind, binary) {
         (None, _) => {}
@@ -245,7 +233,6 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
     });
 }
 
-/// `bin.symbols`
 pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
     let wanted = Fmu::symbols();
     each(binaries, findings, |name, _, binary, findings| {
@@ -257,7 +244,6 @@ pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
     });
 }
 
-/// `bin.this_platform`
 pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
     if !binaries.is_callable() {
         findings.add(

@@ -1,4 +1,5 @@
-//! Rules of calls for FMUs 3.0: loading, life, values, states, log (FMI 3.0.2, sections 2.2 and 2.3).
+//! Rules of calls for FMI 3.0: loading, life cycle, values, states, logging (FMI 3.0.2, sections 2.2 and
+//! 2.3).
 
 use anyhow::Result;
 
@@ -12,7 +13,6 @@ use host::causality::{Causality, Variability};
 use host::description::{CType, Type, Value};
 use host::fmi3::Interface;
 
-/// `instantiate.token`
 pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
         let mut with = subject.instantiation(using)?;
@@ -32,7 +32,6 @@ pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `instantiate.callbacks`
 pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
         let mut with = subject.instantiation(using)?;
@@ -46,7 +45,7 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 continue;
             }
         }
-        // required variables, but nobody who hears of them
+        // With required intermediate variables, but no callback that receives them.
         let mut session = subject.session(using)?;
         session.initialise()?;
         session.advance(2)?;
@@ -54,7 +53,6 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `life.deterministic`
 pub fn deterministic(subject: &Subject, findings: &mut Findings) -> Result<()> {
     life::deterministic(subject, findings)?;
     match findings.list.is_empty() {
@@ -65,7 +63,6 @@ pub fn deterministic(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- values
 
-/// `values.readable`
 pub fn readable(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
         let mut session = subject.running(using)?;
@@ -79,7 +76,6 @@ pub fn readable(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.start`
 pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using = subject.plain_uses()[0];
     let mut session = subject.session(using)?;
@@ -104,7 +100,6 @@ pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.set`
 pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using = subject.plain_uses()[0];
     let wanted = |v: &&super::description::Variable| {
@@ -113,11 +108,11 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for v in subject.readable().filter(wanted) {
         let Some(mut values) = start_values(v) else { continue };
         let (min, max) = v.bounds();
-        // distinct for each element, so that one in the place of another shows
+        // Each element has its own value, so that exchanged elements show.
         for (i, value) in values.iter_mut().enumerate() {
             match value {
                 Value::Real(x) => {
-                    // a Float32 has it as it is
+                    // A Float32 represents it exactly.
                     let size = if *x == 0.0 { v.nominal() } else { x.abs() };
                     let moved = f64::from((*x + size * (i + 1) as f64 / 64.0) as f32);
                     if moved > min && moved < max {
@@ -138,14 +133,14 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let mut session = subject.session(using)?;
         subject.doing(format!("setting {}", v.name));
         if let Err(error) = session.instance.set_values(v.c_type, v.reference, &values) {
-            // a value that the model has reasons to refuse is none to complain of, without being told why
+            // A model may refuse a value for its own reasons, but must say why.
             if error.messages.is_empty() {
                 findings.add(v.place(), format!("{error} (allowed: a message)"));
             }
             continue;
         }
-        // with such a value the model may have no solution
-        if subject.told_by("", || session.enter_initialization()).is_err() {
+        // With such a value the model may have no solution.
+        if subject.with_crash_reported_by("", || session.enter_initialization()).is_err() {
             continue;
         }
         let read = session.read(v)?;
@@ -159,8 +154,7 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.type`
-pub fn of_type(subject: &Subject, findings: &mut Findings) -> Result<()> {
+pub fn type_mismatch(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
     for v in subject.readable() {
         let n = v.length();
@@ -181,7 +175,6 @@ pub fn of_type(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.unknown`
 pub fn unknown(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let last = subject.description.variables.iter().map(|v| v.reference).max().unwrap_or(0);
     let Some(unknown) = last.checked_add(1000) else {
@@ -196,14 +189,13 @@ pub fn unknown(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.counts`
 pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     const CANARY: f64 = -7.25e77;
     let mut session = subject.running(subject.plain_uses()[0])?;
     let all = subject.readable().filter(|v| v.c_type == CType::Float64);
     for v in all {
         let n = v.length();
-        // nValues is n, then n - 1; the array is longer
+        // nValues is n and then n - 1; the array is longer in both cases.
         for told in [n, n.saturating_sub(1)] {
             let place = format!("fmi3GetFloat64 of {} with nValues = {told}", v.name);
             let mut values = vec![CANARY; n + 8];
@@ -228,7 +220,6 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.booleans`
 pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
     session.advance(2)?;
@@ -247,7 +238,6 @@ pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `values.fixed`
 pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = subject.plain_uses().first().copied() else { return Ok(()) };
     let mut any = false;
@@ -283,7 +273,6 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- states
 
-/// `states.restore`
 pub fn restore(subject: &Subject, findings: &mut Findings) -> Result<()> {
     states::rollback(subject, findings)?;
     match subject.plain_uses().first().filter(|_| findings.skipped.is_none()) {
@@ -292,7 +281,6 @@ pub fn restore(subject: &Subject, findings: &mut Findings) -> Result<()> {
     }
 }
 
-/// `states.serialize`
 pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in states::with(subject, "canSerialize", findings) {
         let mut session = subject.running(using)?;
@@ -301,7 +289,7 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
         subject.doing("fmi3SerializeFMUState");
         let bytes = session.instance.serialize(&state)?;
         let mark = session.mark();
-        // an FMU that has asked for the end is called on all the same, both times
+        // The calls go on even if the FMU has requested the end of the simulation, in both runs.
         session.go_back(&mark);
         session.advance(STEPS)?;
         let first = session.readings()?;
@@ -335,7 +323,6 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- log
 
-/// `log.environment`
 pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut heard = 0;
     let mut run = |mut using: Use| -> Result<()> {
@@ -366,7 +353,6 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-/// `log.errors`
 pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
     if let Some(error) = subject.refused(&mut session)
@@ -380,7 +366,7 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- Model Exchange
 
-/// An instance for Model Exchange, or the reason why there is none.
+/// Returns an initialised instance for Model Exchange, or skips the rule if the FMU has no Model Exchange.
 fn exchanging<'s>(subject: &'s Subject, findings: &mut Findings) -> Result<Option<Session<'s>>> {
     if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip("it offers no Model Exchange");
@@ -389,7 +375,6 @@ fn exchanging<'s>(subject: &'s Subject, findings: &mut Findings) -> Result<Optio
     subject.running(Use::EXCHANGE).map(Some)
 }
 
-/// `exchange.counts`
 pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
     let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
@@ -419,7 +404,6 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-/// `exchange.vectors`
 pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
     let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
@@ -457,7 +441,6 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
     Ok(())
 }
 
-/// `exchange.states_set`
 pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
     let n = session.instance.number_of_states()?;
@@ -480,7 +463,6 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `exchange.indicators`
 pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
     let nz = session.instance.number_of_indicators()?;

@@ -1,4 +1,5 @@
-//! Head and definitions of modelDescription.xml (FMI 3.0.2, section 2.4): interfaces, capabilities, units, types.
+//! Rules about the head and the definitions of modelDescription.xml (FMI 3.0.2, section 2.4): interfaces,
+//! capabilities, units, types.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +9,6 @@ use crate::findings::Findings;
 use host::description::Type;
 use host::xml::Element;
 
-/// `xml.fmi_version`
 pub fn fmi_version(d: &Description, findings: &mut Findings) {
     let version = d.root.get("fmiVersion").unwrap_or_default();
     if version != "3.0" {
@@ -16,14 +16,12 @@ pub fn fmi_version(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.token`
 pub fn token(d: &Description, findings: &mut Findings) {
     if d.root.get("instantiationToken").is_none_or(|token| token.trim().is_empty()) {
         findings.add("instantiationToken", "it is missing or empty");
     }
 }
 
-/// `xml.interfaces`
 pub fn interfaces(d: &Description, findings: &mut Findings) {
     if d.interfaces().next().is_none() {
         findings.add(
@@ -33,12 +31,10 @@ pub fn interfaces(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.model_identifier`
 pub fn model_identifier(d: &Description, findings: &mut Findings) {
     identifiers(d.interfaces(), findings);
 }
 
-/// `xml.capabilities`
 pub fn capabilities(d: &Description, findings: &mut Findings) {
     const NEEDS: [(&str, &str); 2] = [
         ("canSerializeFMUState", "canGetAndSetFMUState"),
@@ -81,24 +77,21 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.default_experiment`
 pub fn default_experiment(d: &Description, findings: &mut Findings) {
     if let Some(experiment) = experiment_numbers(&d.root, findings) {
         stop_before_start(experiment, findings);
     }
 }
 
-/// The items of a type.
+/// Returns the child elements named Item of a type.
 pub(super) fn items(of: &Element) -> Vec<&Element> {
     of.children.iter().filter(|c| c.name == "Item").collect()
 }
 
-/// `xml.unique`
 pub fn unique(d: &Description, findings: &mut Findings) {
     unique_names(&d.root, "TypeDefinitions", items, findings);
 }
 
-/// `xml.units`
 pub fn units(d: &Description, findings: &mut Findings) {
     let units: BTreeMap<&str, &Element> =
         d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
@@ -137,7 +130,6 @@ pub fn units(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.types`
 pub fn types(d: &Description, findings: &mut Findings) {
     let types: BTreeMap<&str, &str> = d
         .root

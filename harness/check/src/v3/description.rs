@@ -1,33 +1,30 @@
-//! modelDescription.xml of FMI 3.0.2 (section 2.4): what it says, read without judging.
+//! Reads modelDescription.xml of FMI 3.0.2 (section 2.4) without judging it, so that rules can report what is
+//! wrong.
 
 use std::collections::BTreeMap;
 use std::ops::Deref;
 
-use crate::description::{Common, each, number, words};
+use crate::description::{Common, each, number, split_attribute};
 use crate::findings::Findings;
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 use host::xml::Element;
 
-/// The parts of modelDescription.xml that rules need, read without judging.
+/// The parts of modelDescription.xml that rules need. Faults are not reported here but by the rules.
 pub struct Description {
-    /// All of it.
     pub root: Element,
-    /// Variables in the order of the file.
     pub variables: Vec<Variable>,
-    /// The elements of ModelStructure, in the order of the file.
     pub structure: Vec<Unknown>,
 }
 
-/// A variable.
 #[derive(Clone, Debug)]
 pub struct Variable {
     read: Common,
-    /// Type in which calls exchange the variable.
+    /// Type of the function that reads and sets the variable.
     pub c_type: CType,
-    /// Start values, as written.
+    /// Start values as text, one for each element.
     pub starts: Vec<String>,
-    /// Sizes with the start values of structural parameters; empty for a scalar.
+    /// Sizes of an array, computed with the start values of structural parameters; empty for a scalar.
     pub dimensions: Vec<usize>,
 }
 
@@ -39,44 +36,41 @@ impl Deref for Variable {
     }
 }
 
-/// An element of ModelStructure.
+/// An element of ModelStructure; `list` is its name, for example Output.
 #[derive(Clone, Debug)]
 pub struct Unknown {
-    /// Name: Output and so on.
     pub list: String,
-    /// Line of the file.
     pub line: u64,
-    /// Value reference; none if it cannot be read.
+    /// Value reference; `None` if it is missing or not a number.
     pub reference: Option<u32>,
-    /// Dependencies; `None` if they are not declared and all knowns count.
+    /// Value references on which this unknown depends. `None` if the attribute is missing, which means that
+    /// it may depend on all knowns.
     pub dependencies: Option<Vec<u32>>,
-    /// Kinds of the dependencies.
     pub kinds: Option<Vec<String>>,
 }
 
 impl Variable {
-    /// Value reference of what it is the derivative of.
+    /// Returns the value reference of the variable of which this is the derivative.
     pub fn derivative_of(&self) -> Option<u32> {
         self.typed.get("derivative")?.trim().parse().ok()
     }
 
-    /// Number of values.
     pub fn length(&self) -> usize {
         self.dimensions.iter().product()
     }
 
-    /// Returns true for variables that a host sets before and during a simulation.
+    /// Returns true for inputs and parameters, which a host sets before and during a simulation.
     pub fn is_set_by_hosts(&self) -> bool {
         matches!(self.causality, Causality::Input | Causality::Parameter)
     }
 
-    /// Returns true if the rules' calls exchange values of the variable.
+    /// Returns true if rules read and set this variable; clocked variables, clocks and Binary are left out.
     pub fn is_exchanged(&self) -> bool {
         !matches!(self.kind, Type::Binary | Type::Clock) && self.typed.get("clocks").is_none()
     }
 }
 
-/// Allowed values of `initial` in FMI 3.0; see the type in [`crate::description`].
+/// Returns the allowed values of `initial` in FMI 3.0; see the type `Initials` in [`crate::description`].
 pub(crate) fn initials(
     causality: &Causality,
     variability: &Variability,
@@ -98,12 +92,13 @@ pub(crate) fn initials(
 }
 
 impl Description {
-    /// Returns true if it has clocks: then `eventModeUsed` must be true in Co-Simulation (section 2.3.1).
+    /// Returns true if the FMU has clocks, in which case `eventModeUsed` must be true in Co-Simulation
+    /// (section 2.3.1).
     pub fn has_clocks(&self) -> bool {
         self.variables.iter().any(|v| v.kind == Type::Clock)
     }
 
-    /// Reads the file, whose tree is `root`.
+    /// Reads the description from its parsed tree.
     pub fn new(root: Element) -> Description {
         let types: BTreeMap<&str, &Element> =
             root.list("TypeDefinitions").filter_map(|t| Some((t.get("name")?, t))).collect();
@@ -117,29 +112,27 @@ impl Description {
         Description { variables, structure, root }
     }
 
-    /// The first variable of a value reference.
+    /// Returns the first variable with this value reference.
     pub fn at(&self, reference: u32) -> Option<&Variable> {
         self.variables.iter().find(|v| v.reference == reference)
     }
 
-    /// An interface.
     pub fn interface(&self, name: &str) -> Option<&Element> {
         self.root.child(name)
     }
 
-    /// The interfaces there are.
     pub fn interfaces(&self) -> impl Iterator<Item = &Element> {
         ["ModelExchange", "CoSimulation", "ScheduledExecution"]
             .into_iter()
             .filter_map(|name| self.root.child(name))
     }
 
-    /// Elements of ModelStructure of one name.
     pub fn unknowns<'a>(&'a self, list: &'a str) -> impl Iterator<Item = &'a Unknown> {
         self.structure.iter().filter(move |u| u.list == list)
     }
 
-    /// Value references of the continuous states, in the order of their derivatives.
+    /// Returns the value references of the continuous states, in the order of their derivatives in
+    /// ModelStructure.
     pub fn states(&self) -> Vec<u32> {
         let derivatives = self.unknowns("ContinuousStateDerivative");
         derivatives.filter_map(|u| self.at(u.reference?)?.derivative_of()).collect()
@@ -197,8 +190,8 @@ fn unknown(element: &Element) -> Unknown {
         list: element.name.to_string(),
         line: element.line,
         reference: number(element, "valueReference"),
-        dependencies: words(element, "dependencies")
+        dependencies: split_attribute(element, "dependencies")
             .map(|words| words.iter().filter_map(|word| word.parse().ok()).collect()),
-        kinds: words(element, "dependenciesKind"),
+        kinds: split_attribute(element, "dependenciesKind"),
     }
 }

@@ -1,4 +1,5 @@
-//! The rules for FMUs 3.0, by the text of FMI 3.0.2. Those of the archive and of reading XML are shared with FMI 2.0.
+//! The rules for FMI 3.0 (text of version 3.0.2). Rules about the archive and about XML are shared with FMI
+//! 2.0.
 
 pub mod archive;
 pub mod calls;

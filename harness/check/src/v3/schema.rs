@@ -1,4 +1,4 @@
-//! The schema of modelDescription.xml of FMI 3.0.2 (section 2.4) as a table.
+//! The schema of modelDescription.xml in FMI 3.0.2 (section 2.4) as a table.
 
 use crate::schema::Children::{Any, Choice, Many, Ordered, Sequence};
 use crate::schema::Written::{Boolean, Double, Int, OneOf, Text, Time, Unsigned};
@@ -20,7 +20,7 @@ const CAUSALITY: Written = OneOf(&[
     "structuralParameter",
 ]);
 
-/// The elements that stand for a type of variable.
+/// Elements of ModelVariables; each is a type of variable.
 pub const TYPES: &[&str] = &[
     "Float32",
     "Float64",
@@ -39,7 +39,6 @@ pub const TYPES: &[&str] = &[
     "Clock",
 ];
 
-/// Attributes of every variable except clocks.
 const OF_ALL: Attributes = &[
     ("description", Text),
     ("causality", CAUSALITY),
@@ -108,7 +107,6 @@ const CLOCK_ATTRIBUTES: Attributes = &[
 const NOTE: schema::Children = Sequence(&["Annotations"]);
 
 #[rustfmt::skip]
-/// Every element.
 pub static KINDS: &[Kind] = &[
     kind("fmiModelDescription",
         &[("fmiVersion", Text), ("modelName", Text), ("instantiationToken", Text)],
@@ -203,12 +201,10 @@ pub static KINDS: &[Kind] = &[
         &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)], NOTE),
 ];
 
-/// `xml.schema`
 pub fn structure(description: &Description, findings: &mut Findings) {
     schema::structure_by(KINDS, &description.root, findings);
 }
 
-/// `xml.values`
 pub fn values(description: &Description, findings: &mut Findings) {
     schema::values_by(KINDS, &description.root, findings);
 }

@@ -1,5 +1,5 @@
-//! Rules of steps for FMUs 3.0: what fmi3DoStep answers, events, intermediate update, derivatives and dependencies
-//! (FMI 3.0.2, sections 2.2.9 to 2.2.12, 2.3.5 and 4).
+//! Rules about steps in FMI 3.0: results of fmi3DoStep, events, intermediate update, derivatives and
+//! dependencies (FMI 3.0.2, sections 2.2.9 to 2.2.12, 2.3.5 and 4).
 
 use anyhow::Result;
 
@@ -12,7 +12,7 @@ use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
 
-/// Errors in the results of one fmi3DoStep from `from` by `h`.
+/// Lists what is wrong in the results of one fmi3DoStep from time `from` by `h` seconds.
 fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
     let mut faults = Vec::new();
     for (name, byte) in [
@@ -26,7 +26,7 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
             other => faults.push(format!("{name} is {other} (allowed: 0, 1)")),
         }
     }
-    // 4.2.1 lets an FMU miss the end a little, as those do whose own steps do not fit
+    // Section 4.2.1 allows an FMU to end slightly off the communication point, if its own steps do not fit.
     let slack = 1e-2 * h;
     let end = from + h;
     if step.last_time.is_nan() {
@@ -66,7 +66,7 @@ fn stepping_uses(subject: &Subject) -> Vec<Use> {
     uses.filter(|u| u.interface == Interface::CoSimulation).collect()
 }
 
-/// Returns the uses in which the host handles events. Skips the rule if there are none.
+/// Returns the uses in which the host handles events; skips the rule if there are none.
 fn uses_with_events(subject: &Subject, findings: &mut Findings) -> Vec<Use> {
     let uses = subject.uses().into_iter();
     let uses: Vec<Use> =
@@ -77,10 +77,9 @@ fn uses_with_events(subject: &Subject, findings: &mut Findings) -> Vec<Use> {
     uses
 }
 
-/// Steps long enough to meet events.
+/// Number of steps in a run that should contain events.
 const LONG: usize = 200;
 
-/// `steps.run`
 pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.uses() {
         let mut session = subject.running(using)?;
@@ -100,12 +99,10 @@ pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `events.iteration`
 pub fn iterates(subject: &Subject, _: &mut Findings) -> Result<()> {
     subject.uses().into_iter().try_for_each(|using| subject.running(using)?.advance(STEPS))
 }
 
-/// `steps.answers`
 pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !stepping(subject, findings) {
         return Ok(());
@@ -148,7 +145,6 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `steps.wrong`
 pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !stepping(subject, findings) {
         return Ok(());
@@ -165,7 +161,6 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- events
 
-/// `events.answers`
 pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in uses_with_events(subject, findings) {
         let mut session = subject.session(using)?;
@@ -200,7 +195,7 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
             if session.ended || !findings.list.is_empty() {
                 break;
             }
-            // on to the next event
+            // Continue to the next event.
             let events = session.events;
             while session.events == events && !session.ended && steps < LONG {
                 steps += 1;
@@ -218,7 +213,6 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `events.idempotent`
 pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in uses_with_events(subject, findings) {
         let mut session = subject.running(using)?;
@@ -246,7 +240,6 @@ pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `events.discrete_held`
 pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let uses: Vec<Use> = stepping_uses(subject).into_iter().filter(|u| u.event_mode).collect();
     if uses.is_empty() {
@@ -290,7 +283,7 @@ pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// The outputs that are numbers or Booleans; the continuous ones alone, if so asked.
+/// Reads the outputs that are numbers or Booleans; with `continuous` only the continuous ones.
 fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>> {
     let wanted =
         |v: &&Variable| v.causality == Causality::Output && (!continuous || v.is_continuous());
@@ -306,10 +299,10 @@ fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>
     Ok(outputs)
 }
 
-/// Share of an output's size by which it may depend on how the host uses the FMU: its own solver may be restarted.
+/// Relative difference of an output that the way of use may cause, because the FMU's solver may be restarted
+/// at other times.
 const SAME: f64 = 1e-3;
 
-/// `events.same_trajectory`
 pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !stepping(subject, findings) {
         return Ok(());
@@ -370,7 +363,6 @@ fn updating(subject: &Subject, findings: &mut Findings) -> bool {
 
 const UPDATING: Use = Use { updates: true, ..Use::PLAIN };
 
-/// `intermediate.time`
 pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !updating(subject, findings) {
         return Ok(());
@@ -380,7 +372,7 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
     for k in 0..STEPS {
         session.stimulate(k)?;
         let (from, h) = (session.time, session.h);
-        // as in `faults`: its own steps may not fit
+        // As in `faults`: the FMU's own steps may not fit.
         let slack = 1e-2 * h;
         let mut wrong: Option<String> = None;
         session.raw_step_hearing(
@@ -419,7 +411,6 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
     Ok(())
 }
 
-/// `intermediate.early_return`
 pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !updating(subject, findings) {
         return Ok(());
@@ -465,11 +456,12 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
     Ok(())
 }
 
-/// `intermediate.inputs`
+/// `intermediate.inputs`: checks that inputs which are set in the intermediate update act within the step.
 ///
-/// Checks that inputs set in intermediate update act within the step. With an input on a straight line, the outputs must come
-/// nearer to those of steps 64 times as short than with a held input. The short steps use intermediate update too: an FMU may use
-/// the input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have none at any step.
+/// With an input that changes linearly with time, the outputs must come nearer to those of steps 64 times as
+/// short than with a held input. The short steps use intermediate update too, because an FMU may use the
+/// input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have no rate for any
+/// step size.
 pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !updating(subject, findings) {
         return Ok(());
@@ -522,7 +514,7 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
         };
         let (fine, held, along) = (run(FINE, true)?, run(1, false)?, run(1, true)?);
         for (((name, right), (_, held)), (_, along)) in fine.iter().zip(&held).zip(&along) {
-            // direct feedthrough shows the input as it was set last, whatever was meant by it
+            // Direct feedthrough shows the value that was set last, whatever the FMU does with it.
             let effect = (held - right).abs();
             if effect > 1e-9 * right.abs().max(1e-9) && (along - right).abs() > 0.6 * effect {
                 findings.add(
@@ -540,7 +532,8 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
 
 // ---------------------------------------------------------------- derivatives
 
-/// Unknowns and knowns of directional derivatives that are Float64 and listed with their dependencies.
+/// Returns the Float64 unknowns for which directional derivatives are checked, each with its declared Float64
+/// dependencies.
 fn pairs(subject: &Subject) -> Vec<(Variable, Vec<Variable>)> {
     let d = &subject.description;
     let states = d.states();
@@ -563,7 +556,7 @@ fn real(values: &[Value]) -> Vec<f64> {
     values.iter().map(|v| if let Value::Real(x) = v { *x } else { f64::NAN }).collect()
 }
 
-/// The Float64 value of an unknown where a known is displaced in one element.
+/// Returns the value of `unknown` while one element of `known` is displaced by `by` from `base`.
 fn displaced(
     session: &mut Session,
     unknown: &Variable,
@@ -581,7 +574,7 @@ fn displaced(
 }
 
 fn deriving(subject: &Subject, flag: &str, findings: &mut Findings) -> Option<Use> {
-    // where derivatives follow from states and inputs at once: Model Exchange
+    // In Model Exchange derivatives follow immediately from states and inputs.
     if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip(
             "it offers no Model Exchange, where derivatives can be compared with differences",
@@ -595,10 +588,10 @@ fn deriving(subject: &Subject, flag: &str, findings: &mut Findings) -> Option<Us
     Some(Use::EXCHANGE)
 }
 
-/// A central difference.
+/// A central difference quotient.
 struct Difference {
     quotient: f64,
-    /// Rounding error of the difference of the two values.
+    /// Part of the quotient that may come from rounding of the two values.
     rounding: f64,
 }
 
@@ -608,15 +601,13 @@ impl Difference {
         Difference { quotient: (above - below) / (2.0 * h), rounding }
     }
 
-    /// Returns true if a derivative agrees with the difference quotient, within rounding and
-    /// curvature.
+    /// Returns true if `derivative` agrees with the quotient within rounding, curvature and `unsure`.
     fn is_near(&self, derivative: f64, unsure: f64) -> bool {
         let size = self.quotient.abs().max(derivative.abs());
         (derivative - self.quotient).abs() <= 1e-4 * size + self.rounding + unsure + 1e-9
     }
 }
 
-/// `derivatives.directional`
 pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = deriving(subject, "providesDirectionalDerivatives", findings) else {
         return Ok(());
@@ -648,8 +639,9 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 let mut last = differences(h)?;
                 let mut wrong: Vec<usize> =
                     (0..own.len()).filter(|i| !last[*i].is_near(own[*i], 0.0)).collect();
-                // Where terms cancel in a value, rounding takes more of it than its size tells: what two steps disagree
-                // by shows how much. A derivative is wrong if it is wrong by all steps.
+                // Where terms cancel, rounding is larger than the value suggests. The difference between two
+                // step sizes shows how large. A derivative is wrong only if it disagrees for every step
+                // size.
                 for h in [10.0, 100.0, 1000.0].map(|times| times * h) {
                     let (min, max) = known.bounds();
                     if wrong.is_empty() || base[element] - h < min || base[element] + h > max {
@@ -677,7 +669,6 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `derivatives.adjoint`
 pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = deriving(subject, "providesAdjointDerivatives", findings) else {
         return Ok(());
@@ -731,8 +722,9 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if a value differs from `before` by more than rounding. Terms of the moved known that cancel in exact arithmetic
-/// leave a few units in the last place; the known itself moves by at least a hundredth of its size.
+/// Returns true if `after` differs from `before` by more than rounding. Terms that cancel in exact arithmetic
+/// may leave a few units in the last place; the known itself is changed by at least a hundredth of its
+/// magnitude.
 fn follows(after: f64, before: f64) -> bool {
     const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let same = after.to_bits() == before.to_bits()
@@ -740,7 +732,6 @@ fn follows(after: f64, before: f64) -> bool {
     !same
 }
 
-/// `dependencies.declared`
 pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if subject.binary(Interface::ModelExchange).is_err() {
         findings.skip(
@@ -766,7 +757,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
         for known in d.variables.iter().filter(|k| k.c_type == CType::Float64 && k.is_continuous())
         {
             let is_known = known.causality == Causality::Input || states.contains(&known.reference);
-            // an output that is a state depends on itself
+            // An output that is also a state depends on itself.
             if !is_known || listed.contains(&known.reference) || known.reference == v.reference {
                 continue;
             }
@@ -792,7 +783,6 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// `dependencies.elements`
 pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let uses = subject.plain_uses().into_iter();
     let using =

@@ -1,4 +1,4 @@
-//! ModelStructure of modelDescription.xml (FMI 3.0.2, section 2.4), and dependencies.
+//! Rules about ModelStructure in modelDescription.xml (FMI 3.0.2, section 2.4) and about dependencies.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,8 @@ fn place(d: &Description, u: &Unknown) -> String {
     format!("line {}, {}, {}", u.line, u.list, d.name_of(u.reference))
 }
 
-/// Reports entries that are missing, repeated or not allowed.
+/// Reports elements named `list` that are missing from `needed`, repeated or not `allowed`; `why` describes
+/// the allowed ones.
 fn compare(
     d: &Description,
     findings: &mut Findings,
@@ -42,13 +43,11 @@ fn all(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<u32> {
     d.variables.iter().filter(|v| wanted(v)).map(|v| v.reference).collect()
 }
 
-/// `xml.outputs`
 pub fn outputs(d: &Description, findings: &mut Findings) {
     let is_output = |v: &Variable| v.causality == Causality::Output;
     compare(d, findings, "Output", &all(d, is_output), is_output, "every output, once");
 }
 
-/// `xml.derivatives`
 pub fn derivatives(d: &Description, findings: &mut Findings) {
     let why = "variables with the attribute derivative, once";
     let allowed = |v: &Variable| v.derivative_of().is_some();
@@ -66,14 +65,12 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.clocked_states`
 pub fn clocked_states(d: &Description, findings: &mut Findings) {
     let is_state = |v: &Variable| v.written.get("previous").is_some();
     let why = "every variable with the attribute previous, once";
     compare(d, findings, "ClockedState", &all(d, is_state), is_state, why);
 }
 
-/// `xml.initial_unknowns`
 pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
     let derivatives: BTreeSet<u32> =
         d.unknowns("ContinuousStateDerivative").filter_map(|u| u.reference).collect();
@@ -92,13 +89,11 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
     compare(d, findings, "InitialUnknown", &all(d, needed), allowed, why);
 }
 
-/// `xml.event_indicators`
 pub fn event_indicators(d: &Description, findings: &mut Findings) {
     let why = "continuous Float32 and Float64, each once";
     compare(d, findings, "EventIndicator", &BTreeSet::new(), |v| v.is_continuous(), why);
 }
 
-/// `xml.structure_references`
 pub fn structure_references(d: &Description, findings: &mut Findings) {
     for unknown in &d.structure {
         let all =
@@ -112,7 +107,6 @@ pub fn structure_references(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.dependencies`
 pub fn dependencies(d: &Description, findings: &mut Findings) {
     for unknown in &d.structure {
         let place = place(d, unknown);
@@ -143,10 +137,9 @@ pub fn dependencies(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.dependencies_known`
 pub fn dependencies_known(d: &Description, findings: &mut Findings) {
     let states: BTreeSet<u32> = d.states().into_iter().collect();
-    // what event indicators may depend on is not said
+    // The standard does not say on what event indicators may depend.
     for unknown in d.structure.iter().filter(|u| u.list != "EventIndicator") {
         let initial = unknown.list == "InitialUnknown";
         let known = |v: &Variable| {
@@ -158,7 +151,7 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
                     | Causality::StructuralParameter
             ) || match initial {
                 true => v.initial.as_deref() == Some("exact"),
-                // a discrete variable may be a discrete-time state
+                // A discrete variable may be a discrete-time state.
                 false => states.contains(&v.reference) || v.variability == Variability::Discrete,
             } || v.kind == Type::Clock
                 || v.written.get("clocks").is_some()

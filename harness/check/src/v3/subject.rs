@@ -1,4 +1,4 @@
-//! The FMU 3.0 under test, loaded and called as hosts do, and what rules need to do so shortly.
+//! The FMU 3.0 under test: loads it, calls it as a host does, and has shortcuts for the rules.
 
 use std::ops::Deref;
 use std::path::Path;
@@ -16,18 +16,16 @@ use host::xml::{Element, double};
 
 pub use crate::loaded::STEPS;
 
-/// Calls of fmi3UpdateDiscreteStates after which an event iteration counts as endless.
+/// Number of calls of fmi3UpdateDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
-/// Events in one communication step after which its FMU is not followed any more.
+/// Number of events in one communication step after which the simulation is abandoned.
 const EVENTS: usize = 1000;
 
-/// Hears of a point within a step, and says when to return early, if at all.
+/// Callback for intermediate updates within a step. It returns the time of an early return, or `None`.
 pub type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
 
-/// The loaded FMU.
 pub struct Subject {
     loaded: Loaded<Fmi3>,
-    /// Model description of the FMU.
     pub description: Description,
 }
 
@@ -39,31 +37,25 @@ impl Deref for Subject {
     }
 }
 
-/// Use of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
-    /// Interface type.
     pub interface: Interface,
-    /// eventModeUsed.
     pub event_mode: bool,
-    /// earlyReturnAllowed.
     pub early_return: bool,
-    /// intermediateUpdate is handed over.
+    /// True if the callback intermediateUpdate is passed.
     pub updates: bool,
 }
 
 impl Use {
-    /// Co-Simulation as of FMI 2.0: no event mode, no early return, no intermediate update.
+    /// Co-Simulation as in FMI 2.0: no event mode, no early return, no intermediate update.
     pub const PLAIN: Use = Use {
         interface: Interface::CoSimulation,
         event_mode: false,
         early_return: false,
         updates: false,
     };
-    /// Model Exchange.
     pub const EXCHANGE: Use = Use { interface: Interface::ModelExchange, ..Use::PLAIN };
 
-    /// Name in findings.
     pub fn name(self) -> &'static str {
         match self {
             Use { interface: Interface::ModelExchange, .. } => "Model Exchange",
@@ -78,8 +70,8 @@ impl Use {
 }
 
 impl Subject {
-    /// Loads the FMU that is unpacked in `directory` and has this model description, for each interface that rules call.
-    /// Makes no instances after `deadline`.
+    /// Loads the FMU that is unpacked in `directory`, with the interfaces that rules call. No instances are
+    /// created after `deadline`.
     pub fn open(
         directory: &Path,
         path: &Path,
@@ -87,7 +79,7 @@ impl Subject {
         deadline: Instant,
     ) -> Result<Subject> {
         let description = Description::new(root);
-        // clocks ask for event mode with clock activation, which is not called
+        // Clocks need event mode with clock activation, which this check does not call.
         let has_clocks = description.has_clocks();
         let mut called = declared(&description.root);
         called.retain(|(of, _)| *of == Interface::ModelExchange || !has_clocks);
@@ -100,7 +92,7 @@ impl Subject {
         Ok(Subject { loaded, description })
     }
 
-    /// The plain use of each interface there is.
+    /// Returns the plain use of each interface that can be called.
     pub fn plain_uses(&self) -> Vec<Use> {
         let uses = [Use::PLAIN, Use::EXCHANGE].into_iter();
         uses.filter(|u| self.binary(u.interface).is_ok()).collect()
@@ -111,12 +103,12 @@ impl Subject {
         experiment.and_then(|e| e.number(name)).filter(|x| x.is_finite())
     }
 
-    /// Start time, s.
     pub fn start(&self) -> f64 {
         self.number("startTime").unwrap_or(0.0)
     }
 
-    /// Communication step, s: the FMU's own or a 500th of its experiment.
+    /// Returns the communication step, s: a multiple of the FMU's fixed internal step, or else the suggested
+    /// step or a 500th of the default experiment.
     pub fn step(&self) -> f64 {
         let fixed = self.description.interface("CoSimulation");
         let fixed = fixed.and_then(|e| e.number("fixedInternalStepSize")).filter(|h| *h > 0.0);
@@ -125,14 +117,12 @@ impl Subject {
         let step = step.filter(|h| span.is_none_or(|span| *h * STEPS as f64 <= span));
         let step = step.or(span.map(|span| span / 500.0)).unwrap_or(0.01);
         match fixed {
-            // a whole number of its own steps
-            // a whole number of its own steps, of which there may be millions in a 500th of the experiment
+            // A multiple of the FMU's own step, of which there may be millions in a 500th of the experiment.
             Some(own) => (step / own).round().clamp(1.0, 100.0) * own,
             None => step,
         }
     }
 
-    /// The arguments of an instance.
     pub fn instantiation(&self, using: Use) -> Result<Instantiation<'_>> {
         let mut with = self.binary(using.interface)?.instantiation("check");
         with.interface = using.interface;
@@ -145,27 +135,29 @@ impl Subject {
         Ok(with)
     }
 
-    /// Instantiates the FMU as `with` says, unless it may have one instance per process and had it.
+    /// Instantiates the FMU with the arguments `with`. The outer error means that the FMU allows only one
+    /// instance in a process and already has had it, or that the deadline has passed.
     pub fn instantiate(&self, with: &Instantiation) -> Result<Result<Instance<'_>, CallError>> {
         let binary = self.binary(with.interface)?;
         let is_once = self.can(with.interface, "canBeInstantiatedOnlyOncePerProcess");
         self.make(is_once, || binary.instantiate_with(with))
     }
 
-    /// Reads a value reference that no variable has; `values.unknown` reports a crash. The messages of the refusal.
+    /// Reads a value reference that no variable has, and returns the FMU's refusal with its messages. If this
+    /// crashes, `values.unknown` reports it.
     pub fn refused(&self, session: &mut Session) -> Option<CallError> {
-        self.told_by("values.unknown", || {
+        self.with_crash_reported_by("values.unknown", || {
             self.doing("fmi3GetFloat64 of a valueReference that no variable has");
             session.instance.fetch(&[u32::MAX], &mut [0.0f64]).err()
         })
     }
 
-    /// Variables whose values rules read.
+    /// Iterates over the variables whose values rules read.
     pub fn readable(&self) -> impl Iterator<Item = &Variable> {
         self.description.variables.iter().filter(|v| v.is_exchanged())
     }
 
-    /// Continuous Float64 inputs.
+    /// Iterates over the continuous Float64 inputs, which rules stimulate.
     pub fn inputs(&self) -> impl Iterator<Item = &Variable> {
         let float = host::description::CType::Float64;
         let all = self.description.variables.iter();
@@ -244,39 +236,34 @@ impl UnderTest for Subject {
     }
 }
 
-/// An instance and how far it is.
+/// An instance together with the state of the host that simulates it.
 pub struct Session<'s> {
-    /// The FMU.
     pub subject: &'s Subject,
-    /// Use of the instance.
     pub using: Use,
-    /// The instance.
     pub instance: Instance<'s>,
-    /// Time reached, s.
     pub time: f64,
-    /// Communication step, s.
     pub h: f64,
-    /// Steps of [`Life::advance`]; inputs follow it.
+    /// Number of steps of [`Life::advance`] so far, from which the changing inputs follow.
     pub count: usize,
-    /// The next event that the FMU has told.
+    /// Time of the next event that the FMU has announced, s.
     pub next_event: Option<f64>,
-    /// Event modes entered after the start.
+    /// Number of times that event mode was entered after the start.
     pub events: usize,
-    /// The first indicator that was 0 after event mode: when and which.
+    /// The first event indicator that was 0 after event mode: time and index.
     pub zero_indicator: Option<(f64, usize)>,
-    /// The FMU has asked for the end.
+    /// True if the FMU has requested the end of the simulation.
     pub ended: bool,
 }
 
 impl Session<'_> {
-    /// Into initialization mode.
+    /// Enters initialization mode with the FMU's suggested tolerance.
     pub fn enter_initialization(&mut self) -> Result<()> {
         self.subject.doing("fmi3EnterInitializationMode");
         let tolerance = self.subject.number("tolerance").filter(|t| *t > 0.0);
         self.instance.enter_initialization_mode(tolerance, self.time, None).map_err(starts)
     }
 
-    /// Out of it, and on until a step may be made.
+    /// Leaves initialization mode and iterates events, so that the instance is ready for a step.
     pub fn leave_initialization(&mut self) -> Result<()> {
         self.subject.doing("fmi3ExitInitializationMode");
         self.instance.exit_initialization_mode().map_err(starts)?;
@@ -286,7 +273,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Iterates in event mode until nothing is new, then leaves it. What the FMU said in the last iteration.
+    /// Iterates events until no new iteration is requested, and leaves event mode. Returns the results of the
+    /// last iteration.
     pub fn leave_event(&mut self) -> Result<EventInfo> {
         let info = self.iterate()?;
         if self.ended {
@@ -305,7 +293,7 @@ impl Session<'_> {
         Ok(info)
     }
 
-    /// Calls fmi3UpdateDiscreteStates until nothing is new.
+    /// Calls fmi3UpdateDiscreteStates until no new iteration is requested.
     pub fn iterate(&mut self) -> Result<EventInfo> {
         self.subject.doing("fmi3UpdateDiscreteStates");
         for _ in 0..ITERATIONS {
@@ -326,7 +314,7 @@ impl Session<'_> {
         Err(Unusable { rule: "events.iteration", why }.into())
     }
 
-    /// Event mode and back.
+    /// Enters event mode, iterates, leaves it, and notes event indicators that are 0 afterwards.
     pub fn event(&mut self) -> Result<EventInfo> {
         self.events += 1;
         self.subject.doing(format!("event mode at {:?} s", self.time));
@@ -341,12 +329,12 @@ impl Session<'_> {
         Ok(info)
     }
 
-    /// fmi3DoStep, and the time that follows from it.
+    /// Calls fmi3DoStep and updates the time from its results.
     pub fn raw_step(&mut self, h: f64) -> Called<Step> {
         self.raw_step_hearing(h, None)
     }
 
-    /// The same; `within` hears of the points within the step.
+    /// Calls fmi3DoStep with a callback for intermediate updates.
     pub fn raw_step_hearing(&mut self, h: f64, within: Option<&mut Within>) -> Called<Step> {
         self.subject.doing(format!(
             "fmi3DoStep from {:?} s by {h:?} s ({})",
@@ -358,7 +346,7 @@ impl Session<'_> {
             None => self.instance.do_step(self.time, h)?,
         };
         self.ended |= step.terminate == 1;
-        // an FMU that returns early says where; another is at the end
+        // An FMU that returns early reports the time it has reached; otherwise this is the end of the step.
         self.time = match step.early_return == 1 && step.last_time.is_finite() {
             true => step.last_time,
             false => self.time + h,
@@ -366,8 +354,9 @@ impl Session<'_> {
         Ok(step)
     }
 
-    /// Steps to `until`, s, with event mode where the FMU asks for it. Model Exchange by Euler's method, which is
-    /// good enough to move and no more; where states change fast it ends before.
+    /// Advances to the time `until` (s), with event mode whenever the FMU requests it. Model Exchange is
+    /// integrated by Euler's method, which is accurate enough for the rules; if states change fast, the run
+    /// ends earlier.
     pub fn advance_to(&mut self, until: f64) -> Result<()> {
         if self.using.interface == Interface::ModelExchange {
             return self.euler_to(until);
@@ -408,7 +397,7 @@ impl Session<'_> {
                 self.instance.continuous_states(&mut x)?;
                 self.instance.derivatives(&mut dx)?;
             }
-            // Euler's method is stable where no state changes much
+            // Euler's method is stable as long as no state changes much in a step.
             let share = |i: usize| dx[i].abs() / x[i].abs().max(nominals[i].abs()).max(1e-9);
             let fastest = (0..n).map(share).fold(0.0, f64::max);
             let h = longest.min(1e-3 / fastest.max(1e-3 / longest));
@@ -433,7 +422,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Sets all continuous Float64 inputs to values that differ from step to step.
     pub fn stimulate(&mut self, k: usize) -> Result<()> {
         for (n, v) in self.subject.inputs().enumerate() {
             let values = stimulus(v, k + 3 * n);
@@ -442,7 +430,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// All values of a variable.
+    /// Reads all elements of a variable. If this fails, `values.readable` reports it.
     pub fn read(&mut self, v: &Variable) -> Result<Vec<Value>> {
         self.get(v).map_err(|error| {
             let why = format!("{} cannot be read: {error}", v.name);
@@ -450,7 +438,7 @@ impl Session<'_> {
         })
     }
 
-    /// The same; that it cannot be read is the caller's business.
+    /// Reads all elements of a variable; the caller handles a refusal.
     pub fn get(&mut self, v: &Variable) -> Called<Vec<Value>> {
         self.instance.values(v.c_type, v.reference, v.length())
     }
@@ -458,7 +446,7 @@ impl Session<'_> {
 
 impl<'f> Life<'f, Fmi3> for Session<'f> {
     type Reading = (String, Vec<Value>);
-    /// Time, s, steps and the next event.
+    /// Time (s), number of steps, and time of the next event (s).
     type Mark = (f64, usize, Option<f64>);
 
     fn instance(&mut self) -> &mut Instance<'f> {
@@ -527,7 +515,7 @@ impl<'f> Life<'f, Fmi3> for Session<'f> {
     }
 }
 
-/// A value in a finding.
+/// Formats a value for a finding.
 fn shown(value: &Value) -> String {
     match value {
         Value::Real(x) => format!("{x:?}"),
@@ -545,7 +533,8 @@ fn runs(error: host::c_abi::CallError) -> anyhow::Error {
     Unusable { rule: "steps.run", why: error.to_string() }.into()
 }
 
-/// Values of an input that differ from its start values by something of its size, within its bounds.
+/// Returns values for the elements of an input at step `k`: its start values plus a sine of a quarter of
+/// their magnitude, within the bounds.
 pub fn stimulus(v: &Variable, k: usize) -> Vec<f64> {
     let (min, max) = v.bounds();
     let swing = 0.25 * (0.7 * k as f64 + 0.3).sin();
@@ -559,7 +548,7 @@ pub fn stimulus(v: &Variable, k: usize) -> Vec<f64> {
     (0..v.length()).map(one).collect()
 }
 
-/// The start values that the description gives, one for each element.
+/// Returns the start value of each element, or `None` if the description has none.
 pub fn start_values(v: &Variable) -> Option<Vec<Value>> {
     let value = |text: &String| {
         Some(match v.kind {

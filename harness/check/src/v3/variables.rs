@@ -1,5 +1,3 @@
-//! Variables of modelDescription.xml (FMI 3.0.2, section 2.4): names, causality, start values, ranges.
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::definitions::items;
@@ -12,7 +10,6 @@ use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 use host::xml::double;
 
-/// `xml.names`
 pub fn names(d: &Description, findings: &mut Findings) {
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     for v in &d.variables {
@@ -31,12 +28,10 @@ pub fn names(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.structured_names`
 pub fn structured_names(d: &Description, findings: &mut Findings) {
     unstructured(&d.root, &d.variables, findings);
 }
 
-/// `xml.references`
 pub fn references(d: &Description, findings: &mut Findings) {
     let mut seen: BTreeMap<u32, &str> = BTreeMap::new();
     for v in &d.variables {
@@ -53,21 +48,18 @@ pub fn references(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.causality`
 pub fn causality(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| wrong_causality(v, initials, "Float32, Float64"));
 }
 
-/// `xml.initial`
 pub fn initial(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| wrong_initial(v, initials));
 }
 
-/// `xml.start`
 pub fn start(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         let (count, length) = (v.starts.len(), v.length());
-        // an array of no elements has no values
+        // An array without elements has no start values.
         if v.kind == Type::Clock || (count == 0 && length == 0) {
             return None;
         }
@@ -83,12 +75,10 @@ pub fn start(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.finite`
 pub fn finite(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| not_finite(v, v.starts.iter().filter_map(|s| double(s))));
 }
 
-/// `xml.range`
 pub fn range(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         let starts: Vec<f64> = v.starts.iter().filter_map(|s| double(s)).collect();
@@ -96,7 +86,6 @@ pub fn range(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.independent`
 pub fn independent(d: &Description, findings: &mut Findings) {
     let all: Vec<_> =
         d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
@@ -119,7 +108,6 @@ pub fn independent(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.flags`
 pub fn flags(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         if v.written.get("canHandleMultipleSetPerTimeInstant").is_some()
@@ -141,7 +129,6 @@ pub fn flags(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.clocks`
 pub fn clocks(d: &Description, findings: &mut Findings) {
     let mut previous = BTreeMap::new();
     for v in &d.variables {
@@ -191,7 +178,6 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.dimensions`
 pub fn dimensions(d: &Description, findings: &mut Findings) {
     for v in &d.variables {
         for dimension in v.written.children.iter().filter(|c| c.name == "Dimension") {
@@ -234,7 +220,6 @@ pub fn dimensions(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.derivatives_of`
 pub fn derivatives_of(d: &Description, findings: &mut Findings) {
     let states: BTreeSet<u32> = d.states().into_iter().collect();
     d.each(findings, |v| {

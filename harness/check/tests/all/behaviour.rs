@@ -8,7 +8,7 @@ use host::fmu::Fmu;
 use zip::CompressionMethod;
 
 use crate::common::{
-    binary, broken, cases, changed, compiled, described, keep, look, look_at, ours, with, xml,
+    binary, broken, cases, changed, check_rules, compiled, described, keep, look, ours, with, xml,
     zipped,
 };
 
@@ -34,7 +34,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("Mutant.fmu");
     std::fs::write(&path, misbehaving("hands_its_own")).unwrap();
-    let report = look_at(&path, &["log", "instantiate", "life.order", "values.unknown"], 60.0);
+    let report = check_rules(&path, &["log", "instantiate", "life.order", "values.unknown"], 60.0);
     assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
     let fmu = Fmu::open(&path).unwrap();
     let begin = |friction: &str| -> anyhow::Result<()> {
@@ -202,7 +202,7 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     let path = directory.path().join("Mutant.fmu");
     std::fs::write(&path, misbehaving("hangs_at_zero")).unwrap();
     // Enough for the calls before it on a busy machine.
-    let report = look_at(&path, &["steps.size", "load.version"], 5.0);
+    let report = check_rules(&path, &["steps.size", "load.version"], 5.0);
     let all: Vec<_> = report.all().collect();
     let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };
     assert_eq!((rule.id, finding.severity), ("steps.size", Severity::Error));

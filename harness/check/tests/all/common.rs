@@ -64,10 +64,10 @@ pub fn look(bytes: &[u8], only: &[&str]) -> Report {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("Mutant.fmu");
     std::fs::write(&path, bytes).unwrap();
-    look_at(&path, only, 60.0)
+    check_rules(&path, only, 60.0)
 }
 
-pub fn look_at(path: &Path, only: &[&str], limit: f64) -> Report {
+pub fn check_rules(path: &Path, only: &[&str], limit: f64) -> Report {
     let options = Options {
         program: PathBuf::from(env!("CARGO_BIN_EXE_check-calls")),
         only: only.iter().map(|rule| rule.to_string()).collect(),

@@ -19,7 +19,7 @@ fn main() -> Result<()> {
     let limit = Duration::try_from_secs_f64(limit?.parse()?)?;
     guard::enter()?;
     let [path, directory, description] = [path, directory, description].map(Path::new);
-    check::process::answer(rule?, Unpacked { path, directory, description }, limit)?;
+    check::process::check_in_child(rule?, Unpacked { path, directory, description }, limit)?;
     guard::done(0);
     Ok(())
 }

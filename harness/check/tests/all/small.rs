@@ -114,7 +114,7 @@ fn good_fmus_get_no_finding_however_stiff_and_whatever_they_offer() {
         // A plain build is for this machine; the one step that is too long is meant.
         let fine = ["bin.system", "xml.default_experiment"];
         let others: Vec<_> = report.all().filter(|(rule, _)| !fine.contains(&rule.id)).collect();
-        if !others.is_empty() || report.count(Severity::Error) > 0 {
+        if !others.is_empty() || report.count_findings(Severity::Error) > 0 {
             wrong.push(format!("{name}: {}", report.text()));
         }
     }
@@ -187,7 +187,7 @@ fn resources_are_found_by_any_file_uri() {
         for (place, part) in places.iter().zip(told) {
             assert!(place.contains(part), "{fault:?}: {place}");
         }
-        assert_eq!(report.count(Severity::Error), told.len());
+        assert_eq!(report.count_findings(Severity::Error), told.len());
         assert_eq!(report.outcomes[0].findings.skipped, None, "{}", report.text());
     }
 }

@@ -101,7 +101,7 @@ impl CheckArgs {
         if let Some(path) = &self.sarif {
             output::atomically(path, |file| sarif::write(&report, file))?;
         }
-        if let warnings @ 1.. = report.count(Severity::Warning) {
+        if let warnings @ 1.. = report.count_findings(Severity::Warning) {
             terminal::warn(format_args!("{} draws {warnings} warnings", fmu.display()));
         }
         if let Some(bug) = &report.bug {
@@ -115,7 +115,7 @@ impl CheckArgs {
             json::write(&report, &mut text)?;
             terminal::message("result", &String::from_utf8(text)?);
         }
-        match report.count(Severity::Error) {
+        match report.count_findings(Severity::Error) {
             0 => Ok(()),
             errors => bail!("{} breaks the rules in {errors} places", fmu.display()),
         }
@@ -131,6 +131,6 @@ impl CheckCallsArgs {
             directory: &self.directory,
             description: &self.description,
         };
-        process::answer(&self.rule, fmu, limit)
+        process::check_in_child(&self.rule, fmu, limit)
     }
 }

@@ -63,7 +63,7 @@ fn checked(fmu: &Path) -> Result<String> {
     // not where it happened to lie while it was checked
     report.path = fmu.file_name().unwrap_or_default().into();
     let text = report.text();
-    match report.count(Severity::Error) {
+    match report.count_findings(Severity::Error) {
         0 => Ok(text),
         _ => bail!("nothing is released, the FMU breaks rules:\n{text}"),
     }
