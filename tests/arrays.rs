@@ -77,7 +77,7 @@ impl Variable {
     }
 
     fn c_type(&self) -> CType {
-        CType::of_element(&self.kind).unwrap().0
+        CType::from_element_name(&self.kind).unwrap().0
     }
 }
 

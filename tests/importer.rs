@@ -208,7 +208,7 @@ mod fmi3 {
         }
         to.finish().unwrap();
         let import = fmi::import::from_path(copy.path()).unwrap();
-        (import, ModelDescription::of_packed(packed).unwrap())
+        (import, ModelDescription::from_fmu(packed).unwrap())
     }
 
     fn references(description: &ModelDescription, names: &[&str]) -> Vec<u32> {

@@ -49,7 +49,7 @@ impl Unpacked {
                 root.list("ModelStructure").filter(|e| e.name == "EventIndicator").count()
             }
         };
-        let description = ModelDescription::of_packed(packed).unwrap();
+        let description = ModelDescription::from_fmu(packed).unwrap();
         Unpacked { fmi, directory, library, description, states, indicators }
     }
 

@@ -9,6 +9,7 @@ use crate::slosh_model::SloshModel;
 
 /// All parameters of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct Parameters {
     pub hub: Hub,
     pub tank: Tank,
@@ -25,6 +26,7 @@ pub struct Parameters {
 
 /// The rigid hub with the dry tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Hub {
     pub inertia: f64,
     pub imbalance: f64,
@@ -36,6 +38,7 @@ pub struct Hub {
 
 /// An upright cylindrical tank, its axis parallel to the bearing axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Tank {
     pub d: f64,
     pub h: f64,
@@ -45,6 +48,7 @@ pub struct Tank {
 
 /// The liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Fluid {
     pub rho: f64,
     pub nu: f64,
@@ -89,6 +93,7 @@ impl DampingLaw {
 
 /// Choice and parameters of the slosh model; `modes` is 1 to [`MODES`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Slosh {
     pub model: SloshModel,
     pub source: SloshSource,
@@ -105,6 +110,7 @@ pub struct Slosh {
 
 /// Modes of a tank of any shape; 0 for values that are not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct ModeTable {
     /// True if the table holds only the modes along one axis of a tank that has others across it.
     pub one_axis: bool,
@@ -148,6 +154,7 @@ impl ModeTable {
 
 /// A flat ring baffle at the tank's wall, `depth` below the surface; width 0 for no baffle.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct Ring {
     pub width: f64,
     pub depth: f64,
@@ -156,6 +163,7 @@ pub struct Ring {
 /// Attitude of the bench: its axis is tilted by `tilt`; the component of gravity across the axis points to
 /// `tilt_azimuth`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct Bench {
     pub tilt: f64,
     pub tilt_azimuth: f64,
@@ -191,6 +199,7 @@ impl FrictionModel {
 /// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are the coefficients of
 /// cos theta, sin theta, cos 2 theta, sin 2 theta.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Friction {
     pub model: FrictionModel,
     pub b: f64,
@@ -207,6 +216,7 @@ pub struct Friction {
 
 /// Initial conditions; the slosh quantities are those of mode 1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct Init {
     pub theta: f64,
     pub omega: f64,
@@ -218,6 +228,7 @@ pub struct Init {
 
 /// The reaction wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Wheel {
     pub enabled: bool,
     pub inertia: f64,
@@ -229,6 +240,7 @@ pub struct Wheel {
 
 /// The rate gyro on the hub.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Imu {
     pub enabled: bool,
     pub rate: f64,
@@ -244,6 +256,7 @@ pub struct Imu {
 /// Limits of the integrator. `max_steps` is the number of internal steps and gyro samples that one
 /// call may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Solver {
     pub max_steps: usize,
 }

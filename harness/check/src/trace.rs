@@ -37,6 +37,6 @@ pub fn done(findings: Findings) -> Result<()> {
 }
 
 fn send(answer: &Answer) -> Result<()> {
-    guard::answer(&serde_json::to_vec(answer)?);
+    guard::send_answer(&serde_json::to_vec(answer)?);
     Ok(())
 }

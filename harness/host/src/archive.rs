@@ -1,7 +1,7 @@
-//! Reads the zip archive of an FMU (FMI 2.0.5, section 2.3). No archive can fill the disk or the memory, or write outside the
-//! folder that it is unpacked to.
+//! Reads the zip archive of an FMU (FMI 2.0.5, section 2.3). No archive can fill the disk or the memory, or
+//! write outside the folder into which it is unpacked.
 //!
-//! Everything that opens an FMU does it here; `book/foreign.md` lists the budgets for users.
+//! Every command that opens an FMU does so here; `book/foreign.md` lists the limits for users.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -11,44 +11,41 @@ use std::path::Path;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use files::input;
 use zip::read::Config;
-// Unstable by its own word, and the one reader that shows repeated names; the lock file pins it.
+// This part of the crate is marked as unstable. It is the only reader that shows repeated names; the lock
+// file pins its version.
 use zip::unstable::read::ZipIterable;
 use zip::{CompressionMethod, ZipReadOptions, read::OwnedZipFileEntry};
 
 use crate::xml;
 
-/// Most entries of an archive.
+/// Largest number of entries in an archive.
 pub const MOST_ENTRIES: usize = 20_000;
-/// Bytes that a name may have; Windows opens paths of 259 characters.
+/// Longest name of an entry, bytes. Windows opens paths of up to 259 characters.
 pub const LONGEST_NAME: usize = 1024;
-/// Bytes that all files of an archive together may unpack to, whatever its size.
+/// Number of bytes to which the files of an archive may unpack in any case.
 pub const UNPACKED: u64 = 64 << 20;
-/// Further bytes that they may unpack to for each byte of the archive; binaries compress to a third,
-/// descriptions to a twentieth.
+/// Number of bytes to which they may unpack in addition, per byte of the archive. Binaries usually compress
+/// to a third and descriptions to a twentieth.
 pub const UNPACKED_PER_BYTE: u64 = 8;
-/// The description of the model.
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
-/// An entry of the archive's directory.
+/// An entry in the directory of the archive.
 pub struct Entry {
-    /// Name as written, invalid characters replaced.
+    /// Name as it stands in the archive; bytes that are not UTF-8 are replaced.
     pub name: String,
-    /// Compression method.
     pub method: CompressionMethod,
-    /// True if the entry is encrypted.
     pub encrypted: bool,
-    /// True for a symbolic link.
     pub link: bool,
     zip: OwnedZipFileEntry,
 }
 
 impl Entry {
-    /// Returns true for the entry of a folder.
     pub fn is_folder(&self) -> bool {
         self.name.ends_with('/')
     }
 
-    /// Reason why a host that unpacks the entry would write outside its folder, if it would.
+    /// Returns the reason why unpacking this entry would write outside the folder, or `None` if it stays
+    /// inside.
     fn way_out(&self) -> Option<&'static str> {
         let name = &self.name;
         if name.starts_with('/') || name.get(1..2) == Some(":") {
@@ -67,11 +64,12 @@ impl Entry {
     }
 }
 
-/// Returns a name's path as the most lenient file system reads it. Windows and macOS ignore capitals. Windows drops full stops
-/// and spaces at the end of a part, and takes text after a colon for a stream of the file.
+/// Returns the path of a name as the most lenient file system understands it. Windows and macOS ignore
+/// capitals. Windows drops full stops and spaces at the end of a part, and takes the text after a colon for a
+/// stream of the file.
 ///
-/// Two entries with the same place overwrite each other on some system. An archive with such entries is refused on
-/// every system, so that an FMU has the same files everywhere.
+/// Two entries with the same place would overwrite each other on some systems. An archive with such entries
+/// is refused on every system, so that an FMU consists of the same files everywhere.
 pub fn place(name: &str) -> String {
     let part = |part: &str| {
         let file = part.split(':').next().unwrap_or_default();
@@ -80,13 +78,13 @@ pub fn place(name: &str) -> String {
     name.trim_end_matches('/').split('/').map(part).collect::<Vec<_>>().join("/")
 }
 
-/// An archive whose directory was read.
+/// An archive whose directory has been read.
 pub struct Archive {
     file: File,
-    /// Entries in the order of the zip directory, repeated names included, up to the first fault.
+    /// Entries in the order of the zip directory, with repeated names, up to the first fault.
     pub entries: Vec<Entry>,
-    /// Error in its directory, or the exceeded budget: nothing of the archive should
-    /// be unpacked then.
+    /// Error in the directory, or the limit that is exceeded. If there is one, nothing of the archive should
+    /// be unpacked.
     pub fault: Option<String>,
 }
 
@@ -94,7 +92,9 @@ impl Archive {
     /// Reads the directory of an archive.
     ///
     /// # Errors
-    /// If the file cannot be read. What is wrong with it as an archive is in [`Archive::fault`].
+    ///
+    /// If the file cannot be read. A file that is not a valid archive is no error; [`Archive::fault`] has the
+    /// reason.
     pub fn open(path: &Path) -> Result<Archive> {
         let name = path.display();
         let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
@@ -132,8 +132,12 @@ impl Archive {
         Ok(())
     }
 
-    /// Fails unless the archive can be unpacked: whole, within the budgets, every name inside, and each with a
-    /// [`place`] of its own.
+    /// Checks that the archive can be unpacked: it is complete, within the limits, every name stays inside
+    /// the folder, and each file has a [`place`] of its own.
+    ///
+    /// # Errors
+    ///
+    /// The first of these conditions that is not fulfilled.
     pub fn check(&self) -> Result<()> {
         if let Some(why) = &self.fault {
             bail!("it is not a zip archive that can be unpacked: {why}");
@@ -145,7 +149,7 @@ impl Archive {
                 bail!("{name}: {why} (allowed: files and folders with relative names)");
             }
             let Some(other) = places.insert(place(&entry.name), entry) else { continue };
-            // two entries of one folder overwrite nothing
+            // Two entries for one folder overwrite no file.
             if entry.is_folder() && other.is_folder() {
                 continue;
             }
@@ -159,7 +163,11 @@ impl Archive {
         Ok(())
     }
 
-    /// Unpacks a file to `to`, and fails unless its size and checksum are those of its header.
+    /// Unpacks a file to `to`.
+    ///
+    /// # Errors
+    ///
+    /// If size or checksum differ from those in its header.
     pub fn copy(&self, entry: &Entry, to: &mut impl Write) -> Result<()> {
         let said = entry.zip.size();
         if entry.name == DESCRIPTION {
@@ -168,21 +176,21 @@ impl Archive {
         }
         let mut reader = BufReader::new(&self.file);
         let file = entry.zip.as_ref().with_reader(&mut reader, ZipReadOptions::new())?;
-        // one more than there should be, which shows that there is more
+        // One byte more than the header says, to notice a longer file.
         let size = std::io::copy(&mut file.take(said.saturating_add(1)), to)?;
         let relation = if size > said { "more" } else { "fewer" };
         ensure!(size == said, "it has {relation} bytes than its header says ({said})");
         Ok(())
     }
 
-    /// Content of a file.
+    /// Unpacks a file into memory.
     pub fn content(&self, entry: &Entry) -> Result<Vec<u8>> {
         let mut content = Vec::new();
         self.copy(entry, &mut content)?;
         Ok(content)
     }
 
-    /// Unpacks the whole archive into a folder.
+    /// Unpacks the archive into a folder, without overwriting any file.
     pub fn unpack(&self, directory: &Path) -> Result<()> {
         self.check()?;
         for entry in &self.entries {
@@ -192,7 +200,8 @@ impl Archive {
             made.map_err(anyhow::Error::from)
                 .and_then(|()| match entry.is_folder() {
                     true => Ok(()),
-                    // a file system may know further names for a file that is there: never overwrite it
+                    // A file system may have further names for an existing file, so that it must never be
+                    // overwritten.
                     false => self.copy(entry, &mut File::create_new(&path)?),
                 })
                 .with_context(|| format!("{} cannot be unpacked", entry.name.escape_debug()))?;
@@ -200,14 +209,13 @@ impl Archive {
         Ok(())
     }
 
-    /// SHA-256 of the archive, in hexadecimal digits.
     pub fn hash(&self) -> Result<String> {
         let mut file = &self.file;
         file.seek(SeekFrom::Start(0))?;
         files::output::sha256_of(file)
     }
 
-    /// The text of modelDescription.xml.
+    /// Checks the archive and returns the text of modelDescription.xml.
     pub fn description(&self) -> Result<String> {
         self.check()?;
         let entry = self.entries.iter().find(|entry| entry.name == DESCRIPTION);

@@ -1,8 +1,8 @@
-//! Requirements and exports of an FMU's binary for any platform, read from the file itself.
+//! Reads the requirements and the exported functions of an FMU's binary from the file, for any platform.
 //!
-//! An FMU is loaded by programs its maker never saw: a MATLAB on an old Linux
-//! cluster, a Windows without development tools. A library or a symbol version
-//! that is not there stops it before its first line runs.
+//! An FMU is loaded by programs that its author has never seen, for example MATLAB on an old Linux cluster or
+//! on Windows without development tools. If a library or a symbol version is missing there, the FMU cannot be
+//! loaded at all.
 
 use std::fmt;
 
@@ -16,15 +16,16 @@ use sha2::{Digest, Sha256};
 
 use crate::symbol::readable;
 
-/// The newest glibc a binary may need: that of the oldest Linux still in use with simulation tools.
+/// Newest version of glibc that a binary may need: the one of the oldest Linux on which simulation tools
+/// still run.
 pub const GLIBC: Version = Version(2, 17);
-/// The newest macOS a binary may need: the first one on both architectures.
+/// Newest version of macOS that a binary may need: the first one for both architectures.
 pub const MACOS: Version = Version(11, 0);
 
-/// Surplus exports that are named.
+/// Number of unexpected exports that a message names.
 const NAMED: usize = 8;
 
-/// Libraries that are part of glibc.
+/// Libraries that belong to glibc.
 const LINUX_LIBRARIES: [&str; 8] = [
     "ld-linux-aarch64.so.1",
     "ld-linux-x86-64.so.2",
@@ -35,8 +36,8 @@ const LINUX_LIBRARIES: [&str; 8] = [
     "librt.so.1",
     "libutil.so.1",
 ];
-/// Libraries that are part of Windows (since 8; no run-time library of a compiler among them), in
-/// small letters.
+/// Libraries that belong to Windows since version 8, in small letters. The run-time libraries of compilers do
+/// not belong to it.
 const WINDOWS_LIBRARIES: [&str; 12] = [
     "advapi32.dll",
     "api-ms-win-core-synch-l1-2-0.dll",
@@ -51,7 +52,7 @@ const WINDOWS_LIBRARIES: [&str; 12] = [
     "userenv.dll",
     "ws2_32.dll",
 ];
-/// Folders of the libraries that are part of macOS.
+/// Libraries that belong to macOS.
 const MACOS_LIBRARIES: [&str; 5] = [
     "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
     "/usr/lib/libSystem.B.dylib",
@@ -70,16 +71,12 @@ impl fmt::Display for Version {
     }
 }
 
-/// Kind of a binary, by the platform it is for.
+/// Format of a binary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// ELF, x86-64.
     Linux,
-    /// ELF, 64-bit ARM.
     LinuxArm,
-    /// PE, x86-64.
     Windows,
-    /// Mach-O, one or several architectures.
     MacOs,
 }
 
@@ -94,30 +91,26 @@ impl fmt::Display for Kind {
     }
 }
 
-/// A binary, seen from outside.
+/// Properties of a binary that are read without loading it.
 #[derive(Clone, Debug)]
 pub struct Binary {
-    /// Platform.
     pub kind: Kind,
-    /// Size of the file, bytes.
     pub size: usize,
-    /// `x86_64`, `arm64`, in the order of the file.
+    /// `x86_64` or `arm64`, in the order of the file.
     pub architectures: Vec<&'static str>,
-    /// Libraries the loader must find.
+    /// Names of the libraries that the loader must find.
     pub libraries: Vec<String>,
-    /// Folders the binary tells the loader to search.
+    /// Folders in which the binary tells the loader to search.
     pub search_paths: Vec<String>,
-    /// Newest version of glibc (Linux) or macOS it needs.
+    /// Newest version of glibc (Linux) or macOS that the binary needs.
     pub needs: Option<Version>,
-    /// Names it exports, in alphabetical order.
+    /// Exported names in alphabetical order.
     pub exports: Vec<String>,
-    /// Error in its code signature; macOS kills a process that loads unsigned code for
-    /// arm64.
+    /// Error in the code signature. macOS kills a process that loads unsigned code for arm64.
     pub signature: Option<String>,
 }
 
 impl Binary {
-    /// Reads a binary.
     pub fn read(bytes: &[u8]) -> Result<Self> {
         let kind = FileKind::parse(bytes).context("not a binary of any platform")?;
         let mut binary = match kind {
@@ -136,14 +129,15 @@ impl Binary {
         Ok(binary)
     }
 
-    /// Everything that would keep it from loading on a machine without development tools, or a
-    /// host from finding the functions `wanted`; one sentence each.
+    /// Lists everything that would keep the binary from loading on a machine without development tools, or a
+    /// host from finding the functions `wanted`. Each item is a sentence.
     pub fn faults(&self, wanted: &[&str]) -> Vec<String> {
         let (loading, lacking) = (self.loading_faults(), self.lacking(wanted));
         loading.into_iter().chain(lacking).chain(self.surplus()).collect()
     }
 
-    /// Lists what prevents loading on a machine without development tools.
+    /// Lists what would keep the binary from loading on a machine without development tools, for the
+    /// processors of its platform.
     pub fn loading_faults(&self) -> Vec<String> {
         self.loading_faults_for(match self.kind {
             Kind::Linux | Kind::Windows => &["x86_64"],
@@ -152,7 +146,7 @@ impl Binary {
         })
     }
 
-    /// [`Binary::loading_faults`] for machines with these processors.
+    /// Lists what would keep the binary from loading on machines with these processors.
     pub fn loading_faults_for(&self, architectures: &[&str]) -> Vec<String> {
         let mut faults = Vec::new();
         let (libraries, newest): (&[&str], _) = match self.kind {
@@ -183,18 +177,19 @@ impl Binary {
         faults
     }
 
-    /// The functions among `wanted` that it does not export, in one sentence.
+    /// Names the functions of `wanted` that the binary does not export, in one sentence; `None` if none is
+    /// missing.
     pub fn lacking(&self, wanted: &[&str]) -> Option<String> {
         let lacking: Vec<_> =
             wanted.iter().filter(|w| !self.exports.iter().any(|e| e == **w)).copied().collect();
         (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
     }
 
-    /// Describes exports other than functions of FMI, in one sentence.
+    /// Names the exports that are not functions of FMI, in one sentence; `None` if there are none.
     pub fn surplus(&self) -> Option<String> {
-        // On macOS names are bound to the library they come from, so that others do no harm; and
-        // the linker that links it elsewhere exports a few of Rust's.
-        // One library may serve several versions of FMI (FMI 3.0, 2.5).
+        // macOS binds a name to the library that it comes from, so that further exports do no harm there;
+        // and the linker for macOS exports some of Rust's names when it runs on other systems. One library
+        // may serve several versions of FMI (FMI 3.0.2, section 2.5).
         let own = |name: &&str| name.starts_with("fmi2") || name.starts_with("fmi3");
         let others = || self.exports.iter().map(String::as_str).filter(|name| !own(name));
         let count = others().count();
@@ -209,7 +204,7 @@ impl Binary {
     }
 }
 
-/// `1104600 bytes, x86_64, glibc 2.14, 44 functions, needs libc.so.6, …`
+/// Writes for example `1104600 bytes, x86_64, glibc 2.14, 44 functions, needs libc.so.6, …`.
 impl fmt::Display for Binary {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} bytes, {}", self.size, self.architectures.join(" + "))?;
@@ -280,7 +275,7 @@ fn linux(bytes: &[u8]) -> Result<Binary> {
     Ok(binary)
 }
 
-/// 2.14 of `GLIBC_2.14`; `GLIBC_2.2.5` is 2.2 for this purpose.
+/// Returns 2.14 for `GLIBC_2.14`. Only two parts are kept, so that `GLIBC_2.2.5` gives 2.2.
 fn glibc_version(name: &str) -> Option<Version> {
     let mut numbers = name.strip_prefix("GLIBC_")?.split('.').map(str::parse);
     Some(Version(numbers.next()?.ok()?, numbers.next()?.ok()?))
@@ -303,7 +298,7 @@ fn macos(bytes: &[u8]) -> Result<Binary> {
     let endian = file.endian();
     let mut binary = common(Kind::MacOs, &file)?;
     for name in &mut binary.exports {
-        // C's names carry an underscore there
+        // macOS writes an underscore before the names of C functions.
         if let Some(plain) = name.strip_prefix('_') {
             *name = plain.into();
         }
@@ -319,7 +314,7 @@ fn macos(bytes: &[u8]) -> Result<Binary> {
                 binary.search_paths.push(text(command.string(endian, path.path)?));
             }
             LoadCommandVariant::BuildVersion(version) => {
-                // xxxx.yy.zz
+                // Version in the form xxxx.yy.zz.
                 let oldest = version.minos.get(endian);
                 binary.needs = Some(Version(oldest >> 16, (oldest >> 8) & 0xff));
             }
@@ -357,8 +352,8 @@ fn universal(bytes: &[u8]) -> Result<Binary> {
     whole.context("no code in it")
 }
 
-/// Error if the hashes in the code directory of a signature differ from those of the code: macOS kills a binary that
-/// was changed after signing (stripped, for example).
+/// Returns the fault if the hashes in the signature differ from those of the code. macOS kills a process that
+/// loads a binary which was changed after signing, for example by stripping.
 fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
     const SIGNATURE: u32 = 0xfade_0cc0; // CSMAGIC_EMBEDDED_SIGNATURE
     const DIRECTORY: u32 = 0xfade_0c02; // CSMAGIC_CODEDIRECTORY
@@ -372,7 +367,7 @@ fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
         if !is(0, SIGNATURE) {
             return None;
         }
-        // a magic number, a length, a count, then a type and an offset for each blob
+        // A magic number, a length and a count, then a type and an offset for each blob.
         let directory =
             (0..number(8)?).filter_map(|i| number(16 + 8 * i)).find(|at| is(*at, DIRECTORY))?;
         let hashes = directory + number(directory + 16)?;
@@ -403,11 +398,11 @@ fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
 pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     const ALIGNMENT: u32 = 14; // 2^14: arm64's pages are the larger ones
     let page = 1 << ALIGNMENT;
-    // the head: magic number, count, then five numbers for each part, all big-endian
+    // The head consists of magic number, count, and five numbers for each part, all big-endian.
     let mut head = vec![macho::FAT_MAGIC, parts.len() as u32];
     let mut body = vec![0; page];
     for part in parts {
-        // type and subtype of the processor follow the magic number of a Mach-O file
+        // In a Mach-O file type and subtype of the processor follow the magic number.
         let number = |at: usize| -> Option<u32> {
             Some(u32::from_le_bytes(part.get(at..at + 4)?.try_into().ok()?))
         };
@@ -426,7 +421,8 @@ pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     Ok(body)
 }
 
-/// Returns the part of a universal binary for an architecture, `x86_64` or `arm64`; any other file as it is.
+/// Returns the part of a universal binary for `architecture`, `x86_64` or `arm64`. Any other file is returned
+/// unchanged.
 pub fn part<'a>(bytes: &'a [u8], architecture: &str) -> &'a [u8] {
     let Ok(whole) = MachOFatFile32::parse(bytes) else { return bytes };
     let wanted =

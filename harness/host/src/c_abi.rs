@@ -1,5 +1,5 @@
-//! C as the host sees it in any version of FMI: status, messages, what an FMU shares with its host, opening its
-//! library.
+//! The C interface as a host sees it in any version of FMI: status, messages, the process state that an FMU
+//! shares with its host, and loading a library.
 #![allow(unsafe_code)]
 
 use std::cell::Cell;
@@ -22,17 +22,14 @@ pub mod version;
 /// `fmi2Status` and `fmi3Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
-    /// All well.
     Ok,
-    /// All well, but look at the message.
+    /// The call succeeded, with a message that the user should read.
     Warning,
-    /// The step was not done.
+    /// The FMU refused the step, because it cannot compute it.
     Discard,
-    /// The call failed; the instance lives on.
     Error,
-    /// All instances of the FMU are lost.
     Fatal,
-    /// The step goes on in the background (FMI 2.0).
+    /// The step goes on in the background (FMI 2.0 only).
     Pending,
 }
 
@@ -53,16 +50,16 @@ impl From<c_int> for Status {
 #[derive(Default)]
 struct Sink {
     messages: Mutex<Vec<Message>>,
-    /// Messages whose category is NULL.
+    /// Number of messages whose category is NULL.
     uncategorised: AtomicUsize,
 }
 
-/// The sinks of all living instances, by the environment that their FMUs hand back to the callbacks.
+/// The sinks of all living instances, by the environment pointer that their FMUs pass back to the callbacks.
 ///
-/// An FMU may hand back any pointer. The callbacks look the pointer up here and never follow it.
+/// An FMU may pass any pointer. The callbacks look it up here and never follow it.
 static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
 
-/// Calls of a callback with another pointer than the environment of an instance.
+/// Number of calls of a callback with a pointer that is not the environment of an instance.
 static FOREIGN: AtomicUsize = AtomicUsize::new(0);
 
 thread_local! {
@@ -74,7 +71,7 @@ fn sinks() -> MutexGuard<'static, BTreeMap<usize, Arc<Sink>>> {
     SINKS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// Returns how often FMUs have called a callback of this process with another pointer than the
+/// Returns how often FMUs have called a callback of this process with a pointer other than the
 /// componentEnvironment (FMI 3.0: instanceEnvironment) of an instance.
 pub fn foreign_environments() -> usize {
     FOREIGN.load(Ordering::Relaxed)
@@ -85,7 +82,8 @@ pub(crate) fn count_foreign_environment() {
     FOREIGN.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Environment of an instance: receives its messages until it is dropped, which must be after the instance.
+/// Environment of an instance. It receives the instance's messages until it is dropped, which must be after
+/// the instance.
 pub(crate) struct Environment {
     sink: Arc<Sink>,
 }
@@ -101,22 +99,23 @@ impl Environment {
         Arc::as_ptr(&self.sink) as usize
     }
 
-    /// Returns the pointer that the FMU hands back.
+    /// Returns the environment pointer for the FMU.
     pub(crate) fn pointer(&self) -> *mut c_void {
         Arc::as_ptr(&self.sink).cast_mut().cast()
     }
 
-    /// Notes that a call of the instance begins on this thread.
+    /// Records that a call of the instance begins on this thread, so that messages with a wrong environment
+    /// can be assigned.
     pub(crate) fn begin_call(&self) {
         CALLED.set(self.address());
     }
 
-    /// Returns all messages since the last call of this function.
+    /// Returns the messages since the last call of this function.
     pub(crate) fn take(&self) -> Vec<Message> {
         std::mem::take(&mut *self.sink.lock())
     }
 
-    /// Returns how many messages had no category (NULL).
+    /// Returns the number of messages whose category is NULL.
     pub(crate) fn uncategorised(&self) -> usize {
         self.sink.uncategorised.load(Ordering::Relaxed)
     }
@@ -134,8 +133,8 @@ impl Sink {
     }
 }
 
-/// Returns the sink that messages with this environment belong to. If no instance has that environment, the instance
-/// that this thread called last has logged, or the only instance there is.
+/// Returns the sink for messages with this environment. If no instance has this environment, the message is
+/// assigned to the instance that this thread called last, or to the only instance.
 fn sink_of(environment: *mut c_void) -> Option<Arc<Sink>> {
     let sinks = sinks();
     if let Some(sink) = sinks.get(&(environment as usize)) {
@@ -146,7 +145,8 @@ fn sink_of(environment: *mut c_void) -> Option<Arc<Sink>> {
     sinks.get(&CALLED.get()).or_else(only).cloned()
 }
 
-/// Keeps a message of an FMU, of the first [`MESSAGES_KEPT`]: `logMessage` of FMI 3.0, which `logger.c` calls for FMI 2.0.
+/// Stores a message of an FMU if there are fewer than [`MESSAGES_KEPT`]. This is `logMessage` of FMI 3.0; for
+/// FMI 2.0 `logger.c` formats the message and calls it.
 pub(crate) extern "C" fn log_message(
     environment: *mut c_void,
     status: c_int,
@@ -165,9 +165,10 @@ pub(crate) extern "C" fn log_message(
     }
 }
 
-/// Copies a text of an FMU, which lives only until the next call; NULL becomes an empty text.
+/// Copies a text of an FMU, which is valid only until the next call. NULL becomes an empty text.
 ///
 /// # Safety
+///
 /// The pointer is NULL or points to a terminated string.
 pub(crate) unsafe fn copied(text: *const c_char) -> String {
     match text.is_null() {
@@ -176,28 +177,25 @@ pub(crate) unsafe fn copied(text: *const c_char) -> String {
     }
 }
 
-/// Returns a text for a C function; `None` becomes NULL.
 pub(crate) fn c_string(text: Option<&str>) -> Option<CString> {
     text.map(|text| CString::new(text).unwrap_or_default())
 }
 
-/// Returns the pointer to such a text, which must outlive it.
+/// Returns the pointer to a text for a C function, or NULL for `None`. The text must outlive the pointer.
 pub(crate) fn pointer(text: &Option<CString>) -> *const c_char {
     text.as_ref().map_or(null(), |text| text.as_ptr())
 }
 
-/// One message of the FMU's logger.
+/// A message that an FMU has logged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Status of the message.
     pub status: Status,
-    /// Log category, as in modelDescription.xml.
     pub category: String,
-    /// The text.
     pub text: String,
 }
 
-/// Messages kept per instance; a chatty FMU shall not eat the memory.
+/// Largest number of messages stored per instance, so that an FMU that logs every step does not fill the
+/// memory.
 const MESSAGES_KEPT: usize = 1000;
 
 unsafe extern "C" {
@@ -206,19 +204,18 @@ unsafe extern "C" {
     fn hubslosh_signal_handlers() -> u64;
 }
 
-/// A call that did not succeed: which, how, and what the FMU said.
+/// A call that failed: the function, its status, and the messages of the FMU.
 #[derive(Clone, Debug)]
 pub struct CallError {
-    /// The C function.
     pub call: &'static str,
-    /// Returned status; `Error` for a function that returned NULL instead of an instance.
+    /// The status, or `Error` if a function returned NULL instead of an instance.
     pub status: Status,
-    /// Messages of the FMU during the call.
+    /// Messages that the FMU logged during the call.
     pub messages: Vec<Message>,
 }
 
 impl CallError {
-    /// Messages of the FMU in one line.
+    /// Joins the FMU's messages to one line.
     pub fn text(&self) -> String {
         let prefix = format!("{}: ", self.call); // the FMU may name the call as well; once will do
         let text = |m: &Message| m.text.trim().trim_start_matches(&prefix).to_string();
@@ -243,17 +240,16 @@ impl std::fmt::Display for CallError {
 
 impl std::error::Error for CallError {}
 
-/// Result of a call.
 pub type Called<T = ()> = Result<T, CallError>;
 
-/// A C function of an FMU and its name.
 #[derive(Clone, Copy)]
 pub(crate) struct Function<T> {
     pub name: &'static str,
     pub call: T,
 }
 
-/// Declares a table of C functions once: field, symbol, type. A table for both versions of FMI has a symbol for each.
+/// Declares a table of C functions with field, symbol and type of each. A table for both versions of FMI has
+/// one symbol per version.
 macro_rules! functions {
     ($table:ident $(<$boolean:ident>)?: $($field:ident $($symbol:literal)+, $type:ty;)*) => {
         pub(crate) struct $table $(<$boolean>)? {
@@ -261,7 +257,7 @@ macro_rules! functions {
         }
 
         impl $(<$boolean>)? $table $(<$boolean>)? {
-            /// Names of all the functions, in the version of that number among the symbols.
+            /// Names of all functions of the table; `version` is the index among each function's symbols.
             pub(crate) fn symbols(version: usize) -> Vec<&'static str> {
                 vec![$([$($symbol),+][version],)*]
             }
@@ -287,18 +283,15 @@ pub(crate) use functions;
 /// State of the process that an FMU shares with its host and must not change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HostState {
-    /// Rounding mode, exception masks and flushing of small numbers.
+    /// Rounding mode, exception masks, and flushing of subnormal numbers to zero.
     pub float_control: u32,
-    /// The C library's locale.
     pub locale: String,
-    /// A fingerprint of the signal handlers; 0 where there are none.
+    /// Hash of the installed signal handlers; 0 on systems without them.
     pub signal_handlers: u64,
-    /// The working directory.
     pub directory: Option<PathBuf>,
 }
 
 impl HostState {
-    /// Present state.
     pub fn now() -> Self {
         // SAFETY: the three take nothing; the locale's name is a terminated string of the C
         // library.
@@ -312,7 +305,7 @@ impl HostState {
         }
     }
 
-    /// Lists the differences from the present state.
+    /// Names the parts of the state that differ from the present state.
     pub(crate) fn changed(&self) -> Vec<&'static str> {
         let now = HostState::now();
         let parts = [
@@ -328,7 +321,7 @@ impl HostState {
     }
 }
 
-/// All files below a folder; none if it cannot be read.
+/// Lists all files below a folder; the list is empty if the folder cannot be read.
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let below = entries.flat_map(|entry| match entry.path() {
@@ -338,18 +331,22 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
     below.collect()
 }
 
-/// The library of an FMU, loaded.
+/// A loaded library of an FMU.
 pub(crate) struct Loaded {
     pub library: Library,
-    /// SHA-256 of its file, in hexadecimal digits.
+    /// SHA-256 of the file, in hexadecimal digits.
     pub hash: String,
-    /// Changes of the whole process by loading it.
+    /// Parts of the process state that loading the library has changed.
     pub changed: Vec<&'static str>,
     /// Path within the FMU.
     pub binary: String,
 }
 
-/// Loads the library `identifier` of the FMU that is unpacked in `directory`; errors speak of the FMU as `name`.
+/// Loads the library `identifier` of the FMU that is unpacked in `directory`. Errors call the FMU `name`.
+///
+/// # Errors
+///
+/// If there is no such library for the platform, or it cannot be loaded; the text says why.
 pub(crate) fn load(
     directory: &Path,
     name: &Path,
@@ -357,7 +354,7 @@ pub(crate) fn load(
     identifier: &str,
 ) -> Result<Loaded> {
     let name = name.display();
-    // a library outside the archive is not the FMU's
+    // A library outside the archive is not part of the FMU.
     if identifier.contains(['/', '\\', ':', '\0']) {
         bail!(
             "{name} cannot be used: modelIdentifier {identifier:?} leads out of the folder of its \
@@ -383,17 +380,18 @@ pub(crate) fn load(
     let (before, calls) = (HostState::now(), Calls::one());
     // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
     let library = unsafe { Library::new(&path) }.map_err(|error| {
-        // the symbol stands in the cause of the loader's error
+        // The loader's error names the undefined symbol in its cause.
         let error = format!("{:#}", anyhow::Error::new(error));
         let needs = needs(&error);
-        anyhow!(told(&error)).context(format!("{binary} in {name} cannot be loaded{needs}"))
+        anyhow!(with_readable_symbol(&error))
+            .context(format!("{binary} in {name} cannot be loaded{needs}"))
     })?;
     drop(calls);
     Ok(Loaded { library, hash, changed: before.changed(), binary })
 }
 
-/// The loader's message with an undefined symbol as people read it.
-fn told(error: &str) -> String {
+/// Replaces the mangled symbol in a loader's message by a readable name.
+fn with_readable_symbol(error: &str) -> String {
     const UNDEFINED: &str = "undefined symbol: ";
     match error.split_once(UNDEFINED) {
         Some((before, symbol)) => {
@@ -404,7 +402,8 @@ fn told(error: &str) -> String {
     }
 }
 
-/// Names the host that a binary needs, by the loader's message; empty if it needs none.
+/// Returns an explanation if the loader's message shows that the binary needs a Python interpreter in the
+/// host process; otherwise an empty text.
 fn needs(error: &str) -> &'static str {
     let symbol = error.split("undefined symbol: ").nth(1).unwrap_or_default();
     match symbol.trim_start_matches('_').starts_with("Py") {
@@ -416,7 +415,7 @@ fn needs(error: &str) -> &'static str {
     }
 }
 
-/// Functions of this list that a library lacks.
+/// Lists the functions of `symbols` that a library does not export.
 pub(crate) fn lacking(library: &Library, symbols: &[&'static str]) -> Vec<&'static str> {
     let is_there = |symbol: &&&str| {
         // SAFETY: only asked whether the symbol is there.

@@ -1,5 +1,3 @@
-//! Causality and variability of a variable.
-
 use std::fmt::{self, Display};
 
 macro_rules! attribute {
@@ -13,7 +11,6 @@ macro_rules! attribute {
         }
 
         impl $name {
-            /// Returns the attribute's text.
             pub fn as_str(&self) -> &str {
                 match self {
                     $($name::$item => $text,)+
@@ -40,14 +37,12 @@ macro_rules! attribute {
 }
 
 attribute! {
-    /// Attribute `causality` of FMI 2.0 and 3.0.
     Causality: Parameter "parameter", CalculatedParameter "calculatedParameter",
     StructuralParameter "structuralParameter", Input "input", Output "output", Local "local",
     Independent "independent"
 }
 
 attribute! {
-    /// Attribute `variability` of FMI 2.0 and 3.0.
     Variability: Constant "constant", Fixed "fixed", Tunable "tunable", Discrete "discrete",
     Continuous "continuous"
 }

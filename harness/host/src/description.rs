@@ -1,9 +1,10 @@
-//! Model description: `modelDescription.xml` (FMI 2.0, section 2.2; FMI 3.0, section 2.4), as far as
-//! a host needs it to drive the FMU.
+//! Reads `modelDescription.xml` (FMI 2.0, section 2.2; FMI 3.0, section 2.4) as far as a host needs it to run
+//! the FMU.
 //!
-//! Both versions are read into the same: what FMI 3.0 calls Float64 is a Real here, its instantiationToken a
-//! GUID, an alias a variable with the same reference. An array is read as its elements, `x[1,2]`, each a
-//! variable, as FMI 2.0 would have it; [`ModelDescription::element`] says where they are.
+//! Both versions are read into the same structures: a Float64 of FMI 3.0 is a Real here, its
+//! instantiationToken is the GUID, and an alias is a variable with the same reference. An array becomes one
+//! variable per element, for example `x[1,2]`, as in FMI 2.0; [`ModelDescription::element`] returns its
+//! position.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,112 +18,99 @@ use crate::xml::Element;
 /// The root element `fmiModelDescription`.
 #[derive(Clone, Debug)]
 pub struct ModelDescription {
-    /// FMI version, "2.0" or "3.0" and its like.
+    /// FMI version, for example "2.0" or "3.0".
     pub fmi_version: String,
-    /// Name of the model.
     pub model_name: String,
-    /// Fingerprint that XML and binary must share; the instantiationToken of FMI 3.0.
     pub guid: String,
-    /// Version of the model; empty if none is given.
+    /// Version of the model; empty if it is missing.
     pub version: String,
-    /// One sentence on the model; empty if there is none.
+    /// Description of the model; empty if it is missing.
     pub description: String,
-    /// The tool that wrote the FMU; empty if none is given.
+    /// The tool that exported the FMU; empty if it is missing.
     pub generation_tool: String,
-    /// Present if the FMU brings its own solver.
+    /// The element CoSimulation, if the FMU can integrate itself.
     pub co_simulation: Option<Interface>,
-    /// Present if the host may integrate.
+    /// The element ModelExchange, if a host can integrate the FMU.
     pub model_exchange: Option<Interface>,
-    /// Units that variables name.
     pub units: Vec<Unit>,
-    /// Named types.
     pub types: Vec<SimpleType>,
-    /// Start, stop, tolerance and step the author suggests.
+    /// Suggested start and stop time, tolerance and step.
     pub default_experiment: DefaultExperiment,
-    /// The variables, in the order of the file; the elements of an array one after the other, by rows.
+    /// The variables in the order of the file. The elements of an array follow each other in row-major order.
     pub variables: Vec<Variable>,
-    /// Value references of the derivatives of the continuous states, each with that of its state.
+    /// Value references of the derivatives of the continuous states, each with the value reference of its
+    /// state.
     pub derivatives: Vec<(u32, u32)>,
-    /// Continuous states and event indicators, as an FMU 2.0 declares them.
+    /// Numbers of continuous states and event indicators that an FMU 2.0 declares.
     pub(crate) sizes: (usize, usize),
     arrays: BTreeMap<u32, Array>,
     elements: BTreeMap<u32, ArrayElement>,
 }
 
-/// An array of FMI 3.0.
+/// An array variable of FMI 3.0.
 #[derive(Clone, Debug)]
 pub struct Array {
-    /// Number of elements.
     pub length: usize,
-    /// Type of its elements.
     pub c_type: CType,
-    /// Their start values, as written: none, one for all, or one for each.
+    /// Start values as written: none, one for all elements, or one for each element.
     pub start: Vec<String>,
-    /// True if its start values are for another size.
+    /// True if structural parameters change its size, so that the declared start values have no meaning.
     pub(crate) is_resized: bool,
 }
 
-/// Position of an element of an array.
+/// Position of an element in an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArrayElement {
-    /// Value reference of the array.
     pub array: u32,
-    /// Place, counted from 0, by rows.
+    /// Row-major index, from 0.
     pub index: usize,
 }
 
-/// Element `CoSimulation` or `ModelExchange`.
+/// The element `CoSimulation` or `ModelExchange`.
 #[derive(Clone, Debug)]
 pub struct Interface {
-    /// Name of the binary, without the platform's ending.
     pub model_identifier: String,
-    /// True if Co-Simulation takes derivatives of inputs (FMI 2.0), or new values of inputs within a step (FMI 3.0).
+    /// True if the FMU accepts derivatives of inputs (FMI 2.0) or new values of inputs within a step (FMI
+    /// 3.0).
     pub can_interpolate_inputs: bool,
-    /// True if there are directional derivatives.
+    /// True if the FMU provides directional derivatives.
     pub directional_derivatives: bool,
 }
 
-/// Element `DefaultExperiment`; times in s.
+/// The element `DefaultExperiment`.
 #[derive(Clone, Debug, Default)]
 pub struct DefaultExperiment {
-    /// Start time, s.
     pub start_time: Option<f64>,
-    /// Stop time, s.
     pub stop_time: Option<f64>,
-    /// Relative tolerance of the FMU's solver.
     pub tolerance: Option<f64>,
-    /// Communication step, s.
     pub step_size: Option<f64>,
 }
 
-/// Element `Unit`: a unit in which values are exchanged, and those in which people give and read them.
+/// A unit in which an FMU exchanges values, with the display units in which users enter and read them.
 #[derive(Clone, Debug)]
 pub struct Unit {
-    /// Name used by variables as `unit`.
     pub name: String,
-    /// Elements `DisplayUnit`.
     pub display: Vec<DisplayUnit>,
-    /// Element `BaseUnit`: what it is in SI.
     pub base: Option<BaseUnit>,
 }
 
-/// Element `BaseUnit` of FMI and SSP: a value in SI is `factor` times the number, plus `offset`.
+/// The element `BaseUnit` of FMI and SSP: value in SI base units = `factor` · value + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseUnit {
-    /// Exponents of [`BaseUnit::NAMES`].
+    /// Exponents of the base units [`BaseUnit::NAMES`].
     pub exponents: [i32; 8],
-    /// Factor of the number.
     pub factor: f64,
-    /// Offset, added after the factor.
+    /// Offset in SI base units.
     pub offset: f64,
 }
 
 impl BaseUnit {
-    /// The base units of SI that FMI and SSP have, and rad.
+    /// Base units of FMI and SSP: those of SI, and rad.
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
-    /// The one in an element `Unit`; `None` if the element has none, or one that is not of numbers.
-    pub fn of(unit: &Element) -> Option<BaseUnit> {
+    /// Reads the child `BaseUnit` of an element `Unit`. Returns `None` if it is missing or one of its numbers
+    /// is not valid.
+    pub fn from_element(unit: &Element) -> Option<BaseUnit> {
         let base = unit.child("BaseUnit")?;
         let mut exponents = [0; 8];
         for (exponent, name) in exponents.iter_mut().zip(BaseUnit::NAMES) {
@@ -137,95 +125,77 @@ impl BaseUnit {
     }
 }
 
-/// Element `DisplayUnit`: a number in it is `factor` times the value, plus `offset`.
+/// The element `DisplayUnit`: displayed value = `factor` · value + `offset`.
 #[derive(Clone, Debug)]
 pub struct DisplayUnit {
-    /// Name.
     pub name: String,
-    /// Factor on the value.
     pub factor: f64,
-    /// Offset, added after the factor.
+    /// Offset in the display unit.
     pub offset: f64,
 }
 
-/// Element `SimpleType`.
 #[derive(Clone, Debug)]
 pub struct SimpleType {
-    /// Name used by variables as `declaredType`.
+    /// Name that variables use as `declaredType`.
     pub name: String,
-    /// Unit of variables of this type that name none.
+    /// Unit of those variables of this type that declare none.
     pub unit: Option<String>,
-    /// The values it can take, if it is an enumeration.
+    /// Items, if the type is an enumeration.
     pub items: Vec<Item>,
 }
 
-/// One value of an enumeration.
+/// Item of an enumeration.
 #[derive(Clone, Debug)]
 pub struct Item {
-    /// Name.
     pub name: String,
-    /// Number.
     pub value: i64,
 }
 
-/// Element `ScalarVariable`, in FMI 3.0 one of its type's name.
+/// A variable: the element `ScalarVariable`, in FMI 3.0 the element named after its type.
 #[derive(Clone, Debug)]
 pub struct Variable {
-    /// Name, unique in the FMU.
     pub name: String,
-    /// Number by which calls refer to it (within its type); of an element of an array one of this host's own, that no
-    /// other variable has.
+    /// Value reference. An element of an array has a number that this host assigns and that no other variable
+    /// has.
     pub reference: u32,
-    /// Role.
     pub causality: Causality,
-    /// When its value can change; `Other` with an empty text if it is not given.
+    /// Variability; `Other` with an empty text if it is missing.
     pub variability: Variability,
-    /// Description; empty if there is none.
     pub description: String,
-    /// FMI 3.0: true if it may be set or read within a step.
+    /// True if the variable may be set or read within a step (FMI 3.0).
     pub intermediate: bool,
     c_type: CType,
     kind: Type,
     attributes: Attributes,
 }
 
-/// Attributes of the typed child of a `ScalarVariable`.
 #[derive(Clone, Debug, Default)]
 pub struct Attributes {
-    /// Start value, as written.
     pub start: Option<String>,
-    /// Unit in which values are exchanged.
     pub unit: Option<String>,
-    /// Unit in which a person likes to read it.
+    /// Unit in which users prefer to read the value.
     pub display_unit: Option<String>,
     /// Smallest value, as written.
     pub min: Option<String>,
     /// Largest value, as written.
     pub max: Option<String>,
-    /// Name of the `SimpleType`.
     pub declared_type: Option<String>,
 }
 
-/// Type of a variable.
+/// Type of a variable, as users see it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
-    /// 64-bit real.
     Real,
-    /// 32-bit integer.
     Integer,
-    /// True or false.
     Boolean,
-    /// Text.
     String,
-    /// An integer with named values.
     Enumeration,
-    /// Bytes; this host does not exchange them.
+    /// Bytes, which this host does not exchange.
     Binary,
-    /// An instant; this host does not exchange them.
+    /// A clock, which this host does not exchange.
     Clock,
 }
 
-/// Type in which calls exchange a variable, by the names of FMI 3.0. A Real of FMI 2.0 is a Float64, an Integer an Int32.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CType {
     Float32,
@@ -245,8 +215,8 @@ pub enum CType {
 }
 
 impl CType {
-    /// C type and displayed type of an element of FMI 3.0.
-    pub fn of_element(name: &str) -> Option<(CType, Type)> {
+    /// Returns the C type and the displayed type for an element of ModelVariables in FMI 3.0.
+    pub fn from_element_name(name: &str) -> Option<(CType, Type)> {
         Some(match name {
             "Float32" => (CType::Float32, Type::Real),
             "Float64" => (CType::Float64, Type::Real),
@@ -267,8 +237,8 @@ impl CType {
         })
     }
 
-    /// The whole numbers that it has, if it has no others.
-    fn whole(self) -> Option<(i64, i64)> {
+    /// Returns the smallest and the largest value of an integer type, or `None` for other types.
+    fn integer_bounds(self) -> Option<(i64, i64)> {
         Some(match self {
             CType::Int8 => (i8::MIN.into(), i8::MAX.into()),
             CType::UInt8 => (0, u8::MAX.into()),
@@ -283,21 +253,16 @@ impl CType {
     }
 }
 
-/// A value of a variable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Value of a Real.
     Real(f64),
-    /// Value of an Integer or an Enumeration.
     Integer(i64),
-    /// Value of a Boolean.
     Boolean(bool),
-    /// Value of a String.
     String(String),
 }
 
 impl Value {
-    /// Returns the value as tables have it: Booleans as 0 and 1, NaN for a text.
+    /// Returns the value as a number for tables: Booleans as 0 and 1, texts as NaN.
     pub fn number(&self) -> f64 {
         match self {
             Value::Real(x) => *x,
@@ -307,7 +272,7 @@ impl Value {
         }
     }
 
-    /// Returns the value in the form of a description.
+    /// Returns the value as a start attribute has it.
     fn text(&self) -> String {
         match self {
             Value::Real(x) => x.to_string(),
@@ -319,28 +284,25 @@ impl Value {
 }
 
 impl Variable {
-    /// Returns the type.
     pub fn kind(&self) -> Type {
         self.kind
     }
 
-    /// Returns the type in which calls exchange the variable.
     pub fn c_type(&self) -> CType {
         self.c_type
     }
 
-    /// Returns true for a structural parameter of FMI 3.0, which is set in configuration mode alone.
+    /// Returns true for a structural parameter of FMI 3.0, which can be set only in configuration mode.
     pub fn is_structural(&self) -> bool {
         self.causality == Causality::StructuralParameter
     }
 
-    /// Start, unit, bounds.
     pub fn attributes(&self) -> &Attributes {
         &self.attributes
     }
 }
 
-/// A text in quotes, or its beginning and its length.
+/// Returns a text in quotes; of a long text its beginning and its length.
 fn short(text: &str) -> String {
     match text.char_indices().nth(60) {
         None => format!("\"{text}\""),
@@ -348,7 +310,7 @@ fn short(text: &str) -> String {
     }
 }
 
-/// Reads elements and keeps all that is wrong with them.
+/// Reads elements and collects everything that is wrong with them.
 #[derive(Default)]
 struct Reader {
     is_fmi3: bool,
@@ -357,7 +319,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Adds a problem; only the first ones are kept.
+    /// Adds a problem. Only the first [`NAMED`] are stored; the others are counted.
     fn problem(&mut self, element: &Element, what: &str) {
         match self.problems.len() < NAMED {
             true => {
@@ -367,7 +329,7 @@ impl Reader {
         }
     }
 
-    /// An attribute that must be there and that `read` understands.
+    /// Reads a required attribute with `read`; adds a problem if it is missing or not valid.
     fn must<T: Default>(
         &mut self,
         element: &Element,
@@ -403,12 +365,12 @@ impl Reader {
             factor: shown.number("factor").unwrap_or(1.0),
             offset: shown.number("offset").unwrap_or(0.0),
         });
-        let base = BaseUnit::of(element);
+        let base = BaseUnit::from_element(element);
         Unit { display: display.collect(), name: self.text(element, "name"), base }
     }
 
     fn item(&mut self, element: &Element) -> Item {
-        // of 32 bits in FMI 2.0, of 64 in FMI 3.0
+        // Item values have 32 bits in FMI 2.0 and 64 bits in FMI 3.0.
         let is_fmi3 = self.is_fmi3;
         let fits = |n: &i64| is_fmi3 || i32::try_from(*n).is_ok();
         let value = self.must(element, "value", |text| text.trim().parse().ok().filter(fits));
@@ -459,7 +421,8 @@ impl Reader {
         }
     }
 
-    /// Reads what both versions say of a variable alike. `typed` has the attributes that depend on the type.
+    /// Reads the attributes that FMI 2.0 and 3.0 have in common. `typed` has the attributes that depend on
+    /// the type.
     fn common(
         &mut self,
         element: &Element,
@@ -488,8 +451,8 @@ impl Reader {
         }
     }
 
-    /// A variable of FMI 3.0 and its aliases; all its elements if it is an array. Structural parameters that are `set`, by
-    /// their references, have other values than those that are written.
+    /// Reads the variables of FMI 3.0 with their aliases; an array becomes one variable per element. `set`
+    /// has the values of structural parameters, by value reference, that differ from the declared ones.
     fn variables3(
         &mut self,
         root: &Element,
@@ -510,7 +473,7 @@ impl Reader {
         let references = references.filter_map(|r| r.trim().parse::<u32>().ok());
         let mut next = references.max().map_or(Some(0), |last| last.checked_add(1));
         for element in root.list("ModelVariables") {
-            let Some((c_type, kind)) = CType::of_element(&element.name) else {
+            let Some((c_type, kind)) = CType::from_element_name(&element.name) else {
                 self.problem(element, "there is no such type");
                 continue;
             };
@@ -558,7 +521,7 @@ impl Reader {
         }
     }
 
-    /// A variable of FMI 3.0 as it is written, and its start values.
+    /// Reads a variable of FMI 3.0 and its start values.
     fn variable3(
         &mut self,
         element: &Element,
@@ -589,7 +552,8 @@ impl Reader {
         (Variable { variability, ..common }, starts)
     }
 
-    /// Sizes of an array, those by structural parameters from `sizes`; none of a scalar.
+    /// Returns the sizes of an array; empty for a scalar. `sizes` has the values of structural parameters by
+    /// value reference.
     fn dimensions(&mut self, element: &Element, sizes: &BTreeMap<&str, u64>) -> Vec<usize> {
         let mut dimensions = Vec::new();
         for dimension in element.children.iter().filter(|child| child.name == "Dimension") {
@@ -606,7 +570,8 @@ impl Reader {
         dimensions
     }
 
-    /// A variable by its other names; it is set and recorded by its first one.
+    /// Returns the aliases of a variable as variables. The variable is set and recorded only by its first
+    /// name.
     fn aliases(&mut self, element: &Element, variable: &Variable) -> Vec<Variable> {
         let mut aliases = Vec::new();
         for alias in element.children.iter().filter(|child| child.name == "Alias") {
@@ -622,8 +587,8 @@ impl Reader {
     }
 }
 
-/// Value references of the derivatives in the model structure, each with that of its state: FMI 2.0 names variables by
-/// their places, FMI 3.0 by their references.
+/// Returns the value references of the derivatives in ModelStructure, each with the value reference of its
+/// state. FMI 2.0 identifies variables by position, FMI 3.0 by value reference.
 fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     let all: Vec<&Element> = root.list("ModelVariables").collect();
     let reference = |variable: &Element| variable.get("valueReference")?.trim().parse::<u32>().ok();
@@ -650,7 +615,7 @@ fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     unknowns.filter_map(pair).collect()
 }
 
-/// Indices from 1, with commas between, of an element counted from 0, by rows.
+/// Converts a row-major index, counted from 0, to indices from 1, separated by commas.
 fn indices(mut index: usize, dimensions: &[usize]) -> String {
     let mut all = Vec::new();
     for size in dimensions.iter().rev() {
@@ -661,19 +626,18 @@ fn indices(mut index: usize, dimensions: &[usize]) -> String {
     all.join(",")
 }
 
-/// Bytes that the name of a variable may have.
+/// Longest name of a variable, bytes.
 const LONGEST_NAME: usize = 1024;
-/// Types that a description may have, and items of one: what a variable is declared as is looked up
-/// among all of them.
+/// Largest number of types, and of items of one type. They are limited because each declaredType is searched
+/// among all types.
 const MOST_TYPES: usize = 5000;
-/// Elements that all arrays of an FMU may have together.
+/// Largest number of elements of all arrays together.
 const MOST_ELEMENTS: usize = 100_000;
-/// Largest number of missing items that a message names.
 const NAMED: usize = 20;
 
 impl ModelDescription {
-    /// Reads the description of a packed FMU; nothing is unpacked or loaded.
-    pub fn of_packed(path: &Path) -> Result<Self> {
+    /// Reads the description of a packed FMU, without unpacking or loading its binary.
+    pub fn from_fmu(path: &Path) -> Result<Self> {
         let name = path.display();
         let text = Archive::open(path)?.description();
         let text = text.with_context(|| format!("{name} is not an FMU"))?;
@@ -683,7 +647,11 @@ impl ModelDescription {
         Ok(description)
     }
 
-    /// Fails unless it is of FMI 2.0 or 3.
+    /// Checks that the FMI version is 2.0 or 3.
+    ///
+    /// # Errors
+    ///
+    /// If it is another version.
     pub fn check_version(&self) -> Result<()> {
         let version = short(&self.fmi_version).replace('"', "");
         ensure!(
@@ -693,27 +661,26 @@ impl ModelDescription {
         Ok(())
     }
 
-    /// Returns true for FMI 3.
     pub fn is_fmi3(&self) -> bool {
         self.fmi_version.starts_with("3.")
     }
 
-    /// Position of an array element by its variable's reference; `None` for a variable that is not an element.
+    /// Returns the position of an array element by its value reference, or `None` for a variable that is not
+    /// an element.
     pub fn element(&self, reference: u32) -> Option<ArrayElement> {
         self.elements.get(&reference).copied()
     }
 
-    /// The array of that value reference.
+    /// Returns the array with this value reference.
     pub fn array(&self, reference: u32) -> Option<&Array> {
         self.arrays.get(&reference)
     }
 
-    /// The arrays with their value references.
     pub(crate) fn arrays(&self) -> impl Iterator<Item = (u32, &Array)> {
         self.arrays.iter().map(|(reference, array)| (*reference, array))
     }
 
-    /// Start values of an array, one for each element.
+    /// Sets the start values of an array, one for each element.
     pub(crate) fn set_starts(&mut self, array: u32, values: &[Value]) {
         let texts: Vec<String> = values.iter().map(Value::text).collect();
         for variable in &mut self.variables {
@@ -727,25 +694,28 @@ impl ModelDescription {
         }
     }
 
-    /// Reads the XML text.
+    /// Parses the text of modelDescription.xml.
     ///
     /// # Errors
-    /// If it is not well-formed, of FMI 1, or without what a host needs; what is missing is named.
+    ///
+    /// If it is not well-formed, is of another version of FMI, or lacks what a host needs; the text names
+    /// what is missing.
     pub fn from_xml(text: &str) -> Result<Self> {
         ModelDescription::from_xml_with(text, &BTreeMap::new())
     }
 
-    /// The same, where structural parameters have these values, by their references: arrays have the sizes that follow. The
-    /// start values of those that are longer or shorter than declared mean nothing (FMI 3.0.2, section 2.4.7.2).
+    /// Parses modelDescription.xml with the values `set` of structural parameters, by value reference, from
+    /// which array sizes follow. The declared start values of arrays whose size changes have no meaning (FMI
+    /// 3.0.2, section 2.4.7.2).
     pub(crate) fn from_xml_with(text: &str, set: &BTreeMap<u32, Value>) -> Result<Self> {
         let root = Element::parse(text.as_bytes())
             .map_err(|why| anyhow!("modelDescription.xml, line and column {why}"))?;
         ModelDescription::from_element(&root, set)
     }
 
-    /// The same from the parsed file.
+    /// Reads the description from the parsed file, as [`ModelDescription::from_xml_with`] does.
     pub(crate) fn from_element(root: &Element, set: &BTreeMap<u32, Value>) -> Result<Self> {
-        // what other versions have is not missing here
+        // Checked first, because an FMU of another version would otherwise be reported as incomplete.
         let version = root.get("fmiVersion").unwrap_or("2.0");
         let is_fmi3 = version.starts_with("3.");
         if !is_fmi3 && !version.starts_with("2.") {
@@ -805,7 +775,11 @@ impl ModelDescription {
         Ok(description)
     }
 
-    /// The variable of that name; if there is none, the error names those that look alike.
+    /// Finds a variable by name.
+    ///
+    /// # Errors
+    ///
+    /// If there is none; the text suggests similar names.
     pub fn variable(&self, name: &str) -> Result<&Variable> {
         self.variables.iter().find(|v| v.name == name).with_context(|| {
             let names = self.variables.iter().map(|v| v.name.as_str());
@@ -813,31 +787,31 @@ impl ModelDescription {
         })
     }
 
-    /// The values an enumeration variable can take.
     pub fn items(&self, variable: &Variable) -> &[Item] {
         let declared = variable.attributes().declared_type.as_deref();
         let named = self.types.iter().find(|t| Some(t.name.as_str()) == declared);
         named.map_or(&[], |t| &t.items)
     }
 
-    /// The unit in which a variable is exchanged; empty if it has none.
+    /// Returns the unit in which a variable is exchanged; empty if it has none.
     pub fn unit<'a>(&'a self, variable: &'a Variable) -> &'a str {
         let declared = variable.attributes.declared_type.as_ref();
         let declared = || self.types.iter().find(|t| Some(&t.name) == declared)?.unit.as_ref();
         variable.attributes.unit.as_ref().or_else(declared).map_or("", String::as_str)
     }
 
-    /// The units in which people may give a variable, in addition to its own.
+    /// Returns the units in which users may also enter a variable.
     pub fn display_units(&self, variable: &Variable) -> &[DisplayUnit] {
         let own = self.unit(variable);
         let defined = self.units.iter().find(|unit| unit.name == own);
         defined.map_or(&[], |unit| &unit.display)
     }
 
-    /// A number of a Real in a unit that is defined by its base units, in the variable's own unit.
+    /// Converts `number` from `unit`, defined by `base`, to the unit of a Real variable.
     ///
     /// # Errors
-    /// If the two units are not of one quantity, or the FMU does not define its own.
+    ///
+    /// If the two units measure different quantities, or the FMU does not define the variable's unit.
     pub fn converted(
         &self,
         variable: &Variable,
@@ -847,7 +821,7 @@ impl ModelDescription {
     ) -> Result<f64> {
         let (name, own) = (&variable.name, self.unit(variable));
         let known = self.units.iter().find(|unit| unit.name == own).and_then(|unit| unit.base);
-        // a variable without a unit is a plain number
+        // A variable without a unit is a dimensionless number.
         let plain = BaseUnit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
         let known = if own.is_empty() { Some(plain) } else { known };
         let Some(known) = known else {
@@ -863,7 +837,7 @@ impl ModelDescription {
         Ok((si - known.offset) / known.factor)
     }
 
-    /// The units in which a variable may be given, by name.
+    /// Lists the names of the units in which a variable may be entered, for messages.
     pub fn units_of(&self, variable: &Variable) -> String {
         let own = self.unit(variable);
         let all = self.display_units(variable).iter().map(|shown| shown.name.as_str());
@@ -871,7 +845,8 @@ impl ModelDescription {
         if all.is_empty() { "a number without unit".into() } else { all.join(", ") }
     }
 
-    /// A number of a Real: `0.05`, or with its own unit or one of its display units, `50mm`, `50 mm`.
+    /// Parses the value of a Real: `0.05`, or with the variable's unit or one of its display units, for
+    /// example `50mm` or `50 mm`.
     fn real(&self, variable: &Variable, text: &str) -> Result<f64> {
         if let Ok(number) = text.parse() {
             return Ok(number);
@@ -898,17 +873,19 @@ impl ModelDescription {
         }
     }
 
-    /// Reads a value of a variable from text; of a Real with or without a unit.
+    /// Parses a value of a variable; a Real may have a unit.
     ///
     /// # Errors
-    /// If it is not of the variable's type; the error says what is allowed.
+    ///
+    /// If the text does not fit the type; the message says what is allowed.
     pub fn value(&self, variable: &Variable, text: &str) -> Result<Value> {
         let name = &variable.name;
         let text = text.trim();
         match variable.kind() {
             Type::Real => self.real(variable, text).map(Value::Real),
             Type::Integer => {
-                let (least, most) = variable.c_type.whole().unwrap_or((i64::MIN, i64::MAX));
+                let (least, most) =
+                    variable.c_type.integer_bounds().unwrap_or((i64::MIN, i64::MAX));
                 let number = text.parse().ok().filter(|n| (least..=most).contains(n));
                 number.map(Value::Integer).with_context(|| match text.parse::<f64>() {
                     Ok(x) if x.fract() == 0.0 => {
@@ -942,7 +919,7 @@ impl ModelDescription {
     }
 }
 
-/// "; did you mean …?" with the (at most three) likeliest of `names`, or nothing.
+/// Returns "; did you mean …?" with at most three of `names` that are similar to `wrong`, or an empty text.
 pub fn did_you_mean<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> String {
     let mut near: Vec<(f64, &str)> = names
         .map(|name| (strsim::jaro_winkler(&wrong.to_lowercase(), &name.to_lowercase()), name))

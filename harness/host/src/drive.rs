@@ -1,6 +1,6 @@
-//! A run of either version of FMI: inputs set at every communication point, Reals with the slopes that they have
-//! until the next. Integers, enumerations and Booleans are held. An FMU that was opened for Model Exchange is integrated between
-//! communication points ([`exchange`]).
+//! Runs an FMU of either version of FMI. Inputs are set at every communication point: Reals with their slope
+//! until the next point; integers, enumerations and Booleans are held. An FMU that was opened for Model
+//! Exchange is integrated between the communication points ([`exchange`]).
 
 use std::borrow::Cow;
 
@@ -11,37 +11,37 @@ use crate::description::{ModelDescription, Type, Value, Variable};
 use crate::exchange;
 use crate::fmu::Instance;
 
-/// The inputs that a host drives.
+/// The inputs that a host sets during a run.
 pub struct Inputs {
-    /// The Reals, and their places among the inputs.
+    /// Value references of the Reals, and their positions among the inputs.
     references: Vec<u32>,
     places: Vec<usize>,
-    /// The others, with their places.
+    /// The inputs that are not Reals, with their positions.
     discrete: Vec<(usize, Variable)>,
-    /// The FMU takes slopes of inputs.
+    /// True if the FMU accepts slopes of inputs.
     sloped: bool,
-    /// The inputs are held over each step.
+    /// True if the inputs are held constant during each step.
     hold: bool,
-    /// Relative tolerance of the host's solver, for an FMU without Co-Simulation.
+    /// Relative tolerance of the host's solver; `None` if the FMU has Co-Simulation.
     exchange: Option<f64>,
 }
 
-/// Relative tolerance of the host's solver, unless the user or the default experiment of the FMU states one.
+/// Relative tolerance of the host's solver if neither the user nor the default experiment gives one.
 const TOLERANCE: f64 = 1e-6;
-/// Part of an input's size by which it may be off its slope before it jumps.
+/// Relative deviation of an input from its slope above which it jumps, which is an event.
 const JUMP: f64 = 1e-9;
 
-/// Course of the inputs between two communication points, in their order.
+/// Values of the inputs between two communication points, in the order of the inputs.
 pub struct Course<'a> {
     /// Values at the communication point.
     pub values: &'a mut [f64],
-    /// Derivatives until the next, per s; an FMU that cannot interpolate, or whose inputs are held,
-    /// does not hear of them.
+    /// Time derivatives until the next communication point, per s. They are ignored if the FMU cannot
+    /// interpolate or the inputs are held.
     pub slopes: &'a mut [f64],
 }
 
 impl Inputs {
-    /// Inputs by FMU name; `hold`: they are held over each step (zero-order hold).
+    /// Selects the inputs by name. With `hold` they are constant during each step (zero-order hold).
     pub fn new(description: &ModelDescription, names: &[&str], hold: bool) -> Result<Self> {
         let (mut references, mut places, mut discrete) = (Vec::new(), Vec::new(), Vec::new());
         for (place, name) in names.iter().enumerate() {
@@ -61,18 +61,17 @@ impl Inputs {
         Ok(Inputs { references, places, discrete, sloped, hold, exchange })
     }
 
-    /// The same with a relative tolerance of the host's solver; `None` leaves the default.
+    /// Sets the relative tolerance of the host's solver; `None` leaves the default.
     pub fn with_tolerance(self, tolerance: Option<f64>) -> Self {
         Inputs { exchange: self.exchange.map(|default| tolerance.unwrap_or(default)), ..self }
     }
 
-    /// Returns true if an input of this type can be driven.
+    /// Returns true if inputs of this type can be set.
     pub fn takes(kind: Type) -> bool {
         matches!(kind, Type::Real | Type::Integer | Type::Enumeration | Type::Boolean)
     }
 
-    /// Takes an instance whose start values are set through its initialisation, with the inputs' first
-    /// values.
+    /// Initialises an instance whose start values are set. `values` are the inputs at the start; times in s.
     pub fn initialise(
         &self,
         instance: &mut Instance,
@@ -86,11 +85,13 @@ impl Inputs {
         instance.exit_initialization_mode()
     }
 
-    /// Steps an initialised instance from `start`, s. At every communication point, `at` receives the time and the instance to
-    /// read from. It returns the inputs until the next communication point and the time of that point; `None` ends the run.
+    /// Simulates an initialised instance from `start`, s. At every communication point `at` receives the
+    /// instance and the time, reads outputs, writes the inputs until the next point, and returns the time of
+    /// that point, or `None` to end the run.
     ///
     /// # Errors
-    /// Errors of `at`; a call that the FMU refuses, with the time.
+    ///
+    /// Errors of `at`, and calls that the FMU refuses, with the time.
     pub fn drive<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,
@@ -112,7 +113,8 @@ impl Inputs {
         Ok(())
     }
 
-    /// The same by Model Exchange. An input that leaves its slope, and one that is not a Real and changes, is an event.
+    /// Does the same as [`Inputs::drive`] by Model Exchange. An input that deviates from its slope, or an
+    /// input other than a Real that changes, is an event.
     fn integrate<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,
@@ -123,7 +125,7 @@ impl Inputs {
         let count = self.places.len() + self.discrete.len();
         let (mut values, mut slopes) = (vec![0.0; count], vec![0.0; count]);
         let mut run = exchange::Run::new(instance, tolerance, start, exchange::MOST_STEPS)?;
-        // inputs since the last communication point, which led to here
+        // Values, slopes and time of the inputs since the last communication point.
         let mut last: Option<(Vec<f64>, Vec<f64>, f64)> = None;
         let mut t = start;
         while let Some(next) =
@@ -155,7 +157,7 @@ impl Inputs {
         Ok(())
     }
 
-    /// The Reals among values of all inputs.
+    /// Selects the Reals among the values of all inputs.
     fn reals<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
         match self.discrete.is_empty() {
             true => Cow::Borrowed(values),

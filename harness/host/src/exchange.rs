@@ -1,9 +1,11 @@
-//! The host's solver, for FMUs of model exchange: Dormand and Prince's pair of order 5(4) (J. Comput. Appl. Math. 6, 1980), with
-//! events located on its continuous extension (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.6).
+//! The host's solver for FMUs for Model Exchange: the pair of Dormand and Prince of order 5(4) (J. Comput.
+//! Appl. Math. 6, 1980), with events located on its continuous extension (Hairer, Nørsett, Wanner, Solving
+//! Ordinary Differential Equations I, II.6).
 //!
-//! A state event is where an indicator changes sign (FMI 2.0.5, section 3.1.1); it is located by bisection to [`LOCATED`] of the
-//! step. Time events and those that completedIntegratorStep asks for are handled as they come. Where events pile up, as under
-//! chattering, each one still moves time on by [`APART`] of the way to the next row, so that the run ends.
+//! A state event is a sign change of an indicator (FMI 2.0.5, section 3.1.1); it is located by bisection to
+//! [`LOCATED`] of the step. Time events, and events that completedIntegratorStep requests, are handled as
+//! they occur. If events accumulate, for example in chattering, each one still advances the time by [`APART`]
+//! of the distance to the next row, so that the run ends.
 
 use std::ops::DerefMut;
 
@@ -12,11 +14,11 @@ use anyhow::{Result, bail, ensure};
 use crate::c_abi::Called;
 use crate::fmu::Instance;
 
-/// Part of a step to which an event is located.
+/// Accuracy of the time of an event, as a fraction of the step.
 const LOCATED: f64 = 1e-13;
-/// Part of the way to the next row that lies between two events at least.
+/// Smallest distance of two events, as a fraction of the distance between two rows.
 const APART: f64 = 1e-6;
-/// Steps from one row to the next, unless fewer are allowed.
+/// Largest number of steps between two rows by default.
 pub const MOST_STEPS: usize = 100_000;
 
 const C: [f64; 6] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
@@ -30,7 +32,7 @@ const A: [[f64; 5]; 6] = [
 ];
 const B: [f64; 6] =
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0];
-/// Weights of the error, of the six slopes and of that at the end.
+/// Weights of the error estimate: six stages and the derivative at the end.
 const E: [f64; 7] = [
     71.0 / 57600.0,
     0.0,
@@ -40,7 +42,7 @@ const E: [f64; 7] = [
     22.0 / 525.0,
     -1.0 / 40.0,
 ];
-/// Weights of the continuous extension's fifth term.
+/// Weights of the fifth term of the continuous extension.
 const D: [f64; 7] = [
     -12715105075.0 / 11282082432.0,
     0.0,
@@ -51,25 +53,25 @@ const D: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
-/// A run of an initialised instance.
+/// A simulation of an initialised instance by the host's solver.
 pub struct Run<I> {
     instance: I,
     t: f64,
     x: Vec<f64>,
     z: Vec<f64>,
-    /// Absolute tolerance of each state over the relative one.
+    /// Ratio of the absolute tolerance of each state to the relative tolerance.
     nominals: Vec<f64>,
     tolerance: f64,
     h: f64,
     next_event: Option<f64>,
     most_steps: usize,
-    /// References, values and slopes of the inputs since `from`.
+    /// Value references, values and slopes of the inputs, and the time from which they hold.
     inputs: (Vec<u32>, Vec<f64>, Vec<f64>, f64),
 }
 
 impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
-    /// Starts a run from an instance in event mode, as initialization leaves it. `most_steps` limits the steps from one row to
-    /// the next.
+    /// Starts a simulation from an instance in event mode, as initialisation leaves it. `tolerance` is
+    /// relative; `most_steps` limits the number of steps between two rows.
     pub fn new(mut instance: I, tolerance: f64, start: f64, most_steps: usize) -> Result<Self> {
         let (states, indicators) = instance.sizes()?;
         let mut run = Run {
@@ -91,19 +93,19 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(run)
     }
 
-    /// The instance, to read from.
     pub fn instance(&mut self) -> &mut Instance<'fmu> {
         &mut self.instance
     }
 
-    /// Sets what is not a Real, which is an event.
+    /// Sets inputs that are not Reals, which is an event.
     pub fn change(&mut self, set: impl FnOnce(&mut Instance<'fmu>) -> Called) -> Result<()> {
         self.instance.enter_event_mode()?;
         set(&mut self.instance)?;
         self.update()
     }
 
-    /// Sets inputs from here on; `jump`: one of them jumps, which is an event.
+    /// Sets the values and slopes of Real inputs from now on. `jump` says that one of them is discontinuous,
+    /// which is an event.
     pub fn drive(
         &mut self,
         references: &[u32],
@@ -128,7 +130,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(self.instance.set_real(references, &at)?)
     }
 
-    /// Leaves event mode once the discrete states have settled.
+    /// Iterates the discrete states until they no longer change, and enters continuous-time mode.
     fn update(&mut self) -> Result<()> {
         for _ in 0..1000 {
             let updated = self.instance.update_discrete_states()?;
@@ -172,7 +174,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(dx)
     }
 
-    /// Returns true if an indicator changes sign between here and a point.
+    /// Returns true if an indicator changes sign between the present point and (t, x).
     fn crosses(&mut self, t: f64, x: &[f64]) -> Result<bool> {
         if self.z.is_empty() {
             return Ok(false);
@@ -182,9 +184,10 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(self.z.iter().zip(&z).any(|(a, b)| (*a > 0.0) != (*b > 0.0)))
     }
 
-    /// Integrates to `end`, s.
+    /// Integrates to the time `end`, s.
     ///
     /// # Errors
+    ///
     /// If the FMU refuses a call, or more steps are needed than are allowed.
     pub fn integrate(&mut self, end: f64) -> Result<()> {
         let apart = APART * (end - self.t);
@@ -225,7 +228,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             let (mut to, mut x_to) = (if ends_row { limit } else { t + h }, new.clone());
             let crossed = self.crosses(to, &x_to)?;
             if crossed {
-                // the first instant after the change of sign
+                // The first time after the sign change.
                 let (mut before, mut after) = (0.0, 1.0);
                 while after - before > LOCATED {
                     let middle = 0.5 * (before + after);
@@ -242,7 +245,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             self.go_to(to, &x_to)?;
             (self.t, self.x) = (to, x_to);
             let grown = h * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
-            // a step that was cut says nothing against longer ones
+            // A step that was shortened gives no reason to shorten the next one.
             self.h = match crossed || h < self.h {
                 true => self.h.max(grown),
                 false => grown,
@@ -264,7 +267,8 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
     }
 }
 
-/// The solution within a step, at the part `s` of it.
+/// Evaluates the continuous extension at the fraction `s` of a step of length `h` from `x` to `new` with the
+/// stages `k`.
 fn extended(x: &[f64], new: &[f64], k: &[Vec<f64>], h: f64, s: f64) -> Vec<f64> {
     (0..x.len())
         .map(|i| {

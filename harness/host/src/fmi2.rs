@@ -1,7 +1,8 @@
-//! The part of the C ABI that only FMI 2.0 has, as a host sees it: its types, the functions whose types differ from those of
-//! FMI 3.0, and calls for tests. [`crate::c_abi::version`] has the rest.
+//! The part of the C interface that only FMI 2.0 has: its types, the functions whose types differ from FMI
+//! 3.0, and calls for tests. [`crate::c_abi::version`] has the rest.
 //!
-//! Unsafe code of the harness is here, in `c_abi.rs`, `fmi3.rs` and `harness/native/src/instance.rs` (`tests/architecture.rs`).
+//! The unsafe code of the harness is in this file, `c_abi.rs`, `fmi3.rs` and `harness/native/src/instance.rs`
+//! (`tests/architecture.rs`).
 #![allow(unsafe_code)]
 
 use std::ffi::{c_char, c_int, c_void};
@@ -25,12 +26,11 @@ pub mod guarded;
 
 /// An FMU 2.0 whose binary is loaded.
 pub type Fmu = version::Fmu<Fmi2>;
-/// One instance of it; freed when dropped. Belongs to the thread that made it.
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi2>;
 
-/// Folder of the binaries for this program's platform (FMI 2.0.5, section 2.3). Names with 32 and 64 are for x86; other
-/// processors use the platform tuples of FMI 3.0. On macOS darwin64 is for both processors, for hosts look there on both and one
-/// universal binary serves them.
+/// Folder of the binaries for the platform of this program (FMI 2.0.5, section 2.3). Names with 32 and 64 are
+/// for x86; other processors use the platform tuples of FMI 3.0. On macOS darwin64 is used for both
+/// processors, because hosts look there on both, and one universal binary serves both.
 pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "aarch64")) {
     "aarch64-windows"
 } else if cfg!(target_os = "windows") {
@@ -66,7 +66,6 @@ unsafe extern "C" {
 type Logger =
     unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
 
-/// `fmi2CallbackFunctions`.
 #[repr(C)]
 pub(crate) struct CallbackFunctions {
     logger: Option<Logger>,
@@ -80,7 +79,7 @@ type Get<T> = unsafe extern "C" fn(Component, Refs, usize, *mut T) -> c_int;
 type Set<T> = unsafe extern "C" fn(Component, Refs, usize, *const T) -> c_int;
 type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
 
-// What every FMU must export besides `Common`.
+// Functions that every FMU 2.0 must export in addition to `Common`.
 functions! { Functions:
     get_types_platform "fmi2GetTypesPlatform", unsafe extern "C" fn() -> *const c_char;
     instantiate "fmi2Instantiate", unsafe extern "C" fn(*const c_char, c_int, *const c_char, *const c_char, *const CallbackFunctions, c_int, c_int) -> Component;
@@ -97,7 +96,7 @@ functions! { Functions:
     get_directional_derivative "fmi2GetDirectionalDerivative", unsafe extern "C" fn(Component, Refs, usize, Refs, usize, *const f64, *mut f64) -> c_int;
 }
 
-// What a co-simulation FMU must export besides.
+// Functions that an FMU for Co-Simulation must export in addition.
 functions! { StepFunctions:
     set_real_input_derivatives "fmi2SetRealInputDerivatives", unsafe extern "C" fn(Component, Refs, usize, *const c_int, *const f64) -> c_int;
     get_real_output_derivatives "fmi2GetRealOutputDerivatives", unsafe extern "C" fn(Component, Refs, usize, *const c_int, *mut f64) -> c_int;
@@ -110,13 +109,12 @@ functions! { StepFunctions:
     get_string_status "fmi2GetStringStatus", GetStatus<*const c_char>;
 }
 
-// What a model exchange FMU must export besides `Exchange`.
+// Functions that an FMU for Model Exchange must export in addition to `Exchange`.
 functions! { EventFunctions:
     enter_event_mode "fmi2EnterEventMode", Call;
     new_discrete_states "fmi2NewDiscreteStates", unsafe extern "C" fn(Component, *mut EventInfo) -> c_int;
 }
 
-/// `fmi2EventInfo`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EventInfo {
@@ -146,7 +144,7 @@ impl<T> Setter<T> for Set<T> {
     }
 }
 
-/// The functions that FMI 2.0 alone has.
+/// The functions that only FMI 2.0 has.
 pub struct Fmi2 {
     functions: Functions,
     stepping: Option<StepFunctions>,
@@ -159,7 +157,7 @@ impl Version for Fmi2 {
     type Boolean = c_int;
     type Kept = Given;
 
-    fn needed(steps: bool, _: bool) -> Vec<&'static str> {
+    fn required_functions(steps: bool, _: bool) -> Vec<&'static str> {
         let mut needed = Fmu::symbols();
         needed.extend(steps.then(Fmu::step_symbols).into_iter().flatten());
         needed
@@ -204,7 +202,7 @@ impl Version for Fmi2 {
 
     fn set_slopes(instance: &mut Instance, references: &[u32], slopes: &[f64]) -> Called {
         assert_eq!(references.len(), slopes.len());
-        // no allocation in a step, so as many at a time as there are ones
+        // Steps must not allocate memory, so the references are set in groups of the length of `ones`.
         let ones = [1; 16];
         for (some, slopes) in references.chunks(ones.len()).zip(slopes.chunks(ones.len())) {
             instance.set_real_input_derivatives(some, &ones[..some.len()], slopes)?;
@@ -272,7 +270,7 @@ impl Version for Fmi2 {
         let (reference, functions) = ([reference], instance.functions());
         values.iter().try_for_each(|value| match value {
             Value::Real(value) => instance.write(functions.set_real, &reference, &[*value]),
-            // read within 32 bits: `ModelDescription::value`
+            // The value fits 32 bits, because `ModelDescription::value` has checked it.
             Value::Integer(value) => {
                 instance.write(functions.set_integer, &reference, &[*value as i32])
             }
@@ -294,7 +292,6 @@ impl Version for Fmi2 {
     }
 }
 
-/// Statuses that the functions of a table return for these arguments.
 macro_rules! answers {
     ($table:expr, $component:expr; $($function:ident($($argument:expr),*)),* $(,)?) => {
         [$((
@@ -320,8 +317,8 @@ pub fn file_uri(folder: &Path) -> String {
 }
 
 impl Fmu {
-    /// Loads the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`], from an unpacked FMU whose model
-    /// description is `root`. The two interfaces may name different binaries.
+    /// Loads the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`], from an unpacked FMU with
+    /// the model description `root`. The two interfaces may have different binaries.
     pub fn load_for(kind: i32, directory: &Path, path: &Path, root: &Element) -> Result<Self> {
         let interface = match kind {
             CO_SIMULATION => Interface::CoSimulation,
@@ -330,33 +327,33 @@ impl Fmu {
         Fmu::load_parsed(Some(interface), directory, path, root)
     }
 
-    /// Returns true if the binary has all functions of Model Exchange.
+    /// Returns true if the binary exports all functions of Model Exchange.
     pub fn has_exchange(&self) -> bool {
         self.exchange.is_some() && self.own.events.is_some()
     }
 
-    /// Names of the 25 C functions every FMU must export.
+    /// Names of the 25 C functions that every FMU must export.
     pub fn symbols() -> Vec<&'static str> {
         [Common::<c_int>::symbols(0), Functions::symbols(0)].concat()
     }
 
-    /// Names of the 9 C functions every co-simulation FMU must export besides.
+    /// Names of the 9 C functions that an FMU for Co-Simulation must export in addition.
     pub fn step_symbols() -> Vec<&'static str> {
         StepFunctions::symbols(0)
     }
 
-    /// Names of the 10 C functions every model exchange FMU must export besides.
+    /// Names of the 10 C functions that an FMU for Model Exchange must export in addition.
     pub fn exchange_symbols() -> Vec<&'static str> {
         [EventFunctions::symbols(0), Exchange::<c_int>::symbols(0)].concat()
     }
 
-    /// Result of fmi2GetTypesPlatform.
+    /// Returns the result of fmi2GetTypesPlatform.
     pub fn types_platform(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
         unsafe { copied((self.own.functions.get_types_platform.call)()) }
     }
 
-    /// The arguments [`Fmu::instantiate`] uses, to be bent for tests of bad calls.
+    /// Returns the arguments that [`Fmu::instantiate`] uses, which tests of bad calls modify.
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         Instantiation {
             name: Some(name),
@@ -389,7 +386,7 @@ impl Fmu {
             environment: if logs { environment.pointer() } else { null_mut() },
         }));
         let instantiate = self.own.functions.instantiate;
-        self.made(instantiate.name, environment, Given(callbacks), || {
+        self.create_instance(instantiate.name, environment, Given(callbacks), || {
             // SAFETY: strings and callbacks outlive the call; the callbacks outlive the instance.
             let component = unsafe {
                 (instantiate.call)(
@@ -410,7 +407,7 @@ impl Fmu {
         })
     }
 
-    /// Returns the status of each function when its instance is NULL; for tests.
+    /// Calls each function with the instance NULL and returns the statuses, for tests.
     pub fn calls_with_null_instance(&self) -> Vec<(&'static str, Status)> {
         let c: Component = null_mut();
         let (mut i, mut x, mut n, mut s, mut t) = (0, 0.0, 0, null_mut(), null());
@@ -480,9 +477,10 @@ impl Fmu {
 }
 
 impl Functions {
-    /// Gets and sets nothing of each type, with NULL pointers.
+    /// Calls the get and set functions of each type with no variables and NULL pointers.
     ///
     /// # Safety
+    ///
     /// The component is NULL or an instance of the FMU.
     unsafe fn nothing(&self, component: Component) -> [(&'static str, Status); 8] {
         // SAFETY: the FMU must look at the number before it follows a pointer.
@@ -501,7 +499,7 @@ impl Functions {
     }
 }
 
-/// Callbacks that an FMU was given, freed after its instance.
+/// Callbacks that were passed to an FMU; they are freed after the instance.
 pub struct Given(*mut CallbackFunctions);
 
 impl Drop for Given {
@@ -511,44 +509,39 @@ impl Drop for Given {
     }
 }
 
-/// fmi2Type of an instance that the host integrates.
+/// fmi2Type for an instance that the host integrates.
 pub const MODEL_EXCHANGE: i32 = 0;
-/// fmi2Type of an instance that integrates itself.
+/// fmi2Type for an instance that integrates itself.
 pub const CO_SIMULATION: i32 = 1;
 
-/// fmi2StatusKind that tells whether the FMU wants the simulation to end.
+/// fmi2StatusKind that asks whether the FMU requests the end of the simulation.
 pub const TERMINATED: i32 = 3;
 
 /// Arguments of fmi2Instantiate; `None` becomes a NULL pointer.
 #[derive(Clone, Debug)]
 pub struct Instantiation<'a> {
-    /// Instance name.
     pub name: Option<&'a str>,
     /// fmi2Type: [`CO_SIMULATION`] or [`MODEL_EXCHANGE`].
     pub kind: i32,
-    /// GUID the host expects.
+    /// GUID that the host expects.
     pub guid: Option<&'a str>,
-    /// URI of the unpacked resources folder.
+    /// URI of the folder with the unpacked resources.
     pub resources: Option<&'a str>,
-    /// Callbacks for the FMU.
     pub callbacks: Callbacks,
-    /// True if the FMU may log.
+    /// Value of loggingOn.
     pub logging: bool,
 }
 
-/// Callback functions for fmi2Instantiate.
+/// Callbacks that are passed to fmi2Instantiate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Callbacks {
-    /// Logger and memory functions.
     Full,
-    /// Like `Full`, with the struct wiped after fmi2Instantiate has returned: it is valid during
-    /// that call alone.
+    /// Like `Full`, but the struct is overwritten after fmi2Instantiate has returned, because it is valid
+    /// only during that call.
     Fleeting,
-    /// The logger alone; the memory functions are NULL.
+    /// Only the logger; the memory functions are NULL.
     Logger,
-    /// A struct whose members are all NULL.
     Empty,
-    /// No struct at all.
     Null,
 }
 
@@ -567,7 +560,7 @@ impl<'fmu> Instance<'fmu> {
         self.fmu.own.events.as_ref().expect("the FMU exports the functions of model exchange")
     }
 
-    /// fmi2SetupExperiment: times in s; `tolerance` is relative.
+    /// Calls fmi2SetupExperiment: times in s, `tolerance` is relative.
     pub fn setup_experiment(
         &mut self,
         tolerance: Option<f64>,
@@ -581,23 +574,25 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// fmi2EnterInitializationMode.
     pub fn enter_initialization_mode(&mut self) -> Called {
         self.plain(self.functions().enter_initialization_mode)
     }
 
-    /// fmi2CancelStep.
     pub fn cancel_step(&mut self) -> Called {
         self.plain(self.stepping().cancel_step)
     }
 
-    /// fmi2DoStep from `time` by `step`, s; the past is never asked for again.
+    /// Calls fmi2DoStep from `time` by `step`, s, with noSetFMUStatePriorToCurrentPoint true.
     pub fn do_step(&mut self, time: f64, step: f64) -> Called {
         // SAFETY: plain values on a live instance.
         self.call(self.stepping().do_step, |f, c| unsafe { f(c, time, step, 1) })
     }
 
-    /// fmi2NewDiscreteStates. It panics when the FMU does not have it.
+    /// Calls fmi2NewDiscreteStates.
+    ///
+    /// # Panics
+    ///
+    /// If the FMU does not export it.
     pub fn new_discrete_states(&mut self) -> Called<EventInfo> {
         let mut info = EventInfo::default();
         // SAFETY: a place for the answer.
@@ -607,37 +602,33 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ variables by reference
 
-    /// fmi2GetInteger (enumerations too).
     pub fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Called {
         self.read(self.functions().get_integer, references, values)
     }
 
-    /// fmi2SetInteger (enumerations too).
     pub fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Called {
         self.write(self.functions().set_integer, references, values)
     }
 
-    /// fmi2GetBoolean; the C values, of which only 0 and 1 are proper.
+    /// Reads Booleans as C integers, of which only 0 and 1 are valid.
     pub fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Called {
         self.read(self.functions().get_boolean, references, values)
     }
 
-    /// fmi2SetBoolean; the C values, of which every non-zero one is true.
+    /// Sets Booleans from C integers, of which every non-zero one is true.
     pub fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Called {
         self.write(self.functions().set_boolean, references, values)
     }
 
-    /// fmi2GetString; the texts are copied, because the FMU's live only until the next call.
+    /// Reads Strings and copies them, because the FMU's texts are valid only until its next call.
     pub fn get_string(&mut self, references: &[u32]) -> Called<Vec<String>> {
         self.read_texts(self.functions().get_string, references, references.len())
     }
 
-    /// fmi2SetString.
     pub fn set_string(&mut self, references: &[u32], values: &[&str]) -> Called {
         self.write_texts(self.functions().set_string, references, values)
     }
 
-    /// fmi2SetRealInputDerivatives.
     pub fn set_real_input_derivatives(
         &mut self,
         references: &[u32],
@@ -652,7 +643,6 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// fmi2GetRealOutputDerivatives.
     pub fn get_real_output_derivatives(
         &mut self,
         references: &[u32],
@@ -667,7 +657,7 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// fmi2GetDirectionalDerivative: d(unknowns) for a change `change` of the knowns.
+    /// Calls fmi2GetDirectionalDerivative: the derivatives of `unknowns` for a change `change` of the knowns.
     pub fn get_directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -687,8 +677,8 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ status of an asynchronous step
 
-    /// One of the functions that tell the status of a step, `kind` being an fmi2StatusKind.
-    fn answer<T>(
+    /// Calls one of the functions that return the status of a step; `kind` is an fmi2StatusKind.
+    fn read_status<T>(
         &mut self,
         function: Function<GetStatus<T>>,
         kind: i32,
@@ -699,73 +689,68 @@ impl<'fmu> Instance<'fmu> {
         Ok(value)
     }
 
-    /// fmi2GetStatus.
     pub fn status(&mut self, kind: i32) -> Called<i32> {
-        self.answer(self.stepping().get_status, kind, 0)
+        self.read_status(self.stepping().get_status, kind, 0)
     }
 
-    /// fmi2GetRealStatus.
     pub fn real_status(&mut self, kind: i32) -> Called<f64> {
-        self.answer(self.stepping().get_real_status, kind, 0.0)
+        self.read_status(self.stepping().get_real_status, kind, 0.0)
     }
 
-    /// fmi2GetIntegerStatus.
     pub fn integer_status(&mut self, kind: i32) -> Called<i32> {
-        self.answer(self.stepping().get_integer_status, kind, 0)
+        self.read_status(self.stepping().get_integer_status, kind, 0)
     }
 
-    /// fmi2GetBooleanStatus.
     pub fn boolean_status(&mut self, kind: i32) -> Called<bool> {
-        Ok(self.answer(self.stepping().get_boolean_status, kind, 0)? != 0)
+        Ok(self.read_status(self.stepping().get_boolean_status, kind, 0)? != 0)
     }
 
-    /// fmi2GetStringStatus.
     pub fn string_status(&mut self, kind: i32) -> Called<String> {
-        let text = self.answer(self.stepping().get_string_status, kind, null())?;
+        let text = self.read_status(self.stepping().get_string_status, kind, null())?;
         // SAFETY: the FMU answered OK, so it points to a terminated string of the FMU.
         Ok(unsafe { copied(text) })
     }
 
     // ------------------------------------------------ for tests of bad calls
 
-    /// fmi2GetReal with `count` and NULL pointers: an FMU must accept 0 and refuse the rest.
+    /// Calls fmi2GetReal with nvr = `count` and NULL pointers. An FMU must accept 0 and refuse any other
+    /// number.
     pub fn get_real_null(&mut self, count: usize) -> Called {
         // SAFETY: the point of the call is that the FMU looks before it leaps; so in the next four.
         self.call(self.functions().get_real, |f, c| unsafe { f(c, null(), count, null_mut()) })
     }
 
-    /// fmi2SetReal with `count` and NULL pointers.
+    /// Calls fmi2SetReal with nvr = `count` and NULL pointers.
     pub fn set_real_null(&mut self, count: usize) -> Called {
         // SAFETY: see get_real_null.
         self.call(self.functions().set_real, |f, c| unsafe { f(c, null(), count, null()) })
     }
 
-    /// fmi2Get… and fmi2Set… of each type without variables and with NULL pointers, which must be
-    /// fine.
+    /// Calls the get and set functions of each type with no variables and NULL pointers, which must succeed.
     pub fn nothing_null(&mut self) -> [(&'static str, Status); 8] {
         // SAFETY: see get_real_null.
         unsafe { self.functions().nothing(self.component) }
     }
 
-    /// fmi2SetString with one NULL text.
+    /// Calls fmi2SetString with NULL as the text.
     pub fn set_string_null(&mut self, reference: u32) -> Called {
         let text = null::<c_char>();
         // SAFETY: see get_real_null.
         self.call(self.functions().set_string, |f, c| unsafe { f(c, &reference, 1, &text) })
     }
 
-    /// fmi2SetFMUstate with NULL.
+    /// Calls fmi2SetFMUstate with NULL.
     pub fn set_state_null(&mut self) -> Called {
         self.set_state(&FmuState(null_mut()))
     }
 
-    /// fmi2FreeFMUstate with the state itself in place of its address, as fmusim calls it.
+    /// Calls fmi2FreeFMUstate with the state itself instead of its address, as fmusim does.
     pub fn free_state_itself(&mut self, state: FmuState) -> Called {
         // SAFETY: a handle from this FMU, gone after this call; it points to more than a pointer.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, state.0.cast()) })
     }
 
-    /// fmi2FreeFMUstate with NULL and with a pointer to NULL, which must both be fine.
+    /// Calls fmi2FreeFMUstate with NULL and with a pointer to NULL, both of which must succeed.
     pub fn free_state_null(&mut self) -> Called {
         // SAFETY: see get_real_null.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, null_mut()) })?;

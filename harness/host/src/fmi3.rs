@@ -1,6 +1,6 @@
-//! The part of the C ABI that only FMI 3.0 has, as a host sees it: its types, the functions whose types differ from those of
-//! FMI 2.0, event mode, early return and intermediate update of co-simulation. [`crate::c_abi::version`] has the rest. What
-//! only scheduled execution needs is not here.
+//! The part of the C interface that only FMI 3.0 has: its types, the functions whose types differ from FMI
+//! 2.0, and event mode, early return and intermediate update in Co-Simulation. [`crate::c_abi::version`] has
+//! the rest. Functions that only Scheduled Execution needs are not here.
 #![allow(unsafe_code)]
 
 use std::cell::Cell;
@@ -26,10 +26,9 @@ use crate::xml::Element;
 
 /// An FMU 3.0 whose binary is loaded.
 pub type Fmu = version::Fmu<Fmi3>;
-/// One instance of it; freed when dropped. Belongs to the thread that made it.
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi3>;
 
-/// Folder of the binaries for the platform this program was built for (FMI 3.0.2, section 2.5.1.4.1).
+/// Folder of the binaries for the platform of this program (FMI 3.0.2, section 2.5.1.4.1).
 pub const PLATFORM: &str = if cfg!(target_os = "windows") {
     if cfg!(target_arch = "aarch64") {
         "aarch64-windows"
@@ -50,7 +49,7 @@ pub const PLATFORM: &str = if cfg!(target_os = "windows") {
 
 // ---------------------------------------------------------------- C types
 
-/// `fmi3Boolean`, a byte; one that is neither 0 nor 1 must not become a `bool`.
+/// `fmi3Boolean`: a byte, because a value that is neither 0 nor 1 must not become a `bool`.
 type Byte = u8;
 type Get<T> = unsafe extern "C" fn(Component, Refs, usize, *mut T, usize) -> c_int;
 type Set<T> = unsafe extern "C" fn(Component, Refs, usize, *const T, usize) -> c_int;
@@ -69,7 +68,8 @@ type Derivative = unsafe extern "C" fn(
 ) -> c_int;
 type Intermediate = extern "C" fn(*mut c_void, f64, Byte, Byte, Byte, Byte, *mut Byte, *mut f64);
 
-// What of the functions every FMU has this host calls besides `Common` (FMI 3.0.2, section 2.5: all 75 are exported).
+// Functions of every FMU 3.0 that this host calls, in addition to `Common`. (All 75 functions must be
+// exported; FMI 3.0.2, section 2.5.)
 functions! { Functions:
     enter_initialization_mode "fmi3EnterInitializationMode", unsafe extern "C" fn(Component, Byte, f64, f64, Byte, f64) -> c_int;
     get_float32 "fmi3GetFloat32", Get<f32>;
@@ -106,7 +106,7 @@ functions! { Functions:
     update_discrete_states "fmi3UpdateDiscreteStates", unsafe extern "C" fn(Component, *mut Byte, *mut Byte, *mut Byte, *mut Byte, *mut Byte, *mut f64) -> c_int;
 }
 
-// What a co-simulation FMU is called by besides.
+// Functions that this host calls for Co-Simulation in addition.
 functions! { StepFunctions:
     instantiate "fmi3InstantiateCoSimulation", unsafe extern "C" fn(*const c_char, *const c_char, *const c_char, Byte, Byte, Byte, Byte, Refs, usize, *mut c_void, Option<LogMessage>, Option<Intermediate>) -> Component;
     enter_step_mode "fmi3EnterStepMode", Call;
@@ -114,14 +114,14 @@ functions! { StepFunctions:
     do_step "fmi3DoStep", unsafe extern "C" fn(Component, f64, f64, Byte, *mut Byte, *mut Byte, *mut Byte, *mut f64) -> c_int;
 }
 
-// What a model exchange FMU is called by besides `Exchange`.
+// Functions that this host calls for Model Exchange in addition to `Exchange`.
 functions! { ExchangeFunctions:
     instantiate "fmi3InstantiateModelExchange", unsafe extern "C" fn(*const c_char, *const c_char, *const c_char, Byte, Byte, *mut c_void, Option<LogMessage>) -> Component;
     number_of_event_indicators "fmi3GetNumberOfEventIndicators", Count;
     number_of_continuous_states "fmi3GetNumberOfContinuousStates", Count;
 }
 
-/// Names of the functions that an FMU exports and this host never calls.
+/// Functions that an FMU must export and this host never calls.
 const UNCALLED: [&str; 15] = [
     "fmi3InstantiateScheduledExecution",
     "fmi3GetBinary",
@@ -140,17 +140,17 @@ const UNCALLED: [&str; 15] = [
     "fmi3ActivateModelPartition",
 ];
 
-/// A C type in which a variable's values are exchanged.
+/// A numeric C type in which the values of variables are exchanged.
 pub trait Exchanged: Copy + Default {
     #[doc(hidden)]
     #[allow(private_interfaces)]
     fn calls(functions: &Functions) -> (Function<Get<Self>>, Function<Set<Self>>);
 
-    /// The value as one of any type.
+    /// Converts a number of this type to a [`Value`].
     fn value(self) -> Value;
 
-    /// The number from a value that was read within the bounds of the type.
-    fn of(value: &Value) -> Self;
+    /// Converts a [`Value`] that is within the bounds of this type.
+    fn from_value(value: &Value) -> Self;
 }
 
 macro_rules! exchanged {
@@ -163,44 +163,44 @@ macro_rules! exchanged {
             fn value(self) -> Value {
                 $value(self)
             }
-            fn of(value: &Value) -> Self {
+            fn from_value(value: &Value) -> Self {
                 $of(value) as $type
             }
         }
     )*};
 }
 
-fn real(value: &Value) -> f64 {
+fn as_real(value: &Value) -> f64 {
     if let Value::Real(x) = value { *x } else { f64::NAN }
 }
 
-fn whole(value: &Value) -> i64 {
+fn as_integer(value: &Value) -> i64 {
     if let Value::Integer(n) = value { *n } else { 0 }
 }
 
-fn text(value: &Value) -> &str {
+fn as_text(value: &Value) -> &str {
     if let Value::String(text) = value { text } else { "" }
 }
 
-/// A number of more than 63 bits becomes the largest there is.
+/// Converts an integer; a number of more than 63 bits becomes the largest i64.
 fn integer(n: impl TryInto<i64>) -> Value {
     Value::Integer(n.try_into().unwrap_or(i64::MAX))
 }
 
 exchanged! {
-    f32, get_float32 set_float32, |x: f32| Value::Real(x.into()), real;
-    f64, get_float64 set_float64, Value::Real, real;
-    i8, get_int8 set_int8, integer, whole;
-    u8, get_uint8 set_uint8, integer, whole;
-    i16, get_int16 set_int16, integer, whole;
-    u16, get_uint16 set_uint16, integer, whole;
-    i32, get_int32 set_int32, integer, whole;
-    u32, get_uint32 set_uint32, integer, whole;
-    i64, get_int64 set_int64, integer, whole;
-    u64, get_uint64 set_uint64, integer, whole;
+    f32, get_float32 set_float32, |x: f32| Value::Real(x.into()), as_real;
+    f64, get_float64 set_float64, Value::Real, as_real;
+    i8, get_int8 set_int8, integer, as_integer;
+    u8, get_uint8 set_uint8, integer, as_integer;
+    i16, get_int16 set_int16, integer, as_integer;
+    u16, get_uint16 set_uint16, integer, as_integer;
+    i32, get_int32 set_int32, integer, as_integer;
+    u32, get_uint32 set_uint32, integer, as_integer;
+    i64, get_int64 set_int64, integer, as_integer;
+    u64, get_uint64 set_uint64, integer, as_integer;
 }
 
-/// Does the same with the Rust type of each C type of numbers.
+/// Evaluates an expression with the Rust type that belongs to a numeric C type.
 macro_rules! numbers {
     ($c_type:expr, $type:ident => $do:expr, $($others:tt)*) => {
         match $c_type {
@@ -221,26 +221,26 @@ macro_rules! numbers {
 
 // ---------------------------------------------------------------- callbacks
 
-/// Callbacks and results of the steps of an instance.
+/// Callbacks and results of an instance's steps.
 pub struct Stepping {
     component: Cell<Component>,
     functions: *const Functions,
-    /// Alive during one call of fmi3DoStep; NULL outside of it.
+    /// Valid during one call of fmi3DoStep, otherwise NULL.
     within: Cell<*mut Within<'static>>,
-    /// Calls of intermediateUpdate.
+    /// Number of calls of intermediateUpdate.
     updates: Cell<usize>,
-    /// Room for the inputs of a step.
+    /// Memory for the inputs of a step, which is used again in every step.
     line: Cell<Line>,
-    /// The pointer that the FMU hands back to intermediateUpdate.
+    /// The pointer that the FMU passes back to intermediateUpdate.
     environment: *mut c_void,
 }
 
 thread_local! {
-    /// The instance whose fmi3DoStep runs on this thread; NULL if none does.
+    /// The instance whose fmi3DoStep runs on this thread, or NULL.
     static STEPPING: Cell<*const Stepping> = const { Cell::new(null()) };
 }
 
-/// Hears of a point within a step, and says when to return early, if at all.
+/// Callback for a point within a step; it returns the time at which the step should end early, or `None`.
 type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
 
 #[allow(clippy::too_many_arguments)]
@@ -285,23 +285,21 @@ extern "C" fn intermediate_update(
     }
 }
 
-/// A point within a step, where the FMU has called intermediateUpdate (section 4.2.2).
+/// A point within a step at which the FMU has called intermediateUpdate (section 4.2.2).
 pub struct Update<'a> {
-    /// intermediateUpdateTime, s.
     pub time: f64,
-    /// Inputs may be set.
+    /// intermediateVariableSetRequested: inputs may be set.
     pub set_requested: bool,
-    /// Variables may be read.
+    /// intermediateVariableGetAllowed: variables may be read.
     pub get_allowed: bool,
-    /// The solver has finished a step of its own.
+    /// intermediateStepFinished: the FMU's solver has finished a step of its own.
     pub step_finished: bool,
-    /// An early return may be asked for.
+    /// canReturnEarly: the host may request an early return.
     pub can_return_early: bool,
     stepping: &'a Stepping,
 }
 
 impl Update<'_> {
-    /// fmi3SetFloat64.
     pub fn set(&self, references: &[u32], values: &[f64]) -> Status {
         let n = references.len();
         // SAFETY: two slices of the lengths given; the FMU has called and expects such a call.
@@ -317,7 +315,6 @@ impl Update<'_> {
         status.into()
     }
 
-    /// fmi3GetFloat64.
     pub fn get(&self, references: &[u32], values: &mut [f64]) -> Status {
         // SAFETY: as in set.
         let status = unsafe {
@@ -351,7 +348,7 @@ impl<T> Setter<T> for Set<T> {
     }
 }
 
-/// The functions that FMI 3.0 alone has.
+/// The functions that only FMI 3.0 has.
 pub struct Fmi3 {
     functions: Functions,
     stepping: Option<StepFunctions>,
@@ -364,7 +361,7 @@ impl Version for Fmi3 {
     type Boolean = Byte;
     type Kept = Box<Stepping>;
 
-    fn needed(steps: bool, exchanges: bool) -> Vec<&'static str> {
+    fn required_functions(steps: bool, exchanges: bool) -> Vec<&'static str> {
         let mut needed = [Common::<Byte>::symbols(1), Functions::symbols(0)].concat();
         if steps {
             needed.extend(StepFunctions::symbols(0));
@@ -501,8 +498,8 @@ impl Version for Fmi3 {
 }
 
 impl Fmu {
-    /// Loads the binary of one interface from an unpacked FMU whose model description is `root`. The two interfaces may
-    /// name different binaries.
+    /// Loads the binary of one interface from an unpacked FMU with the model description `root`. The two
+    /// interfaces may have different binaries.
     pub fn load_for(
         interface: Option<Interface>,
         directory: &Path,
@@ -514,13 +511,14 @@ impl Fmu {
 
     /// Names of the 75 functions that every FMU must export (section 2.5).
     pub fn symbols() -> Vec<&'static str> {
-        let mut all = Fmi3::needed(true, true);
+        let mut all = Fmi3::required_functions(true, true);
         all.extend(UNCALLED);
         all
     }
 
-    /// Arguments of a plain instance, which tests of bad calls modify: no event mode and no early return. With intermediate
-    /// update, it requires every input and output that may be exchanged within a step.
+    /// Returns the arguments of an ordinary instance, which tests of bad calls modify: no event mode and no
+    /// early return. If the FMU provides intermediate update, all inputs that may be set within a step are
+    /// required.
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         let stepping = self.description.co_simulation.as_ref();
         let updates = stepping.is_some_and(|cs| cs.can_interpolate_inputs);
@@ -546,7 +544,7 @@ impl Fmu {
         }
     }
 
-    /// Makes an instance with exactly these arguments.
+    /// Instantiates the FMU with exactly these arguments.
     pub fn instantiate_with(&self, with: &Instantiation) -> Called<Instance<'_>> {
         let (name, token, resources) =
             (c_string(with.name), c_string(with.token), c_string(with.resources));
@@ -573,7 +571,7 @@ impl Fmu {
                 let (events, early) = (with.event_mode.into(), with.early_return.into());
                 let n = required.len();
                 // SAFETY: strings outlive the call, the environment the instance.
-                self.made(f.name, environment, stepping, || unsafe {
+                self.create_instance(f.name, environment, stepping, || unsafe {
                     (f.call)(
                         name, token, resources, 0, logging, events, early, first, n, host, logger,
                         updates,
@@ -584,7 +582,7 @@ impl Fmu {
                 let f = self.own.exchange.as_ref().expect("the functions of model exchange");
                 let f = f.instantiate;
                 // SAFETY: see above.
-                self.made(f.name, environment, stepping, || unsafe {
+                self.create_instance(f.name, environment, stepping, || unsafe {
                     (f.call)(name, token, resources, 0, logging, host, logger)
                 })
             }
@@ -594,53 +592,44 @@ impl Fmu {
     }
 }
 
-/// Somebody who hears of no point within a step: gives a NULL pointer its type.
+/// Type of a missing callback, needed to give a NULL pointer a type.
 type Nobody = fn(&Update) -> Option<f64>;
 
 /// Arguments of fmi3InstantiateCoSimulation or fmi3InstantiateModelExchange; `None` becomes a NULL pointer.
 #[derive(Clone, Debug)]
 pub struct Instantiation<'a> {
-    /// Instance name.
     pub name: Option<&'a str>,
-    /// Interface type.
     pub interface: Interface,
     /// instantiationToken that the host expects.
     pub token: Option<&'a str>,
-    /// Path of the unpacked resources folder.
+    /// Path of the folder with the unpacked resources.
     pub resources: Option<&'a str>,
-    /// True if the FMU may log.
     pub logging: bool,
-    /// eventModeUsed.
     pub event_mode: bool,
-    /// earlyReturnAllowed.
     pub early_return: bool,
-    /// True if the FMU gets the callback intermediateUpdate.
+    /// True if the callback intermediateUpdate is passed to the FMU.
     pub intermediate_update: bool,
-    /// requiredIntermediateVariables.
     pub required: Vec<u32>,
-    /// True if the FMU gets the callback logMessage.
+    /// True if the callback logMessage is passed to the FMU.
     pub logger: bool,
 }
 
 // ---------------------------------------------------------------- an instance
 
-/// Results of fmi3DoStep other than its status. Bytes as the FMU wrote them, or [`UNWRITTEN`].
+/// Results of fmi3DoStep other than its status: the bytes as the FMU wrote them, or [`UNWRITTEN`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// eventHandlingNeeded.
     pub event: u8,
-    /// terminateSimulation.
     pub terminate: u8,
-    /// earlyReturn.
     pub early_return: u8,
-    /// lastSuccessfulTime, s; NaN if it was not written.
+    /// lastSuccessfulTime, s; NaN if the FMU has not written it.
     pub last_time: f64,
 }
 
-/// Value of a byte before the FMU writes to it: neither 0 nor 1.
+/// Value of a result byte before the call. It is neither 0 nor 1, so that a missing result shows.
 pub const UNWRITTEN: u8 = 0xa5;
 
-/// Results of fmi3UpdateDiscreteStates. Bytes as the FMU wrote them, or [`UNWRITTEN`].
+/// Results of fmi3UpdateDiscreteStates: the bytes as the FMU wrote them, or [`UNWRITTEN`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventInfo {
     pub needs_update: u8,
@@ -651,16 +640,14 @@ pub struct EventInfo {
     pub next_event_time: f64,
 }
 
-/// One dependency as fmi3GetVariableDependencies tells it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dependency {
-    /// Element of the dependent, from 1; 0: all.
+    /// Element of the dependent variable, from 1; 0 means all elements.
     pub element: usize,
-    /// The independent.
+    /// Value reference of the independent variable.
     pub independent: u32,
-    /// Element of the independent, from 1; 0: all.
+    /// Element of the independent variable, from 1; 0 means all elements.
     pub independent_element: usize,
-    /// fmi3DependencyKind.
     pub kind: i32,
 }
 
@@ -673,12 +660,12 @@ impl<'fmu> Instance<'fmu> {
         self.fmu.own.stepping.as_ref().expect("the FMU exports the functions of co-simulation")
     }
 
-    /// Number of calls of intermediateUpdate by the FMU.
+    /// Returns how often the FMU has called intermediateUpdate.
     pub fn updates(&self) -> usize {
         self.kept.updates.get()
     }
 
-    /// fmi3EnterInitializationMode: times in s; `tolerance` is relative.
+    /// Calls fmi3EnterInitializationMode: times in s, `tolerance` is relative.
     pub fn enter_initialization_mode(
         &mut self,
         tolerance: Option<f64>,
@@ -692,22 +679,18 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// fmi3EnterConfigurationMode.
     pub fn enter_configuration_mode(&mut self) -> Called {
         self.plain(self.functions().enter_configuration_mode)
     }
 
-    /// fmi3ExitConfigurationMode.
     pub fn exit_configuration_mode(&mut self) -> Called {
         self.plain(self.functions().exit_configuration_mode)
     }
 
-    /// fmi3EnterStepMode.
     pub fn enter_step_mode(&mut self) -> Called {
         self.plain(self.stepping().enter_step_mode)
     }
 
-    /// fmi3UpdateDiscreteStates.
     pub fn update_discrete_states(&mut self) -> Called<EventInfo> {
         let mut bytes = [UNWRITTEN; 5];
         let mut next_event_time = f64::NAN;
@@ -727,13 +710,13 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// fmi3DoStep from `time` by `step`, s; the past is never asked for again, and nobody hears of points within
-    /// the step.
+    /// Calls fmi3DoStep from `time` by `step`, s, with noSetFMUStatePriorToCurrentPoint true and without a
+    /// callback for points within the step.
     pub fn do_step(&mut self, time: f64, step: f64) -> Called<Step> {
         self.do_step_hearing(time, step, None)
     }
 
-    /// The same; `within` hears of the points within the step at which the FMU calls intermediateUpdate.
+    /// Calls fmi3DoStep; `within` is called for each intermediate update.
     pub fn do_step_hearing(
         &mut self,
         time: f64,
@@ -763,22 +746,21 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ variables by reference
 
-    /// fmi3Get… of the type of the values; `values` has room for all elements of all variables.
+    /// Calls fmi3Get… for the type of the values; `values` has room for all elements of all variables.
     pub fn fetch<T: Exchanged>(&mut self, references: &[u32], values: &mut [T]) -> Called {
         self.read(T::calls(self.functions()).0, references, values)
     }
 
-    /// fmi3Set… of the type of the values.
+    /// Calls fmi3Set… for the type of the values; `values` has all elements of all variables.
     pub fn give<T: Exchanged>(&mut self, references: &[u32], values: &[T]) -> Called {
         self.write(T::calls(self.functions()).1, references, values)
     }
 
-    /// fmi3GetBoolean; the bytes, of which only 0 and 1 are proper.
+    /// Reads Booleans as bytes, of which only 0 and 1 are valid.
     pub fn fetch_boolean(&mut self, references: &[u32], values: &mut [u8]) -> Called {
         self.read(self.functions().get_boolean, references, values)
     }
 
-    /// fmi3GetOutputDerivatives.
     pub fn output_derivatives(
         &mut self,
         references: &[u32],
@@ -793,8 +775,8 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// fmi3GetDirectionalDerivative: the sensitivity of `count` elements of the unknowns for the seed, which has as
-    /// many values as the knowns have elements.
+    /// Calls fmi3GetDirectionalDerivative. `seed` has one value per element of the knowns; `count` is the
+    /// number of elements of the unknowns.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -806,8 +788,8 @@ impl<'fmu> Instance<'fmu> {
         self.derivative(function, unknowns, knowns, seed, count)
     }
 
-    /// fmi3GetAdjointDerivative: the sensitivity of `count` elements of the knowns for the seed, which has as many
-    /// values as the unknowns have elements.
+    /// Calls fmi3GetAdjointDerivative. `seed` has one value per element of the unknowns; `count` is the
+    /// number of elements of the knowns.
     pub fn adjoint_derivative(
         &mut self,
         unknowns: &[u32],
@@ -837,10 +819,10 @@ impl<'fmu> Instance<'fmu> {
         Ok(answer)
     }
 
-    /// fmi3GetVariableDependencies, as many as fmi3GetNumberOfVariableDependencies says.
+    /// Calls fmi3GetVariableDependencies for as many dependencies as fmi3GetNumberOfVariableDependencies
+    /// returns.
     pub fn dependencies(&mut self, reference: u32) -> Called<Vec<Dependency>> {
         let mut n = 0;
-        // SAFETY: a place for the answer.
         self.call(self.functions().number_of_dependencies, |f, c| unsafe {
             f(c, reference, &mut n)
         })?;
@@ -864,7 +846,7 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ variables as the description has them
 
-    /// All values of one variable or array by its value reference in the FMU.
+    /// Reads the `count` values of a variable or an array with this value reference.
     pub fn values(&mut self, c_type: CType, reference: u32, count: usize) -> Called<Vec<Value>> {
         let reference = [reference];
         Ok(numbers! { c_type, T => {
@@ -880,36 +862,39 @@ impl<'fmu> Instance<'fmu> {
             CType::String => {
                 self.read_texts(self.functions().get_string, &reference, count)?.into_iter().map(Value::String).collect()
             }
-            // no values of these are exchanged: `ModelDescription::value` refuses them
+            // Values of these types are not exchanged: `ModelDescription::value` refuses them.
             CType::Binary | CType::Clock => Vec::new(),
         })
     }
 
-    /// Sets all values of one variable or array by its value reference in the FMU.
+    /// Sets all values of a variable or an array with this value reference.
     pub fn set_values(&mut self, c_type: CType, reference: u32, values: &[Value]) -> Called {
         let reference = [reference];
         numbers! { c_type, T => {
-                self.give(&reference, &values.iter().map(T::of).collect::<Vec<T>>())
+                self.give(&reference, &values.iter().map(T::from_value).collect::<Vec<T>>())
             },
             CType::Boolean => {
                 let byte = |value: &Value| u8::from(*value == Value::Boolean(true));
                 self.write(self.functions().set_boolean, &reference, &values.iter().map(byte).collect::<Vec<u8>>())
             }
             CType::String => {
-                self.write_texts(self.functions().set_string, &reference, &values.iter().map(text).collect::<Vec<&str>>())
+                self.write_texts(self.functions().set_string, &reference, &values.iter().map(as_text).collect::<Vec<&str>>())
             }
             CType::Binary | CType::Clock => Ok(()),
         }
     }
 
-    /// fmi3FreeFMUState with a pointer to NULL, which must be fine.
+    /// Calls fmi3FreeFMUState with a pointer to NULL, which must succeed.
     pub fn free_state_null(&mut self) -> Called {
         self.free_state(FmuState(null_mut()))
     }
 
     // ------------------------------------------------ model exchange
 
-    fn count(&self, function: impl FnOnce(&ExchangeFunctions) -> Function<Count>) -> Called<usize> {
+    fn read_count(
+        &self,
+        function: impl FnOnce(&ExchangeFunctions) -> Function<Count>,
+    ) -> Called<usize> {
         let exchange = self.fmu.own.exchange.as_ref();
         let function = function(exchange.expect("the FMU exports the functions of model exchange"));
         let mut count = 0;
@@ -918,28 +903,38 @@ impl<'fmu> Instance<'fmu> {
         Ok(count)
     }
 
-    /// fmi3GetNumberOfContinuousStates. It panics when the FMU does not have it.
+    /// Calls fmi3GetNumberOfContinuousStates.
+    ///
+    /// # Panics
+    ///
+    /// If the FMU does not export it.
     pub fn number_of_states(&mut self) -> Called<usize> {
-        self.count(|f| f.number_of_continuous_states)
+        self.read_count(|f| f.number_of_continuous_states)
     }
 
-    /// fmi3GetNumberOfEventIndicators. It panics when the FMU does not have it.
+    /// Calls fmi3GetNumberOfEventIndicators.
+    ///
+    /// # Panics
+    ///
+    /// If the FMU does not export it.
     pub fn number_of_indicators(&mut self) -> Called<usize> {
-        self.count(|f| f.number_of_event_indicators)
+        self.read_count(|f| f.number_of_event_indicators)
     }
 }
 
-/// Inputs of an FMU 3.0 within a step, by its own value references: of an array all elements.
+/// Inputs that an FMU 3.0 receives within a step, by its own value references; of an array all elements.
 #[derive(Default)]
 struct Line {
     references: Vec<u32>,
     values: Vec<f64>,
-    /// Places among the values that move, each with the place of its input among those that were asked for.
+    /// Positions of the values that change within the step, each with the position of its input among the
+    /// arguments.
     moving: Vec<(usize, usize)>,
 }
 
 impl Line {
-    /// Takes those of these inputs, at `values` now, that the FMU takes within a step, in place of the last ones.
+    /// Stores those of the inputs `references`, with the present `values`, that the FMU accepts within a
+    /// step.
     fn fill(&mut self, instance: &mut Instance, references: &[u32], values: &[f64]) -> Called {
         let description = instance.fmu().description();
         self.references.clear();
@@ -974,11 +969,11 @@ impl Line {
     }
 }
 
-/// Refuses a step that has not come to its end, of an FMU that was allowed no early return.
+/// Returns an error for a step that did not reach its end although the FMU was not allowed an early return.
 fn whole_step(instance: &Instance, done: Step) -> Called {
     let time = done.last_time;
     let (status, mut messages, text) = if done.terminate == 1 {
-        // as FMI 2.0 says it: the step was not done to its end
+        // FMI 2.0 reports the same by the status discard: the step was not completed.
         let text = format!("it asks for the end of the simulation at t = {time} s");
         (Status::Discard, instance.take_messages(), text)
     } else if done.early_return == 1 {

@@ -1,19 +1,21 @@
-//! Runs foreign code in a process of its own, with limits. Whatever an FMU's binary does ends with that process, and
-//! the parent reports it.
+//! Runs foreign code in a process of its own, with limits. Whatever an FMU's binary does ends with that
+//! process, and the parent reports it.
 //!
-//! The parent ([`run`]) starts the process in a group of its own with a temporary folder, and reads its output up to a limit. If
-//! it takes too long, the parent ends it and all processes that it started. The child calls [`enter`] first and [`done`] last:
-//! without the latter it did not succeed, whatever its exit code. It limits its own memory and files when the first binary is
-//! loaded, and keeps stdout and stderr for itself then; what the binary prints goes to the parent.
+//! The parent ([`run`]) starts the process in a process group of its own with a temporary folder, and reads
+//! its output up to a limit. If the process takes too long, the parent kills it and all processes that it has
+//! started. The child calls [`enter`] first and [`done`] last; without [`done`] it has failed, whatever its
+//! exit code. When the first binary is loaded, the child limits its own memory and files and keeps stdout and
+//! stderr for itself; the output of the binary goes to the parent.
 //!
-//! The child answers over a connection ([`channel`]). Each message begins with a nonce that the child has read before it
-//! loads a binary. A binary that writes to the connection by mistake, or to look successful, is ended.
+//! The child sends messages over a connection ([`channel`]). Each message begins with a nonce that the child
+//! has read before it loads a binary. A binary that writes to the connection, by mistake or to look
+//! successful, is killed.
 //!
-//! Linux has everything. Other Unix systems do not limit memory and miss processes that leave the group. Windows ends only the
-//! process itself.
+//! Linux has all of this. Other Unix systems do not limit memory, and miss processes that leave the group. On
+//! Windows only the process itself is killed.
 //!
-//! The guard protects against faults. It is not a sandbox: a malicious binary shares the memory of the child, where it
-//! finds the nonce, and has the rights of the user.
+//! The guard protects against faults. It is not a sandbox: a malicious binary shares the memory of the child,
+//! where it can find the nonce, and it has the rights of the user.
 
 mod channel;
 
@@ -31,68 +33,65 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use files::{bug, temporary};
 
-/// The argument of `hubslosh` that makes it a guarded process.
+/// The argument with which `hubslosh` becomes a guarded process.
 pub const OPTION: &str = "--guarded";
-/// Time that one call of an FMU may take, unless the user gives more.
+/// Default time limit for one call of an FMU.
 pub const CALL: Duration = Duration::from_secs(8);
-/// Bytes of memory that an FMU may take, unless the user gives more.
+/// Default limit of the memory that an FMU may allocate, bytes.
 pub const MEMORY: u64 = 320 << 20;
-/// Bytes that a file may have, unless a table needs more.
+/// Default limit of the size of a file, bytes; large tables extend it.
 pub const FILE: u64 = 64 << 20;
-/// Bytes that are kept of what a process prints, on stdout and on stderr.
+/// Number of bytes of a process's output that are stored, each of stdout and stderr.
 pub const PRINTED: usize = 64 << 10;
 
-/// Bytes that a process may print: one whose output is kept, and one whose output is shown.
+/// Number of bytes that a process may print if its output is stored.
 pub const FLOOD: u64 = 16 << 20;
-/// See [`FLOOD`].
+/// Number of bytes that a process may print if its output is shown.
 pub const FLOOD_SHOWN: u64 = 4 << 30;
 
-/// Limits of a guarded process.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Time that one call of an FMU may take.
+    /// Time limit for one call of an FMU.
     pub call: Duration,
-    /// Time for everything, if that is limited.
+    /// Time limit for the whole process, if there is one.
     pub total: Option<Duration>,
-    /// Bytes of memory beyond what the process has when the first binary is loaded; as many of
-    /// temporary files, and as many of shared memory.
+    /// Limit of memory beyond that in use when the first binary is loaded, bytes. The same number limits
+    /// temporary files and shared memory.
     pub memory: u64,
-    /// Bytes that a file may have.
+    /// Limit of the size of a file, bytes.
     pub file: u64,
 }
 
-/// End of a process.
+/// Reason for the end of a process.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cause {
     /// The process called [`done`] with this code.
     Done(u8),
-    /// Something else ended it.
     Ended(ExitStatus),
-    /// The process was ended because a call of the FMU did not return in time.
+    /// The process was killed because a call of the FMU did not return in time.
     EndlessCall,
-    /// The process was ended because it took too long.
+    /// The process was killed because it took longer than [`Limits::total`].
     TooLong,
-    /// The process was ended because it printed more than [`FLOOD`] or [`FLOOD_SHOWN`].
+    /// The process was killed because it printed more than [`FLOOD`] or [`FLOOD_SHOWN`].
     Flood,
-    /// The process was ended because its temporary files or its shared memory took more than [`Limits::memory`].
+    /// The process was killed because its temporary files or its shared memory exceeded [`Limits::memory`].
     Hoard,
-    /// The process was ended because its connection was closed or carried something other than its messages.
+    /// The process was killed because its connection was closed or carried bytes that were not its messages.
     Interfered,
-    /// Our own code in it has panicked; the report for the user.
+    /// Our own code in the process panicked; the text is the report for the user.
     Panicked(String),
 }
 
-/// Result of a process.
 #[derive(Debug)]
 pub struct Outcome {
-    /// End of the process.
     pub cause: Cause,
-    /// Output to stdout and stderr, up to [`PRINTED`] bytes; echoed, both are the first.
+    /// Output to stdout and to stderr, each up to [`PRINTED`] bytes. With [`Output::Shown`] both are in the
+    /// first.
     pub printed: [Vec<u8>; 2],
 }
 
 impl Outcome {
-    /// The last line that it printed.
+    /// Returns the last line that the process printed and that is not empty.
     pub fn last_line(&self) -> Option<String> {
         let all = self.printed.concat();
         let text = String::from_utf8_lossy(&all);
@@ -103,9 +102,9 @@ impl Outcome {
 /// Treatment of a process's output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output {
-    /// Output is kept for the parent.
+    /// The output is stored for the parent.
     Kept,
-    /// The process has the parent's stdout and stderr; what the FMU's binary prints comes to stderr.
+    /// The process writes to the parent's stdout and stderr; the output of the FMU's binary goes to stderr.
     Shown,
 }
 
@@ -113,13 +112,11 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-// ---------------------------------------------------------------- the parent
-
-/// The processes that run now.
+/// Identifiers of the guarded processes that are running.
 static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 
-/// Runs a program that calls [`enter`], to its end and the end of whatever it started. `hear` takes what the program
-/// answers.
+/// Runs a program that calls [`enter`], until it and all processes that it has started have ended. `hear`
+/// receives the program's answers.
 pub fn run<A: AsRef<OsStr>>(
     program: &Path,
     arguments: impl IntoIterator<Item = A>,
@@ -139,7 +136,7 @@ pub fn run<A: AsRef<OsStr>>(
             command.stdout(first_end).stderr(second_end);
             None
         }
-        // the child puts it in the place of stdout and stderr
+        // The child uses it in place of stdout and stderr.
         Output::Shown => {
             drop(second_end);
             Some(first_end)
@@ -156,7 +153,7 @@ pub fn run<A: AsRef<OsStr>>(
     let readers = [reader(first, shown), reader(second, shown)];
     let started = Instant::now();
     let child = {
-        // so that a signal finds it
+        // Registered, so that [`end_all`] finds it.
         let mut running = lock(&RUNNING);
         let child =
             command.spawn().with_context(|| format!("{} cannot be run", program.display()))?;
@@ -168,7 +165,7 @@ pub fn run<A: AsRef<OsStr>>(
     let floods = || readers.iter().any(|reader| lock(&reader.printed).more > flood);
     let cause = watch(child, &mut news, started, limits, &files, &floods)?;
     let printed = readers.map(|reader| {
-        // a process that could not be found may hold the pipe
+        // A process that could not be found may keep the pipe open.
         let _ = reader.end.recv_timeout(Duration::from_millis(500));
         let printed = lock(&reader.printed);
         if shown && printed.more > 0 {
@@ -179,7 +176,7 @@ pub fn run<A: AsRef<OsStr>>(
     Ok(Outcome { cause, printed })
 }
 
-/// Waits for the end of a process, or makes it.
+/// Waits until a process ends, or kills it when it exceeds a limit. Returns the reason for its end.
 fn watch(
     mut child: Child,
     news: &mut News<impl FnMut(&[u8])>,
@@ -188,7 +185,7 @@ fn watch(
     files: &Path,
     floods: &dyn Fn() -> bool,
 ) -> Result<Cause> {
-    // a process says four times a second that it lives; one that is stopped does not
+    // A process sends a sign of life four times a second; a process that is stopped does not.
     let silence = limits.call.max(Duration::from_secs(3));
     let (mut done_at, mut closed_at) = (None, None);
     let mut counted_at = started;
@@ -199,7 +196,7 @@ fn watch(
         pause = (pause * 2).min(Duration::from_millis(10));
         let now = Instant::now();
         if news.done.is_some() {
-            // what is left is the end of the program itself
+            // Only the end of the program itself is left.
             if now - *done_at.get_or_insert(now) > Duration::from_secs(2) {
                 break;
             }
@@ -243,15 +240,15 @@ fn watch(
     Ok(panic.or(cause).unwrap_or(Cause::Ended(status)))
 }
 
-/// Time from the end of the connection to the end of the process, at most.
+/// Longest time between the end of the connection and the end of the process.
 const CLOSED: Duration = Duration::from_secs(1);
 
-/// Interval at which temporary files and shared memory are counted.
+/// Interval at which temporary files and shared memory are measured.
 const COUNTING: Duration = Duration::from_millis(50);
-/// Most entries of a folder that are counted.
+/// Largest number of files and folders that are measured.
 const COUNTED: usize = 100_000;
 
-/// Bytes that the files below a folder take on the disk.
+/// Returns the disk space of the files below a folder, bytes.
 fn stored(folder: &Path) -> u64 {
     let (mut folders, mut bytes, mut entries) = (vec![folder.to_path_buf()], 0, 0);
     while let Some(folder) = folders.pop() {
@@ -260,7 +257,7 @@ fn stored(folder: &Path) -> u64 {
             if entries > COUNTED {
                 return u64::MAX;
             }
-            // of a link itself, not of what it leads to
+            // The size of the link itself, not of its target.
             match entry.metadata() {
                 Ok(found) if found.is_dir() => folders.push(entry.path()),
                 Ok(found) => bytes += on_disk(&found),
@@ -281,8 +278,8 @@ fn on_disk(file: &std::fs::Metadata) -> u64 {
     file.len()
 }
 
-/// Bytes of shared memory of a process, and of its open files that no folder has: the larger of
-/// what it has mapped and what it has open.
+/// Returns the shared memory of a process together with its open files that are in no folder, bytes: the
+/// larger of the mapped and the open memory.
 #[cfg(target_os = "linux")]
 fn shared(id: u32) -> u64 {
     let process = Path::new("/proc").join(id.to_string());
@@ -298,7 +295,7 @@ fn shared(id: u32) -> u64 {
         let found = is_hidden(name.to_str()?).then(|| std::fs::metadata(entry.path()))?.ok()?;
         Some((identity(&found), on_disk(&found)))
     });
-    // a file that is open twice takes its bytes once
+    // A file that is open twice counts once.
     let hidden: std::collections::BTreeMap<_, u64> = hidden.collect();
     mapped.max(hidden.values().sum())
 }
@@ -314,8 +311,8 @@ fn shared(_: u32) -> u64 {
     0
 }
 
-/// Ends a process, its group, and those that have left the group: they still name its folder for
-/// temporary files.
+/// Kills a process, its group, and the processes that have left the group, which are recognised by the
+/// temporary folder in their environment.
 fn end(id: u32, child: &mut Child, files: &Path) {
     kill_group(id);
     let _ = child.kill(); // it may have ended; either is fine
@@ -327,8 +324,8 @@ fn end(id: u32, child: &mut Child, files: &Path) {
     }
 }
 
-/// Ends all guarded processes when a signal ends the program. They have a second to remove half-written files; new ones do not
-/// start any more.
+/// Ends all guarded processes when a signal ends this program. They have one second to remove incomplete
+/// files; no new ones can start.
 pub fn end_all() {
     let running = lock(&RUNNING);
     #[cfg(unix)]
@@ -361,7 +358,7 @@ fn kill_group(id: u32) {
 #[cfg(not(unix))]
 fn kill_group(_: u32) {}
 
-/// Returns true if a process has ended. It is not reaped, so that its number is not reused.
+/// Returns true if a process has ended. The process is not reaped, so that its identifier is not used again.
 #[cfg(unix)]
 fn has_ended(child: &mut Child) -> Result<bool> {
     let id = rustix::process::Pid::from_raw(i32::try_from(child.id())?);
@@ -380,7 +377,7 @@ fn has_ended(child: &mut Child) -> Result<bool> {
     Ok(child.try_wait()?.is_some())
 }
 
-/// Ends the processes in whose environment a folder is that for temporary files; whether there were
+/// Kills the processes whose environment names `files` as the temporary folder. Returns true if there were
 /// any.
 #[cfg(target_os = "linux")]
 fn kill_descendants(files: &Path) -> bool {
@@ -406,31 +403,31 @@ fn kill_descendants(_: &Path) -> bool {
     false
 }
 
-/// Messages of a process.
+/// Messages from a process.
 struct News<F> {
     channel: channel::Parent,
     hear: F,
     heard_at: Instant,
-    /// Bytes of temporary files when the first binary was loaded, if one was.
+    /// Size of the temporary files when the first binary was loaded, bytes; `None` before that.
     loaded: Option<u64>,
     is_endless: bool,
-    /// Report of the first panic since the last that was caught.
+    /// Report of the first panic since the last one that was caught.
     panic: Option<String>,
     done: Option<u8>,
 }
 
-// The kinds of message, and what they contain.
+// Kinds of messages.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
-/// The first binary is loaded; the bytes of temporary files.
+/// The first binary is loaded. Content: size of the temporary files, bytes.
 const LOADS: u8 = b'+';
 /// An answer for the caller of [`run`].
 const ANSWER: u8 = b'>';
-/// Our code panics; the report.
+/// Our code has panicked. Content: the report.
 const PANICS: u8 = b'?';
 /// Our code has caught its panic.
 const CATCHES: u8 = b'-';
-/// The end; the exit code.
+/// The work is done. Content: the exit code.
 const DONE: u8 = b'=';
 
 impl<F: FnMut(&[u8])> News<F> {
@@ -440,7 +437,7 @@ impl<F: FnMut(&[u8])> News<F> {
         News { channel, hear, heard_at, loaded, is_endless: false, panic, done }
     }
 
-    /// Waits for messages for `pause` at most. Returns false if nothing has arrived.
+    /// Waits for messages for at most `pause` and handles them. Returns false if none has arrived.
     fn read(&mut self, pause: Duration) -> bool {
         let text = |content: &[u8]| String::from_utf8_lossy(content).into_owned();
         self.channel.read(pause, |kind, content| {
@@ -458,7 +455,7 @@ impl<F: FnMut(&[u8])> News<F> {
     }
 }
 
-/// Data read from a pipe.
+/// Output of a process that was read from a pipe: the beginning, and the number of further bytes.
 #[derive(Default)]
 struct Printed {
     kept: Vec<u8>,
@@ -470,10 +467,12 @@ struct Reader {
     end: Receiver<()>,
 }
 
-/// Starts a thread. A system that is short of resources for a moment (EAGAIN) is asked again for up to two seconds.
+/// Starts a thread. If the system is briefly short of resources (EAGAIN), the call is repeated for up to two
+/// seconds.
 ///
 /// # Panics
-/// If the system still refuses the thread then.
+///
+/// If the system still refuses to start a thread.
 pub fn spawn(work: impl FnOnce() + Send + 'static) {
     let work = Arc::new(Mutex::new(Some(work)));
     let attempt = || {
@@ -497,7 +496,7 @@ pub fn spawn(work: impl FnOnce() + Send + 'static) {
     panic!("a thread could not be started: the system is short of resources");
 }
 
-/// Reads a pipe to its end, so that nobody who writes waits, and keeps the beginning.
+/// Starts a thread that reads a pipe to its end, so that the writer never waits, and stores the beginning.
 fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
     let (printed, (tell, end)) = (Arc::<Mutex<Printed>>::default(), channel());
     let to = printed.clone();
@@ -519,11 +518,10 @@ fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
 
 // ---------------------------------------------------------------- the child
 
-/// Data of a guarded process.
 struct Guarded {
     channel: channel::Process,
     limits: Limits,
-    /// The pipe for what the binary prints, and stdout and stderr as they were given.
+    /// The pipe for the output of the binary, and the original stdout and stderr.
     #[cfg(unix)]
     streams: Option<[File; 3]>,
 }
@@ -531,6 +529,10 @@ struct Guarded {
 static GUARDED: OnceLock<Guarded> = OnceLock::new();
 
 /// Makes this process the guarded one that [`run`] has started.
+///
+/// # Errors
+///
+/// If it was not started by [`run`].
 pub fn enter() -> Result<()> {
     let (channel, [call, memory, file], pipe) =
         channel::Process::take().context("this is for hubslosh alone")?;
@@ -556,10 +558,10 @@ pub fn enter() -> Result<()> {
         bail!("it is guarded already");
     }
     bug::set_listener(bug::Listener {
-        panics: |report| tell(PANICS, report.as_bytes()),
-        catches: || tell(CATCHES, &[]),
+        panics: |report| send(PANICS, report.as_bytes()),
+        catches: || send(CATCHES, &[]),
     });
-    spawn(tell_of_life);
+    spawn(send_signs_of_life);
     Ok(())
 }
 
@@ -568,29 +570,30 @@ fn copy(stream: impl std::os::fd::AsFd) -> std::io::Result<File> {
     Ok(stream.as_fd().try_clone_to_owned()?.into())
 }
 
-fn tell(kind: u8, content: &[u8]) {
+fn send(kind: u8, content: &[u8]) {
     if let Some(guarded) = GUARDED.get() {
         guarded.channel.send(kind, content);
     }
 }
 
-/// Answers the caller of [`run`].
-pub fn answer(content: &[u8]) {
-    tell(ANSWER, content);
+/// Sends an answer to the caller of [`run`] in the parent process.
+pub fn send_answer(content: &[u8]) {
+    send(ANSWER, content);
 }
 
-/// Reports to the parent that the work is done, with this exit code. Does nothing without a parent.
+/// Tells the parent that the work is done, with this exit code. Without a parent it does nothing.
 pub fn done(code: u8) {
-    tell(DONE, &[code]);
+    send(DONE, &[code]);
 }
 
 /// Reports a panic of our own code to the parent. Returns false if this process is not guarded.
 pub fn panics(report: &str) -> bool {
-    tell(PANICS, report.as_bytes());
+    send(PANICS, report.as_bytes());
     GUARDED.get().is_some()
 }
 
-/// stdout and stderr of a guarded process, which a binary does not know.
+/// Returns the original stdout and stderr of a guarded process, which the binary cannot reach by their usual
+/// numbers.
 pub fn streams() -> Option<(&'static File, &'static File)> {
     #[cfg(unix)]
     if let Some([_, stdout, stderr]) = GUARDED.get().and_then(|guarded| guarded.streams.as_ref()) {
@@ -599,8 +602,8 @@ pub fn streams() -> Option<(&'static File, &'static File)> {
     None
 }
 
-/// Sends a sign of life four times a second, until a call takes too long.
-fn tell_of_life() {
+/// Sends a sign of life four times a second, until a call takes longer than its limit.
+fn send_signs_of_life() {
     let Some(guarded) = GUARDED.get() else { return };
     let mut seen: Vec<(Weak<AtomicU64>, u64, Instant)> = Vec::new();
     loop {
@@ -613,19 +616,19 @@ fn tell_of_life() {
             let before = known.iter().find(|(k, n, _)| k.ptr_eq(calls) && *n == count);
             let since = before.map_or(now, |(.., since)| *since);
             if count % 2 == 1 && now - since > guarded.limits.call {
-                return tell(ENDLESS, &[]);
+                return send(ENDLESS, &[]);
             }
             seen.push((calls.clone(), count, since));
         }
-        tell(ALIVE, &[]);
+        send(ALIVE, &[]);
         std::thread::sleep(Duration::from_millis(250));
     }
 }
 
-/// Callers of a binary, each with a number that is odd during a call.
+/// Counters of all callers of a binary; each is odd during a call.
 static CALLS: Mutex<Vec<Weak<AtomicU64>>> = Mutex::new(Vec::new());
 
-/// Marks the calls of one caller, so that one that does not return is noticed.
+/// Marks the calls of one caller, so that a call that does not return is noticed.
 #[derive(Debug)]
 pub(crate) struct Calls(Arc<AtomicU64>);
 
@@ -640,7 +643,7 @@ impl Calls {
         calls
     }
 
-    /// One that is in a call until it is dropped.
+    /// Creates a marker that counts as one call until it is dropped.
     pub(crate) fn one() -> Calls {
         let calls = Calls::new();
         calls.begin();
@@ -656,19 +659,19 @@ impl Calls {
     }
 }
 
-/// Sets the limits and hands stdout and stderr to the binary that is loaded next; once, in a guarded
-/// process.
+/// Sets the limits, and redirects stdout and stderr for the binary that is loaded next. Acts only once, in a
+/// guarded process.
 pub(crate) fn before_loading() {
     static ONCE: Once = Once::new();
     let Some(guarded) = GUARDED.get() else { return };
     ONCE.call_once(|| {
-        tell(LOADS, &stored(&std::env::temp_dir()).to_le_bytes());
+        send(LOADS, &stored(&std::env::temp_dir()).to_le_bytes());
         #[cfg(target_os = "linux")]
         {
             use rustix::process::Resource;
             let memory = guarded.limits.memory;
             restrict(Resource::Data, in_use("VmData:").saturating_add(memory));
-            // What is shared does not count as data. Each thread reserves more than it uses.
+            // Shared memory does not count as data. Each thread reserves more memory than it uses.
             let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
             let reserved = (1 << 30) + (threads << 27);
             restrict(Resource::As, in_use("VmSize:").saturating_add(memory + reserved));
@@ -687,7 +690,7 @@ pub(crate) fn before_loading() {
     });
 }
 
-/// Lets a guarded process take so many bytes more, of memory and in a file: what its own tables need.
+/// Raises the limits of memory and file size of a guarded process by `bytes`, for its own tables.
 pub fn allow(bytes: u64) {
     before_loading();
     #[cfg(target_os = "linux")]
@@ -700,7 +703,7 @@ pub fn allow(bytes: u64) {
     let _ = bytes;
 }
 
-/// Sets a limit that can be raised again, to what was given at most.
+/// Sets a soft limit, at most to the limit with which the process was started.
 #[cfg(unix)]
 fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let mut limit = rustix::process::getrlimit(resource);
@@ -710,7 +713,7 @@ fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let _ = rustix::process::setrlimit(resource, limit);
 }
 
-/// The limits that this process was given.
+/// The limits with which this process was started.
 #[cfg(unix)]
 static GIVEN: Mutex<std::collections::BTreeMap<u32, Option<u64>>> =
     Mutex::new(std::collections::BTreeMap::new());
@@ -724,14 +727,14 @@ fn extend(resource: rustix::process::Resource, bytes: u64) {
     }
 }
 
-/// Bytes of memory in use, of a kind that Linux names.
+/// Returns the memory in use of a kind that /proc/self/status names, bytes.
 #[cfg(target_os = "linux")]
 fn in_use(kind: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     kilobytes(&status, kind).unwrap_or(1 << 20) << 10
 }
 
-/// A number of /proc/…/status.
+/// Parses a number in kB from the text of /proc/…/status.
 #[cfg(target_os = "linux")]
 fn kilobytes(status: &str, kind: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix(kind))?;

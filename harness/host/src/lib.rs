@@ -1,7 +1,7 @@
-//! Loads FMUs as any host does: the packed archive, what it says of itself, its binary.
+//! Loads FMUs as any host does: the packed archive, its description and its binary.
 //!
-//! The rest of the harness meets an FMU only through this crate; no code is shared with a model.
-//! Code that check and pack need too is here: reading binaries of any platform.
+//! The rest of the harness accesses an FMU only through this crate; no code is shared with a model. Code that
+//! check and pack also need is here too, for example reading binaries of any platform.
 
 pub mod archive;
 pub mod binary;

@@ -1,5 +1,5 @@
-//! Files of parameters: `"name" = value` as TOML, SSP's parameter set (.ssv), or the result of `hubslosh identify` (.json). The
-//! command line and the Python package read them here.
+//! Reads files of parameters: TOML with `"name" = value`, the parameter set of SSP (.ssv), or the result of
+//! `hubslosh identify` (.json). Both the command line and the Python package read them here.
 
 use std::fmt;
 use std::path::Path;
@@ -13,42 +13,40 @@ use toml::de::{DeTable, DeValue};
 use crate::description::{BaseUnit, ModelDescription, Type, Value};
 use crate::xml::Element;
 
-/// Parameters of a file.
 #[derive(Clone, Debug, Default)]
 pub struct ParameterSet {
-    /// In the order of the file, each name once.
+    /// Parameters in the order of the file; each name occurs once.
     pub parameters: Vec<Parameter>,
-    /// Reasons not to trust the values.
+    /// Reasons why the values may be wrong.
     pub warnings: Vec<String>,
 }
 
-/// A parameter of a file.
 #[derive(Clone, Debug)]
 pub struct Parameter {
-    /// Name of the FMU's variable.
     pub name: String,
-    /// Value in its unit.
+    /// Value in `unit`.
     pub value: Value,
-    /// Unit, if the file names one; otherwise the value is in the unit of the FMU.
+    /// Unit in the file; without one the value is in the unit of the FMU's variable.
     pub unit: Option<Unit>,
-    /// Line of the file, 0 if unknown.
     line: u64,
 }
 
-/// Unit of a parameter.
+/// Unit of a parameter in a file.
 #[derive(Clone, Debug)]
 pub struct Unit {
-    /// Name.
     pub name: String,
-    /// Definition by SI base units in the file. Without one it must be a unit of the FMU's variable.
+    /// Definition by SI base units, if the file has one. Otherwise the unit must be one of the FMU's
+    /// variable.
     pub base: Option<BaseUnit>,
 }
 
 impl ParameterSet {
-    /// Reads a file by its ending.
+    /// Reads a file of the format that its ending names.
     ///
     /// # Errors
-    /// If the file cannot be read so, sets nothing, or sets a parameter twice. The message begins with the path.
+    ///
+    /// If the file is not valid, has no parameters, or sets a parameter twice. The message begins with the
+    /// path.
     pub fn read(path: &Path) -> Result<ParameterSet> {
         let shown = path.display();
         let text = input::text(path).with_context(|| format!("could not read {shown}"))?;
@@ -65,9 +63,10 @@ impl ParameterSet {
 }
 
 impl Parameter {
-    /// The value as a text in the unit of the FMU's variable.
+    /// Returns the value as a text in the unit of the FMU's variable.
     ///
     /// # Errors
+    ///
     /// If the variable has no unit, or the value cannot be converted to it.
     pub fn text(&self, description: &ModelDescription) -> Result<String> {
         let name = &self.name;
@@ -108,7 +107,7 @@ fn text(value: &Value) -> String {
     }
 }
 
-/// Fails if two parameters have one name.
+/// Returns an error if two parameters have the same name.
 fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
     for (k, parameter) in parameters.iter().enumerate() {
         let Parameter { name, line, .. } = parameter;
@@ -122,7 +121,7 @@ fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
     Ok(ParameterSet { parameters, warnings: Vec::new() })
 }
 
-/// TOML, in which nested tables are names with dots.
+/// Reads TOML. Nested tables become names with dots.
 fn from_toml(text: &str) -> Result<ParameterSet> {
     fn flatten(
         prefix: &str,
@@ -168,7 +167,7 @@ fn from_toml(text: &str) -> Result<ParameterSet> {
     once(found)
 }
 
-/// An object of JSON that has each name once. (A map would keep the last one without a word.)
+/// A JSON object whose repeated names are an error. (A map would silently keep the last value.)
 #[derive(Default)]
 struct Entries<T>(Vec<(String, T)>);
 
@@ -198,13 +197,13 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entries<T> {
     }
 }
 
-/// Result of an identification, as far as it is read.
+/// The parts of an identification's result that are used here.
 #[derive(Deserialize)]
 struct Identified {
     parameters: Option<Entries<serde_json::Value>>,
     #[serde(default)]
     settings: Entries<serde_json::Value>,
-    /// `described` until version 0.2.
+    /// Called `described` until version 0.2.
     #[serde(alias = "described")]
     fits: Option<bool>,
     converged: Option<bool>,
@@ -212,8 +211,8 @@ struct Identified {
     decided_by_solver: Vec<serde_json::Value>,
 }
 
-/// Reads the result of an identification: `settings`, then the estimates of `parameters`, which take the place of settings. The
-/// initial states of the recordings are not parameters of the FMU and stand elsewhere in the file.
+/// Reads the result of an identification: first `settings`, then the estimates in `parameters`, which
+/// override settings. The initial states of the recordings are not parameters of the FMU and are not read.
 fn from_json(text: &str) -> Result<ParameterSet> {
     let none =
         "it is not a result of hubslosh identify, or one of a --method without any parameters";
@@ -248,8 +247,9 @@ fn from_json(text: &str) -> Result<ParameterSet> {
     Ok(keep_parameters_of_one_run(ParameterSet { parameters, warnings }))
 }
 
-/// Keeps the parameters of one run: those of all recordings, and those of the only recording (`NAME@1`). If there are several
-/// recordings, their own parameters are left out, and a warning names them.
+/// Keeps the parameters of one simulation: those common to all recordings and, if there is only one
+/// recording, its own (`NAME@1`). With several recordings their own parameters are left out, and a warning
+/// names them.
 fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     let recording = |name: &str| -> Option<usize> { name.rsplit_once('@')?.1.parse().ok() };
     let has_others = found.parameters.iter().any(|p| recording(&p.name).is_some_and(|n| n > 1));
@@ -274,7 +274,7 @@ fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     ParameterSet { parameters, warnings }
 }
 
-/// SSP 1.0 and 2.0, "SystemStructureParameterValues".
+/// Reads the parameter set of SSP 1.0 and 2.0 ("SystemStructureParameterValues").
 fn from_ssv(text: &str) -> Result<ParameterSet> {
     let root = Element::parse(text.as_bytes()).map_err(anyhow::Error::msg)?;
     ensure!(root.name == "ParameterSet", "its root is {}, not ParameterSet", root.name);
@@ -290,7 +290,7 @@ fn from_ssv(text: &str) -> Result<ParameterSet> {
     let mut units = Vec::new();
     for unit in inside("Units", "Unit") {
         let name = attribute(unit, "name")?;
-        let base = BaseUnit::of(unit).with_context(|| {
+        let base = BaseUnit::from_element(unit).with_context(|| {
             format!(
                 "line {}: the unit \"{name}\" has no valid BaseUnit (allowed: whole exponents, a finite offset, and a finite \
                  factor other than 0)",

@@ -1,7 +1,8 @@
-//! A model description with a part of the variables, for hosts that show every variable. The FMU's binary is the same: it reads the
-//! sizes from the GUID, and start values that differ from its own from a file among the resources.
+//! Writes a model description with only part of the variables, for hosts that show every variable. The binary
+//! of the FMU is the same: it reads the array sizes from the GUID, and start values that differ from its own
+//! from a file in the resources.
 //!
-//! `fmu/runtime/src/extent.rs` has the other half: the form of the GUID and of the file.
+//! `fmu/runtime/src/extent.rs` is the other half, with the format of the GUID and of the file.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -9,39 +10,37 @@ use std::ops::Range;
 use anyhow::{Context, Result, bail, ensure};
 use roxmltree::{Document, Node};
 
-/// Name of the file of start values in the FMU.
 pub const START_VALUES: &str = "resources/start_values.txt";
 
-/// Largest value that is left to a parameter that sizes arrays.
+/// Limit of a parameter that determines the size of arrays.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit<'a> {
-    /// Name of the parameter.
     pub parameter: &'a str,
-    /// Largest value of the parameter in the part.
+    /// Largest value of the parameter in the reduced description.
     pub size: usize,
-    /// Largest value of the parameter in the whole description.
+    /// Largest value of the parameter in the full description.
     pub most: usize,
-    /// True if each element has its event indicators.
+    /// True if each element has event indicators of its own.
     pub has_indicators: bool,
-    /// The arrays, each with the place among its indices of the one that the parameter limits.
+    /// The arrays that the parameter sizes, each with the position of this dimension among its indices.
     pub arrays: &'a [(&'a str, usize)],
 }
 
-/// A model description with a part of the variables.
+/// A model description with part of the variables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Text of modelDescription.xml.
     pub xml: String,
     /// Content of [`START_VALUES`], if start values differ from those of the binary.
     pub start_values: Option<String>,
 }
 
-/// Returns the description with the variables within the limits, and other start values of parameters: by name, as FMI writes
-/// them.
+/// Returns the description with only the variables within the limits. `starts` has other start values of
+/// parameters by name, in the format of FMI.
 ///
 /// # Errors
-/// A limit that is 0 or above the largest value, a start value of a parameter that the part does not have, or XML that is no
-/// description of scalars from this project.
+///
+/// If a limit is 0 or above the largest value, a parameter in `starts` is not in the reduced description, or
+/// the XML is not a description of scalars from this project.
 pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) -> Result<Part> {
     for limit in limits {
         let Limit { parameter, size, most, .. } = limit;
@@ -92,7 +91,7 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
     if let Some(name) = left.keys().next() {
         bail!("the description has no parameter {name} (allowed: those within the sizes)");
     }
-    // A state may stand behind its derivative.
+    // The derivative may come before its state.
     for node in variables.descendants().filter(|node| node.has_attribute("derivative")) {
         if let Some(new) = renumbered.get(node.attribute("derivative").unwrap_or_default()) {
             edits.set(&node, "derivative", new);
@@ -124,7 +123,7 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
     Ok(Part { xml: edits.applied(xml), start_values })
 }
 
-/// The GUID of the part: see `fmu/runtime/src/extent.rs`.
+/// Returns the GUID of a reduced description; its format is described in `fmu/runtime/src/extent.rs`.
 fn token_of_part(
     whole: &str,
     limits: &[Limit],
@@ -140,14 +139,15 @@ fn token_of_part(
     Ok(format!("{}{sizes:0<2}{states:02x}{sum:04x}}}", &whole[..29]))
 }
 
-/// FNV-1a with 128 bits.
+/// Returns the FNV-1a hash of 128 bits.
 fn fnv(bytes: &[u8]) -> u128 {
     bytes.iter().fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash: u128, byte| {
         (hash ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
     })
 }
 
-/// Returns a name without its indices, as the table has it, and the indices: `tank[1].p[2,3]` is `tank[].p` with 1, 2, 3.
+/// Splits a name into the name without indices, as the table has it, and the indices. For example
+/// `tank[1].p[2,3]` becomes `tank[].p` and 1, 2, 3.
 fn pattern(name: &str) -> (String, Vec<usize>) {
     let (mut text, mut indices, mut rest) = (String::new(), Vec::new(), name);
     while let Some((before, after)) = rest.split_once('[') {
@@ -170,12 +170,12 @@ fn is_within(name: &str, limits: &[Limit]) -> bool {
     })
 }
 
-/// The number of an event indicator of FMI 3.0, from its variable's name.
+/// Returns the number of an event indicator of FMI 3.0 from its variable's name.
 fn is_indicator(name: &str) -> Option<usize> {
     name.strip_prefix("event_indicator[")?.strip_suffix(']')?.parse().ok()
 }
 
-/// Number of event indicators within the limits.
+/// Returns the number of event indicators within the limits.
 fn indicators(root: &Node, limits: &[Limit]) -> usize {
     let named = |node: &Node| node.attribute("name").and_then(is_indicator).is_some();
     let all = match root.attribute("numberOfEventIndicators") {
@@ -191,11 +191,11 @@ fn child<'a>(root: &Node<'a, 'a>, name: &str) -> Result<Node<'a, 'a>> {
     found.with_context(|| format!("modelDescription.xml has no {name}"))
 }
 
-/// Replacements of ranges of a text.
+/// Replacements of ranges in a text.
 struct Edits(Vec<(Range<usize>, String)>);
 
 impl Edits {
-    /// Removes an element and the space before it.
+    /// Removes an element and the white space before it.
     fn remove(&mut self, xml: &str, node: &Node) {
         let range = node.range();
         let begin = xml[..range.start].trim_end().len();
@@ -213,7 +213,7 @@ impl Edits {
         self.0.sort_by_key(|(range, _)| range.start);
         let (mut text, mut at) = (String::with_capacity(xml.len()), 0);
         for (range, value) in self.0 {
-            // An attribute of an element that is removed.
+            // Skipped is an attribute of an element that is removed.
             if range.start < at {
                 continue;
             }

@@ -1,42 +1,46 @@
-//! Communication points of a run, and the inputs between them: one rule for the command and for the Python package.
+//! Communication points of a run, and the inputs between them. The command and the Python package use the
+//! same rules.
 //!
-//! An input is a [`History`]: rows that are joined by lines or held. The [`Schedule`] of a run has a communication point at the
-//! start, at every row of an input, at every row of the result, and at the stop time. A line between two
-//! rows is therefore never sampled, so the rows of the result can be chosen freely.
+//! An input is a [`History`]: rows that are joined by straight lines or held. The [`Schedule`] of a run has a
+//! communication point at the start, at every row of an input, at every row of the result, and at the stop
+//! time. Therefore a line between two rows is never sampled, and the rows of the result can be chosen freely.
 
 use anyhow::{Result, bail, ensure};
 use files::budget;
 
 use crate::description::ModelDescription;
 
-/// Part of the time between two rows of the result by which a row may differ from a row of an input or from the stop time,
-/// to be moved there: 3 · 0.02 is not 0.06.
+/// A row of the result is moved to a row of an input, or to the stop time, if it differs by less than this
+/// fraction of the row interval, because for example 3 · 0.02 is not exactly 0.06.
 const SAME: f64 = 1e-6;
 
-/// Sentence for the metadata of a result: which inputs and which outputs stand in one row.
+/// Sentence for the metadata of a result: the times for which the inputs and the outputs in one row hold.
 pub const ROWS: &str =
     "inputs from the row's time on; other variables at the row's time, before these inputs act";
 
-/// How inputs go on from row to row, for the metadata of a result.
+/// Returns a description of the inputs between rows for the metadata of a result.
 pub const fn between(hold: bool) -> &'static str {
     if hold { "held from row to row" } else { "straight lines between rows" }
 }
 
-/// An input over time. Two rows at one time are a jump. Before its first and after its last row the input is constant.
+/// An input as a function of time. Two rows with the same time are a jump. Before the first and after the
+/// last row the input is constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
     time: Vec<f64>,
     values: Vec<f64>,
-    /// From each row to the next, per s; 0 in the last row.
+    /// Slope from each row to the next, per s; 0 in the last row.
     slopes: Vec<f64>,
 }
 
 impl History {
-    /// A history with the value `values[k]` at `time[k]` (s). From there to the next row it has the slope `slopes[k]` (per s) and may jump
-    /// at its end; without `slopes` it is a straight line between the two rows. With `hold` it is constant.
+    /// Creates a history with the value `values[k]` at `time[k]` (s). From there to the next row it has the
+    /// slope `slopes[k]` (per s) and may jump at the end of that interval. Without `slopes` two rows are
+    /// joined by a straight line; with `hold` the value is constant between rows.
     ///
     /// # Errors
-    /// There are fewer than two rows, or the time goes back.
+    ///
+    /// If there are fewer than two rows, or the times are not ascending.
     pub fn new(
         time: Vec<f64>,
         values: Vec<f64>,
@@ -49,7 +53,7 @@ impl History {
             values.len() == rows && slopes.as_ref().is_none_or(|slopes| slopes.len() == rows),
             "its columns have different lengths"
         );
-        // also true of NaN
+        // The condition is also true for NaN.
         if let Some(row) = time
             .windows(2)
             .position(|pair| pair[0] > pair[1] || pair[0].is_nan() || pair[1].is_nan())
@@ -76,54 +80,56 @@ impl History {
         Ok(History { time, values, slopes })
     }
 
-    /// The same rows, each held until the next.
+    /// Returns a history with the same rows, each held until the next one.
     pub fn held(&self) -> History {
         let slopes = vec![0.0; self.time.len()];
         History { time: self.time.clone(), values: self.values.clone(), slopes }
     }
 
-    /// Times of its rows, s.
     pub fn time(&self) -> &[f64] {
         &self.time
     }
 
-    /// Returns true if it is constant from each row to the next.
+    /// Returns true if the value is constant from each row to the next.
     pub fn is_held(&self) -> bool {
         self.slopes.iter().all(|slope| *slope == 0.0)
     }
 
-    /// Value and slope at `t` and immediately after it.
+    /// Returns value and slope (per s) at `t` and immediately after it.
     pub fn after(&self, t: f64) -> (f64, f64) {
         self.at_row(self.time.partition_point(|row| *row <= t), t)
     }
 
-    /// Value at `t` of a clock with rounding errors: a row that is at most 1e-9 (1 + |t|) s later has begun.
+    /// Returns the value at `t` from a clock with rounding errors: a row that begins up to 1e-9 (1 + |t|) s
+    /// later already counts.
     pub fn near(&self, t: f64) -> f64 {
         let slack = 1e-9 * (1.0 + t.abs());
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
     }
 
-    /// Value and slope at `t` (s), at which so many rows have begun.
+    /// Returns value and slope at `t` (s), if `begun` rows have begun.
     fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
         let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
         let (value, slope) = (self.values[k], self.slopes[k]);
         (if t == self.time[k] { value } else { value + slope * (t - self.time[k]) }, slope)
     }
 
-    /// Goes through ascending times.
+    /// Returns a cursor that evaluates the history at ascending times, which is faster than searching each
+    /// time.
     pub fn cursor(&self) -> Cursor<'_> {
         Cursor { history: self, begun: 0 }
     }
 }
 
-/// A history that is followed through time.
+/// A history that is evaluated at ascending times.
 pub struct Cursor<'h> {
     history: &'h History,
     begun: usize,
 }
 
 impl Cursor<'_> {
-    /// [`History::after`]; `t` is not before that of the last call.
+    /// Returns value and slope (per s) at `t` and immediately after it. `t` must not be less than in the last
+    /// call.
     pub fn after(&mut self, t: f64) -> (f64, f64) {
         let time = &self.history.time;
         while time.get(self.begun).is_some_and(|row| *row <= t) {
@@ -136,18 +142,20 @@ impl Cursor<'_> {
 /// Communication points of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    /// Their times, ascending, s.
+    /// Times, ascending, s.
     pub time: Vec<f64>,
-    /// True for those that are rows of the result; `None`: all are.
+    /// True for each point that is a row of the result; `None` if all are.
     pub rows: Option<Vec<bool>>,
 }
 
 impl Schedule {
-    /// Communication points from `start` to `stop`, s: both ends, the times `inputs` and the rows of the result. These are `step` s
-    /// apart and end at `stop`; without a `step` they are all communication points.
+    /// Returns the communication points from `start` to `stop`, s: both ends, the times `inputs`, and the
+    /// rows of the result. The rows are `step` seconds apart and end at `stop`; without `step` every
+    /// communication point is a row.
     ///
     /// # Errors
-    /// The times make no sense, or there are more than [`budget::ROWS`].
+    ///
+    /// If the times are not valid, or there are more points than [`budget::ROWS`].
     pub fn new<'h>(
         (start, stop): (f64, f64),
         step: Option<f64>,
@@ -156,7 +164,7 @@ impl Schedule {
         let mut knots: Vec<f64> = Vec::new();
         let mut last: Option<&[f64]> = None;
         for times in inputs {
-            // the inputs of one table have the same rows
+            // The inputs of one table have the same rows.
             if last != Some(times) {
                 let from = times.partition_point(|t| *t <= start);
                 let to = times.partition_point(|t| *t < stop);
@@ -192,7 +200,7 @@ impl Schedule {
             let mut row = grid;
             while let Some(knot) = knots.get(next).filter(|knot| **knot <= grid + SAME * step) {
                 let is_row = k > 0 && k < steps && (knot - grid).abs() <= SAME * step;
-                // of two that are close the closer one is the row
+                // If two points are close to a row, the closer one becomes the row.
                 if is_row && (row == grid || (knot - grid).abs() < (row - grid).abs()) {
                     row = *knot;
                 }
@@ -220,8 +228,8 @@ impl Schedule {
     }
 }
 
-/// Returns true if a host can give the FMU the slopes of its inputs. An FMU for Model Exchange alone is integrated by the host, which
-/// sets the inputs at any time.
+/// Returns true if the FMU can receive the slopes of its inputs. An FMU with only Model Exchange can, because
+/// the host integrates it and sets the inputs at any time.
 pub fn interpolates(description: &ModelDescription) -> bool {
     description
         .co_simulation
@@ -229,11 +237,13 @@ pub fn interpolates(description: &ModelDescription) -> bool {
         .is_none_or(|co_simulation| co_simulation.can_interpolate_inputs)
 }
 
-/// Refuses inputs with slopes for an FMU that cannot interpolate: held over each step they would be late, and a row of the result would pair
-/// an input with the answer to the one before. `hold` is how the user asks for inputs that are held from row to row.
+/// Refuses inputs with slopes for an FMU that cannot interpolate. If they were held over each step, they
+/// would lag, and a row of the result would have an input together with the response to the previous input.
+/// `hold` is the option by which the user can hold inputs between rows; it is named in the message.
 ///
 /// # Errors
-/// There is such an input.
+///
+/// If there is such an input.
 pub fn check_interpolation<'h>(
     description: &ModelDescription,
     inputs: impl IntoIterator<Item = (&'h str, &'h History)>,

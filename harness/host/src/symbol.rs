@@ -1,13 +1,14 @@
-//! Symbols of libraries as people read them: names of C++ and Rust without mangling and arguments.
+//! Readable names for symbols of libraries: names of C++ and Rust without mangling and arguments.
 
 use std::fmt::{self, Write};
 
 use cpp_demangle::{DemangleOptions, Symbol};
 
-/// Characters of a name that are shown.
+/// Number of characters of a name that are shown.
 const LONGEST: usize = 60;
 
-/// The beginning of a name. Writing ends with an error where it is full, since short symbols of C++ can have endless names.
+/// The beginning of a name. Writing fails when it is full, because short symbols of C++ may have extremely
+/// long names.
 #[derive(Default)]
 struct Short(String);
 
@@ -24,25 +25,26 @@ impl Write for Short {
     }
 }
 
-/// A symbol in a message: its name, shortened; a mangled one that cannot be read is `None`.
+/// Returns the name of a symbol, shortened, for a message. `None` if the symbol is mangled and cannot be
+/// decoded.
 pub fn readable(symbol: &str) -> Option<String> {
     let mut name = Short::default();
     let written = if let Ok(rust) = rustc_demangle::try_demangle(symbol) {
         write!(name, "{rust:#}") // without its hash
     } else if symbol.starts_with('?') {
-        name.write_str(&of_microsoft(symbol)?)
+        name.write_str(&demangle_microsoft(symbol)?)
     } else if symbol.starts_with("_Z") || symbol.starts_with("__Z") {
         let options = DemangleOptions::new().no_params().no_return_type();
         Symbol::new(symbol).ok()?.structured_demangle(&mut name, &options)
     } else {
         name.write_str(symbol)
     };
-    // an error at the end of a name is that it is full
+    // An error at this point means that the name is full.
     (written.is_ok() || name.0.ends_with('…')).then_some(name.0)
 }
 
-/// Names of Microsoft's compiler: `?method@type@ns@@QEAAXXZ` is ns::type::method.
-fn of_microsoft(symbol: &str) -> Option<String> {
+/// Decodes simple names of Microsoft's compiler: `?method@type@ns@@QEAAXXZ` becomes `ns::type::method`.
+fn demangle_microsoft(symbol: &str) -> Option<String> {
     let (name, _) = symbol.strip_prefix('?')?.split_once("@@")?;
     let parts: Vec<&str> = name.split('@').rev().collect();
     (!name.contains(['?', '$'])).then(|| parts.join("::"))

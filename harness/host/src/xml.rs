@@ -1,35 +1,32 @@
-//! An XML file as a tree of elements, each with the line it starts in: the one reading of XML here.
+//! Reads XML into a tree of elements with line numbers. All XML of the harness is read here.
 
 use std::borrow::Cow;
 
 use roxmltree::{Document, Error, Node};
 
-/// Levels of elements that are read; a model description has eight.
+/// Largest nesting depth; a model description has eight levels.
 pub const DEEPEST: usize = 256;
-/// Bytes that are read. This and the next two are what a hundred thousand variables need. Their description, 27 MB, takes
-/// 0.6 GB of memory.
+/// Largest file, bytes. This and the next two limits allow a hundred thousand variables, whose description
+/// has 27 MB and takes 0.6 GB of memory.
 pub const LONGEST: usize = 32 << 20;
-/// Elements that are read.
 pub const MOST: usize = 400_000;
-/// Attributes that all elements together may have.
+/// Largest number of attributes of all elements together.
 pub const MOST_ATTRIBUTES: usize = 1_000_000;
-/// Attributes that one element may have; those of FMI have 13 at most.
+/// Largest number of attributes of one element; FMI uses up to 13.
 pub const MOST_OF_ONE: usize = 200;
-/// Bytes that the name of an element or an attribute may have.
+/// Longest name of an element or attribute, bytes.
 pub const LONGEST_NAME: usize = 1000;
-/// Bytes that the value of an attribute may have; those of FMI are longest where they list dependencies.
+/// Longest value of an attribute, bytes. The longest values in FMI are lists of dependencies.
 pub const LONGEST_VALUE: usize = 1 << 20;
-/// Namespaces that may be declared: looking one up takes longer the more there are.
+/// Largest number of declared namespaces, because the time of a look-up grows with it.
 pub const MOST_NAMESPACES: usize = 100;
 
-/// Reasons for refusing a file. The texts of all but `TooLarge` begin with line and column.
+/// Reason for refusing a file. All texts except `TooLarge` begin with line and column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
-    /// The file is not well-formed XML or not UTF-8.
     Malformed(String),
-    /// The file exceeds one of the budgets above.
     TooLarge(String),
-    /// The file has a document type declaration, which can define entities and name other files.
+    /// The file has a document type declaration, which can define entities and refer to other files.
     Doctype(String),
 }
 
@@ -40,27 +37,28 @@ impl std::fmt::Display for Fault {
     }
 }
 
-/// An element with its attributes and what is inside it; text is left out.
+/// An element with its attributes and child elements; text is left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
-    /// Name, without prefix.
     pub name: Cow<'static, str>,
-    /// Line of the file, counted from 1.
     pub line: u64,
     /// Names and values, in the order of the file.
     pub attributes: Vec<(Cow<'static, str>, Cow<'static, str>)>,
-    /// The elements inside, in the order of the file.
     pub children: Vec<Element>,
 }
 
 impl Element {
-    /// Reads a file; the error begins with the line and the column where it is not well-formed, is
-    /// not UTF-8, has a DOCTYPE, or nests elements deeper than [`DEEPEST`].
+    /// Parses a file.
+    ///
+    /// # Errors
+    ///
+    /// If the file is not well-formed, not UTF-8, has a DOCTYPE, or exceeds a limit such as [`DEEPEST`]. The
+    /// text begins with line and column.
     pub fn parse(bytes: &[u8]) -> Result<Element, String> {
         Element::read(bytes).map_err(|fault| fault.to_string())
     }
 
-    /// [`Element::parse`] with the kind of the fault.
+    /// Parses a file like [`Element::parse`], but returns the kind of the fault.
     pub fn read(bytes: &[u8]) -> Result<Element, Fault> {
         if bytes.len() > LONGEST {
             let length = bytes.len();
@@ -84,11 +82,11 @@ impl Element {
                 _ => Fault::Malformed(why),
             }
         })?;
-        Ok(Element::of(document.root_element(), &mut Lines { text, at: 0, line: 1 }))
+        Ok(Element::from_node(document.root_element(), &mut Lines { text, at: 0, line: 1 }))
     }
 
-    fn of(node: Node, lines: &mut Lines) -> Element {
-        let line = lines.of(node.range().start);
+    fn from_node(node: Node, lines: &mut Lines) -> Element {
+        let line = lines.line_at(node.range().start);
         let owned = |text: &str| Cow::Owned(text.to_string());
         let attribute = |a: roxmltree::Attribute| (owned(a.name()), owned(a.value()));
         Element {
@@ -98,12 +96,12 @@ impl Element {
             children: node
                 .children()
                 .filter(Node::is_element)
-                .map(|child| Element::of(child, lines))
+                .map(|child| Element::from_node(child, lines))
                 .collect(),
         }
     }
 
-    /// Appends a form of the element that [`Element::unpack`] reads many times faster than XML.
+    /// Appends the element in a binary format, which [`Element::unpack`] reads many times faster than XML.
     pub fn pack(&self, to: &mut Vec<u8>) {
         let number = |number: usize, to: &mut Vec<u8>| to.extend((number as u32).to_le_bytes());
         let text = |text: &str, to: &mut Vec<u8>| {
@@ -121,8 +119,8 @@ impl Element {
         self.children.iter().for_each(|child| child.pack(to));
     }
 
-    /// Reads what [`Element::pack`] has written and removes it from the bytes. The texts are not copied. `None`: the
-    /// bytes are something else.
+    /// Reads an element in the format of [`Element::pack`] and removes it from `bytes`. The texts are not
+    /// copied. Returns `None` if the bytes have another format.
     pub fn unpack(bytes: &mut &'static [u8]) -> Option<Element> {
         fn number(bytes: &mut &'static [u8]) -> Option<usize> {
             let number;
@@ -135,57 +133,57 @@ impl Element {
             (text, *bytes) = bytes.split_at_checked(length)?;
             std::str::from_utf8(text).ok().map(Cow::Borrowed)
         }
-        // of things that take at least 8 bytes each: a wrong number reserves little
-        fn count(bytes: &mut &'static [u8]) -> Option<usize> {
+        // Each item has at least 8 bytes, which limits the memory that a wrong number could reserve.
+        fn read_count(bytes: &mut &'static [u8]) -> Option<usize> {
             number(bytes).filter(|count| *count <= bytes.len() / 8)
         }
         let (name, line) = (text(bytes)?, number(bytes)? as u64);
-        let mut attributes = Vec::with_capacity(count(bytes)?);
+        let mut attributes = Vec::with_capacity(read_count(bytes)?);
         for _ in 0..attributes.capacity() {
             attributes.push((text(bytes)?, text(bytes)?));
         }
-        let mut children = Vec::with_capacity(count(bytes)?);
+        let mut children = Vec::with_capacity(read_count(bytes)?);
         for _ in 0..children.capacity() {
             children.push(Element::unpack(bytes)?);
         }
         Some(Element { name, line, attributes, children })
     }
 
-    /// Returns the element without those inside.
+    /// Returns the element without its children.
     pub fn alone(&self) -> Element {
         let Element { name, line, attributes, .. } = self;
         let (name, attributes) = (name.clone(), attributes.clone());
         Element { name, line: *line, attributes, children: Vec::new() }
     }
 
-    /// The value of an attribute.
     pub fn get(&self, attribute: &str) -> Option<&str> {
         self.attributes.iter().find(|(name, _)| name == attribute).map(|(_, value)| &**value)
     }
 
-    /// The value of an attribute that is a number; none if it is not written or is not a number.
+    /// Returns the value of a numeric attribute, or `None` if it is missing or not a number.
     pub fn number(&self, attribute: &str) -> Option<f64> {
         self.get(attribute).and_then(double)
     }
 
-    /// Returns true for an attribute with the value true or 1.
+    /// Returns true if the attribute has the value true or 1.
     pub fn flag(&self, attribute: &str) -> bool {
         matches!(self.get(attribute).map(str::trim), Some("true" | "1"))
     }
 
-    /// The first element of that name inside.
+    /// Returns the first child element with this name.
     pub fn child(&self, name: &str) -> Option<&Element> {
         self.children.iter().find(|child| child.name == name)
     }
 
-    /// All elements below `list`, if that is there.
+    /// Iterates over the children of the child element `list`; there are none if it is missing.
     pub fn list<'a>(&'a self, list: &str) -> impl Iterator<Item = &'a Element> + use<'a> {
         self.child(list).into_iter().flat_map(|list| &list.children)
     }
 }
 
-/// Returns the first limit that a file exceeds, before a parser runs: in some parsers time grows with the square of the depth or
-/// of the number of attributes. The file need not be well-formed: the parser checks that.
+/// Returns the first limit that a file exceeds. This is checked before parsing, because the time of some
+/// parsers grows with the square of the depth or of the number of attributes. The file need not be
+/// well-formed; the parser checks that later.
 fn excess(text: &str) -> Option<String> {
     let namespaces = text.matches("xmlns").count();
     if namespaces > MOST_NAMESPACES {
@@ -194,7 +192,7 @@ fn excess(text: &str) -> Option<String> {
     let (mut depth, mut elements, mut all_attributes, mut rest) = (0usize, 0, 0, text);
     while let Some(at) = rest.find('<') {
         rest = &rest[at + 1..];
-        // what is not markup
+        // Skip comments, CDATA, processing instructions, declarations and end tags.
         let skipped = [("!--", "-->"), ("![CDATA[", "]]>"), ("?", "?>"), ("!", ">"), ("/", ">")]
             .into_iter()
             .find(|(start, _)| rest.starts_with(start));
@@ -205,7 +203,7 @@ fn excess(text: &str) -> Option<String> {
             rest = rest.split_once(end)?.1;
             continue;
         }
-        // a start tag, to its end, which is not in quotes
+        // A start tag up to its end, which is not within quotes.
         let (mut quote, mut attributes, mut empty) = (None, 0, false);
         let (mut name, mut longest_name, mut value, mut longest_value) = (0usize, 0, 0usize, 0);
         let end = rest.bytes().position(|byte| {
@@ -225,7 +223,7 @@ fn excess(text: &str) -> Option<String> {
             longest_value = longest_value.max(value);
             false
         });
-        // a tag without an end is the parser's business, but not its names
+        // The parser reports a tag without an end, but the length of its names is checked here.
         let end = end.unwrap_or(rest.len().saturating_sub(1));
         depth += 1;
         elements += 1;
@@ -253,7 +251,8 @@ fn excess(text: &str) -> Option<String> {
     None
 }
 
-/// Counts lines forwards: finding each by itself would read the file from its beginning every time.
+/// Counts lines incrementally, because counting from the beginning for every element would take quadratic
+/// time.
 struct Lines<'t> {
     text: &'t str,
     at: usize,
@@ -261,8 +260,8 @@ struct Lines<'t> {
 }
 
 impl Lines<'_> {
-    /// The line of a byte, which is not before the last one that was asked for.
-    fn of(&mut self, byte: usize) -> u64 {
+    /// Returns the line of a byte, which must not be before the byte of the last call.
+    fn line_at(&mut self, byte: usize) -> u64 {
         let passed = &self.text.as_bytes()[self.at..byte.max(self.at)];
         self.line += passed.iter().filter(|b| **b == b'\n').count() as u64;
         self.at = byte.max(self.at);
@@ -270,13 +269,13 @@ impl Lines<'_> {
     }
 }
 
-/// A number as XML writes it (`xs:double`): a decimal point, `INF`, `-INF`, `NaN`.
+/// Parses a number in the format of XML (`xs:double`): with a decimal point, or `INF`, `-INF`, `NaN`.
 pub fn double(text: &str) -> Option<f64> {
     match text.trim() {
         "INF" => Some(f64::INFINITY),
         "-INF" => Some(f64::NEG_INFINITY),
         "NaN" => Some(f64::NAN),
-        // Rust reads words that XML does not: "inf", "infinity", "nan"
+        // Rust also accepts words that XML does not allow: "inf", "infinity", "nan".
         number if number.chars().any(|c| c.is_alphabetic() && !matches!(c, 'e' | 'E')) => None,
         number => number.parse().ok(),
     }

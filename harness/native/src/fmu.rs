@@ -116,7 +116,7 @@ impl Fmu {
     /// Read the description of a packed FMU; nothing is unpacked or loaded.
     #[new]
     fn new(py: Python, path: PathBuf) -> PyResult<Fmu> {
-        let description = py.detach(|| ModelDescription::of_packed(&path)).map_err(error)?;
+        let description = py.detach(|| ModelDescription::from_fmu(&path)).map_err(error)?;
         let names = description.variables.iter().map(|variable| variable.name.clone());
         let places = names.zip(0..).collect();
         Ok(Fmu { path, description, places, loaded: Default::default() })

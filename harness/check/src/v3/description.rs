@@ -160,7 +160,7 @@ fn variable(
     types: &BTreeMap<&str, &Element>,
     sizes: &BTreeMap<&str, usize>,
 ) -> Option<Variable> {
-    let (c_type, kind) = CType::of_element(&element.name)?;
+    let (c_type, kind) = CType::from_element_name(&element.name)?;
     let causality = element.get("causality").unwrap_or("local").trim();
     let default = match kind {
         _ if causality.to_lowercase().ends_with("parameter") => "fixed",

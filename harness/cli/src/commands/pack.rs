@@ -147,7 +147,7 @@ impl PackArgs {
         }
         let mut starts = BTreeMap::new();
         if let Some(path) = &self.parameters {
-            let description = || ModelDescription::of_packed(fmu);
+            let description = || ModelDescription::from_fmu(fmu);
             let settings = set_file::read(path, &description)?;
             let description = description()?;
             for (name, text) in settings {

@@ -91,9 +91,9 @@ impl RunArgs {
     pub fn run(self) -> Result<()> {
         check_out(&self.out)?;
         let mut settings = match &self.parameters {
-            Some(path) => set_file::read(path, &|| {
-                ModelDescription::of_packed(&crate::fmu::find(&self.fmu)?)
-            })?,
+            Some(path) => {
+                set_file::read(path, &|| ModelDescription::from_fmu(&crate::fmu::find(&self.fmu)?))?
+            }
             None => Vec::new(),
         };
         settings.extend(self.settings);

@@ -40,7 +40,7 @@ impl VariablesArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let fmu = fmu::find(&self.fmu)?;
-        let description = &ModelDescription::of_packed(&fmu)?;
+        let description = &ModelDescription::from_fmu(&fmu)?;
         let filter = self.filter.unwrap_or_default().to_lowercase();
         let wanted = |v: &&Variable| {
             let named = v.name.to_lowercase().contains(&filter);

@@ -75,7 +75,7 @@ impl ViewArgs {
                 )
             })?,
         };
-        let description = ModelDescription::of_packed(&fmu::find(&name)?)?;
+        let description = ModelDescription::from_fmu(&fmu::find(&name)?)?;
         let mut parameters: BTreeMap<String, String> = match notes.get("parameters") {
             Some(text) => serde_json::from_str(text)
                 .with_context(|| format!("{}: its metadata are damaged", self.run.display()))?,

@@ -1,5 +1,6 @@
-//! An FMU of one version of FMI and its instances: everything that the versions have in common. [`Version`] is what
-//! differs; `fmi2.rs` and `fmi3.rs` implement it and add the calls that one version alone has.
+//! An FMU and its instances, as far as the versions of FMI have them in common. The trait [`Version`]
+//! contains the differences; `fmi2.rs` and `fmi3.rs` implement it and add the calls that only one version
+//! has.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -55,68 +56,73 @@ functions! { Exchange<B>:
     get_nominals "fmi2GetNominalsOfContinuousStates" "fmi3GetNominalsOfContinuousStates", GetVector;
 }
 
-/// A C function that writes the values of variables into an array.
+/// A C function that writes the values of variables into an array of the host.
 pub(crate) trait Getter<T> {
     /// # Safety
     /// It is a function of the FMU of this instance.
     unsafe fn get(self, component: Component, references: &[u32], values: &mut [T]) -> c_int;
 }
 
-/// A C function that reads the values of variables from an array.
+/// A C function that reads the values of variables from an array of the host.
 pub(crate) trait Setter<T> {
     /// # Safety
     /// It is a function of the FMU of this instance, and what the values point to is alive.
     unsafe fn set(self, component: Component, references: &[u32], values: &[T]) -> c_int;
 }
 
-/// The interfaces that this host can drive.
+/// Interfaces of FMI that this host supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
-    /// The FMU integrates.
     CoSimulation,
-    /// The host integrates.
     ModelExchange,
 }
 
-/// Result of updating the discrete states.
+/// Result of one update of the discrete states in event mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Updated {
-    /// The host must update them again.
+    /// The host must update the discrete states again.
     pub again: bool,
-    /// The FMU asks for the end of the simulation.
+    /// The FMU requests the end of the simulation.
     pub terminate: bool,
     /// Time of the next time event, s.
     pub next_event: Option<f64>,
 }
 
-/// A version of FMI: the functions that were loaded, and the steps in which a host calls them.
+/// A version of FMI: its C functions, and the order in which a host calls them.
 pub trait Version: Sized {
-    /// Folder of the binaries for the platform this program was built for.
+    /// Folder of the binaries for the platform on which this program runs.
     const PLATFORM: &'static str;
-    /// Column of its symbols in the tables of functions of both versions.
     const NUMBER: usize;
-    /// `fmi2Boolean` or `fmi3Boolean`. A byte that is neither 0 nor 1 must not become a `bool`.
+    /// `fmi2Boolean` or `fmi3Boolean`. It is not `bool`, because a byte that is neither 0 nor 1 must not
+    /// become a `bool`.
     type Boolean: Copy + Default + PartialEq + From<bool>;
-    /// Data of an instance that this version needs.
+    /// Data that this version stores with each instance.
     type Kept;
 
-    /// Names of the functions that a binary must export for the interfaces that it declares.
-    fn needed(steps: bool, exchanges: bool) -> Vec<&'static str>;
+    /// Returns the names of the functions that a binary must export. `steps`: the FMU has Co-Simulation;
+    /// `exchanges`: it has Model Exchange.
+    fn required_functions(steps: bool, exchanges: bool) -> Vec<&'static str>;
 
+    /// Finds the version's functions in a library.
+    ///
     /// # Errors
-    /// If a function that every FMU has is missing.
+    ///
+    /// If a function is missing that every FMU must export.
     ///
     /// # Safety
-    /// The library must be a binary of that version of FMI: the types are taken on trust.
+    ///
+    /// The library must be a binary for this version of FMI, because the types of the functions cannot be
+    /// checked.
     unsafe fn load(library: &Library) -> Result<Self, libloading::Error>;
 
-    /// Location of the resources of an FMU that is unpacked in this folder, as `instantiate` takes it.
+    /// Returns the location of the resources of an FMU that is unpacked in `directory`, in the form that this
+    /// version's instantiation expects.
     fn resources(directory: &Path) -> Option<String>;
 
-    /// Makes a plain instance, with logging on.
+    /// Creates an instance with logging on.
     fn instantiate<'fmu>(fmu: &'fmu Fmu<Self>, name: &str) -> Called<Instance<'fmu, Self>>;
 
-    /// Enters initialization mode: times in s; `tolerance` is relative.
+    /// Enters initialization mode with start and stop time (s) and relative tolerance.
     fn initialize(
         instance: &mut Instance<'_, Self>,
         tolerance: Option<f64>,
@@ -124,16 +130,17 @@ pub trait Version: Sized {
         stop: Option<f64>,
     ) -> Called;
 
-    /// Enters or leaves the mode in which structural parameters may be set.
+    /// Enters (`enters`) or leaves configuration mode, in which structural parameters may be set.
     fn configure(instance: &mut Instance<'_, Self>, enters: bool) -> Called;
 
-    /// Makes a step of `step` s from `time`, with constant inputs.
+    /// Makes a step of `step` seconds from `time` with constant inputs.
     fn step(instance: &mut Instance<'_, Self>, time: f64, step: f64) -> Called;
 
     /// Sets the time derivatives of inputs, per s, if this version has a call for that.
     fn set_slopes(instance: &mut Instance<'_, Self>, references: &[u32], slopes: &[f64]) -> Called;
 
-    /// Makes a step in which these inputs, set to `values` at its start, change with `slopes`, per s.
+    /// Makes a step in which inputs change linearly: they are set to `values` at the start of the step and
+    /// have the derivatives `slopes`, per s.
     fn step_along(
         instance: &mut Instance<'_, Self>,
         time: f64,
@@ -143,16 +150,15 @@ pub trait Version: Sized {
         slopes: &[f64],
     ) -> Called;
 
-    /// Enters event mode.
     fn enter_event_mode(instance: &mut Instance<'_, Self>) -> Called;
 
     /// Updates the discrete states, in event mode.
     fn update(instance: &mut Instance<'_, Self>) -> Called<Updated>;
 
-    /// Numbers of continuous states and of event indicators.
+    /// Returns the numbers of continuous states and of event indicators.
     fn sizes(instance: &mut Instance<'_, Self>) -> Called<(usize, usize)>;
 
-    /// All values of one variable or array by its value reference in the FMU.
+    /// Reads the `count` values of a variable or an array with this value reference.
     fn values(
         instance: &mut Instance<'_, Self>,
         c_type: CType,
@@ -160,7 +166,7 @@ pub trait Version: Sized {
         count: usize,
     ) -> Called<Vec<Value>>;
 
-    /// Sets all values of one variable or array by its value reference in the FMU.
+    /// Sets all values of a variable or an array with this value reference.
     fn set_values(
         instance: &mut Instance<'_, Self>,
         c_type: CType,
@@ -168,36 +174,35 @@ pub trait Version: Sized {
         values: &[Value],
     ) -> Called;
 
-    /// Reads Reals of which none is an element of an array.
+    /// Reads Reals, none of which may be an element of an array.
     fn reals(instance: &mut Instance<'_, Self>, references: &[u32], values: &mut [f64]) -> Called;
 
-    /// Sets Reals of which none is an element of an array.
+    /// Sets Reals, none of which may be an element of an array.
     fn set_reals(instance: &mut Instance<'_, Self>, references: &[u32], values: &[f64]) -> Called;
 }
 
-/// An FMU whose binary is loaded.
 pub struct Fmu<V: Version> {
     pub(crate) description: ModelDescription,
     pub(crate) common: Common<V::Boolean>,
     pub(crate) exchange: Option<Exchange<V::Boolean>>,
-    /// The functions of this version alone.
     pub(crate) own: V,
-    /// Interface of instances for which none is given.
+    /// Interface of the instances that [`Fmu::instantiate`] creates.
     pub(crate) interface: Interface,
     pub(crate) resources: Option<String>,
     hash: String,
     binary_hash: String,
     path: PathBuf,
     changed: Vec<&'static str>,
-    /// All Reals are Float64 and scalar.
+    /// True if all Reals are scalars of type Float64, so that they can be exchanged in one call.
     is_plain: bool,
-    /// References of those that are, in order.
+    /// Value references of the scalar Float64 variables, ascending.
     plain: Vec<u32>,
-    /// References of Float64 inputs that an FMU 3.0 takes within a step, elements of arrays too; in order.
+    /// Value references of the Float64 inputs, and of elements of input arrays, that an FMU 3.0 accepts
+    /// within a step; ascending.
     pub(crate) taken: Vec<u32>,
-    /// Structural parameters that every instance of [`Fmu::instantiate`] begins with, by reference.
+    /// Structural parameters by value reference, which [`Fmu::instantiate`] sets in every instance.
     structural: BTreeMap<u32, Value>,
-    // dropped in this order: first the code, then the files
+    // Dropped in this order: first the library, then its files.
     library: Option<Library>,
     _directory: Option<temporary::Folder>,
 }
@@ -210,16 +215,16 @@ impl<V: Version> Drop for Fmu<V> {
 }
 
 impl<V: Version> Fmu<V> {
-    /// Opens a packed FMU and loads the binary for this platform.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let archive = Archive::open(path)?;
         let described = described(&archive, path)?;
-        Fmu::of_archive(&archive, described, path, Interface::CoSimulation, &[])
+        Fmu::from_archive(&archive, described, path, Interface::CoSimulation, &[])
     }
 
-    /// Opens the FMU of an archive for one interface. Of the settings it takes those that are structural parameters of FMI 3.0.
-    pub(crate) fn of_archive(
+    /// Loads the FMU in an archive for one interface. Of `settings` only structural parameters of FMI 3.0 are
+    /// used, because they determine the sizes of arrays.
+    pub(crate) fn from_archive(
         archive: &Archive,
         (text, description): (String, ModelDescription),
         path: &Path,
@@ -245,13 +250,13 @@ impl<V: Version> Fmu<V> {
         Ok(fmu)
     }
 
-    /// Loads the binary of an FMU that is unpacked in `directory`: that of Co-Simulation if there is one; errors
-    /// speak of `path`. [`Fmu::hash`] is empty.
+    /// Loads the binary of an FMU that is unpacked in `directory`, for Co-Simulation if the FMU has it.
+    /// Errors call the FMU `path`. [`Fmu::hash`] is empty, because there is no archive.
     pub fn load(directory: &Path, path: &Path) -> Result<Self> {
         Fmu::load_binary(None, directory, path)
     }
 
-    /// The same for one interface: the two may name different binaries.
+    /// Loads the binary of one interface; the two interfaces may have different binaries.
     pub(crate) fn load_binary(
         interface: Option<Interface>,
         directory: &Path,
@@ -269,7 +274,8 @@ impl<V: Version> Fmu<V> {
         Fmu::load_described(description, interface, directory, path)
     }
 
-    /// The same with a model description that is parsed already: parsing takes most of the time of a large one.
+    /// Loads the binary for a model description that is already parsed, because parsing a large one takes
+    /// most of the time.
     pub(crate) fn load_parsed(
         interface: Option<Interface>,
         directory: &Path,
@@ -299,7 +305,8 @@ impl<V: Version> Fmu<V> {
             .with_context(|| format!("{name} offers neither co-simulation nor model exchange"))?;
         let Loaded { library, hash, changed, binary } =
             super::load(directory, path, V::PLATFORM, identifier)?;
-        let needed = V::needed(stepping == Some(identifier), exchange == Some(identifier));
+        let needed =
+            V::required_functions(stepping == Some(identifier), exchange == Some(identifier));
         let lacking = lacking(&library, &needed);
         if !lacking.is_empty() {
             bail!("{binary} in {name} lacks {}", lacking.join(", "));
@@ -339,12 +346,13 @@ impl<V: Version> Fmu<V> {
         })
     }
 
-    /// Gives structural parameters other values than those that they start with: every instance of [`Fmu::instantiate`] sets
-    /// them first, in configuration mode, and [`Fmu::description`] has the sizes that follow. Of arrays whose size has changed
-    /// it has the start values that the FMU tells then. `text` is modelDescription.xml.
+    /// Sets structural parameters to other values than those declared. Every instance of [`Fmu::instantiate`]
+    /// then sets them first, in configuration mode, and [`Fmu::description`] has the resulting array sizes.
+    /// For arrays of another size the start values are read from the FMU. `text` is modelDescription.xml.
     ///
     /// # Errors
-    /// If the FMU refuses one.
+    ///
+    /// If the FMU refuses a value.
     fn configure(&mut self, text: &str, settings: &[(String, String)]) -> Result<()> {
         let mut is_set = false;
         for (name, value) in settings {
@@ -353,7 +361,7 @@ impl<V: Version> Fmu<V> {
             is_set = true;
             let value = self.description.value(variable, value)?;
             let start = variable.attributes().start.as_deref().unwrap_or_default();
-            // as declared: nothing is to be done
+            // The declared value needs no call.
             match self.description.value(variable, start).is_ok_and(|start| start == value) {
                 true => self.structural.remove(&variable.reference),
                 false => self.structural.insert(variable.reference, value),
@@ -362,7 +370,7 @@ impl<V: Version> Fmu<V> {
         if !is_set {
             return Ok(());
         }
-        // first: what is too large for the FMU may be too large for a description
+        // The FMU is asked first, because a size that it refuses may also be too large for a description.
         let mut instance = self.instantiate("sizes")?;
         let mut description = ModelDescription::from_xml_with(text, &self.structural)?;
         let mut starts = Vec::new();
@@ -382,44 +390,42 @@ impl<V: Version> Fmu<V> {
         Ok(())
     }
 
-    /// Model description of the FMU.
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }
 
-    /// SHA-256 of the `.fmu` file, in hexadecimal digits.
+    /// Returns the SHA-256 of the `.fmu` file, in hexadecimal digits.
     pub fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// SHA-256 of the binary that is loaded, in hexadecimal digits.
+    /// Returns the SHA-256 of the loaded binary, in hexadecimal digits.
     pub fn binary_hash(&self) -> &str {
         &self.binary_hash
     }
 
-    /// Changes of the whole process by loading the binary, such as the rounding mode.
+    /// Names the parts of the process state that loading the binary has changed, for example the rounding
+    /// mode.
     pub fn changed(&self) -> &[&'static str] {
         &self.changed
     }
 
-    /// The file it was opened from.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Result of fmi2GetVersion or fmi3GetVersion.
+    /// Returns the result of fmi2GetVersion or fmi3GetVersion.
     pub fn version(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
         unsafe { copied((self.common.get_version.call)()) }
     }
 
-    /// Returns true if these Reals can be exchanged in one call: all are Float64, none an element of an array.
+    /// Returns true if these Reals can be exchanged in one call, because all are scalars of type Float64.
     fn is_plain(&self, references: &[u32]) -> bool {
         self.is_plain || references.iter().all(|r| self.plain.binary_search(r).is_ok())
     }
 
-    /// A new instance with logging on, in the sizes of the description, for the interface of the binary: Co-Simulation if it has
-    /// both.
+    /// Creates an instance with logging on and with the array sizes of the description.
     pub fn instantiate(&self, name: &str) -> Called<Instance<'_, V>> {
         let mut instance = V::instantiate(self, name)?;
         if !self.structural.is_empty() {
@@ -436,8 +442,8 @@ impl<V: Version> Fmu<V> {
         Ok(instance)
     }
 
-    /// Makes an instance by the function of this name, which `make` calls.
-    pub(crate) fn made(
+    /// Creates an instance; `make` calls the function of this name and returns the pointer.
+    pub(crate) fn create_instance(
         &self,
         name: &'static str,
         environment: Environment,
@@ -448,7 +454,7 @@ impl<V: Version> Fmu<V> {
         environment.begin_call();
         let component = make();
         calls.end();
-        // a NULL component never reaches the FMU again
+        // A NULL pointer never reaches the FMU again.
         let instance = Instance {
             fmu: self,
             component,
@@ -466,14 +472,13 @@ impl<V: Version> Fmu<V> {
         Ok(instance)
     }
 
-    /// Calls fmi2FreeInstance(NULL) or fmi3FreeInstance(NULL), which does nothing; for tests.
     pub fn free_null_instance(&self) {
         // SAFETY: the standard allows NULL here (FMI 2.0.5, section 2.1.5; FMI 3.0.2, section 2.3.1).
         unsafe { (self.common.free_instance.call)(null_mut()) }
     }
 }
 
-/// Reads modelDescription.xml of an archive.
+/// Reads and checks modelDescription.xml in an archive.
 pub(crate) fn described(archive: &Archive, path: &Path) -> Result<(String, ModelDescription)> {
     let name = path.display();
     let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;
@@ -483,7 +488,8 @@ pub(crate) fn described(archive: &Archive, path: &Path) -> Result<(String, Model
     Ok((text, description))
 }
 
-/// True if all Reals are scalar Float64, and the references of those that are, in order.
+/// Returns whether all Reals are scalars of type Float64, and the value references of those that are,
+/// ascending.
 fn plain(description: &ModelDescription) -> (bool, Vec<u32>) {
     let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
     let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
@@ -501,16 +507,14 @@ fn taken(description: &ModelDescription) -> Vec<u32> {
     taken
 }
 
-/// Requests of an FMU after a step of the integrator.
+/// Results of completedIntegratorStep.
 #[derive(Clone, Copy, Debug)]
 pub struct CompletedStep {
-    /// The host must enter event mode.
     pub enter_event_mode: bool,
-    /// The host must end the simulation.
     pub terminate: bool,
 }
 
-/// One instance of an FMU; freed when dropped. Belongs to the thread that made it.
+/// One instance of an FMU. It is freed when it is dropped, and belongs to the thread that created it.
 pub struct Instance<'fmu, V: Version> {
     pub(crate) fmu: &'fmu Fmu<V>,
     pub(crate) component: Component,
@@ -518,7 +522,7 @@ pub struct Instance<'fmu, V: Version> {
     pub(crate) kept: V::Kept,
     warned: Cell<Option<&'static str>>,
     pub(crate) calls: Calls,
-    /// Values of the arrays of which elements were set, before they can be read.
+    /// Values of arrays of which single elements were set before the array could be read.
     arrays: RefCell<BTreeMap<u32, Vec<Value>>>,
     one_thread: PhantomData<*mut ()>,
 }
@@ -535,34 +539,33 @@ impl<V: Version> Drop for Instance<'_, V> {
     }
 }
 
-/// A snapshot of an instance. Belongs to the instance it was taken from, and must be given back to it with
-/// [`Instance::free_state`]; otherwise its memory is lost.
+/// A saved state. It belongs to the instance from which it was taken and must be returned to that instance
+/// with [`Instance::free_state`]; otherwise its memory is lost.
 pub struct FmuState(pub(crate) State);
 
 impl<'fmu, V: Version> Instance<'fmu, V> {
-    /// The FMU it is an instance of.
     pub fn fmu(&self) -> &'fmu Fmu<V> {
         self.fmu
     }
 
-    /// Everything logged since the last time somebody asked.
+    /// Returns the messages since the last call of this function.
     pub fn take_messages(&self) -> Vec<Message> {
         self.environment.take()
     }
 
-    /// Returns the FMU's warnings since the last call.
+    /// Returns the texts of the warnings since the last call, and drops all other messages.
     pub fn take_warnings(&self) -> Vec<String> {
         let messages = self.take_messages().into_iter();
         let warnings = messages.filter(|message| message.status == Status::Warning);
         warnings.map(|message| message.text.trim().to_string()).collect()
     }
 
-    /// Number of messages without a category (NULL).
+    /// Returns the number of messages whose category is NULL.
     pub fn uncategorised(&self) -> usize {
         self.environment.uncategorised()
     }
 
-    /// The last call that returned a warning since somebody asked.
+    /// Returns the name of the last function that returned a warning since the last call of `take_warning`.
     pub fn take_warning(&self) -> Option<&'static str> {
         self.warned.take()
     }
@@ -572,7 +575,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.calls.begin();
     }
 
-    /// Makes a call of a function of this instance and looks at its status.
+    /// Calls a function for this instance and turns its status into a result.
     pub(crate) fn call<T>(
         &self,
         function: Function<T>,
@@ -593,7 +596,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         }
     }
 
-    /// Calls a function that takes the instance alone.
+    /// Calls a function that has no argument other than the instance.
     pub(crate) fn plain(&self, function: Function<Call>) -> Called {
         // SAFETY: plain call on a live instance.
         self.call(function, |f, c| unsafe { f(c) })
@@ -604,7 +607,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(function, |f, c| unsafe { f(c, x.as_mut_ptr(), x.len()) })
     }
 
-    /// Calls one of the functions that write values into a slice.
+    /// Calls a function that writes values into a slice.
     pub(crate) fn read<T>(
         &self,
         function: Function<impl Getter<T>>,
@@ -615,7 +618,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(function, |f, c| unsafe { f.get(c, references, values) })
     }
 
-    /// Calls one of the functions that read values from a slice.
+    /// Calls a function that reads values from a slice.
     pub(crate) fn write<T>(
         &self,
         function: Function<impl Setter<T>>,
@@ -626,7 +629,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(function, |f, c| unsafe { f.set(c, references, values) })
     }
 
-    /// Calls the function that reads texts: `count` of them.
+    /// Calls a function that returns `count` texts and copies them.
     pub(crate) fn read_texts(
         &self,
         function: Function<impl Getter<*const c_char>>,
@@ -639,7 +642,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(pointers.into_iter().map(|text| unsafe { copied(text) }).collect())
     }
 
-    /// Calls the function that sets texts.
+    /// Calls a function that sets texts.
     pub(crate) fn write_texts(
         &self,
         function: Function<impl Setter<*const c_char>>,
@@ -650,7 +653,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.write(function, references, &pointers)
     }
 
-    /// fmi2SetDebugLogging or fmi3SetDebugLogging.
     pub fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Called {
         let (_texts, pointers) = c_strings(categories);
         let start = if pointers.is_empty() { null() } else { pointers.as_ptr() };
@@ -660,23 +662,19 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         })
     }
 
-    /// Leaves initialization mode, ready for the first step.
     pub fn exit_initialization_mode(&mut self) -> Called {
         self.plain(self.fmu.common.exit_initialization_mode)
     }
 
-    /// fmi2Terminate or fmi3Terminate.
     pub fn terminate(&mut self) -> Called {
         self.plain(self.fmu.common.terminate)
     }
 
-    /// fmi2Reset or fmi3Reset.
     pub fn reset(&mut self) -> Called {
         self.arrays.borrow_mut().clear();
         self.plain(self.fmu.common.reset)
     }
 
-    /// fmi2EnterEventMode or fmi3EnterEventMode.
     pub fn enter_event_mode(&mut self) -> Called {
         V::enter_event_mode(self)
     }
@@ -689,7 +687,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         of.expect("a reference of one of the FMU's Reals")
     }
 
-    /// Reads Reals by reference.
     pub fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Called {
         if self.fmu.is_plain(references) {
             return V::reals(self, references, values);
@@ -702,7 +699,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(())
     }
 
-    /// Sets Reals by reference.
     pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Called {
         if self.fmu.is_plain(references) {
             return V::set_reals(self, references, values);
@@ -713,7 +709,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(())
     }
 
-    /// The value of a variable, or of an element of an array.
+    /// Reads a variable, or an element of an array.
     pub fn value(&mut self, variable: &Variable) -> Called<Value> {
         let description = &self.fmu.description;
         let (reference, length, index) = match description.element(variable.reference) {
@@ -727,7 +723,8 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(values.into_iter().nth(index).unwrap_or(Value::String(String::new())))
     }
 
-    /// Sets a variable, or an element of an array: the others keep what was set last, or their start values.
+    /// Sets a variable or one element of an array. The other elements keep the values that were set last, or
+    /// their start values.
     pub fn set_value(&mut self, variable: &Variable, value: Value) -> Called {
         let description = &self.fmu.description;
         let Some(element) = description.element(variable.reference) else {
@@ -755,7 +752,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         set
     }
 
-    /// The value of a variable by name.
     pub fn get(&mut self, name: &str) -> Result<Value> {
         let variable = self.fmu.description.variable(name)?;
         if matches!(variable.kind(), Type::Binary | Type::Clock) {
@@ -764,7 +760,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(self.value(variable)?)
     }
 
-    /// The value of a real variable.
     pub fn real(&mut self, name: &str) -> Result<f64> {
         match self.get(name)? {
             Value::Real(value) => Ok(value),
@@ -772,11 +767,13 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         }
     }
 
-    /// Sets a variable from text: a number, `true`/`false`, or an enumeration's value by name or number.
+    /// Sets a variable from a text: a number, `true` or `false`, or an item of an enumeration by name or
+    /// number.
     ///
     /// # Errors
-    /// If the text is not of its type, or the FMU refuses it. A structural parameter of FMI 3.0 keeps the value that it has since
-    /// the FMU was opened.
+    ///
+    /// If the text does not fit the type, the FMU refuses the value, or the variable is a structural
+    /// parameter of FMI 3.0 and the value differs from that with which the FMU was opened.
     pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
         let description = &self.fmu.description;
         let variable = description.variable(name)?;
@@ -796,32 +793,32 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
 
     // ------------------------------------------------ snapshots
 
-    /// Takes a new snapshot.
+    /// Saves the state in a new handle.
     pub fn get_state(&mut self) -> Called<FmuState> {
         let mut state = FmuState(null_mut());
         self.get_state_into(&mut state)?;
         Ok(state)
     }
 
-    /// Takes a snapshot into one that is there already.
+    /// Saves the state in an existing handle.
     pub fn get_state_into(&mut self, state: &mut FmuState) -> Called {
         // SAFETY: NULL or a handle from this FMU.
         self.call(self.fmu.common.get_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
     }
 
-    /// Goes back to a snapshot of this instance.
+    /// Restores a saved state of this instance.
     pub fn set_state(&mut self, state: &FmuState) -> Called {
         // SAFETY: a handle from this FMU.
         self.call(self.fmu.common.set_fmu_state, |f, c| unsafe { f(c, state.0) })
     }
 
-    /// Gives a snapshot of this instance back.
+    /// Frees a saved state of this instance.
     pub fn free_state(&mut self, mut state: FmuState) -> Called {
         // SAFETY: a handle from this FMU, gone after this call.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
     }
 
-    /// Writes a snapshot as bytes.
+    /// Serialises a saved state to bytes.
     pub fn serialize(&mut self, state: &FmuState) -> Called<Vec<u8>> {
         let mut size = 0;
         let common = &self.fmu.common;
@@ -835,7 +832,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(bytes)
     }
 
-    /// Makes a snapshot of such bytes.
+    /// Restores a saved state from the bytes of [`Instance::serialize`].
     pub fn deserialize(&mut self, bytes: &[u8]) -> Called<FmuState> {
         let mut state = FmuState(null_mut());
         // SAFETY: `bytes.len()` bytes are there.
@@ -851,12 +848,15 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.fmu.exchange.as_ref().expect("the FMU exports the functions of model exchange")
     }
 
-    /// Enters continuous-time mode. As all calls of this section it panics when the FMU does not have it.
+    /// Enters continuous-time mode.
+    ///
+    /// # Panics
+    ///
+    /// If the FMU does not export the functions of Model Exchange; this holds for all calls of this section.
     pub fn enter_continuous_time_mode(&mut self) -> Called {
         self.plain(self.exchange().enter_continuous_time_mode)
     }
 
-    /// fmi2CompletedIntegratorStep or fmi3CompletedIntegratorStep.
     pub fn completed_integrator_step(&mut self) -> Called<CompletedStep> {
         let no = V::Boolean::default();
         let (mut enter, mut terminate) = (no, no);
@@ -867,13 +867,11 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(CompletedStep { enter_event_mode: enter != no, terminate: terminate != no })
     }
 
-    /// Sets the time, s.
     pub fn set_time(&mut self, time: f64) -> Called {
         // SAFETY: plain value on a live instance.
         self.call(self.exchange().set_time, |f, c| unsafe { f(c, time) })
     }
 
-    /// Sets the continuous states.
     pub fn set_continuous_states(&mut self, x: &[f64]) -> Called {
         // SAFETY: a slice of the length given.
         self.call(self.exchange().set_continuous_states, |f, c| unsafe {
@@ -881,28 +879,24 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         })
     }
 
-    /// Reads the continuous states.
     pub fn continuous_states(&mut self, x: &mut [f64]) -> Called {
         self.vector(self.exchange().get_continuous_states, x)
     }
 
-    /// Reads the derivatives of the continuous states.
     pub fn derivatives(&mut self, dx: &mut [f64]) -> Called {
         self.vector(self.exchange().get_derivatives, dx)
     }
 
-    /// Reads the event indicators.
     pub fn event_indicators(&mut self, z: &mut [f64]) -> Called {
         self.vector(self.exchange().get_event_indicators, z)
     }
 
-    /// Reads the nominal values of the continuous states.
     pub fn nominals(&mut self, x: &mut [f64]) -> Called {
         self.vector(self.exchange().get_nominals, x)
     }
 }
 
-/// Texts for a C function, and the pointers to them.
+/// Converts texts for a C function; the pointers are valid as long as the texts.
 fn c_strings(texts: &[&str]) -> (Vec<CString>, Vec<*const c_char>) {
     let texts: Vec<CString> = texts.iter().map(|t| CString::new(*t).unwrap_or_default()).collect();
     let pointers = texts.iter().map(|text| text.as_ptr()).collect();

@@ -1,31 +1,31 @@
-//! Calls whose arrays lie between two margins: they show whether an FMU writes outside what it is
-//! given, or into what it shall only read.
+//! Calls with a margin of known bytes before and after each array, which shows whether an FMU writes outside
+//! an array or into an array that it may only read.
 
 use super::*;
 use crate::c_abi::version::{GetVector, State};
 
-/// Bytes on either side of an array.
+/// Size of the margin on either side of an array, bytes.
 const MARGIN: usize = 1024;
-/// Fill value of the margins; no number of an FMU looks like it by chance.
+/// Content of the margins, which no FMU writes by chance.
 const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 
-/// An array between its margins, aligned for every type of FMI.
+/// An array between its margins, aligned for every C type of FMI.
 struct Guarded {
     words: Vec<u64>,
     bytes: usize,
-    /// Content at the call, if the FMU may only read it.
+    /// Content before the call, if the FMU may only read the array.
     input: Option<Vec<u8>>,
 }
 
 impl Guarded {
-    /// Room for `count` values that the FMU writes.
+    /// Creates an array for `count` values that the FMU writes.
     fn output<T>(count: usize) -> Guarded {
         let bytes = count * size_of::<T>();
         let words = vec![FILL; 2 * MARGIN / 8 + bytes.div_ceil(8)];
         Guarded { words, bytes, input: None }
     }
 
-    /// A copy of values that the FMU reads.
+    /// Creates an array with values that the FMU reads.
     fn input<T: Copy>(values: &[T]) -> Guarded {
         let mut array = Guarded::output::<T>(values.len());
         // SAFETY: there is room for them, and the two do not overlap.
@@ -46,7 +46,7 @@ impl Guarded {
         self.all_bytes()[MARGIN..MARGIN + self.bytes].to_vec()
     }
 
-    /// Describes writes outside the array or to a read-only array.
+    /// Describes writes outside the array or into a read-only array; `None` if there are none.
     fn fault(&self) -> Option<String> {
         let all = self.all_bytes();
         let fill = FILL.to_ne_bytes();
@@ -68,45 +68,43 @@ impl Guarded {
     }
 }
 
-/// Something written outside an array.
+/// A write outside an array, or into an array that may only be read.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// The C function.
+    /// Name of the C function.
     pub call: &'static str,
-    /// The array, by the name of the standard's argument, and how many values it has.
+    /// The array's name in the standard and its number of values.
     pub array: String,
-    /// Description of the write.
     pub fault: String,
 }
 
-/// Arguments of the calls in [`Instance::writes_beside`].
+/// Arguments for the calls of [`Instance::writes_beside`].
 #[derive(Clone, Debug, Default)]
 pub struct Lists {
     /// Value references of Reals to read.
     pub reals: Vec<u32>,
-    /// References of Integers and Enumerations.
+    /// Value references of Integers and Enumerations.
     pub integers: Vec<u32>,
-    /// References of Booleans.
+    /// Value references of Booleans.
     pub booleans: Vec<u32>,
-    /// References of Strings.
+    /// Value references of Strings.
     pub strings: Vec<u32>,
-    /// References of Reals that may be set now, with values.
+    /// Value references and values of Reals that may be set now.
     pub inputs: Vec<(u32, f64)>,
-    /// Unknowns of directional derivatives; none if the FMU does not provide them.
+    /// Unknowns of directional derivatives; empty if the FMU does not provide them.
     pub unknowns: Vec<u32>,
-    /// Knowns of directional derivatives.
     pub knowns: Vec<u32>,
-    /// Outputs whose derivatives the FMU gives.
+    /// Outputs whose time derivatives the FMU provides.
     pub outputs: Vec<u32>,
-    /// Continuous states, if they may be asked for now.
+    /// Number of continuous states, if they may be read now.
     pub states: Option<usize>,
-    /// Event indicators, if they may be asked for now.
+    /// Number of event indicators, if they may be read now.
     pub indicators: Option<usize>,
-    /// True if states can be serialised.
+    /// True if the FMU can serialise states.
     pub serializes: bool,
 }
 
-/// Lengths at which a list is tried: one, some and all.
+/// Returns the lengths with which an array of `all` values is tried: one, half and all.
 fn lengths(all: usize) -> Vec<usize> {
     let mut lengths = vec![1, all.div_ceil(2), all];
     lengths.retain(|n| *n > 0 && *n <= all);
@@ -115,7 +113,8 @@ fn lengths(all: usize) -> Vec<usize> {
 }
 
 impl Instance<'_> {
-    /// Makes calls with margins around every array and returns writes into the margins, whatever the calls' status; for tests.
+    /// Makes calls with margins around every array and returns the writes into the margins, whatever the
+    /// status of the calls; for tests.
     pub fn writes_beside(&mut self, lists: &Lists) -> Vec<Beside> {
         let mut found = Vec::new();
         self.begin_call();
@@ -268,7 +267,7 @@ impl Instance<'_> {
     }
 }
 
-/// Returns what was written outside the arrays of a call.
+/// Adds the faults of a call's arrays to `found`.
 fn note(found: &mut Vec<Beside>, call: &'static str, n: usize, arrays: &[(&str, &Guarded)]) {
     for (name, array) in arrays {
         if let Some(fault) = array.fault() {

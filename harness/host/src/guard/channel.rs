@@ -1,11 +1,12 @@
 //! Connection between a guarded process and its parent.
 //!
-//! The parent sends one request with a random nonce before it starts the process. The process keeps the nonce in its
-//! memory and begins each message with it. The parent takes nothing after bytes that do not begin with the nonce.
+//! The parent sends one request with a random nonce before it starts the process. The process keeps the nonce
+//! in its memory and begins each message with it. After bytes that do not begin with the nonce the parent
+//! accepts nothing more.
 //!
-//! On Unix the connection is a pair of sockets, handed over as stdin. Nobody can open a socket through /proc and read what
-//! the process has sent. On Windows the standard library hands over no socket, so the connection is a file, which a binary
-//! in the process could read.
+//! On Unix the connection is a pair of sockets, of which one is the child's stdin. A socket cannot be opened
+//! through /proc, so that no other process can read the messages. On Windows the standard library cannot pass
+//! on a socket, so the connection is a file, which a binary in the process could read.
 
 use std::fs::File;
 use std::hash::{BuildHasher, RandomState};
@@ -19,9 +20,8 @@ use std::time::Duration;
 
 use anyhow::Result;
 
-/// Bytes of a nonce.
 const NONCE: usize = 16;
-/// Bytes before the content of a message: the nonce, the kind and the length.
+/// Number of bytes before the content of a message: the nonce, the kind and the length.
 const HEAD: usize = NONCE + 1 + 4;
 
 #[cfg(unix)]
@@ -34,9 +34,9 @@ pub struct Parent {
     end: End,
     nonce: [u8; NONCE],
     bytes: Vec<u8>,
-    /// Something without the nonce has arrived.
+    /// Bytes without the nonce have arrived.
     pub is_forged: bool,
-    /// No process holds the other end any more.
+    /// No process has the other end open any more.
     pub is_closed: bool,
 }
 
@@ -46,17 +46,19 @@ pub struct Process {
     nonce: [u8; NONCE],
 }
 
-/// Numbers in a request.
+/// Number of integers in a request.
 pub const REQUEST: usize = 3;
 const REQUEST_BYTES: usize = NONCE + 8 * REQUEST;
 
-/// Returns random bytes. The standard library seeds the hashers of its maps from the system's random numbers.
+/// Returns random bytes. They come from the hashers of the standard library's maps, which are seeded by the
+/// system's random numbers.
 fn nonce() -> [u8; NONCE] {
     let half = || u128::from(RandomState::new().hash_one(0));
     (half() << 64 | half()).to_ne_bytes()
 }
 
-/// Makes a connection on which the request waits. Returns the parent's end and stdin for the process.
+/// Creates a connection on which the request already waits. Returns the parent's end, and stdin for the
+/// process.
 #[cfg(unix)]
 pub fn open(
     request: [u64; REQUEST],
@@ -81,7 +83,8 @@ pub fn open(
     Ok((parent, OwnedFd::from(stdin).into()))
 }
 
-/// Makes a connection on which the request waits: a file in `folder`. Returns the parent's end and stdin for the process.
+/// Creates a connection, a file in `folder`, on which the request already waits. Returns the parent's end,
+/// and stdin for the process.
 #[cfg(not(unix))]
 pub fn open(
     request: [u64; REQUEST],
@@ -108,8 +111,8 @@ impl Parent {
         [&self.nonce[..], &numbers.map(u64::to_le_bytes).concat()].concat()
     }
 
-    /// Waits for messages for `pause` at most, and passes the kind and the content of each to `hear`. Returns false if
-    /// nothing has arrived.
+    /// Waits for messages for at most `pause` and passes the kind and the content of each to `hear`. Returns
+    /// false if none has arrived.
     pub fn read(&mut self, pause: Duration, mut hear: impl FnMut(u8, &[u8])) -> bool {
         #[cfg(unix)]
         let _ = self.end.set_read_timeout(Some(pause));
@@ -150,7 +153,8 @@ impl Parent {
 }
 
 impl Process {
-    /// Takes the connection from stdin, which is empty from then on, with the request and the attached pipe.
+    /// Takes over the connection from stdin, which is empty afterwards. Returns it with the request and the
+    /// attached pipe.
     #[cfg(unix)]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::io::IoSliceMut;
@@ -169,7 +173,7 @@ impl Process {
         let mut pipe = None;
         for message in attached.drain() {
             if let RecvAncillaryMessage::ScmRights(files) = message {
-                // a copy is closed in programs that this process starts
+                // The duplicated handle is closed in programs that this process starts.
                 pipe = files.last().map(|file| file.try_clone()).transpose()?.map(File::from);
             }
         }
@@ -177,7 +181,7 @@ impl Process {
         Ok((process, numbers, pipe))
     }
 
-    /// Takes the connection from stdin, with the request; there is no pipe.
+    /// Takes over the connection from stdin. Returns it with the request; there is no pipe.
     #[cfg(not(unix))]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::os::windows::io::AsHandle;
@@ -195,7 +199,7 @@ impl Process {
         (Process { end: Mutex::new(end), nonce }, std::array::from_fn(number))
     }
 
-    /// Sends a message. It is lost if the parent no longer lives.
+    /// Sends a message. It is lost if the parent has ended.
     pub fn send(&self, kind: u8, content: &[u8]) {
         let length = (content.len() as u32).to_le_bytes();
         let message = [&self.nonce, &[kind][..], &length, content].concat();
