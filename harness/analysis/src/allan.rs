@@ -34,25 +34,24 @@ pub const FLICKER: f64 = 0.664;
 /// Number of averaging times per decade.
 const PER_DECADE: f64 = 15.0;
 
-/// One point of the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Averaging time, s.
     pub tau: f64,
-    /// Allan variance, the unit of the signal squared.
+    /// Allan variance, in the unit of the signal squared.
     pub variance: f64,
 }
 
-/// Part of the record that the longest averaging time takes.
+/// The longest averaging time is the length of the record divided by this number.
 const LONGEST: usize = 10;
 
-/// Returns the overlapping Allan variance of samples `step` (s) apart, at averaging times equally
-/// spaced in the logarithm from one sample to a tenth of the record.
+/// Returns the overlapping Allan variance of samples `step` (s) apart, at averaging times equally spaced in
+/// the logarithm from one sample to a tenth of the record.
 pub fn variances(step: f64, samples: &[f64]) -> Vec<Point> {
     overlapping(step, samples, factors(samples.len() / LONGEST))
 }
 
-/// Returns the overlapping Allan variance at averages of these numbers of samples.
+/// Returns the overlapping Allan variance for averages of `factors` samples each.
 fn overlapping(step: f64, samples: &[f64], factors: impl IntoIterator<Item = usize>) -> Vec<Point> {
     // sums[k] is the sum of the first k samples
     let mut sums = vec![0.0; samples.len() + 1];
@@ -71,7 +70,7 @@ fn overlapping(step: f64, samples: &[f64], factors: impl IntoIterator<Item = usi
         .collect()
 }
 
-/// Returns whole numbers from 1 to `last`, at most [`PER_DECADE`] per decade.
+/// Returns integers from 1 to `last`, at most [`PER_DECADE`] per decade, equally spaced in the logarithm.
 fn factors(last: usize) -> Vec<usize> {
     let count = ((last.max(1) as f64).log10() * PER_DECADE).floor() as usize;
     let mut factors: Vec<usize> =
@@ -81,24 +80,20 @@ fn factors(last: usize) -> Vec<usize> {
     factors
 }
 
-/// Terms of a gyro's noise.
+/// Terms of a gyro's noise. The coefficients are N² (white), B² (flicker), K² (rate random walk), R² (ramp),
+/// and the variance of a Gauss–Markov bias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
-    /// White noise; its coefficient is N².
     White,
-    /// Flicker noise; B².
     Flicker,
-    /// Rate random walk; K².
     Walk,
-    /// Linear drift of the rate; R².
     Ramp,
-    /// Gauss–Markov bias; its variance.
     Markov,
 }
 
 impl Term {
-    /// Returns the Allan variance at averaging time `tau` (s) for a coefficient of 1; `time`: correlation time of the
-    /// Gauss–Markov bias, s.
+    /// Returns the Allan variance at averaging time `tau` (s) for a coefficient of 1. `time` is the
+    /// correlation time of the Gauss–Markov bias, s.
     fn variance(self, tau: f64, time: f64) -> f64 {
         match self {
             Term::White => 1.0 / tau,
@@ -110,7 +105,7 @@ impl Term {
     }
 }
 
-/// Noise of a gyro; a term that it does not have is 0.
+/// Parameters of a gyro's noise; a term that is absent is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Angle random walk N, rad/s/√Hz.
@@ -121,9 +116,9 @@ pub struct Noise {
     pub rrw: f64,
     /// Rate ramp R, rad/s².
     pub ramp: f64,
-    /// Bias instability of a Gauss–Markov bias, rad/s; the bias has the standard deviation of this over 0.664.
+    /// Bias instability of a Gauss–Markov bias, rad/s; its standard deviation is this value divided by 0.664.
     pub bias_instability: f64,
-    /// Correlation time of the Gauss–Markov bias T, s; no meaning without one.
+    /// Correlation time T of the Gauss–Markov bias, s; without such a bias it has no meaning.
     pub bias_time: f64,
 }
 
@@ -135,7 +130,6 @@ impl Default for Noise {
 }
 
 impl Noise {
-    /// Returns the coefficient of a term.
     fn coefficient(&self, term: Term) -> f64 {
         match term {
             Term::White => self.arw.powi(2),
@@ -146,7 +140,7 @@ impl Noise {
         }
     }
 
-    /// Returns the parameter that a term's coefficient stands for, to be set.
+    /// Returns the parameter that belongs to a term, so that it can be set.
     fn parameter(&mut self, term: Term) -> &mut f64 {
         match term {
             Term::White => &mut self.arw,
@@ -170,8 +164,7 @@ impl Noise {
     }
 }
 
-/// Returns the Allan variance of a Gauss–Markov process over its variance, at `x` correlation
-/// times.
+/// Returns the Allan variance of a Gauss–Markov process divided by its variance, at `x` correlation times.
 fn markov(x: f64) -> f64 {
     // exp_m1, because for small x everything except (2/3) x³ cancels
     (2.0 * x + 4.0 * (-x).exp_m1() - (-2.0 * x).exp_m1()) / (x * x)

@@ -12,7 +12,7 @@
 use crate::sweep::Sweep;
 use crate::{Complex64, FrequencyResponse};
 
-/// Smallest number of cycles of a window. With three cycles a Hann window separates a sweep from
+/// Smallest number of cycles in a window. With three cycles a Hann window still separates the sweep from
 /// other components.
 pub const LEAST_CYCLES: f64 = 3.0;
 
@@ -21,17 +21,17 @@ pub const LEAST_CYCLES: f64 = 3.0;
 /// the harmonics of a sticking bearing from the sweep.
 pub const CYCLES: f64 = 24.0;
 
-/// Largest relative change of a sweep's frequency within a window.
+/// Largest relative change of the sweep's frequency within a window.
 const MOST_MOVE: f64 = 0.015;
 
-/// Returns the cycles of the window at a frequency, Hz: 24, or fewer if the sweep would move by
-/// more than 1.5 % of its frequency. The minimum is 3, where harmonics still average out.
+/// Returns the number of cycles in the window at a frequency, Hz: 24, or fewer if the sweep would change by
+/// more than 1.5 % of its frequency. The minimum is 3, with which harmonics still average out.
 pub fn cycles(sweep: &Sweep, frequency: f64) -> f64 {
     let slow = MOST_MOVE * frequency.powi(2) / sweep.rate_at(frequency).abs();
     slow.clamp(LEAST_CYCLES, CYCLES)
 }
 
-/// Responses with the data for their uncertainty.
+/// Frequency responses with the data from which their uncertainty follows.
 pub struct Demodulated<const N: usize> {
     /// One response for each output.
     pub responses: [FrequencyResponse; N],
@@ -40,8 +40,8 @@ pub struct Demodulated<const N: usize> {
     pub noise_gain: Vec<f64>,
 }
 
-/// Returns the standard deviation of |H| relative to |H| (and of the phase, rad). `unexplained` is
-/// the two-sided power spectral density of the part of the output that the response does not
+/// Returns the standard deviation of |H| relative to |H|, which is also that of the phase in rad.
+/// `unexplained` is the two-sided power spectral density of the part of the output that the response does not
 /// explain.
 pub fn deviation(
     response: &FrequencyResponse,
@@ -52,8 +52,8 @@ pub fn deviation(
     each.map(|((h, v), gain)| (v * gain / 2.0).sqrt() / h.norm()).collect()
 }
 
-/// Returns the rate at which the error of a response changes along the frequency, relative to the error, 1/Hz. It is
-/// the root of ∫w'²/∫w², 2π/√3 per length of a Hann window, over the sweep's rate.
+/// Returns the rate of change of the response's error along the frequency, relative to the error, 1/Hz. It is
+/// the root of ∫w'²/∫w², which is 2π/√3 divided by the length of a Hann window, divided by the sweep's rate.
 pub fn slope(sweep: &Sweep, frequency: f64) -> f64 {
     let window = cycles(sweep, frequency) / frequency;
     std::f64::consts::TAU / 3f64.sqrt() / (window * sweep.rate_at(frequency).abs())
@@ -79,8 +79,8 @@ pub fn frequency_responses<const N: usize>(
         let to = time.partition_point(|&t| t <= centre + half);
         let (mut u, mut squares) = (Complex64::default(), 0.0);
         let mut y = [Complex64::default(); N];
-        // the window's cosine rotates by the same angle from sample to sample; over some hundred
-        // samples the recurrence is exact to 1e-13 and takes a fifth of the time
+        // From sample to sample the window's cosine rotates by the same angle. Over some hundred samples
+        // this recurrence is exact to 1e-13 and takes a fifth of the time.
         let turns = |seconds: f64| Complex64::cis(std::f64::consts::PI * seconds / half);
         let Some(first) = time.get(from) else { continue };
         let (mut window, turn) = (turns(first - centre), turns(step));

@@ -1,13 +1,14 @@
-//! The exponential of a matrix of any size, in bounded time.
+//! Computes the exponential of a matrix of any magnitude in bounded time.
 
 use std::ops::Mul;
 
-/// Largest sum of absolute values that nalgebra's exponential is given. It takes powers up to the 27th, and computes without end if one
-/// overflows.
+/// Largest sum of absolute values that is passed to nalgebra's exponential, which uses powers up to the 27th
+/// and never returns if one of them overflows.
 const LARGEST: f64 = 1e9;
 
-/// Returns the exponential of `matrix`, whose absolute values add up to `size`; `exp` is nalgebra's. A larger matrix is halved n times, and
-/// its exponential squared n times. NaN if the matrix is not finite.
+/// Returns the exponential of `matrix`, whose absolute values add up to `size`; `exp` is nalgebra's
+/// exponential. A larger matrix is halved n times and its exponential squared n times. The result is NaN if
+/// the matrix is not finite.
 pub fn exponential<M>(matrix: M, size: f64, exp: impl Fn(&M) -> M) -> M
 where
     M: Clone + Mul<M, Output = M> + Mul<f64, Output = M>,

@@ -14,24 +14,23 @@ pub struct Features {
     pub notch_db: Option<f64>,
 }
 
-/// Standard deviations of [`Features`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviations {
-    /// Resonance frequency, Hz.
     pub f_res: Option<f64>,
-    /// Antiresonance frequency, Hz.
     pub f_dip: Option<f64>,
 }
 
 impl Features {
-    /// Returns the standard deviations of the features, from the response, its relative standard deviation
-    /// `relative` at each frequency, and the relative rate `slope` at which its error changes along the frequency, 1/Hz. In
-    /// responses with another error of this kind added, 95 % of the features' shifts are below 1.96 deviations.
+    /// Returns the standard deviations of the features by adding simulated errors to the response. `relative`
+    /// is the relative standard deviation of the response at each frequency, and `slope` the rate of change
+    /// of its error along the frequency relative to the error, 1/Hz. In responses with another error of this
+    /// kind 95 % of the features' shifts are below 1.96 deviations.
     ///
-    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are normal numbers
-    /// whose deviation is the rate s, so that errors at frequencies Δf apart have the correlation exp(−s²Δf²/2) of a Gaussian
-    /// window. The slope of the error over the curvature of ln |H| would be simpler, but it holds only where the error is
-    /// small against the response, which it is not at an antiresonance.
+    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are
+    /// normal numbers whose deviation is the rate s, so that errors at frequencies Δf apart have the
+    /// correlation exp(−s²Δf²/2) of a Gaussian window. The slope of the error divided by the curvature of ln
+    /// |H| would be simpler, but holds only where the error is small compared with the response, which is not
+    /// the case at an antiresonance.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,
@@ -39,7 +38,7 @@ impl Features {
         slope: impl Fn(f64) -> f64,
     ) -> Deviations {
         let f = &response.frequency;
-        // far enough for the extremum of a response with an error, and not farther, which takes time
+        // Far enough for the extremum of a response with an error, and no farther, to save time.
         let margin = 3.0 * self.delta_f().unwrap_or(f64::INFINITY);
         let near = |f: f64| self.f_dip.is_none_or(|dip| f > dip - margin);
         let first = f.partition_point(|f| !near(*f));
@@ -53,7 +52,7 @@ impl Features {
         if relative.iter().any(|x| !x.is_finite()) {
             return Deviations::default();
         }
-        // ∫ s df, along which the error's correlation is the same everywhere
+        // ∫ s df, a coordinate along which the correlation of the error is the same everywhere.
         let mut phase = vec![0.0; f.len()];
         for i in 1..f.len() {
             phase[i] = phase[i - 1] + 0.5 * (slope(f[i]) + slope(f[i - 1])) * (f[i] - f[i - 1]);
@@ -97,7 +96,7 @@ impl Features {
         Features::within(response, (f64::NEG_INFINITY, f64::INFINITY))
     }
 
-    /// Finds the features between two frequencies, Hz.
+    /// Finds the features between two frequencies, Hz; otherwise as [`Features::of`].
     pub fn within(response: &FrequencyResponse, (from, to): (f64, f64)) -> Self {
         let level = response.decibels();
         let first = response.frequency.partition_point(|f| *f < from);
@@ -116,27 +115,27 @@ impl Features {
         }
     }
 
-    /// Returns true if there is an antiresonance or a resonance.
     pub fn any(&self) -> bool {
         self.f_dip.is_some() || self.f_res.is_some()
     }
 
-    /// f_res − f_dip, Hz.
+    /// Returns the separation f_res − f_dip, Hz.
     pub fn delta_f(&self) -> Option<f64> {
         Some(self.f_res? - self.f_dip?)
     }
 }
 
-/// Responses with another error that are drawn: their deviation is known to 7 %.
+/// Number of simulated errors, which determines a standard deviation to 7 %.
 const DRAWS: usize = 100;
-/// Waves of which an error consists.
+/// Number of waves of which a simulated error consists.
 const WAVES: usize = 8;
 
 /// Smallest rise from antiresonance to resonance that counts, dB. A tank damped to ζ = 0.05 still
 /// rises by 3.9 dB.
 pub const LEAST: f64 = 1.0;
 
-/// Returns the indices of the lowest and highest value between which a sequence rises most.
+/// Returns the indices of the lowest and the highest value between which a sequence rises most; `None` if it
+/// rises by less than [`LEAST`].
 fn largest_rise(level: &[f64]) -> Option<(usize, usize)> {
     let (mut lowest, mut best, mut rise) = (0, None, LEAST);
     for (i, &value) in level.iter().enumerate() {

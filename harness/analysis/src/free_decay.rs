@@ -26,10 +26,10 @@ use crate::Complex64;
 use crate::least_squares::{differences, minimise, smallest};
 use crate::statistics::{deviation, mean};
 
-/// Smallest number of periods for an estimate of frequency and damping.
+/// Smallest number of periods from which frequency and damping are estimated.
 pub const LEAST_PERIODS: f64 = 5.0;
 
-/// One record of a free decay.
+/// A record of a free decay.
 #[derive(Clone, Copy, Debug)]
 pub struct Record<'a> {
     /// Times, s, increasing; they need not be equally spaced.
@@ -38,39 +38,32 @@ pub struct Record<'a> {
     pub signal: &'a [f64],
 }
 
-/// An estimate and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
-    /// The estimate.
     pub value: f64,
-    /// Standard deviation.
     pub std: f64,
 }
 
-/// Estimates from all records of one oscillation.
+/// Estimates from all records of one oscillation: frequency f (Hz), damping ratio ζ, ζ_A (1/U) and κ (1/U²).
 #[derive(Clone, Debug)]
 pub struct FreeDecay {
-    /// f, Hz.
     pub frequency: Value,
-    /// ζ.
     pub zeta: Value,
-    /// ζ_A, 1/U.
     pub zeta_amplitude: Value,
-    /// κ, 1/U².
     pub hardening: Value,
-    /// ζ with the same damping at all amplitudes.
+    /// Damping ratio ζ if it is assumed equal at all amplitudes.
     pub constant: f64,
-    /// Amplitude at each record's beginning and end, U.
+    /// Amplitude at the beginning and the end of each record, U.
     pub amplitudes: Vec<[f64; 2]>,
-    /// Periods of each record.
+    /// Number of periods in each record.
     pub periods: Vec<f64>,
-    /// Residual of each record, U.
+    /// Residuals of each record, U.
     pub residuals: Vec<Vec<f64>>,
     /// Root mean square of the residual, U.
     pub residual: f64,
-    /// Root mean square of the residual with constant ζ, U.
+    /// Root mean square of the residual if ζ is constant, U.
     pub residual_constant: f64,
-    /// Largest other oscillation in the residual: its frequency, Hz, and amplitude, U.
+    /// Largest other oscillation in the residual: frequency, Hz, and amplitude, U.
     pub other: (f64, f64),
     /// True if the search ended at a minimum.
     pub converged: bool,
@@ -98,7 +91,7 @@ fn model(time: &[f64], common: &[f64], own: &[f64], size: f64) -> Vec<f64> {
     let values = time.iter().map(|t| {
         let t = t - time[0];
         let a = amplitude(t);
-        // Simpson's rule over the row: the amplitude hardly changes within a row
+        // Simpson's rule over the step, because the amplitude hardly changes within a step.
         let middle = amplitude((t + before.0) / 2.0);
         square += (t - before.0) / 6.0 * (before.1.powi(2) + 4.0 * middle.powi(2) + a * a);
         before = (t, a);
@@ -109,7 +102,8 @@ fn model(time: &[f64], common: &[f64], own: &[f64], size: f64) -> Vec<f64> {
 }
 
 impl FreeDecay {
-    /// Fits records of one oscillation; `None` without records, or if a record has less than [`LEAST_PERIODS`] of it.
+    /// Fits all records of one oscillation. Returns `None` without records, or if a record has fewer than
+    /// [`LEAST_PERIODS`] periods.
     pub fn of(records: &[Record]) -> Option<FreeDecay> {
         let starts: Vec<Start> = records.iter().map(Start::of).collect::<Option<_>>()?;
         let size = starts.iter().map(|start| start.amplitude).fold(0.0, f64::max);
@@ -126,8 +120,8 @@ impl FreeDecay {
         for start in &starts {
             x.extend([(start.amplitude / size).ln(), start.phase, start.offset / size, 0.0]);
         }
-        // steps of the differences: relative to a significant change over a period or over the
-        // record
+        // Steps of the finite differences, relative to a significant change over a period or over the
+        // record.
         let longest = starts.iter().map(|start| start.periods).fold(0.0, f64::max);
         let small = 1e-4 / longest;
         let mut steps = vec![small * x[0], small, small, small];
@@ -144,7 +138,7 @@ impl FreeDecay {
             }
             all
         };
-        // first with fixed κ and ζ_A, and with constant damping for comparison
+        // First with fixed κ and ζ_A, and with constant damping for comparison.
         let fixed = |x: &[f64]| {
             let mut all = x.to_vec();
             all.insert(2, 0.0);
@@ -208,25 +202,25 @@ impl FreeDecay {
         })
     }
 
-    /// Returns ζ(A) = ζ + ζ_A A at an amplitude, U.
+    /// Returns the damping ratio ζ + ζ_A A at the amplitude A, U.
     pub fn zeta_at(&self, amplitude: f64) -> f64 {
         self.zeta.value + self.zeta_amplitude.value * amplitude
     }
 }
 
-/// The residual's spectrum.
+/// Properties of the residual's spectrum.
 struct Beside {
-    /// Power near the frequency, as the variance of white noise of equal power.
+    /// Power near the frequency, expressed as the variance of white noise of equal power.
     power: f64,
-    /// Frequency, Hz, and amplitude of its largest line.
+    /// Frequency, Hz, and amplitude of the largest line.
     other: (f64, f64),
 }
 
-/// Number of lines of 1/T on either side of f that the fit absorbs, and width of the neighbourhood
-/// of f.
+/// Number of lines (spaced 1/T) on either side of f that the fit absorbs, and number of lines that form the
+/// neighbourhood of f.
 const TAKEN: usize = 2;
 const SIDE: usize = 12;
-/// Number of frequencies in the search for lines of a residual.
+/// Number of frequencies at which lines of the residual are searched.
 const LINES: usize = 400;
 
 fn beside(time: &[f64], residual: &[f64], frequency: f64) -> Beside {
@@ -262,7 +256,7 @@ fn beside(time: &[f64], residual: &[f64], frequency: f64) -> Beside {
 /// Row of a phasor: time, ∫A, ∫A², A and φ.
 type Row = (f64, f64, f64, f64, f64);
 
-/// Start of a search.
+/// Start values of the search.
 struct Start {
     frequency: f64,
     zeta: f64,
@@ -274,9 +268,9 @@ struct Start {
     periods: f64,
 }
 
-/// Points per cycle of 1/T in the search for the spectrum's largest line.
+/// Number of points per line spacing 1/T in the search for the largest line.
 const FINE: usize = 4;
-/// Share of the largest amplitude below which the phasor is not used.
+/// The phasor is not used where its amplitude is below this fraction of the largest amplitude.
 const LEAST_PART: f64 = 0.02;
 
 impl Start {
@@ -288,7 +282,7 @@ impl Start {
             return None;
         }
         let offset = mean(signal);
-        // the largest line under a Hann window, which suppresses drift
+        // The largest line under a Hann window, which suppresses drift.
         let window = |t: f64| 0.5 - 0.5 * (TAU * (t - time[0]) / seconds).cos();
         let weighted: Vec<f64> =
             time.iter().zip(signal).map(|(t, y)| window(*t) * (y - offset)).collect();
@@ -300,7 +294,7 @@ impl Start {
             sum.norm_sqr()
         };
         let coarse = largest_line(time, &weighted, low, top)?;
-        // a parabola through the logarithms around it
+        // A parabola through the logarithms around the line.
         let h = 0.25 / seconds;
         let [a, b, c] = [coarse - h, coarse, coarse + h].map(|f| power(f).max(1e-300).ln());
         let bend = a - 2.0 * b + c;
@@ -369,8 +363,9 @@ impl Start {
     }
 }
 
-/// Returns the largest line of a signal between two frequencies, Hz. Each row counts at the nearest point of a grid of the
-/// mean step, so that one transform serves rows of any spacing. Below the Nyquist frequency of that step this is near enough.
+/// Returns the frequency of the largest line of a signal between `low` and `top`, Hz. Each sample is assigned
+/// to the nearest point of a grid with the mean step, so that one Fourier transform serves samples with any
+/// spacing. Below the Nyquist frequency of this step the error is negligible.
 fn largest_line(time: &[f64], weighted: &[f64], low: f64, top: f64) -> Option<f64> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;

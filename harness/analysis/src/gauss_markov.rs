@@ -16,7 +16,6 @@ pub const FLOOR: f64 = 1e-6;
 /// White noise and a Gauss–Markov bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// σ_w, standard deviation of the white noise of one row, rad/s.
     pub white: f64,
     /// σ_b/σ_w.
     pub drift: f64,
@@ -24,29 +23,29 @@ pub struct Noise {
     pub time: f64,
 }
 
-/// Gains of the filter for the rows of one recording.
+/// Gains of the whitening filter for the rows of one recording.
 pub struct Whitening {
-    /// φ before each row, K and 1/sqrt(innovation variance) at each row.
+    /// For each row: φ of the preceding step, Kalman gain K, and 1/sqrt(innovation variance).
     rows: Vec<[f64; 3]>,
     /// Σ ln(innovation variance).
     log_variance: f64,
 }
 
 impl Noise {
-    /// White noise alone.
+    /// Creates white noise without drift.
     pub fn white(sigma: f64) -> Self {
         Noise { white: sigma, drift: 0.0, time: 100.0 }
     }
 
-    /// Returns the filter for rows at these times, s. Rows that are not `fresh` carry no information: their innovation
-    /// is 0.
+    /// Returns the whitening filter for rows at these times, s. Rows that are not `fresh` carry no new
+    /// information; their innovation is 0.
     pub fn whitening(&self, time: &[f64], fresh: Option<&[bool]>) -> Whitening {
         let (white, drift) = (self.white.powi(2), (self.white * self.drift).powi(2));
         let mut variance = drift;
         let mut log_variance = 0.0;
         let mut rows = Vec::with_capacity(time.len());
         let (mut last_step, mut keep) = (0.0, 1.0);
-        // a settled filter has constant gains
+        // Once the filter has settled its gains are constant.
         let (mut last_innovation, mut settled) = (f64::NEG_INFINITY, ([1.0, 0.0, 1.0], 0.0));
         for k in 0..time.len() {
             if k > 0 {
@@ -74,11 +73,11 @@ impl Noise {
         Whitening { rows, log_variance }
     }
 
-    /// Estimates the noise from a residual, rad/s, at these times, by maximum likelihood.
+    /// Estimates the noise from a residual (rad/s) at these times by maximum likelihood.
     pub fn of(time: &[f64], residual: &[f64], fresh: Option<&[bool]>) -> Self {
         let new = |fresh: &[bool]| fresh.iter().filter(|new| **new).count();
         let count = fresh.map_or(residual.len(), new) as f64;
-        // σ_w follows from the other parameters; the search minimises −2 ln L
+        // σ_w follows from the other parameters; the search minimises −2 ln L.
         let sized = |ln_drift: f64, ln_time: f64| {
             let unit = Noise { white: 1.0, drift: ln_drift.exp(), time: ln_time.exp() };
             let filter = unit.whitening(time, fresh);
@@ -90,7 +89,7 @@ impl Noise {
         let longest = (time[time.len() - 1] - time[0]).ln();
         let mut best = sized(-4.0, 4.6);
         let (mut at, mut reach): ((f64, f64), _) = ((-4.0, 4.6f64.min(longest)), (1.5, 1.5));
-        // coordinate search: two smooth variables, some tens of evaluations
+        // Coordinate search over two smooth variables, which takes some tens of evaluations.
         for _ in 0..40 {
             let mut moved = false;
             for (dx, dt) in [(reach.0, 0.0), (-reach.0, 0.0), (0.0, reach.1), (0.0, -reach.1)] {
@@ -112,7 +111,7 @@ impl Noise {
 }
 
 impl Whitening {
-    /// Turns a residual, or a sensitivity, into innovations divided by their standard deviation.
+    /// Replaces a residual, or a sensitivity, by innovations divided by their standard deviation.
     pub fn apply(&self, signal: &mut [f64]) {
         let mut bias = 0.0;
         for (value, [keep, gain, scale]) in signal.iter_mut().zip(&self.rows) {
@@ -123,7 +122,7 @@ impl Whitening {
         }
     }
 
-    /// Returns Σ ln(innovation variance); with Σ e² it is −2 ln L up to a constant.
+    /// Returns Σ ln(innovation variance); together with Σ e² it is −2 ln L up to a constant.
     pub fn log_variance(&self) -> f64 {
         self.log_variance
     }

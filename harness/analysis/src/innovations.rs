@@ -18,28 +18,28 @@ use crate::statistics::{mean, median};
 
 /// Number of lags of the whiteness test.
 pub const LAGS: usize = 50;
-/// Number of rows of a window: 20 s at 50 Hz.
+/// Number of rows in a window, 20 s at 50 Hz.
 pub const WINDOW: usize = 1000;
 /// Number of bands of the periodogram.
 const BANDS: usize = 100;
-/// Smallest number of lines of a band.
+/// Smallest number of lines in a band.
 const FEWEST_LINES: usize = 4;
 /// Limit of each test in standard deviations: the chance of exceeding it is 1e-6 for one test and
 /// about 1e-4 for about a hundred tests.
 pub const LIMIT: f64 = 5.0;
 
-/// Test results, in standard deviations of chance.
+/// Results of the tests, in standard deviations of what chance would give.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Tests {
     /// Result of the whiteness test.
     pub whiteness: f64,
-    /// Largest excess of the power in a window of time, and the time, s.
+    /// Largest excess of the power in a time window, and the time of the window, s.
     pub in_time: (f64, f64),
-    /// Largest excess of the power in a band, and its frequency, Hz.
+    /// Largest excess of the power in a frequency band, and the frequency of the band, Hz.
     pub in_frequency: (f64, f64),
-    /// Largest cross-correlation with an input up to 2 s.
+    /// Largest cross-correlation with an input over lags up to 2 s.
     pub torque: f64,
-    /// Largest cross-correlation with the square of an input.
+    /// Largest cross-correlation with the square of an input over lags up to 2 s.
     pub torque_squared: f64,
     /// Root mean square of the residual above the noise in the worst band, rad/s.
     #[serde(rename = "left")]
@@ -67,10 +67,11 @@ impl Tests {
         let e: Vec<f64> = e.iter().map(|v| v - middle).collect();
         let power = e.iter().map(|v| v * v).sum::<f64>() / count;
         if power < 0.01 {
-            // below a tenth of the smallest noise ([`crate::gauss_markov::FLOOR`]) the residual counts as zero
+            // Below a tenth of the smallest noise ([`crate::gauss_markov::FLOOR`]) the residual counts as
+            // zero.
             return Tests::default();
         }
-        // a short record uses fewer lags, so that each has several independent products
+        // A short record uses fewer lags, so that each lag has several independent products.
         let lags = LAGS.min(e.len() / 4).max(1);
         let q: f64 = (1..=lags)
             .map(|lag| {
@@ -80,7 +81,7 @@ impl Tests {
             .sum();
         let step = (time[time.len() - 1] - time[0]) / (count - 1.0);
         let window = WINDOW.min(e.len());
-        // windows with noise alone
+        // Windows that contain only noise.
         let windows: Vec<(f64, f64)> = e
             .chunks_exact(window)
             .enumerate()
@@ -107,17 +108,17 @@ impl Tests {
     }
 }
 
-/// Returns χ² with n degrees of freedom as a normal deviate (Wilson and Hilferty).
+/// Converts χ² with `n` degrees of freedom into a standard normal deviate (Wilson and Hilferty).
 fn normal(chi_squared: f64, n: f64) -> f64 {
     let spread = 2.0 / (9.0 * n);
     ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Returns the largest excess over the median in standard deviations, and its position. A level is a mean of n squares;
-/// as a normal deviate it is equally rare for every n.
+/// Returns the largest excess over the median, in standard deviations, and its position. Each level is a mean
+/// of `n` squares; the excess is converted to a normal deviate, so that it is equally rare for every n.
 fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
     let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
-    // the median of χ² is below its mean
+    // The median of χ² is below its mean.
     let middle = median(&values).unwrap_or(0.0) / (1.0 - 2.0 / (9.0 * n)).powi(3);
     levels
         .iter()

@@ -1,28 +1,22 @@
-//! Levenberg–Marquardt method for closures.
-
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 
-/// Residuals at x.
 pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
-/// Returns the derivatives of the residuals at x, one row per residual; `None` ends the search.
+/// Function that returns the derivatives of the residuals at x, one row per residual; `None` ends the search.
 pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 
 /// Minimum of the sum of squares.
 #[derive(Clone, Debug)]
 pub struct Minimum {
-    /// The variables.
     pub x: Vec<f64>,
-    /// Sum of squares.
     pub cost: f64,
-    /// True if the search ended at a minimum, not at its iteration limit.
+    /// True if the search ended at a minimum, false if it reached its limit of iterations.
     pub converged: bool,
-    /// Reason for stopping.
     pub reason: String,
 }
 
-/// Returns the smallest x that minimises |a x − b|. Singular values up to `least` count as 0. Returns `None` if an
-/// entry is not finite, because the iteration for the singular values would not end.
+/// Returns the x of smallest norm that minimises |a x − b|. Singular values up to `least` count as 0. Returns
+/// `None` if an entry is NaN or infinite, because the iteration for the singular values would not end.
 pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector<f64>> {
     if !a.iter().chain(b.iter()).all(|entry| entry.is_finite()) {
         return None;
@@ -30,7 +24,8 @@ pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector
     a.svd(true, true).solve(b, least).ok()
 }
 
-/// Returns the minimum of the sum of squares near `x`. It evaluates derivatives only where residuals were evaluated last.
+/// Minimises the sum of squares, starting at `x`, by the Levenberg–Marquardt method. Derivatives are
+/// evaluated only where residuals were evaluated last.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
     let method = LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9);
     let search = Search { residuals, derivatives, x: DVector::from_column_slice(x) };
@@ -43,7 +38,7 @@ pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Mi
     }
 }
 
-/// Returns derivatives by central differences with these steps.
+/// Returns the derivatives of the residuals by central differences with these steps.
 pub fn differences(residuals: Residuals, x: &[f64], steps: &[f64]) -> DMatrix<f64> {
     let columns: Vec<DVector<f64>> = (0..x.len())
         .map(|j| {

@@ -5,10 +5,10 @@
 use crate::sweep::Sweep;
 use crate::{BAND, spa, welch};
 
-/// Number of samples per cycle of the band's highest frequency that a whole-record estimate needs.
+/// Number of samples per cycle of the band's highest frequency that an estimate from a whole record needs.
 /// The thesis's sweep has 14.3.
 const SAMPLES: f64 = 14.0;
-/// Longest lag as a share of the record.
+/// Longest lag as a fraction of the record.
 const MOST_LAG: f64 = 0.5;
 
 /// Lengths for estimates from a whole record, s.
@@ -21,13 +21,13 @@ pub struct Lengths {
     /// frequency, L = sqrt(1/(3 rate)). For noise, a segment has as many cycles as 20 s of the
     /// thesis's sweep.
     pub segment: f64,
-    /// Number of samples that are averaged into one, equally in torque and rate.
+    /// Number of samples that are averaged to one, in torque and rate alike.
     pub decimation: usize,
 }
 
 impl Lengths {
-    /// Returns the lengths for a record of `duration` s, sampled every `step` s, whose torque has power in the band,
-    /// Hz.
+    /// Returns the lengths for a record of `duration` s, sampled every `step` s. `band` (Hz) contains the
+    /// power of the torque, and `sweep` is the torque if it is a sweep.
     pub fn of(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
         let middle = |(from, to): (f64, f64)| (from * to).sqrt();
         let slower = middle(BAND) / middle(band);

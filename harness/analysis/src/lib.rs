@@ -45,12 +45,10 @@ pub struct FrequencyResponse {
 }
 
 impl FrequencyResponse {
-    /// Magnitudes in dB re 1 (rad/s)/(N·m).
     pub fn decibels(&self) -> Vec<f64> {
         self.response.iter().map(|h| 20.0 * h.norm().log10()).collect()
     }
 
-    /// Phases in degrees, −180 to 180.
     pub fn degrees(&self) -> Vec<f64> {
         self.response.iter().map(|h| h.arg().to_degrees()).collect()
     }

@@ -17,7 +17,7 @@ use nalgebra::DMatrix;
 use crate::exponential::exponential;
 use crate::{Complex64, FrequencyResponse};
 
-/// Parameters of the linear model.
+/// Parameters of the linear model of hub and liquid.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
     /// I0, hub and rigid liquid about the axis, kg·m².
@@ -28,24 +28,21 @@ pub struct Linear {
     pub stiffness: f64,
     /// r, distance of the tank from the axis, m.
     pub arm: f64,
-    /// The slosh modes.
     pub modes: Vec<Mode>,
 }
 
-/// One pendulum.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
     /// m, kg.
     pub mass: f64,
-    /// Natural frequency, Hz.
     pub frequency: f64,
     /// ζ.
     pub damping: f64,
 }
 
-/// Relative difference of steps that are one.
+/// Relative difference below which two steps count as equal.
 const SAME: f64 = 1e-9;
-/// Most exponentials that are kept.
+/// Largest number of matrix exponentials that are stored.
 const FLOWS: usize = 1000;
 
 impl Linear {
@@ -117,7 +114,7 @@ impl Linear {
             flow[(y + 1, y + 1)] -= 2.0 * mode.damping * w;
         }
         flow[(n, n + 1)] = 1.0;
-        // steps that differ by rounding have one exponential
+        // Steps that differ only by rounding share one exponential.
         let mut flows: BTreeMap<i64, DMatrix<f64>> = BTreeMap::new();
         let mut x = vec![0.0; n];
         x[0] = start;
@@ -147,7 +144,7 @@ impl Linear {
         rates
     }
 
-    /// Returns the response on a grid of frequencies, Hz.
+    /// Returns the response at these frequencies, Hz.
     pub fn frequency_response(&self, frequencies: &[f64]) -> FrequencyResponse {
         FrequencyResponse {
             frequency: frequencies.to_vec(),
@@ -157,13 +154,13 @@ impl Linear {
 }
 
 impl Linear {
-    /// Returns the thesis's bench with 10 cm of water: Table 4.1 with the exact first root of J1',
-    /// ρ = 1000 kg/m³, g = 9.81 m/s².
+    /// Returns the thesis's bench with 10 cm of water: Table 4.1 with the exact first root of J1', ρ = 1000
+    /// kg/m³, g = 9.81 m/s². `damping` is the damping ratio of the slosh mode.
     pub fn bench_10_cm(damping: f64) -> Self {
         Self::bench(1.3304311085, 0.7562932719, 2.3436181431, damping)
     }
 
-    /// Returns the same bench with 5 cm of water.
+    /// Returns the thesis's bench with 5 cm of water; otherwise as [`Linear::bench_10_cm`].
     pub fn bench_5_cm(damping: f64) -> Self {
         Self::bench(0.4165810206, 0.6267811696, 2.1335346636, damping)
     }

@@ -1,15 +1,16 @@
-//! Part of an output that no linear response to the input explains: gyro noise, and the effects of dry friction and
-//! a nonlinear liquid. It determines the uncertainty of a frequency response.
+//! Estimates the part of an output that no linear response to the input explains: gyro noise, and the effects
+//! of dry friction and a nonlinear liquid. It determines the uncertainty of a frequency response.
 //!
-//! The method is the local rational method (McKelvey and Guérin, *Non-parametric frequency response estimation using a
-//! local rational model*, SYSID 2012; Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd
-//! ed., 2012, chapter 7). At line k of the whole record's spectra and n lines on either side,
+//! The method is the local rational method (McKelvey and Guérin, *Non-parametric frequency response
+//! estimation using a local rational model*, SYSID 2012; Pintelon and Schoukens, *System Identification: A
+//! Frequency Domain Approach*, 2nd ed., 2012, chapter 7). At line k of the whole record's spectra and n lines
+//! on either side,
 //!
 //! ```text
 //! (1 + a r) Y(k + r) = (b0 + b1 r + b2 r²) U(k + r) + t0 + t1 r + t2 r² + (1 + a r) V(k + r),   |r| ≤ n
 //! ```
 //!
-//! by least squares. The rational function follows a resonance as narrow as a few lines, and the
+//! is solved by least squares. The rational function follows a resonance as narrow as a few lines, and the
 //! polynomial in t represents the leakage of the record's ends. The residual is V.
 
 use nalgebra::{SMatrix, SVector};
@@ -23,11 +24,12 @@ const LINES: usize = 2 * SIDE + 1;
 /// Number of unknowns: b0, b1, b2, t0, t1, t2, a.
 const UNKNOWNS: usize = 7;
 
-/// Returns the two-sided power spectral density of V (unit of the output squared, times s) at
-/// frequencies (Hz) of signals sampled every `step` s; NaN where there is no estimate. It is the mean of five residuals around
-/// the frequency, because a single one has six degrees of freedom, from which a deviation is known to 20 %.
+/// Returns the two-sided power spectral density of V (unit of the output squared, times s) at `frequencies`
+/// (Hz), for signals sampled every `step` s. It is NaN where no estimate is possible. It is the mean of five
+/// residuals around the frequency, because a single one has only six degrees of freedom; with five a
+/// deviation is known to 20 %.
 pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> Vec<f64> {
-    // N steps have N + 1 samples. N is usually a round number, with a transform twice as fast
+    // N steps have N + 1 samples. N is usually a round number, whose transform is twice as fast.
     let count = input.len() / 2 * 2;
     let transform = Forward::new(count);
     let (u, y) = (transform.of(input[..count].to_vec()), transform.of(output[..count].to_vec()));
@@ -52,7 +54,7 @@ pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> V
     frequencies.iter().map(at).collect()
 }
 
-/// Returns the mean of |V|² over the lines.
+/// Returns the mean of |V|² over the lines, or `None` without input or output.
 fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
     let mean = |x: &[Complex64]| x.iter().map(|x| x.norm()).sum::<f64>() / LINES as f64;
     let (scale_u, scale_y) = (mean(u), mean(y));
@@ -69,7 +71,7 @@ fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
     let qr = a.qr();
     let x = qr.r().solve_upper_triangular(&(qr.q().adjoint() * b))?;
     let residual = (b - a * x).norm_squared() / (LINES - UNKNOWNS) as f64;
-    // the residual is (1 + a r) V
+    // The residual of the equations is (1 + a r) V.
     let weight = (0..LINES).map(|i| (1.0 + x[6] * place(i)).norm_sqr()).sum::<f64>() / LINES as f64;
     let power = residual / weight * scale_y * scale_y;
     power.is_finite().then_some(power)

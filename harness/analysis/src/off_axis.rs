@@ -1,18 +1,17 @@
-//! Share of the liquid's force that does not act about the axis (thesis 6.3.6, as far as a hub that
-//! cannot tilt shows it).
+//! Computes the share of the liquid's force that does not act about the hub's axis (thesis 6.3.6, as far as
+//! it shows on a hub that cannot tilt).
 //!
-//! The thesis uses the rates of a gyro about x and y. The liquid's force on the tank tilts a
-//! platform. The tangential force F_t turns the hub, the radial force F_r only loads the bearing.
-//! F_r therefore represents the off-axis part and F_t the on-axis part:
+//! The thesis uses the rates of a gyro about x and y, because the liquid's force tilts a platform. On a hub
+//! that cannot tilt, the tangential force F_t turns the hub, and the radial force F_r only loads the bearing.
+//! Therefore F_r represents the off-axis part and F_t the on-axis part:
 //!
 //! ```text
 //! fraction(t) = F_r² / (F_r² + F_t²)      leakage(f) = r |F_r(f)| / |τ(f)|
 //! ```
 //!
-//! with the Fourier coefficients at the sweep's phase in the leakage (by demodulation) and r the
-//! tank's distance from the axis. The radial force of a planar wave, its centripetal force, is only
-//! at twice the sweep's frequency and causes no leakage. A circular wave has the fraction 1/2 on
-//! average.
+//! The leakage uses the Fourier coefficients at the sweep's phase (from demodulation); r is the tank's
+//! distance from the axis. The radial force of a planar wave, which is its centripetal force, is only at
+//! twice the sweep's frequency and causes no leakage. A circular wave has the fraction 1/2 on average.
 
 use crate::FrequencyResponse;
 use crate::statistics::about_mean;

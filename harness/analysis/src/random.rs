@@ -13,19 +13,19 @@ impl Random {
     /// Returns stream number `stream` for this seed; the streams of one seed are independent.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut generator = Pcg64::new(seed.into(), stream.into());
-        // seeds and streams that differ in few bits begin similarly
+        // Seeds and streams that differ in few bits begin similarly, so the first numbers are dropped.
         for _ in 0..16 {
             generator.next_u64();
         }
         Random(generator)
     }
 
-    /// Returns a uniform number from 0 (included) to 1 (excluded).
+    /// Returns a uniformly distributed number from 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Returns a normal number with mean 0 and standard deviation 1 (Box and Muller).
+    /// Returns a normally distributed number with mean 0 and standard deviation 1 (Box and Muller).
     pub fn normal(&mut self) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.uniform()));
         radius * libm::cos(TAU * self.uniform())

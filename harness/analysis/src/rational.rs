@@ -20,31 +20,32 @@ use crate::features::{Deviations, Features};
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::{Complex64, FrequencyResponse};
 
-/// Largest number of frequencies in a fit; of more, equally spaced ones are used.
+/// Largest number of frequencies in a fit; of more frequencies an equally spaced selection is used.
 const POINTS: usize = 1500;
 /// Smallest number of frequencies.
 const LEAST: usize = 20;
 /// Number of iterations; ten are enough for convergence.
 const ROUNDS: usize = 20;
 
-/// Columns of six coefficients, one for each unknown.
+/// Six coefficients for each of the nine unknowns.
 type Spread = [[f64; 6]; 9];
 
-/// The fitted function.
+/// The fitted transfer function.
 #[derive(Clone, Debug)]
 pub struct Rational {
-    /// Middle of the band, rad/s: the unit of s.
+    /// Centre of the band, rad/s, which is the unit of s.
     unit: f64,
     coefficients: Coefficients,
     /// Root mean square of the fit's residual, relative to |Y|.
     pub misfit: f64,
-    /// A root of the covariance of numerator and denominator, one column for each unknown of the fit.
+    /// Square root of the covariance of numerator and denominator, with one column for each unknown of the
+    /// fit.
     spread: Spread,
 }
 
 impl Rational {
-    /// Fits torque and rate, sampled every `step` s, between two frequencies, Hz; `None` without
-    /// data.
+    /// Fits the transfer function to torque and rate, sampled every `step` s, between two frequencies, Hz.
+    /// Returns `None` without data.
     pub fn fit(step: f64, torque: &[f64], rate: &[f64], (from, to): (f64, f64)) -> Option<Self> {
         let count = torque.len();
         let bin = 1.0 / (step * count as f64);
@@ -73,9 +74,9 @@ impl Rational {
         misfit.is_finite().then_some(Rational { unit, coefficients, misfit, spread })
     }
 
-    /// Returns the relative standard deviation of the response on a grid of frequencies (Hz), and
-    /// those of its antiresonance and resonance. Each column of the covariance's root moves the
-    /// coefficients.
+    /// Returns the relative standard deviation of the response at `frequencies` (Hz), and the standard
+    /// deviations of its antiresonance and resonance. They follow from the response's changes when each
+    /// column of the covariance's root is added to the coefficients.
     pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
         let nominal = self.frequency_response(frequencies);
         let found = Features::of(&nominal);
@@ -103,7 +104,6 @@ impl Rational {
         (squares.into_iter().map(f64::sqrt).collect(), Deviations { f_res, f_dip })
     }
 
-    /// Returns the response on a grid of frequencies, Hz.
     pub fn frequency_response(&self, frequencies: &[f64]) -> FrequencyResponse {
         self.response(self.coefficients, frequencies)
     }
@@ -115,14 +115,14 @@ impl Rational {
     }
 }
 
-/// Solves least squares of nine unknowns. Also returns the root mean square residual, and a root of the covariance of
-/// the first and the last three unknowns.
+/// Solves least squares for nine unknowns. Also returns the root mean square residual, and a root of the
+/// covariance of the first and the last three unknowns.
 fn solved(mut a: DMatrix<f64>, b: DVector<f64>) -> Option<(DVector<f64>, (f64, Spread))> {
     let sizes = DVector::from_iterator(9, a.column_iter().map(|column| column.norm().max(1e-300)));
     for (mut column, size) in a.column_iter_mut().zip(&sizes) {
         column /= *size;
     }
-    // Householder: the normal equations would lose half of the digits
+    // Householder's method, because the normal equations would lose half of the digits.
     let qr = a.clone().qr();
     let x = qr.r().solve_upper_triangular(&(qr.q().transpose() * &b))?;
     let rows = b.len() as f64;

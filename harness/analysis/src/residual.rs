@@ -8,24 +8,21 @@ use crate::{FrequencyResponse, statistics};
 /// A transfer function fitted to a run, and its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelFit {
-    /// Three poles, two zeros.
     pub model: TransferFunction,
-    /// Fit in the frequency domain, %.
     pub fit_frequency: f64,
-    /// Fit in the time domain, %.
     pub fit_time: f64,
-    /// Mean coherence of residual and torque between antiresonance and resonance, if both exist.
+    /// Mean coherence of residual and torque between antiresonance and resonance; `None` if one of them is
+    /// missing.
     pub coherence: Option<f64>,
-    /// Skewness of the residual.
     pub skewness: f64,
-    /// Kurtosis of the residual; a Gaussian has 3.
+    /// Kurtosis of the residual; it is 3 for Gaussian noise.
     pub kurtosis: f64,
 }
 
 impl ModelFit {
-    /// Fits the model to the measured response and simulates it with the run's own torque. Signals
-    /// are sampled every `step` s. Returns `None` without a response, otherwise also the spectra of
-    /// torque and residual, in segments of `segment` s.
+    /// Fits the model to the measured response and simulates it with the run's own torque. Signals are
+    /// sampled every `step` s. Returns the fit together with the spectra of torque and residual in segments
+    /// of `segment` s, or `None` without a response.
     pub fn of(
         step: f64,
         segment: f64,
@@ -58,8 +55,8 @@ impl ModelFit {
     }
 }
 
-/// Returns skewness and kurtosis of a signal: the means of z³ and z⁴, z the signal minus its mean
-/// over its standard deviation. A Gaussian has 0 and 3.
+/// Returns skewness and kurtosis of a signal: the means of z³ and z⁴, where z is the signal minus its mean,
+/// divided by its standard deviation. They are 0 and 3 for Gaussian noise.
 pub fn skewness_and_kurtosis(signal: &[f64]) -> (f64, f64) {
     let count = signal.len() as f64;
     let mean = statistics::mean(signal);

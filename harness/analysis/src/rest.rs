@@ -9,9 +9,8 @@ use crate::statistics::{deviation, mean, variance};
 
 /// Number of quantiles compared.
 const QUANTILES: usize = 200;
-/// Largest number of chunks.
 const CHUNKS: usize = 1000;
-/// Largest number of bins of the histogram on either side of 0, and their usual width in standard deviations.
+/// Largest magnitude in the histogram, and the usual width of its bins, in standard deviations.
 const BINS: (f64, f64) = (5.0, 0.1);
 /// Limit of [`Chunk::kolmogorov`] that normal noise exceeds with a probability of 5 % (Stephens, J. Am. Stat. Assoc. 69, 1974, table 1A,
 /// case 3: mean and variance estimated).
@@ -20,37 +19,36 @@ pub const KOLMOGOROV: f64 = 0.895;
 /// Statistics of a record at rest.
 #[derive(Clone, Debug)]
 pub struct Rest {
-    /// Time between samples, s.
     pub step: f64,
-    /// Number of samples.
     pub count: usize,
-    /// Mean, rad/s: the bias.
+    /// Mean, rad/s, which is the gyro's bias.
     pub mean: f64,
-    /// Slope of the best-fitting line, rad/s².
+    /// Slope of the line that fits best, rad/s².
     pub trend: f64,
-    /// Standard deviation of the samples without that line, rad/s, …
+    /// Standard deviation of the samples after subtraction of this line, rad/s.
     pub deviation: f64,
-    /// … skewness and excess kurtosis; 0 of a normal distribution.
+    /// Skewness of the samples after subtraction of the line; 0 for a normal distribution.
     pub skewness: f64,
-    /// See `skewness`.
+    /// Excess kurtosis of the samples after subtraction of the line; 0 for a normal distribution.
     pub kurtosis: f64,
-    /// Smallest change of the reading, rad/s: its quantisation.
+    /// Smallest change of the reading, rad/s, which is its quantisation.
     pub quantum: f64,
-    /// Density of the samples without the line over their standard deviation: middle of the bin and density.
+    /// Histogram of the samples without the line, divided by their standard deviation: centre of the bin, and
+    /// density.
     pub histogram: Vec<(f64, f64)>,
     /// Allan variances of the samples, (rad/s)².
     pub allan: Vec<Point>,
-    /// The noise that fits them ([`Octaves::describe`]).
+    /// The noise that was fitted to the Allan variances ([`Octaves::describe`]).
     pub noise: Option<Fit>,
-    /// Standard normal quantile and that of the samples without the line over their standard deviation.
+    /// Pairs of a standard normal quantile and the same quantile of the samples without the line, divided by
+    /// their standard deviation.
     pub quantiles: Vec<(f64, f64)>,
-    /// Autocorrelation of the samples without the line, at 0, 1, … steps.
+    /// Autocorrelation of the samples without the line, at lags of 0, 1, … steps.
     pub autocorrelation: Vec<f64>,
     /// Consecutive chunks.
     pub chunks: Vec<Chunk>,
 }
 
-/// A part of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chunk {
     /// Beginning of the chunk, s.
@@ -59,16 +57,17 @@ pub struct Chunk {
     pub mean: f64,
     /// Variance of the samples without the record's line, (rad/s)².
     pub variance: f64,
-    /// Kolmogorov and Smirnov's distance of the readings from the normal distribution of their mean and variance, times
-    /// √n − 0.01 + 0.85/√n (Stephens). Quantisation alone makes it Δ √n/(2σ√(2π)).
+    /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and variance,
+    /// multiplied by √n − 0.01 + 0.85/√n (Stephens). Quantisation alone makes it Δ √n/(2σ√(2π)).
     pub kolmogorov: f64,
-    /// The same distance between the levels of the readings, where quantisation has no effect; the variance is without the
-    /// quantisation's Δ²/12 (Sheppard).
+    /// The distance evaluated only between the levels of the readings, where quantisation has no effect. The
+    /// variance is reduced by that of the quantisation, Δ²/12 (Sheppard).
     pub between_levels: f64,
 }
 
 impl Rest {
-    /// Analyses samples `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to `lag` (s).
+    /// Analyses samples `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to the lag
+    /// `lag` (s).
     pub fn of(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
         let n = samples.len() as f64;
         let middle = (n - 1.0) / 2.0;
@@ -127,33 +126,36 @@ impl Rest {
         }
     }
 
-    /// Returns the ratio of the variance of the samples to that of their quantisation, Δ²/12; infinite without quantisation.
+    /// Returns the ratio of the samples' variance to the variance of their quantisation, Δ²/12; infinite
+    /// without quantisation.
     pub fn quantisation_ratio(&self) -> f64 {
         12.0 * (self.deviation / self.quantum).powi(2)
     }
 
-    /// Returns how many chunks are not normal by [`KOLMOGOROV`], as they were read and between the levels.
+    /// Returns how many chunks exceed [`KOLMOGOROV`], by the distance at the readings and by the distance
+    /// between their levels.
     pub fn not_normal(&self) -> [usize; 2] {
         let count =
             |of: fn(&Chunk) -> f64| self.chunks.iter().filter(|c| of(c) > KOLMOGOROV).count();
         [count(|chunk| chunk.kolmogorov), count(|chunk| chunk.between_levels)]
     }
 
-    /// Returns half of the 95 % interval of the autocorrelation of white noise, 1.96/√n.
+    /// Returns half of the 95 % interval of white noise's autocorrelation, 1.96/√n.
     pub fn white_bound(&self) -> f64 {
         1.96 / (self.count as f64).sqrt()
     }
 
-    /// Returns the share of the autocorrelation, beyond lag 0, outside the interval of white noise; 0.05 for white
-    /// noise.
+    /// Returns the fraction of the autocorrelation, without lag 0, outside the 95 % interval of white noise.
+    /// It is 0.05 for white noise.
     pub fn outside(&self) -> f64 {
         let rest = &self.autocorrelation[1..];
         let out = rest.iter().filter(|r| r.abs() > self.white_bound()).count();
         out as f64 / rest.len().max(1) as f64
     }
 
-    /// Returns the scatter of the chunks' means relative to white noise of the record's standard deviation, and of
-    /// their variances relative to normal noise (√(2/n) of the variance). Both are 1 for white, stationary noise.
+    /// Returns two ratios for chunks of `chunk` samples: the scatter of their means relative to white noise
+    /// with the record's standard deviation, and the scatter of their variances relative to normal noise
+    /// (√(2/n) of the variance). Both are 1 for white, stationary noise.
     pub fn scatter(&self, chunk: usize) -> [f64; 2] {
         let means: Vec<f64> = self.chunks.iter().map(|chunk| chunk.mean).collect();
         let variances: Vec<f64> = self.chunks.iter().map(|chunk| chunk.variance).collect();
@@ -170,7 +172,8 @@ impl Rest {
     }
 }
 
-/// Returns the autocorrelation of a zero-mean signal at 0 to `lags` steps, Σ x_k x_{k+m} / Σ x²; 0 of a signal that is zero.
+/// Returns the autocorrelation of a zero-mean signal at lags of 0 to `lags` steps, Σ x_k x_{k+m} / Σ x². It
+/// is 0 for a signal of zeros.
 pub fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     let lags = lags.clamp(1, signal.len() - 1);
     let length = (signal.len() + lags + 1).next_power_of_two();
@@ -190,12 +193,12 @@ fn normal(x: f64) -> f64 {
     0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
 }
 
-/// Returns Stephens's modification of a distance of n samples.
+/// Returns Stephens's modification of the distance for `n` samples.
 fn modified(distance: f64, n: f64) -> f64 {
     distance * (n.sqrt() - 0.01 + 0.85 / n.sqrt())
 }
 
-/// See [`Chunk::kolmogorov`].
+/// Computes [`Chunk::kolmogorov`] from samples.
 fn kolmogorov(samples: &[f64]) -> f64 {
     let mut sorted = samples.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -207,7 +210,7 @@ fn kolmogorov(samples: &[f64]) -> f64 {
     modified(distance.fold(0.0, f64::max), n)
 }
 
-/// See [`Chunk::between_levels`].
+/// Computes [`Chunk::between_levels`] from samples with the quantisation `quantum`.
 fn between_levels(samples: &[f64], quantum: f64) -> f64 {
     let mut sorted = samples.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -220,7 +223,7 @@ fn between_levels(samples: &[f64], quantum: f64) -> f64 {
     modified(distance.fold(0.0, f64::max), n)
 }
 
-/// See [`Rest::histogram`]; bins are as wide as whole levels if these are coarse.
+/// Computes [`Rest::histogram`] from sorted samples. Bins contain whole levels if the quantisation is coarse.
 fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
     let (most, usual) = BINS;
     let step = quantum / sigma;
@@ -236,13 +239,14 @@ fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Returns the value below which a standard normal variable lies with this probability, by Newton's method on erfc.
+/// Returns the quantile of the standard normal distribution for the probability `part`, by Newton's method on
+/// erfc.
 pub fn normal_quantile(part: f64) -> f64 {
     let mut x = 0.0;
     for _ in 0..60 {
         let error = normal(x) - part;
         let density = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
-        // steps of at most one standard deviation, because the tangent is flat far out
+        // Steps of at most one standard deviation, because the tangent is flat far from the centre.
         let by = (error / density).clamp(-1.0, 1.0);
         x -= by;
         if by.abs() < 1e-14 {

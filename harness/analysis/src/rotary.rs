@@ -11,14 +11,14 @@
 
 use crate::{Complex64, FrequencyResponse};
 
-/// Swirl number above which motion counts as rotary: an ellipse with axes 1 : 3.7.
+/// Swirl number above which motion counts as rotary; this is an ellipse with axes 1 : 3.7.
 pub const ROTARY: f64 = 0.5;
 
-/// Smallest amplitude that counts, rad. Below it the small radial part of a planar wave makes the
+/// Smallest amplitude that is evaluated, rad. Below it the small radial part of a planar wave would make the
 /// swirl number meaningless.
 pub const LEAST: f64 = 0.02;
 
-/// Length of the windows of time, in slosh periods.
+/// Length of the time windows, in slosh periods.
 const PERIODS: f64 = 10.0;
 
 /// Rotary motion in a run.
@@ -34,7 +34,7 @@ pub struct Rotary {
     pub swirl: f64,
 }
 
-/// Returns the swirl number at each frequency, 0 where the motion is too small.
+/// Returns the swirl number at each frequency, or 0 where the amplitude at this torque (N·m) is too small.
 pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque: f64) -> Vec<f64> {
     let number = |(x, y): (&Complex64, &Complex64)| {
         let power = x.norm_sqr() + y.norm_sqr();
@@ -44,10 +44,10 @@ pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque:
 }
 
 impl Rotary {
-    /// Evaluates the swirl numbers at the frequencies (Hz) that a sweep passes at these times (s).
+    /// Summarises the swirl numbers at the frequencies (Hz) that a sweep passes at these times (s).
     pub fn of(frequency: &[f64], time: &[f64], swirl: &[f64]) -> Self {
         let turning: Vec<usize> = (0..swirl.len()).filter(|&i| swirl[i].abs() > ROTARY).collect();
-        // each point represents the time half-way to its neighbours
+        // Each point represents the time up to half-way to its neighbours.
         let share = |i: usize| {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(time.len() - 1));
             (time[after] - time[before]).abs() / 2.0
@@ -60,8 +60,9 @@ impl Rotary {
         }
     }
 
-    /// Evaluates slosh angles (rad) at equal steps (s) of a liquid with this frequency (Hz), without knowledge of the torque.
-    /// In a window with the position q and the velocity v the swirl number is Σ q × v / √(Σ q² Σ v²).
+    /// Evaluates slosh angles (rad) at equal steps (s) of a liquid with this natural frequency (Hz), for any
+    /// torque. In a window with the positions q and the velocities v the swirl number is Σ q × v / √(Σ q² Σ
+    /// v²).
     pub fn in_time(step: f64, frequency: f64, radial: &[f64], tangential: &[f64]) -> Self {
         let length = (PERIODS / frequency / step).ceil() as usize;
         let window = |(x, y): (&[f64], &[f64])| {
@@ -72,7 +73,7 @@ impl Rotary {
                 position += x[1] * x[1] + y[1] * y[1];
                 velocity += vx * vx + vy * vy;
             }
-            // an ellipse with the semi-axes a and b has the mean square (a² + b²)/2
+            // An ellipse with semi-axes a and b has the mean square (a² + b²)/2.
             let amplitude = (2.0 * position / (x.len() - 2) as f64).sqrt();
             if amplitude < LEAST { 0.0 } else { turned / (position * velocity).sqrt() }
         };
@@ -88,7 +89,7 @@ impl Rotary {
     }
 }
 
-/// Returns the number with the largest magnitude.
+/// Returns the swirl number with the largest magnitude.
 fn largest(swirl: &[f64]) -> f64 {
     swirl.iter().fold(0.0, |m: f64, s| if s.abs() > m.abs() { *s } else { m })
 }

@@ -12,30 +12,27 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Complex64;
 
-/// Spectra at one frequency.
+/// Spectra at one frequency: s = jω in a unit near the middle of the lines (for the condition of the
+/// equations), U and Y.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// jω, in a unit near the middle of the lines, for the condition of the equations.
     pub s: Complex64,
-    /// U.
     pub input: Complex64,
-    /// Y.
     pub output: Complex64,
-    /// Divisor of the equation.
+    /// Divisor that weights the equation.
     pub scale: f64,
 }
 
-/// B/A; s in the unit of the lines.
+/// Coefficients of B/A, with s in the unit of the lines. The numerator is b2, b1, b0.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients {
-    /// b2, b1, b0.
     pub numerator: [f64; 3],
-    /// a2, a1, a0; s³ has 1.
+    /// a2, a1, a0; the coefficient of s³ is 1.
     pub denominator: [f64; 3],
 }
 
 impl Coefficients {
-    /// B(s)/A(s).
+    /// Evaluates B(s)/A(s).
     pub fn response(&self, s: Complex64) -> Complex64 {
         let [b2, b1, b0] = self.numerator;
         (b2 * s * s + b1 * s + b0) / self.denominator_at(s)
@@ -47,15 +44,16 @@ impl Coefficients {
     }
 }
 
-/// Fits spectra in `rounds` iterations, with T if `transient`. Returns the result of `solve` for
-/// the last equations and their least-squares solution; `None` without data.
+/// Fits spectra in `rounds` iterations, with the leakage T if `transient`. `solve` solves the last equations
+/// by least squares and may return further results, which are returned together with the coefficients.
+/// Returns `None` without data.
 pub fn fit<S>(
     lines: &[Line],
     transient: bool,
     rounds: usize,
     solve: impl Fn(DMatrix<f64>, DVector<f64>) -> Option<(DVector<f64>, S)>,
 ) -> Option<(Coefficients, S)> {
-    // B, T and A
+    // Unknowns of B, T and A.
     let unknowns = if transient { 9 } else { 6 };
     let rows = 2 * lines.len();
     if rows < 2 * unknowns {

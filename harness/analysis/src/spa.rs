@@ -14,21 +14,18 @@ use crate::{Complex64, FrequencyResponse, statistics};
 /// of the antiresonance, whose half-power width is 14 mHz.
 pub const LAG: f64 = 200.0;
 
-/// A frequency response with the data for its uncertainty.
+/// A frequency response with the data from which its uncertainty follows.
 pub struct Estimate {
-    /// Output over input.
     pub response: FrequencyResponse,
     /// Two-sided power spectral density of the input at the response's frequencies, its unit
     /// squared times s.
     pub input: Vec<f64>,
-    /// Longest lag, s.
     lag: f64,
-    /// Length of the record, s.
     duration: f64,
 }
 
 impl Estimate {
-    /// Estimates from input and output; arguments as for [`frequency_response`].
+    /// Estimates the response and its uncertainty; the arguments are those of [`frequency_response`].
     pub fn of(step: f64, input: &[f64], output: &[f64], frequencies: &[f64], lag: f64) -> Estimate {
         let (response, power) = estimate(step, input, output, frequencies, lag);
         let duration = step * input.len() as f64;
@@ -55,8 +52,9 @@ impl Estimate {
         each.map(|((h, v), u)| (v / (2.0 * average * h.norm_sqr() * u)).sqrt()).collect()
     }
 
-    /// Returns the rate at which the error changes along the frequency, relative to the error, 1/Hz: 2π times the root
-    /// mean square of the lag under the squared window, (1/2 − 15/(4π²)) 2/3 M² for Hann's.
+    /// Returns the rate of change of the error along the frequency, relative to the error, 1/Hz: 2π times the
+    /// root mean square of the lag under the squared window, which is (1/2 − 15/(4π²)) 2/3 M² for Hann's
+    /// window.
     pub fn slope(&self) -> f64 {
         let pi = std::f64::consts::PI;
         2.0 * pi * self.lag * ((0.5 - 3.75 / (pi * pi)) * 2.0 / 3.0).sqrt()
@@ -85,7 +83,7 @@ fn estimate(
     lag: f64,
 ) -> (Vec<Complex64>, Vec<f64>) {
     let lags = ((lag / step).round() as usize).min(input.len() - 1);
-    // zeros after the record, so that covariances up to `lags` do not wrap around
+    // Zeros after the record, so that covariances up to `lags` do not wrap around.
     let length = (input.len() + lags).next_power_of_two();
     let (forward, inverse) = (Forward::new(length), Inverse::new(length));
 
@@ -95,8 +93,8 @@ fn estimate(
         padded.resize(length, 0.0);
         forward.of(padded)
     };
-    // sum and difference of the covariances at +k and -k steps under the Hann lag window, the
-    // factors of cosine and sine; at 0 there is only one covariance
+    // Sum and difference of the covariances at +k and −k steps, multiplied by the Hann lag window: these are
+    // the factors of cosine and sine. At 0 there is only one covariance.
     let tapered = |cross: Vec<Complex64>| -> Vec<(f64, f64)> {
         let covariance = inverse.of(cross);
         let weight = |k: usize| (1.0 + (std::f64::consts::PI * k as f64 / lags as f64).cos()) / 2.0;
@@ -122,7 +120,7 @@ fn estimate(
         }
         transformed(&lags, angles).into_iter().take(chunk.len())
     });
-    // the transforms are not normalised
+    // The transforms are not normalised.
     let unit = step / (length as f64 * input.len() as f64);
     response.map(|(h, power)| (h, power * unit)).unzip()
 }
@@ -131,8 +129,9 @@ fn estimate(
 /// sums keep the processor busy and are six times as fast.
 const TOGETHER: usize = 16;
 
-/// Returns Σ even cos kφ + j odd sin kφ over Σ auto cos kφ, and the latter, at each angle φ per lag, rad. The sums use
-/// the exact frequencies, because interpolation between a transform's bins misses deep antiresonances.
+/// Returns Σ even cos kφ + j odd sin kφ divided by Σ auto cos kφ, and the latter sum, for each angle φ per
+/// lag, rad. The sums use the exact frequencies, because interpolation between the bins of a transform misses
+/// deep antiresonances.
 fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64); TOGETHER] {
     let turn = angles.map(Complex64::cis);
     let (turn_re, turn_im) = (turn.map(|t| t.re), turn.map(|t| t.im));

@@ -1,28 +1,25 @@
-//! Statistics of a signal's values.
-
-/// Arithmetic mean.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Returns the values minus their arithmetic mean.
+/// Subtracts the arithmetic mean from the values.
 pub fn about_mean(values: &[f64]) -> Vec<f64> {
     let mean = mean(values);
     values.iter().map(|v| v - mean).collect()
 }
 
-/// Mean square about the mean.
+/// Returns the mean square about the mean.
 pub fn variance(values: &[f64]) -> f64 {
     let mean = mean(values);
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
 }
 
-/// Root mean square about the mean.
+/// Returns the root mean square about the mean.
 pub fn deviation(values: &[f64]) -> f64 {
     variance(values).sqrt()
 }
 
-/// Coefficient of correlation, −1 to 1.
+/// Returns the correlation coefficient, −1 to 1; NaN if a signal is constant.
 pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (mean_a, mean_b) = (mean(a), mean(b));
     let product: f64 = a.iter().zip(b).map(|(x, y)| (x - mean_a) * (y - mean_b)).sum();
@@ -34,14 +31,14 @@ pub fn peak(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()))
 }
 
-/// Returns the value below which this part of the values lies; `None` without values.
+/// Returns the value below which the fraction `part` of the values lies; `None` without values.
 pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get((sorted.len() as f64 * part) as usize).copied()
 }
 
-/// Returns the middle value, for an even number the upper of two; `None` without values.
+/// Returns the median; for an even number of values the upper of the two middle ones. `None` without values.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
@@ -54,7 +51,7 @@ pub fn noise_level(signal: &[f64]) -> f64 {
     let steps = signal.windows(2).map(|y| (y[1] - y[0]).abs()).filter(|step| *step > 0.0);
     let smallest = steps.fold(f64::INFINITY, f64::min);
     let rounding = if smallest.is_finite() { smallest / 12f64.sqrt() } else { 0.0 };
-    // the median of χ² with one degree of freedom is 0.4549; variance of third differences 20 σ²
+    // The median of χ² with one degree of freedom is 0.4549; third differences have the variance 20 σ².
     let white = median(&squares).map_or(0.0, |s| (s / 0.4549 / 20.0).sqrt());
     white.max(rounding)
 }

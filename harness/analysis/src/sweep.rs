@@ -1,21 +1,17 @@
-//! A sine sweep with known phase, along which estimates are made.
+//! A sine sweep, whose phase is known exactly.
 
 use std::f64::consts::TAU;
 
 use crate::BAND;
 
-/// A sin φ(t), with a frequency φ'/2π from f0 to f1, upwards or downwards.
+/// Torque A sin φ(t) whose frequency φ'/2π goes from f0 to f1, upwards or downwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// A, N·m.
     pub amplitude: f64,
-    /// Frequency at the start, Hz.
     pub f0: f64,
-    /// Frequency at the end, Hz.
     pub f1: f64,
-    /// T, s.
+    /// Duration T, s.
     pub duration: f64,
-    /// Law of the frequency over time.
     pub law: Law,
 }
 
@@ -29,16 +25,16 @@ pub enum Law {
 }
 
 impl Sweep {
-    /// The thesis's (its chapter 5), 0.1 N·m.
+    /// The sweep of Rubaga's thesis (chapter 5) at 0.1 N·m.
     pub const THESIS: Sweep =
         Sweep { amplitude: 0.1, f0: BAND.0, f1: BAND.1, duration: 2700.0, law: Law::Exponential };
 
-    /// Torque at `t`, N·m.
+    /// Returns the torque at `t` (s), N·m.
     pub fn torque(&self, t: f64) -> f64 {
         self.amplitude * self.phase(t).sin()
     }
 
-    /// Phase φ(t), rad: 2π f0 (e^{at} − 1)/a, or 2π (f0 t + s t²/2).
+    /// Returns the phase φ(t), rad: 2π f0 (e^{at} − 1)/a, or 2π (f0 t + s t²/2).
     pub fn phase(&self, t: f64) -> f64 {
         let Sweep { f0, f1, duration, .. } = *self;
         match self.law {
@@ -59,7 +55,7 @@ impl Sweep {
         }
     }
 
-    /// Returns the time at which the sweep passes `frequency` (Hz), s; `None` if it does not.
+    /// Returns the time at which the sweep passes `frequency` (Hz), s, or `None` if it does not pass it.
     pub fn time_of(&self, frequency: f64) -> Option<f64> {
         let Sweep { f0, f1, duration, .. } = *self;
         let t = match self.law {
@@ -78,8 +74,8 @@ impl Sweep {
         }
     }
 
-    /// Returns the lowest and highest frequency, Hz. For a sweep that begins at 0 Hz the lowest is that at the end of
-    /// its first cycle, √(2 f1/T).
+    /// Returns the lowest and the highest frequency, Hz. For a sweep that begins at 0 Hz the lowest is the
+    /// frequency at the end of its first cycle, √(2 f1/T).
     pub fn band(&self) -> (f64, f64) {
         if self.f0 == 0.0 {
             return ((2.0 * self.f1 / self.duration).sqrt().min(self.f1), self.f1);

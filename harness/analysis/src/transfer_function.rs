@@ -24,13 +24,12 @@ use crate::{Complex64, FrequencyResponse};
 /// A transfer function with three stable poles and two zeros; s in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TransferFunction {
-    /// b2, b1, b0.
     pub numerator: [f64; 3],
-    /// The real pole's rate p, 1/s.
+    /// Rate p of the real pole, 1/s.
     pub real_pole: f64,
-    /// Frequency ω of the other two poles, rad/s.
+    /// Natural frequency ω of the pole pair, rad/s.
     pub pole_omega: f64,
-    /// Their damping ratio.
+    /// Damping ratio ζ of the pole pair.
     pub pole_damping: f64,
 }
 
@@ -47,18 +46,18 @@ impl TransferFunction {
         (b0 / b2 > 0.0).then(|| b1 / b2 / (2.0 * (b0 / b2).sqrt()))
     }
 
-    /// a2, a1, a0 of the denominator s³ + a2 s² + a1 s + a0.
+    /// Returns a2, a1, a0 of the denominator s³ + a2 s² + a1 s + a0.
     pub fn denominator(&self) -> [f64; 3] {
         let (p, w, z) = (self.real_pole, self.pole_omega, self.pole_damping);
         [p + 2.0 * z * w, w * w + 2.0 * z * w * p, w * w * p]
     }
 
-    /// Frequency of the pair of poles, Hz.
+    /// Returns the natural frequency of the pole pair, Hz.
     pub fn pole_frequency(&self) -> f64 {
         self.pole_omega / TAU
     }
 
-    /// H at a frequency in Hz.
+    /// Evaluates H at a frequency, Hz.
     pub fn response(&self, frequency: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency);
         let [b2, b1, b0] = self.numerator;
@@ -70,7 +69,8 @@ impl TransferFunction {
         s * s + 2.0 * self.pole_damping * w * s + w * w
     }
 
-    /// Fits a measured response; `None` without data.
+    /// Fits the transfer function to a measured response from two starts and returns the better fit. Returns
+    /// `None` without data.
     pub fn fit(measured: &FrequencyResponse) -> Option<Self> {
         let starts = [by_sanathanan_koerner(measured), at_the_resonance(measured)];
         let fitted = starts.into_iter().flatten().filter_map(|start| {
@@ -79,12 +79,13 @@ impl TransferFunction {
             let (cost, fitted) = (report.objective_function, problem.model);
             (cost.is_finite() && fitted.pole_omega.is_finite()).then_some((cost, fitted))
         });
-        // of two equally good fits the first, independent of rounding
+        // Of two equally good fits the first one is kept, so that the choice does not depend on rounding.
         let best = fitted.reduce(|a, b| if b.0 < 0.999 * a.0 { b } else { a });
         best.map(|(_, fitted)| fitted)
     }
 
-    /// Fit_freq, %: 100 (1 − |H_meas − H_mod| / |H_meas − mean H_meas|) (thesis 6.15).
+    /// Returns the fit in the frequency domain, %: 100 (1 − |H_meas − H_mod| / |H_meas − mean H_meas|)
+    /// (thesis 6.15).
     pub fn fit_frequency(&self, measured: &FrequencyResponse) -> f64 {
         let count = measured.response.len() as f64;
         let mean = measured.response.iter().sum::<Complex64>() / count;
@@ -96,8 +97,8 @@ impl TransferFunction {
         100.0 * (1.0 - (miss / spread).sqrt())
     }
 
-    /// Simulates the response to an input that is linear between samples `step` s apart, from rest,
-    /// exactly, by the matrix exponential of the state and the input's value and slope.
+    /// Simulates the response from rest to an input that is linear between samples `step` s apart. The result
+    /// is exact, because it uses the matrix exponential of the state and the input's value and slope.
     pub fn simulate(&self, step: f64, input: &[f64]) -> Vec<f64> {
         let (p, w, z) = (self.real_pole, self.pole_omega, self.pole_damping);
         let [b2, b1, b0] = self.numerator;
@@ -122,18 +123,18 @@ impl TransferFunction {
         answer
     }
 
-    /// Free response of the model from the initial state that comes closest (least squares)
+    /// Returns the free response of the model from the initial state for which it is closest (least squares)
     /// to a signal sampled every `step` s.
     ///
-    /// The measured band says little of the real pole: it may be fitted as slow as a minute or an
-    /// hour. From rest the torque's first half cycle would then leave an offset that the model
-    /// keeps all the time and the hub loses in seconds. MATLAB's `compare` estimates the initial
-    /// state for the same reason.
+    /// The initial state is needed because the measured band hardly determines the real pole, whose time
+    /// constant may be fitted as a minute or an hour. From rest the torque's first half cycle would then
+    /// leave an offset that the model keeps for the whole record, whereas the hub loses it in seconds.
+    /// MATLAB's `compare` estimates the initial state for the same reason.
     pub fn free_answer(&self, step: f64, signal: &[f64]) -> Vec<f64> {
         let decay = self.pole_damping * self.pole_omega;
         let turn = self.pole_omega * (1.0 - self.pole_damping.powi(2)).max(0.0).sqrt();
-        // from sample to sample an answer decays and turns by the same factor; over a million of
-        // them that is exact to 1e-10, and costs a tenth of asking for each
+        // From sample to sample the response decays and rotates by the same factor. Over a million samples
+        // this recurrence is exact to 1e-10, and it takes a tenth of the time.
         let (slower, turned) = (
             (-self.real_pole * step).exp(),
             Complex64::from_polar((-decay * step).exp(), turn * step),
@@ -141,8 +142,8 @@ impl TransferFunction {
         let answers = || {
             let (mut slow, mut pair) = (1.0, Complex64::ONE);
             (0..signal.len()).map(move |k| {
-                // the pair's second answer is t e^(-decay t) where it is not oscillating; a pair of
-                // real poles is taken as that
+                // If the pair does not oscillate, its second response is t e^(−decay t); a pair of real
+                // poles is treated in the same way.
                 let second = if turn > 0.0 { pair.im } else { k as f64 * step * pair.re };
                 let row = Vector3::new(slow, pair.re, second);
                 slow *= slower;
@@ -161,7 +162,7 @@ impl TransferFunction {
     }
 }
 
-/// Fit_time, %: 100 (1 − |y − ŷ| / |y − mean y|) (thesis 6.14).
+/// Returns the fit in the time domain, %: 100 (1 − |y − ŷ| / |y − mean y|) (thesis 6.14).
 pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     let mean = mean(measured);
     let miss: f64 = measured.iter().zip(model).map(|(y, m)| (y - m).powi(2)).sum();
@@ -169,8 +170,8 @@ pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     100.0 * (1.0 - (miss / spread).sqrt())
 }
 
-/// Poles at the measured resonance, lightly damped, and the zeros that fit best with them: a start
-/// where the other one's weights hide a narrow resonance.
+/// Returns a start with lightly damped poles at the measured resonance and the zeros that fit best with them.
+/// It is needed because the weights of the other start may hide a narrow resonance.
 fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let pole_omega = TAU * Features::of(measured).f_res?;
     let (real_pole, pole_damping) = (0.01 * pole_omega, 0.01);
@@ -193,10 +194,10 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     Some(TransferFunction { numerator, ..start })
 }
 
-/// Rounds of the iteration for the start.
+/// Number of iterations for the start.
 const ROUNDS: usize = 30;
 
-/// The iteration on U = 1, Y = H.
+/// Returns a start from Sanathanan and Koerner's iteration with U = 1 and Y = H.
 fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let count = measured.frequency.len();
     let middle = TAU * measured.frequency.get(count / 2)?;
@@ -209,13 +210,13 @@ fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunctio
             scale: 1.0,
         })
         .collect();
-    // a response may leave coefficients open: the smallest that do
+    // If the response does not determine all coefficients, those of smallest norm are taken.
     let solve =
         |a: DMatrix<f64>, b: DVector<f64>| Some((least_squares::smallest(a, &b, 1e-14)?, ()));
     let (Coefficients { numerator: [b2, b1, b0], denominator }, ()) =
         sanathanan_koerner::fit(&lines, false, ROUNDS, solve)?;
     let (p, w, z) = stable_poles(denominator)?;
-    // Back to rad/s; the numerator has the unit of H times s.
+    // Converted back to rad/s; the numerator has the unit of H times s.
     Some(TransferFunction {
         numerator: [b2 * middle, b1 * middle.powi(2), b0 * middle.powi(3)],
         real_pole: p * middle,
@@ -224,10 +225,11 @@ fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunctio
     })
 }
 
-/// Real pole, frequency and damping of s³ + c2 s² + c1 s + c0, unstable poles mirrored.
+/// Returns real pole, frequency and damping of s³ + c2 s² + c1 s + c0; unstable poles are mirrored to the
+/// left half plane.
 fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     let cubic = |s: f64| ((s + c2) * s + c1) * s + c0;
-    // One real root lies within Cauchy's bound: bisection on the sign change.
+    // One real root lies within Cauchy's bound; it is found by bisection.
     let bound = 1.0 + c2.abs().max(c1.abs()).max(c0.abs());
     let (mut low, mut high) = (-bound, bound);
     for _ in 0..200 {
@@ -243,7 +245,8 @@ fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     (root.is_finite() && w.is_finite()).then_some((root.abs().max(least), w, damping))
 }
 
-/// Parameters: b2, b1, b0 in units of `unit` = the start's ω, then ln p, ln ω, ln ζ.
+/// The search: its variables are b2, b1, b0 in units of `unit`, which is the ω of the start, then ln p, ln ω,
+/// ln ζ.
 struct Problem<'a> {
     measured: &'a FrequencyResponse,
     unit: f64,

@@ -1,31 +1,29 @@
-//! Welch's averaged spectra: Hamming windows, half overlapping, means taken off (thesis 6.3.3).
+//! Welch's averaged spectra: Hamming windows with half overlap and the means removed (thesis 6.3.3).
 //!
-//! The thesis does not say how long the segments are, and for a sweep everything hangs on that. A
-//! sweep is at one frequency only for a moment. If just one segment sees it pass there, nothing is
-//! averaged, and the coherence is 1 whatever the two signals are. The sweep stays within a
-//! segment's resolution 1/L for 1/(L · rate); half-overlapping segments follow each other by L/2:
-//! so 2/(rate · L²) of them see each frequency.
+//! The thesis does not state the length of the segments, which is decisive for a sweep: a sweep is at one
+//! frequency only for a moment, and if only one segment contains this moment, nothing is averaged, and the
+//! coherence is 1 for any two signals. The sweep stays within the resolution 1/L of a segment for 1/(L ·
+//! rate), and half-overlapping segments follow each other by L/2, so that 2/(rate · L²) segments contain each
+//! frequency.
 //!
-//! * for coherence [`SEGMENT`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then asks whether the
-//!   ratio of the two signals stays the same while the sweep passes 50 mHz.
-//! * [`RESPONSE`], a ninth of twice the record (MATLAB's choice when it is not told): 600 s of the
-//!   thesis's sweep, which resolves the antiresonance. For the H1 estimate, which needs no average
-//!   there, and for the signal-to-noise ratio: one segment has the sweep, the others the noise alone.
+//! * for coherence [`SEGMENT`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then shows whether
+//!   the ratio of the two signals stays the same while the sweep passes 50 mHz.
+//! * [`RESPONSE`], a ninth of twice the record (MATLAB's default): 600 s of the thesis's sweep, which resolves
+//!   the antiresonance. It is used for the H1 estimate, which needs no average there, and for the
+//!   signal-to-noise ratio: one segment contains the sweep, and the others only noise.
 
 use signals::fourier::Forward;
 
 use crate::{Complex64, FrequencyResponse, statistics};
 
-/// Segments of a record, as MATLAB's `mscohere`, `cpsd` and `tfestimate` take them when
-/// they are not told otherwise.
+/// Number of segments of a record, which is the default of MATLAB's `mscohere`, `cpsd` and `tfestimate`.
 pub const SEGMENTS: usize = 8;
 
-/// Choice of the segment length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segments {
-    /// Length in seconds, reduced if necessary to fit [`SEGMENTS`] of them.
+    /// Length in seconds; it is reduced if [`SEGMENTS`] of them do not fit into the record.
     Seconds(f64),
-    /// Longest length of which [`SEGMENTS`] fit.
+    /// The longest length of which [`SEGMENTS`] fit into the record.
     Longest,
 }
 
@@ -35,11 +33,11 @@ pub const SEGMENT: f64 = 20.0;
 /// Segments for the H1 estimate and the signal-to-noise ratio.
 pub const RESPONSE: Segments = Segments::Longest;
 
-/// Zeros are put behind each segment up to this many times its length, so that a band as narrow as
-/// that from antiresonance to resonance still holds several bins.
+/// Each segment is padded with zeros to this multiple of its length, so that several bins lie even between
+/// antiresonance and resonance.
 const PADDING: usize = 4;
 
-/// Averaged auto- and cross-spectra of two signals, in arbitrary but common units.
+/// Averaged auto- and cross-spectra of two signals, in an arbitrary common unit.
 pub struct Spectra {
     /// Distance of the bins, Hz.
     pub resolution: f64,
@@ -54,9 +52,9 @@ pub struct Spectra {
 }
 
 impl Spectra {
-    /// Estimate from two equally long signals sampled every `step` s.
+    /// Estimates the spectra of two signals of equal length, sampled every `step` s.
     pub fn of(step: f64, input: &[f64], output: &[f64], segments: Segments) -> Self {
-        // Half overlap: SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
+        // With half overlap SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
         let longest = (2 * input.len() / (SEGMENTS + 1)).max(2);
         let length = match segments {
             Segments::Seconds(seconds) => ((seconds / step).round() as usize).clamp(2, longest),
@@ -99,7 +97,7 @@ impl Spectra {
         all
     }
 
-    /// Magnitude-squared coherence |S_uy|² / (S_uu S_yy), 0 to 1, per bin.
+    /// Returns the magnitude-squared coherence |S_uy|² / (S_uu S_yy), 0 to 1, for each bin.
     pub fn coherence(&self) -> Vec<f64> {
         let at = |k: usize| {
             let power = self.input[k] * self.output[k];
@@ -108,7 +106,7 @@ impl Spectra {
         (0..self.cross.len()).map(at).collect()
     }
 
-    /// Mean coherence of the bins between two frequencies, Hz (thesis 6.17).
+    /// Returns the mean coherence of the bins between two frequencies, Hz (thesis 6.17).
     pub fn mean_coherence(&self, from: f64, to: f64) -> f64 {
         let (from, to) = (from.min(to), from.max(to));
         let first = (from / self.resolution).ceil() as usize;
@@ -117,24 +115,24 @@ impl Spectra {
         statistics::mean(band)
     }
 
-    /// Signal-to-noise ratio from the coherence γ²: 10 log10(γ²/(1 − γ²)), dB, per bin (thesis
-    /// 6.19).
+    /// Returns the signal-to-noise ratio 10 log10(γ²/(1 − γ²)), dB, for each bin from the coherence γ²
+    /// (thesis 6.19).
     pub fn snr_db(&self) -> Vec<f64> {
         self.coherence().into_iter().map(|c| 10.0 * (c / (1.0 - c)).log10()).collect()
     }
 
-    /// Value of the bin nearest to a frequency, Hz.
+    /// Returns the element of `values` in the bin nearest to a frequency, Hz.
     pub fn at(&self, values: &[f64], frequency: f64) -> f64 {
         values[((frequency / self.resolution).round() as usize).min(values.len() - 1)]
     }
 
-    /// Frequencies (Hz) and values of the bins within a band, Hz.
+    /// Returns frequencies (Hz) and values of the bins within a band, Hz.
     pub fn within(&self, (from, to): (f64, f64), values: &[f64]) -> Vec<(f64, f64)> {
         let bins = values.iter().enumerate().map(|(k, v)| (k as f64 * self.resolution, *v));
         bins.filter(|(f, _)| (from..=to).contains(f)).collect()
     }
 
-    /// The H1 estimate S_uy / S_uu within a band, Hz.
+    /// Returns the H1 estimate S_uy / S_uu within a band, Hz.
     pub fn h1(&self, (from, to): (f64, f64)) -> FrequencyResponse {
         let mut h1 = FrequencyResponse::default();
         for (k, cross) in self.cross.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Pictures of a gyro at rest: its Allan deviation, and the noise tests of a recording.
+//! Charts about a gyro at rest: its Allan deviation, and the noise tests of a recording.
 
 use analysis::allan::Point;
 use analysis::rest::{Chunk, KOLMOGOROV, Rest};
@@ -8,7 +8,7 @@ use maud::html;
 use crate::page::{document, drawn, table};
 use crate::svg::{Axis, Chart, Series, Style};
 
-/// The Allan deviations, as a file of its own.
+/// Draws the Allan deviations over the averaging time, as an SVG file.
 pub fn allan_deviations(gyro: &Characteristics) -> String {
     let curve = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
         gyro.points.iter().map(|point| (point.tau, of(point).sqrt())).collect()
@@ -53,17 +53,17 @@ fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Se
     Series { points, color: color.into(), style, title: title.into() }
 }
 
-/// The page about a recording at rest: these rows of text, and the charts.
+/// Returns the HTML page about a recording at rest, with `rows` as a table and the charts of [`rest_charts`].
 pub fn page(rows: &[(String, String)], found: &Rest) -> String {
     let body = html! {
         (table(["statistic", "value"], rows.iter().map(|(name, value)| vec![name.clone(), value.clone()])))
-        @for (_, chart) in rest(found) { (drawn(&chart)) }
+        @for (_, chart) in rest_charts(found) { (drawn(&chart)) }
     };
     document("Gyro at rest", &body)
 }
 
-/// The charts of a recording at rest, each with its file's name.
-pub fn rest(rest: &Rest) -> [(&'static str, Chart); 6] {
+/// Draws the charts of a recording at rest, each with its file name.
+pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
     let chart = |title: &str, x: Axis, y: Axis, series: Vec<Series>, legend: bool| Chart {
         title: title.into(),
         size: (640.0, 400.0),
@@ -72,7 +72,7 @@ pub fn rest(rest: &Rest) -> [(&'static str, Chart); 6] {
         series,
         legend,
     };
-    // the frame that goes round what noise allows
+    // The frame around the range that noise allows.
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
     let deviation = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
         rest.allan.iter().map(|point| (point.tau, of(point).sqrt())).collect()

@@ -1,4 +1,5 @@
-//! Pages and charts: the page about a campaign ([`campaign::page`]), about one run ([`view::page`]), charts in SVG.
+//! HTML pages and charts: about a campaign ([`campaign::page`]) or one run ([`view::page`]), and charts in
+//! SVG.
 
 pub mod campaign;
 pub mod gyro;

@@ -1,5 +1,3 @@
-//! One self-contained page of text, tables and charts: the frame of every report on an identification or a gyro.
-
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::svg::{Axis, Chart, Series, Style};
@@ -21,10 +19,10 @@ svg .title{font-weight:600}svg .grid{stroke:var(--rule);stroke-width:.6;fill:non
 details{margin:.6rem 0}summary{cursor:pointer}
 ";
 
-/// Names of [`series`]' colours, for curves of one kind.
+/// Names of colours for [`series`], for curves of the same kind.
 pub const COLORS: [&str; 5] = ["a", "b", "c", "d", "soft"];
 
-/// Returns a page with this title, which is also its first heading.
+/// Returns an HTML page. The title is also its first heading.
 pub fn document(title: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -44,12 +42,13 @@ pub fn document(title: &str, body: &Markup) -> String {
     page.into_string()
 }
 
-/// A chart that scrolls on a narrow screen, as a table does: shrunk, its letters could not be read.
+/// Embeds a chart that scrolls on a narrow screen, because its labels could not be read if it were made
+/// smaller.
 pub fn drawn(chart: &Chart) -> Markup {
     html! { div class="scroll" { (PreEscaped(chart.svg())) } }
 }
 
-/// A table that scrolls where it is wider than the page.
+/// Renders a table that scrolls if it is wider than the page.
 pub fn table<'a>(
     head: impl IntoIterator<Item = &'a str>,
     rows: impl IntoIterator<Item = Vec<String>>,
@@ -64,7 +63,7 @@ pub fn table<'a>(
     }
 }
 
-/// A chart as wide as the page.
+/// Creates a chart as wide as the page; `logarithmic` is for the y axis.
 pub fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmic: bool) -> Chart {
     let points = || series.iter().flat_map(|s| &s.points);
     Chart {
@@ -80,7 +79,7 @@ pub fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmi
     }
 }
 
-/// A curve in a colour of [`STYLE`].
+/// Creates a curve in one of the colours of [`STYLE`], for example `a`.
 pub fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
     Series { points, color: format!("var(--{color})"), style, title: title.into() }
 }

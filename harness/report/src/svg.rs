@@ -1,27 +1,26 @@
-//! Charts as inline SVG. Colours are CSS values, so that a page can change
-//! them with the reader's light or dark scheme.
+//! Charts as inline SVG. Colours are CSS values, so that a page can change them with the reader's light or
+//! dark scheme.
 
 use std::fmt::Write as _;
 
 use maud::{Markup, html};
 
-/// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// Label with unit.
     pub label: String,
     /// Value at the left or lower end.
     pub from: f64,
     /// Value at the right or upper end.
     pub to: f64,
-    /// Even in the logarithm.
+    /// True for a logarithmic axis.
     pub logarithmic: bool,
-    /// Values that are written at the axis.
+    /// Values that are labelled.
     pub ticks: Vec<f64>,
 }
 
 impl Axis {
-    /// An axis with about `count` round ticks that covers all `values`, and at least `span`.
+    /// Creates an axis with about `count` round ticks that covers all `values`, and a range of at least
+    /// `span`.
     pub fn linear(
         label: &str,
         values: impl IntoIterator<Item = f64>,
@@ -39,7 +38,7 @@ impl Axis {
         Axis { label: label.into(), from, to, logarithmic: false, ticks: ticks.collect() }
     }
 
-    /// An axis over whole decades that covers all positive `values`.
+    /// Creates a logarithmic axis over whole decades that covers all positive `values`.
     pub fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = range(values.into_iter().filter(|v| *v > 0.0).map(f64::log10));
         let (low, mut high) = ((low + 1e-9).floor() as i32, (high - 1e-9).ceil() as i32);
@@ -50,12 +49,12 @@ impl Axis {
         Axis { label: label.into(), from, to, logarithmic: true, ticks }
     }
 
-    /// An axis from end to end, even in the logarithm, with the given ticks.
+    /// Creates a logarithmic axis from end to end with the given ticks.
     pub fn logarithmic(label: &str, (from, to): (f64, f64), ticks: &[f64]) -> Self {
         Axis { label: label.into(), from, to, logarithmic: true, ticks: ticks.to_vec() }
     }
 
-    /// Place along the axis, 0 to 1.
+    /// Returns the position of a value along the axis, 0 to 1.
     fn place(&self, value: f64) -> f64 {
         if self.logarithmic {
             (value / self.from).ln() / (self.to / self.from).ln()
@@ -73,7 +72,7 @@ fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     if low > high { (0.0, 1.0) } else { (low, high) }
 }
 
-/// The next of 1, 2, 5 times a power of ten.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.max(1e-300).log10().floor());
     [1.0, 2.0, 5.0, 10.0]
@@ -83,68 +82,56 @@ fn round_step(step: f64) -> f64 {
         .unwrap_or(step)
 }
 
-/// Drawing style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// A line.
     Line,
-    /// A dashed line.
     Dashed,
-    /// A line with filled dots.
     Dots,
-    /// A dashed line with open dots.
     OpenDots,
-    /// Small dots without a line.
     Cloud,
 }
 
-/// One curve.
+/// A curve of a chart.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Points; those that are not finite are left out.
+    /// Points; those that are NaN or infinite are left out.
     pub points: Vec<(f64, f64)>,
-    /// CSS colour.
     pub color: String,
-    /// Drawing style.
     pub style: Style,
-    /// Shown when the pointer rests on it.
+    /// Shown when the pointer rests on the curve.
     pub title: String,
 }
 
-/// A chart.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// Title; also the text alternative for screen readers.
+    /// Title, which is also the text for screen readers.
     pub title: String,
-    /// Width and height of the drawing, px.
+    /// Width and height, px.
     pub size: (f64, f64),
-    /// Horizontal axis.
     pub x: Axis,
-    /// Vertical axis.
     pub y: Axis,
-    /// The curves, the first one lowest.
+    /// Curves; later ones are drawn on top.
     pub series: Vec<Series>,
-    /// Draws the curves' titles in the upper right corner.
+    /// True to show the titles of the curves in the upper right corner.
     pub legend: bool,
 }
 
-/// Style of a stand-alone file: white background.
+/// Style of a stand-alone file, with a white background.
 const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif }\
     text { fill: #1d2733 } .title { font-size: 12.5px; font-weight: 600 }\
     .grid { stroke: #dde3ea; stroke-width: .7; fill: none }\
     .frame { stroke: #66758a; fill: none }\
     .curve path { fill: none; stroke-width: 1.5 }";
 
-/// Margins of the plot for numbers and labels, px: left, right, top, bottom.
 const MARGIN: (f64, f64, f64, f64) = (56.0, 12.0, 26.0, 40.0);
 
 impl Chart {
-    /// The `<svg>` element, for a page that styles it.
+    /// Returns the `<svg>` element for a page that styles it.
     pub fn svg(&self) -> String {
         self.drawing(None)
     }
 
-    /// A file of its own.
+    /// Returns the chart as an SVG file with a style of its own.
     pub fn file(&self) -> String {
         self.drawing(Some(STYLE))
     }
@@ -154,7 +141,7 @@ impl Chart {
         let (left, right, top, bottom) = (MARGIN.0, width - MARGIN.1, MARGIN.2, height - MARGIN.3);
         let x = |value: f64| left + (right - left) * self.x.place(value);
         let y = |value: f64| bottom - (bottom - top) * self.y.place(value);
-        // a number at the right end would be cut off at the drawing's edge
+        // A number at the right end would extend beyond the drawing.
         let place = |at: f64| if at > right - 6.0 { (width, "end") } else { (at, "middle") };
         let drawing = html! {
             svg xmlns=[style.map(|_| "http://www.w3.org/2000/svg")]
@@ -179,7 +166,7 @@ impl Chart {
                     text-anchor="middle" { (self.x.label) }
                 text .label transform={ "translate(13 " (tenth((top + bottom) / 2.0)) ") rotate(-90)" }
                     text-anchor="middle" { (self.y.label) }
-                // a nested svg cuts off what leaves the plot
+                // A nested svg clips curves to the plot.
                 @let (w, h) = (right - left, bottom - top);
                 svg x=(left) y=(top) width=(w) height=(h)
                     viewBox={ (left) " " (top) " " (w) " " (h) } {
@@ -202,7 +189,6 @@ impl Chart {
     }
 }
 
-/// A length in px.
 fn tenth(length: f64) -> String {
     format!("{length:.1}")
 }
@@ -235,8 +221,7 @@ fn curve(points: impl IntoIterator<Item = (f64, f64)>, series: &Series) -> Marku
     }
 }
 
-/// Leaves out the points that lie within `tolerance` of the line through the others (Ramer, Douglas
-/// and Peucker).
+/// Leaves out points within `tolerance` of the line through the others (Ramer, Douglas and Peucker).
 pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     if points.len() < 3 {
         return points.to_vec();
@@ -259,7 +244,7 @@ pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64
     points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
 }
 
-/// A tick's number with the digits its axis needs.
+/// Formats the number of a tick with as many digits as its axis needs.
 fn number(value: f64, axis: &Axis) -> Markup {
     let written = if axis.logarithmic && !(1e-3..1e4).contains(&value.abs()) {
         let exponent = value.log10().round() as i32;
@@ -274,7 +259,6 @@ fn number(value: f64, axis: &Axis) -> Markup {
     html! { (minus(&written)) }
 }
 
-/// A true minus sign.
 fn minus(text: &str) -> String {
     text.replace('-', "\u{2212}")
 }

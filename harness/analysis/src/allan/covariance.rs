@@ -16,14 +16,15 @@ use nalgebra::DMatrix;
 use super::Term;
 use std::f64::consts::PI;
 
-/// Lags per averaging time of the sum over lags, which is exact for up to as many samples.
+/// Number of lags per averaging time in the sum over lags; up to this number of samples the sum is exact.
 const PER_TIME: usize = 8;
-/// Range of the lags in sums of both averaging times; terms beyond 1 are flicker's alone, and fall as s⁻².
+/// Range of the lags in multiples of the sum of both averaging times. Beyond 1 only flicker noise
+/// contributes, and its terms fall as s⁻².
 const RANGE: usize = 2;
 /// Largest ratio of two averaging times whose estimates count as correlated.
 const RATIO: usize = 32;
 
-/// Tables of C_mn for coefficients of 1.
+/// Tables of C_mn for coefficients of 1, for all pairs of averaging times.
 pub(super) struct Covariance {
     terms: Vec<Term>,
     size: usize,
@@ -32,7 +33,7 @@ pub(super) struct Covariance {
 
 struct Pair {
     places: (usize, usize),
-    /// Pairs of differences at each lag, over M_m M_n.
+    /// Number of pairs of differences at each lag, divided by M_m M_n.
     counts: Vec<f64>,
     /// 1/(2 τ_m² τ_n²).
     scale: f64,
@@ -40,7 +41,7 @@ struct Pair {
     of_terms: Vec<Vec<f64>>,
 }
 
-/// Returns the generalized autocovariance of the angle for a coefficient of 1.
+/// Returns the generalized autocovariance of the angle at `lag` (s) for a coefficient of 1.
 fn angle(term: Term, lag: f64, time: f64) -> f64 {
     let s = lag.abs();
     match term {
@@ -53,8 +54,8 @@ fn angle(term: Term, lag: f64, time: f64) -> f64 {
 }
 
 impl Covariance {
-    /// Tables for records of `count` samples `step` (s) apart, averages of these numbers of samples in increasing order, and
-    /// these terms; `time`: correlation time of the Gauss–Markov bias, s.
+    /// Computes the tables for records of `count` samples `step` (s) apart, averages of `factors` samples
+    /// (ascending), and these terms. `time` is the correlation time of the Gauss–Markov bias, s.
     pub fn of(step: f64, count: usize, factors: &[usize], terms: &[Term], time: f64) -> Self {
         let mut pairs = Vec::new();
         for (i, &m) in factors.iter().enumerate() {
@@ -68,7 +69,8 @@ impl Covariance {
         Covariance { terms: terms.to_vec(), size: factors.len(), pairs }
     }
 
-    /// Returns the covariance for these coefficients, in the order of the terms.
+    /// Returns the covariance matrix of the Allan variances for these coefficients, in the order of the
+    /// terms.
     pub fn matrix(&self, coefficients: &[f64]) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(self.size, self.size);
         let ramp = self.terms.iter().zip(coefficients).find(|(term, _)| **term == Term::Ramp);
@@ -80,7 +82,8 @@ impl Covariance {
                 squares += count * c * c;
                 sum += count * c;
             }
-            // a ramp moves the differences by R τ²: their products with noise scatter
+            // A ramp shifts the differences by R τ², and the product of this shift with the noise has a
+            // variance of its own.
             let value = pair.scale * squares + ramp * sum;
             let (i, j) = pair.places;
             matrix[(i, j)] = value;
@@ -101,7 +104,7 @@ fn pair(
     let last = (RANGE * (m + n) / by) as i64;
     let lags: Vec<i64> = (-last..=last).map(|k| k * by as i64).collect();
     let (m, n, count) = (m as i64, n as i64, count as i64);
-    // centres of differences run from m to count − m, and from n to count − n
+    // The centres of the differences run from m to count − m, and from n to count − n.
     let total = ((count - 2 * m + 1) * (count - 2 * n + 1)) as f64;
     let counts = lags.iter().map(|s| {
         let overlap = (count - m).min(count - n - s) - m.max(n - s) + 1;

@@ -1,12 +1,13 @@
-//! Noise that fits Allan variances, with intervals, and a test of the fit.
+//! Fits noise parameters to Allan variances, with confidence intervals and a test of the fit.
 //!
-//! Averaging times are octaves: overlapping estimates closer than that add little. Generalized least squares of the
-//! coefficients N², B², K², … weights the octaves with the inverse of their [`Covariance`], which holds their degrees of freedom,
-//! and is repeated with the covariance of the noise found. Coefficients are not negative.
+//! Averaging times are octaves, because overlapping estimates closer than that add little information. The
+//! coefficients N², B², K², … are estimated by generalized least squares: the octaves are weighted with the
+//! inverse of their [`Covariance`], which contains their degrees of freedom, and the estimate is repeated
+//! with the covariance of the noise that was found. Coefficients are not negative.
 //!
-//! A 95 % interval holds the values of a coefficient that a test does not reject. The test compares the unconstrained estimate with
-//! its distribution if that value is true and the other terms are fitted again: mean, variance, and skewness (Pearson's type III,
-//! which for one octave is its χ²).
+//! A 95 % interval consists of the values of a coefficient that a test does not reject. The test compares the
+//! unconstrained estimate with its distribution if the tested value is true and the other terms are fitted
+//! again: mean, variance and skewness (Pearson's type III, which for one octave is its χ²).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -15,16 +16,19 @@ use super::{LONGEST, Noise, Term, overlapping};
 
 /// Standard normal quantile of a 95 % interval.
 const NORMAL: f64 = 1.96;
-/// Standard normal quantile of the fit's χ² beyond which the fit does not describe the record; by chance once in 1,000.
+/// Standard normal quantile of the fit's χ² above which the fit is rejected; noise that fits exceeds it once
+/// in 1,000 records.
 const MISFIT: f64 = 3.1;
-/// Iterations of the estimate and of a value of an interval.
+/// Largest number of iterations of the estimate and of each tested value of an interval.
 const ITERATIONS: usize = 12;
-/// Shortest averaging times that may be left out, and their longest, s.
+/// Largest number of short averaging times that may be left out of the fit, and the longest of them, s.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
-/// Octaves that are left out beyond those that the test of the fit demands. A filter's effect on the variance halves with each octave:
-/// what passes the test can still move N by several of its standard deviations.
+/// Number of octaves that are left out in addition to those that the test of the fit requires. The effect of
+/// a filter on the variance halves with each octave, so that an octave which passes the test can still shift
+/// N by several standard deviations.
 const BEYOND: usize = 2;
-/// Shortest correlation time of a Gauss–Markov bias in averaging times: a shorter one looks like white noise.
+/// Shortest correlation time of a Gauss–Markov bias, in averaging times. A shorter one cannot be
+/// distinguished from white noise.
 const SHORTEST: f64 = 10.0;
 
 /// Overlapping Allan variances of one record, or the means of several, at 1, 2, 4, … samples up to a tenth of a record.
@@ -32,43 +36,39 @@ const SHORTEST: f64 = 10.0;
 pub struct Octaves {
     /// Time between samples, s.
     step: f64,
-    /// Number of samples of a record.
+    /// Number of samples per record.
     count: usize,
     /// Number of records.
     records: usize,
-    /// Samples of each average.
+    /// Number of samples per average.
     factors: Vec<usize>,
     variances: Vec<f64>,
 }
 
-/// Estimate of a parameter with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The estimate.
     pub value: f64,
-    /// Lower end of the interval; 0 if the record does not show the term, NaN if no test could be made.
+    /// Lower end of the interval; 0 if the record does not show the term, NaN if no value could be tested.
     pub low: f64,
-    /// Upper end of the interval; infinite if the record is too short, NaN if no test could be made.
+    /// Upper end of the interval; infinite if the record is too short, NaN if no value could be tested.
     pub high: f64,
-    /// Standard error, NaN for an estimate of 0.
+    /// Standard error; NaN for an estimate of 0.
     pub error: f64,
 }
 
-/// Averaging time at which a fit is worst.
+/// The averaging time at which a fit deviates most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     /// Averaging time, s.
     pub tau: f64,
-    /// Allan deviation of the record over that of the fit.
+    /// Ratio of the record's Allan deviation to that of the fit.
     pub ratio: f64,
 }
 
-/// Noise that fits Allan variances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
-    /// The noise.
     pub noise: Noise,
-    /// Estimates of the fitted terms' parameters, in units of [`Noise`].
+    /// Estimates of the fitted parameters, in the units of [`Noise`].
     pub terms: Vec<(Term, Estimate)>,
     /// Estimate of the Gauss–Markov bias's correlation time, s, if it is fitted.
     pub bias_time: Option<Estimate>,
@@ -76,9 +76,8 @@ pub struct Fit {
     pub from: f64,
     /// Misfit χ² and its degrees of freedom.
     pub chi_squared: (f64, usize),
-    /// True if noise of these terms explains the misfit, as it does in 999 of 1,000 records.
+    /// True if the misfit is one that 999 of 1,000 records with this noise would have at most.
     pub fits: bool,
-    /// Averaging time at which the fit is worst.
     pub worst: Outlier,
 }
 
@@ -89,7 +88,7 @@ struct State {
     time: f64,
 }
 
-/// The fit of some terms to the octaves from one on.
+/// The fit of `terms` to the octaves from `from` on.
 struct Problem<'a> {
     octaves: &'a Octaves,
     terms: &'a [Term],
@@ -97,7 +96,7 @@ struct Problem<'a> {
 }
 
 impl Octaves {
-    /// Octaves of samples `step` (s) apart.
+    /// Computes the octaves of samples `step` (s) apart.
     pub fn of(step: f64, samples: &[f64]) -> Octaves {
         let longest = samples.len() / LONGEST;
         let factors: Vec<usize> =
@@ -107,7 +106,7 @@ impl Octaves {
         Octaves { step, count: samples.len(), records: 1, factors, variances }
     }
 
-    /// Means of records of one length; `None` of none.
+    /// Averages the octaves of records of equal length; `None` without records.
     pub fn mean(records: &[Octaves]) -> Option<Octaves> {
         let first = records.first()?;
         let mean = |k: usize| {
@@ -117,15 +116,15 @@ impl Octaves {
         Some(Octaves { records: records.len(), variances, ..first.clone() })
     }
 
-    /// Fits these terms to the averaging times from the octave `from` on; `None` if the octaves show no noise, or are
+    /// Fits `terms` to the octaves from number `from` on. Returns `None` if the octaves show no noise, or are
     /// fewer than the parameters.
     pub fn fit(&self, terms: &[Term], from: usize) -> Option<Fit> {
         Problem { octaves: self, terms, from }.fit()
     }
 
-    /// Fits N, B and K. If they do not describe the record, leaves out short averaging times, at which filters of a gyro
-    /// act, or adds a Gauss–Markov bias or a ramp. If nothing does, returns the fit of N, B and K to all octaves. `None` as
-    /// [`Octaves::fit`].
+    /// Fits N, B and K. If this fit is rejected, tries to leave out short averaging times, at which filters
+    /// of a gyro act, or to add a ramp or a Gauss–Markov bias. If every fit is rejected, returns the one of
+    /// N, B and K to all octaves. Returns `None` in the cases of [`Octaves::fit`].
     pub fn describe(&self) -> Option<Fit> {
         const BASIC: [Term; 3] = [Term::White, Term::Flicker, Term::Walk];
         let first = self.fit(&BASIC, 0)?;
@@ -146,7 +145,7 @@ impl Octaves {
         Some(found.unwrap_or(first))
     }
 
-    /// Averaging time of an octave, s.
+    /// Returns the averaging time of octave `k`, s.
     fn tau(&self, k: usize) -> f64 {
         self.factors.get(k).map_or(f64::INFINITY, |m| *m as f64 * self.step)
     }
@@ -169,7 +168,8 @@ impl Problem<'_> {
         self.terms.iter().position(|term| *term == Term::Markov)
     }
 
-    /// Returns the derivatives of the Allan variances by the coefficients, and by ln T if there is a Gauss–Markov bias.
+    /// Returns the derivatives of the Allan variances with respect to the coefficients, and to ln T if there
+    /// is a Gauss–Markov bias.
     fn jacobian(&self, state: &State) -> DMatrix<f64> {
         let taus = self.taus();
         let columns = self.terms.len() + usize::from(self.markov().is_some());
@@ -195,16 +195,16 @@ impl Problem<'_> {
         self.jacobian(state).columns(0, self.terms.len()) * coefficients
     }
 
-    /// Returns the covariance of the measured variances in a state.
+    /// Returns the covariance of the measured Allan variances if the noise is `state`.
     fn covariance(&self, tables: &Covariance, state: &State) -> DMatrix<f64> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
-    /// Returns the state that fits best with weights from relative errors: the start of the iterations.
+    /// Returns the best fit with weights from relative errors, with which the iterations start.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
-        // intervals of that length in the record, as the inverse variance of a relative error
+        // Inverse variance of a relative error: the number of intervals of this length in the record.
         let weights = DVector::from_iterator(
             taus.len(),
             measured.iter().zip(&taus).map(|(value, tau)| 1.0 / (value * tau.sqrt())),
@@ -226,15 +226,15 @@ impl Problem<'_> {
         states.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(state, _)| state)
     }
 
-    /// Returns the shortest and the longest correlation time, s.
+    /// Returns the shortest and the longest correlation time that the fit allows, s.
     fn times(&self) -> Option<(f64, f64)> {
         let taus = self.taus();
         let (first, last) = (taus.first()?, taus.last()?);
         Some(((SHORTEST * first).min(*last), *last))
     }
 
-    /// Returns the state in which the generalized least squares' weights are its own. A `fixed` coefficient keeps its value, and
-    /// the correlation time too.
+    /// Iterates the generalized least squares until the weights are those of the result. If `fixed` is given,
+    /// this coefficient keeps its value, and so does the correlation time.
     fn settled(
         &self,
         mut state: State,
@@ -244,7 +244,8 @@ impl Problem<'_> {
         let (low, high) = self.times()?;
         for iteration in 0..ITERATIONS {
             let lower = factored(&self.covariance(tables, &state))?.l();
-            // the first weights are those of the state: with the fixed value alone there may be no noise
+            // The first weights are those of the start, because with only the fixed value there might be no
+            // noise.
             if let (0, Some((place, value))) = (iteration, fixed) {
                 state.coefficients[place] = value;
             }
@@ -286,8 +287,8 @@ impl Problem<'_> {
         Some(state)
     }
 
-    /// Returns the unconstrained estimates of the coefficients (and the change of ln T) with the weights of a state,
-    /// the matrix that makes them of the measured variances, and their covariance.
+    /// Returns the unconstrained estimates of the coefficients (and the change of ln T) with the weights of
+    /// `state`, the matrix that computes them from the measured variances, and their covariance.
     fn unconstrained(
         &self,
         state: &State,
@@ -298,7 +299,7 @@ impl Problem<'_> {
         if jacobian.ncols() > self.terms.len() && jacobian.column(self.terms.len()).norm() == 0.0 {
             jacobian = jacobian.columns(0, self.terms.len()).into_owned();
         }
-        // columns of one size, because coefficients differ by decades
+        // Columns are scaled to the same norm, because the coefficients differ by orders of magnitude.
         let sizes: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, column| {
             jacobian[(row, column)] / sizes[column]
@@ -329,7 +330,7 @@ impl Problem<'_> {
         let mut noise = Noise { bias_time: state.time, ..Noise::default() };
         let mut terms = Vec::new();
         for (place, term) in self.terms.iter().enumerate() {
-            // B of a Gauss–Markov bias is 0.664 of its standard deviation
+            // The B of a Gauss–Markov bias is 0.664 of its standard deviation.
             let unit = if *term == Term::Markov { super::FLICKER } else { 1.0 };
             let value = unit * state.coefficients[place].sqrt();
             *noise.parameter(*term) = value;
@@ -347,7 +348,7 @@ impl Problem<'_> {
         let bias_time = self.markov().filter(|_| spread.nrows() > self.terms.len()).map(|_| {
             let relative = spread[(self.terms.len(), self.terms.len())].sqrt();
             let around = |sign: f64| state.time * (sign * NORMAL * relative).exp();
-            // the correlation time of a bias that may not be there can have any value
+            // If there may be no bias, its correlation time can have any value.
             let is_shown = terms.iter().any(|(term, e)| *term == Term::Markov && e.low > 0.0);
             let (low, high) =
                 if is_shown { (around(-1.0), around(1.0)) } else { (0.0, f64::INFINITY) };
@@ -368,7 +369,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Returns χ² of the normal deviates of the octaves, and the worst octave.
+    /// Returns χ² of the normal deviates of the octaves, and the octave with the largest deviate.
     fn misfit(&self, state: &State, covariance: &DMatrix<f64>) -> Option<(f64, Outlier)> {
         let modelled = self.modelled(state);
         let measured = self.measured();
@@ -386,13 +387,13 @@ impl Problem<'_> {
         Some((chi_squared, Outlier { tau: self.taus()[worst], ratio }))
     }
 
-    /// Returns the 95 % interval of a coefficient; `None` if a value cannot be tested.
+    /// Returns the 95 % interval of coefficient `place`, or `None` if a value cannot be tested.
     fn interval(&self, place: usize, state: &State, tables: &mut Covariance) -> Option<(f64, f64)> {
-        // the unconstrained estimate less each end of its 95 % range if this value is true
+        // Distances of the unconstrained estimate from the ends of its 95 % range, if `value` is true.
         let mut beyond = |value: f64| -> Option<(f64, f64, f64)> {
             let there = self.settled(state.clone(), Some((place, value)), tables);
             let there = there.unwrap_or_else(|| {
-                // nothing else is left of the noise
+                // With this value no other noise is left.
                 let mut alone = state.clone();
                 alone.coefficients[place] = value;
                 alone
@@ -403,7 +404,7 @@ impl Problem<'_> {
             let modelled = self.modelled(&there);
             let (mut third, mut second) = (0.0, 0.0);
             for (k, weight) in makes.row(place).iter().enumerate() {
-                // χ² with ν degrees of freedom, of mean A: third cumulant 8 A³/ν²
+                // χ² with ν degrees of freedom and mean A has the third cumulant 8 A³/ν².
                 let variance = covariance[(k, k)];
                 second += weight * weight * variance;
                 third += weight.powi(3) * 2.0 * variance * variance / modelled[k];
@@ -411,8 +412,8 @@ impl Problem<'_> {
             let skewness = third / second.powf(1.5);
             let end = |normal: f64| value + deviation * pearson(normal, skewness);
             let estimate = estimates[place];
-            // an estimate below 0 bounds the coefficient as one at 0 does: otherwise the interval of one in forty records
-            // without this term would be a point
+            // An estimate below 0 is treated as one at 0. Otherwise the interval of one in forty records
+            // without this term would be a single point.
             Some((estimate - end(NORMAL), estimate.max(0.0) - end(-NORMAL), deviation))
         };
         let value = state.coefficients[place];
@@ -421,7 +422,8 @@ impl Problem<'_> {
         let low = match beyond(0.0)?.0 {
             above_none if above_none > 0.0 => {
                 let mut within = if above > 0.0 { value + 4.0 * step } else { value };
-                // downwards from the estimate: of a bias with a correlation time the values near 0 may pass the test again
+                // Downwards from the estimate, because for a bias with a correlation time values near 0 may
+                // pass the test again.
                 let mut out = DOWN * within;
                 while beyond(out)?.0 <= 0.0 && out > LEAST * value {
                     (within, out) = (out, DOWN * out);
@@ -455,14 +457,15 @@ impl Problem<'_> {
     }
 }
 
-/// Bisections of an end of an interval.
+/// Number of bisections for one end of an interval.
 const BISECTIONS: usize = 14;
-/// Factor between the values that are tested below an estimate, and the least of them as a part of it.
+/// Ratio of successive values that are tested below an estimate, and the smallest tested value relative to
+/// the estimate.
 const DOWN: f64 = 0.7;
 const LEAST: f64 = 1e-4;
 
-/// Returns the Cholesky factors of a covariance. Distant octaves count as not correlated, by which the covariance of a noise that
-/// does not describe the record may be indefinite; then its diagonal grows.
+/// Returns the Cholesky factors of a covariance matrix. Distant octaves count as uncorrelated, so that the
+/// matrix may be indefinite if the noise does not fit the record; the diagonal is then increased.
 fn factored(covariance: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     [0.0, 1e-3, 1e-2, 0.1, 1.0].into_iter().find_map(|more| {
         let mut matrix = covariance.clone();
@@ -473,14 +476,14 @@ fn factored(covariance: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     })
 }
 
-/// Returns the standard normal deviate of a χ² variable over its mean (Wilson and Hilferty).
+/// Converts the ratio of a χ² variable to its mean into a standard normal deviate (Wilson and Hilferty).
 fn cube_root(ratio: f64, degrees: f64) -> f64 {
     let spread = 2.0 / (9.0 * degrees);
     (ratio.cbrt() - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Returns the quantile of a distribution of Pearson's type III with mean 0, variance 1 and this skewness, from the standard
-/// normal one (Wilson and Hilferty's frequency factor).
+/// Returns the quantile of Pearson's type III distribution with mean 0, variance 1 and this skewness that
+/// corresponds to the standard normal quantile `normal` (Wilson and Hilferty's frequency factor).
 fn pearson(normal: f64, skewness: f64) -> f64 {
     if skewness.abs() < 1e-3 {
         return normal;
@@ -489,8 +492,8 @@ fn pearson(normal: f64, skewness: f64) -> f64 {
     2.0 / skewness * (base.powi(3) - 1.0)
 }
 
-/// Returns the least-squares solution with coefficients that are not negative, but for those at `either`, and its squared
-/// errors, by trying all subsets of the columns.
+/// Returns the least-squares solution whose coefficients, except those at `either`, are not negative, and its
+/// squared error. All subsets of the columns are tried.
 fn not_negative(
     columns: &DMatrix<f64>,
     values: &DVector<f64>,

@@ -199,7 +199,7 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapt
     bar.finish_and_clear();
     let mut files = campaign.tables(fmu, &results)?;
     files.push(("plan.toml", campaign.plan.text.clone().into_bytes()));
-    let telling = report::campaign::telling(&results);
+    let telling = report::campaign::run_to_view(&results);
     let shown = match telling {
         Some(run) => {
             Some(view::of_stored(fmu.description(), &folder.run(&run.case.name), &run.case.name)?)

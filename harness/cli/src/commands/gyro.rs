@@ -130,7 +130,7 @@ impl GyroArgs {
         for (name, table) in tables(&rest) {
             table.write(&self.out.join(name), &BTreeMap::new())?;
         }
-        for (name, picture) in report::gyro::rest(&rest) {
+        for (name, picture) in report::gyro::rest_charts(&rest) {
             output::write(&self.out.join(name), picture.file().as_bytes())?;
         }
         let rows = rows(&rest);

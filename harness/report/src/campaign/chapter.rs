@@ -1,5 +1,3 @@
-//! Chapters of a page that do not come from runs: text, a table and charts.
-
 use maud::{Markup, html};
 use serde_json::json;
 
@@ -7,34 +5,31 @@ use super::colors;
 use super::figure::{Figure, Figures, Panel, dots, line};
 use crate::svg::{Chart, Style};
 
-/// A chapter.
 #[derive(Clone, Debug, Default)]
 pub struct Chapter {
-    /// Title.
     pub title: String,
     /// Paragraphs before the figures.
     pub text: Vec<String>,
-    /// Rows of a table, the heading first; empty for none.
+    /// Rows of a table, the first of which is the heading; empty for no table.
     pub table: Vec<Vec<String>>,
-    /// Figures.
     pub illustrations: Vec<Illustration>,
 }
 
 /// A figure of a chapter.
 #[derive(Clone, Debug)]
 pub struct Illustration {
-    /// The chart. The page chooses its colours.
+    /// The chart. Its colours are replaced by those of the page.
     pub chart: Chart,
-    /// Caption: the point that the figure makes.
+    /// Caption: the statement that the figure makes.
     pub caption: String,
-    /// Figures of Rubaga's thesis that show the same of its bench.
+    /// Numbers of the figures in Rubaga's thesis that show the same for its bench.
     pub thesis: &'static str,
-    /// True for the same scale on both axes.
+    /// True if both axes have the same scale.
     pub equal: bool,
 }
 
 impl Chapter {
-    /// Returns title and content; the figures join those of the page.
+    /// Returns the chapter's title and content, and adds its figures to those of the page.
     pub(super) fn section(self, figures: &mut Figures) -> (String, Markup) {
         let mut rows = self.table.iter();
         let content = html! {

@@ -1,11 +1,9 @@
-//! Colours, the same in every figure, in the light, in the dark and on paper.
-
-/// Okabe and Ito's palette, safe for colour-blind readers, without black and yellow.
+/// Palette of Okabe and Ito, which is safe for colour-blind readers, without black and yellow.
 const CATEGORIES: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8c6bb1", "#7f7f7f"];
 
-/// The colour map "viridis", which is ordered in lightness and safe for colour-blind readers,
-/// without its ends, which are lost on black and on white.
+/// Colour map "viridis", which increases in lightness and is safe for colour-blind readers. Its ends are left
+/// out, because they cannot be seen on black and on white.
 const VIRIDIS: [[f64; 3]; 8] = [
     [72.0, 40.0, 120.0],
     [62.0, 73.0, 137.0],
@@ -17,17 +15,17 @@ const VIRIDIS: [[f64; 3]; 8] = [
     [170.0, 205.0, 40.0],
 ];
 
-/// Color of the i-th item of an unordered set; colors repeat after eight.
+/// Returns the colour of item `i` of an unordered set; the colours repeat after eight items.
 pub(super) fn category(i: usize) -> &'static str {
     CATEGORIES[i % CATEGORIES.len()]
 }
 
-/// Symbol of the i-th of several things, another one where the colours repeat.
+/// Returns the marker of item `i`, which changes each time the colours repeat.
 pub(super) fn symbol(i: usize) -> &'static str {
     ["circle", "square", "diamond", "cross"][i / CATEGORIES.len() % 4]
 }
 
-/// Line of the i-th of several things whatever their colours: as plotly names it, and in words.
+/// Returns the line style of item `i`: its name in plotly and in words.
 pub(super) fn line(i: usize) -> (&'static str, &'static str) {
     const LINES: [(&str, &str); 5] = [
         ("solid", "solid"),
@@ -39,12 +37,11 @@ pub(super) fn line(i: usize) -> (&'static str, &'static str) {
     LINES[i % LINES.len()]
 }
 
-/// Line of the i-th of several things, another one where the colours repeat.
+/// Returns the line style of item `i`, which changes each time the colours repeat.
 pub(super) fn dash(i: usize) -> &'static str {
     ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"][i / CATEGORIES.len() % 6]
 }
 
-/// Color of the i-th of `count` ordered items.
 pub(super) fn ordered(i: usize, count: usize) -> String {
     let place = if count > 1 { i as f64 / (count - 1) as f64 } else { 0.3 } * 7.0;
     let (low, mix) = ((place as usize).min(6), place - (place as usize).min(6) as f64);
@@ -52,5 +49,5 @@ pub(super) fn ordered(i: usize, count: usize) -> String {
     format!("rgb({r:.0},{g:.0},{b:.0})")
 }
 
-/// A reference: ink in the light, paper in the dark.
+/// Colour of reference curves, dark in the light scheme and light in the dark scheme.
 pub(super) const INK: &str = "@ink";

@@ -1,5 +1,3 @@
-//! Compares this campaign with another one.
-
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -10,7 +8,6 @@ use super::colors;
 use super::figure::{Figure, Panel, numbers};
 use super::page::{Page, list_of};
 
-/// Compared quantities: column of `runs.csv`, label, factor.
 const COMPARED: [(&str, &str, f64); 4] = [
     ("f_dip_hz", "antiresonance / mHz", 1e3),
     ("f_res_hz", "resonance / mHz", 1e3),
@@ -18,7 +15,8 @@ const COMPARED: [(&str, &str, f64); 4] = [
     ("fit_freq_pct", "fit in frequency / %", 1.0),
 ];
 
-/// Differences, run by run, from the campaign in the directory `other`.
+/// Plots the differences of this campaign's runs from the runs of the same name in the campaign in directory
+/// `other`.
 pub(super) fn compare(
     other: &Path,
     page: &Page,

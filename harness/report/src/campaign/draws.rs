@@ -1,4 +1,5 @@
-//! Monte Carlo: which of the drawn parameters decide, and the distribution of what they make.
+//! Figures of Monte Carlo campaigns: the most influential of the drawn parameters, and the distribution of
+//! the results.
 
 use analysis::statistics;
 use experiments::campaign::Outcome;
@@ -8,7 +9,7 @@ use super::colors;
 use super::figure::{Figure, Panel, numbers};
 use super::page::{Group, Page, best};
 
-/// Name, unit, and what it is of a run.
+/// Name and unit of a result, and how it is read from a run.
 type Quantity = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
 pub(super) const QUANTITIES: [Quantity; 4] = [
@@ -18,15 +19,15 @@ pub(super) const QUANTITIES: [Quantity; 4] = [
     ("notch depth", "dB", |run| best(run)?.0.features.notch_db),
 ];
 
-/// Places and names of what a plan draws.
+/// Lists the parameters that are drawn at random: index among the varied parameters, and name.
 fn drawn<'a>(page: &Page<'a>) -> Vec<(usize, &'a str)> {
     let grouping = page.plan.grouping();
     let drawn = page.plan.varied().into_iter().enumerate();
     drawn.filter(|(_, n)| !grouping.contains(n) && !n.ends_with("seed")).collect()
 }
 
-/// Names of what is drawn, how far one standard deviation of each moves antiresonance and
-/// resonance (mHz), and the coefficients of correlation; the largest effect last.
+/// Ranks the drawn parameters by their influence, largest last: name, change of antiresonance and resonance
+/// (mHz) for one standard deviation of the parameter, and the two correlation coefficients.
 pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 2], [f64; 2])> {
     let effect = |place: usize, of: fn(&Outcome) -> Option<f64>| {
         let point = |run: &&Outcome| Some((run.case.varied[place].parse().ok()?, of(run)?));
@@ -34,7 +35,8 @@ pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 
         let (_, deviation) = moments(&points.iter().map(|p| p.1).collect::<Vec<_>>());
         (correlation(&points), deviation)
     };
-    // one standard deviation of the parameter moves the quantity by ρ of its own deviation
+    // One standard deviation of the parameter changes the quantity by ρ times the quantity's own standard
+    // deviation.
     let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = drawn(page)
         .into_iter()
         .map(|(place, name)| {
@@ -47,7 +49,7 @@ pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 
     ranked
 }
 
-/// Ranked sensitivities and histograms of a group.
+/// Plots the ranked sensitivities and the histograms of a group.
 pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     let (drawn, ranked) = (drawn(page), ranked(page, group));
     let names: Vec<&str> = ranked.iter().map(|row| row.0).collect();
@@ -120,7 +122,7 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     vec![first, second, third]
 }
 
-/// Middles of bins and how many values are in each.
+/// Returns the centres of the bins and the number of values in each.
 fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
     const BINS: usize = 24;
     let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
@@ -132,7 +134,7 @@ fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
     ((0..BINS).map(|i| low + (i as f64 + 0.5) * width).collect(), counts)
 }
 
-/// Mean and standard deviation; 0 without values.
+/// Returns mean and standard deviation; both are 0 without values.
 pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     match values {
         [] => (0.0, 0.0),
@@ -140,7 +142,7 @@ pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     }
 }
 
-/// Coefficient of correlation, −1 to 1; 0 where one of the two does not vary.
+/// Returns the correlation coefficient, −1 to 1, or 0 if x or y is constant.
 fn correlation(points: &[(f64, f64)]) -> f64 {
     let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
     let found = statistics::correlation(&x, &y);

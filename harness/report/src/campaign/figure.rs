@@ -1,5 +1,3 @@
-//! Figures: what `report.js` draws with plotly, and the HTML around it.
-
 use std::collections::BTreeSet;
 
 use maud::{Markup, html};
@@ -11,39 +9,36 @@ use experiments::rounding::significant;
 /// A figure of one or more panels with a common legend.
 pub(super) struct Figure {
     pub title: String,
-    /// Caption: the point that the figure makes.
+    /// Caption: the statement that the figure makes.
     pub caption: Markup,
-    /// Figures of Rubaga's thesis that show the same of its bench, such as `7.1 and 7.2`.
+    /// Numbers of the figures in Rubaga's thesis that show the same for its bench, for example `7.1 and 7.2`.
     pub thesis: &'static str,
     /// Number of panels in a row on a wide screen.
     pub columns: usize,
-    /// Height of a row of panels, px.
     pub height: usize,
-    /// Half of the page's width on a wide screen.
+    /// True if the figure takes half of the page's width on a wide screen.
     pub half: bool,
-    /// Panels that zoom together along x.
+    /// True if the panels zoom together along x.
     pub shared: bool,
     pub panels: Vec<Panel>,
     pub traces: Vec<Value>,
-    /// Labels at the right end of lines in the first panel, in place of a legend.
+    /// Labels at the right ends of the lines in the first panel, which replace a legend.
     pub labels: Vec<Label>,
 }
 
-/// A text at the right end of a line.
 pub(super) struct Label {
     pub y: f64,
     pub text: String,
     pub color: String,
 }
 
-/// Axes of a panel.
+/// Axes of a panel; `equal` gives both the same scale.
 #[derive(Clone, Default)]
 pub(super) struct Panel {
     pub x: String,
     pub y: String,
     pub log_x: bool,
     pub log_y: bool,
-    /// The same scale both ways.
     pub equal: bool,
     /// Initial range of x; `None` shows all data.
     pub range: Option<(f64, f64)>,
@@ -72,27 +67,25 @@ impl Default for Figure {
     }
 }
 
-/// The page's figures, in their order.
 #[derive(Default)]
 pub(super) struct Figures {
     specifications: Vec<Value>,
     titles: Vec<String>,
-    /// Captions name the thesis's figures.
+    /// True if captions name the corresponding figures of the thesis.
     of_the_thesis: bool,
 }
 
 impl Figures {
-    /// No figures yet; captions name the thesis's figures if `of_the_thesis`.
     pub fn new(of_the_thesis: bool) -> Self {
         Figures { of_the_thesis, ..Figures::default() }
     }
 
-    /// Takes a figure and gives the HTML of its place; nothing if it has nothing to show.
+    /// Adds a figure and returns the HTML of its place, or nothing if the figure has no data.
     pub fn add(&mut self, figure: Figure) -> Markup {
         let none = |axis: &Value| axis.as_array().is_some_and(Vec::is_empty);
         let empty = |trace: &Value| none(&trace["x"]) || none(&trace["y"]);
         let mut traces: Vec<Value> = figure.traces.into_iter().filter(|t| !empty(t)).collect();
-        // a panel without a trace would be a blank
+        // Panels without a trace are left out.
         let drawn: BTreeSet<u64> = traces.iter().filter_map(|t| t["panel"].as_u64()).collect();
         if drawn.is_empty() {
             return html! {};
@@ -132,7 +125,6 @@ impl Figures {
         }
     }
 
-    /// Links to the figures.
     pub fn list(&self) -> Markup {
         html! {
             @for (title, number) in self.titles.iter().zip(1..) {
@@ -141,13 +133,12 @@ impl Figures {
         }
     }
 
-    /// Returns the specifications as JSON for a script element.
     pub fn json(&self) -> String {
         web::json_in_script(&Value::Array(self.specifications.clone()).to_string())
     }
 }
 
-/// A number with five digits; null if it is none.
+/// Rounds a number to five significant digits; NaN and infinite become null.
 pub(super) fn number(value: f64) -> Value {
     let rounded = significant(value, 5);
     if rounded.is_finite() && rounded == rounded.trunc() && rounded.abs() < 1e15 {
@@ -160,7 +151,7 @@ pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> Vec<Value> {
     values.into_iter().map(number).collect()
 }
 
-/// A curve in panel `panel`: a line, `dash` as plotly names it.
+/// Returns a line in panel number `panel`; `dash` is a line style of plotly.
 pub(super) fn line(
     panel: usize,
     name: &str,
@@ -180,7 +171,7 @@ pub(super) fn line(
     trace
 }
 
-/// The first x and the distance of the others, if all are as far apart.
+/// Returns the first x and the distance between points, if all points have the same distance.
 fn even(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let [first, .., last] = points else { return None };
     let step = (last.0 - first.0) / (points.len() - 1) as f64;
@@ -189,7 +180,7 @@ fn even(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     (points.len() > 20 && step > 0.0 && most < 1e-6 * step).then_some((first.0, step))
 }
 
-/// Points joined by a line, each with the half-width of its uncertainty if there is one.
+/// Returns points joined by a line, each with the half-width of its uncertainty if it has one.
 pub(super) fn dots(
     panel: usize,
     name: &str,
@@ -211,7 +202,8 @@ pub(super) fn dots(
     trace
 }
 
-/// Points of a curve that a drawing of common size needs; x even in the logarithm if `log`.
+/// Selects the points of a curve that are needed to draw it at the usual size. `log` says that the x axis is
+/// logarithmic.
 pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
     let finite = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite();
     let points: Vec<(f64, f64)> = points.iter().filter(finite).copied().collect();
@@ -224,7 +216,7 @@ pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
         (low, (high - low).max(1e-300))
     };
     let ((x0, w), (y0, h)) = (span(&|p| place(p.0)), span(&|p| p.1));
-    // a drawing of 2000 by 400 px: a narrow resonance may be zoomed
+    // Sized for 2000 by 400 px, because readers may zoom into a narrow resonance.
     let scaled: Vec<(f64, f64)> =
         points.iter().map(|p| (2000.0 * (place(p.0) - x0) / w, 400.0 * (p.1 - y0) / h)).collect();
     let mut kept = simplified(&scaled, 0.4).into_iter().peekable();

@@ -1,4 +1,4 @@
-//! Runs of an FMU that is not the bench: its outputs over time.
+//! Figures about the runs of an FMU other than the bench: its outputs over time.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,11 @@ use super::colors;
 use super::figure::{Figure, Panel, line};
 use super::page::unit;
 
-/// A run's figures: attitude and rates, the path of each bob, all other signals.
+/// Plots one run: attitude and rates, the path of each bob, and all other signals. `tail` is the end of the
+/// run with more detail.
 pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> Vec<Figure> {
     let unit = |signal: &str| unit(fmu, signal).map_or(String::new(), |unit| format!(" / {unit}"));
-    // omega[1], omega[2], omega[3] in one panel
+    // Elements such as omega[1], omega[2], omega[3] share a panel.
     let mut vectors: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for (signal, values) in &history.signals {
         let moves = values.iter().any(|v| *v != values[0]);
@@ -35,7 +36,7 @@ pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> V
             let signals = &vectors[*stem];
             panels.push(Panel::new("time / s", &format!("{stem}{}", unit(signals[0]))));
             for signal in signals.iter().take(8) {
-                // all panels have one legend
+                // All panels share one legend.
                 let i = traces.len();
                 let curve = history.curve(signal);
                 traces.push(line(p, signal, colors::category(i), colors::dash(i), &curve));

@@ -1,4 +1,4 @@
-//! Time histories, and the path of the liquid's crest.
+//! Plots over time, and the path of the wave's crest.
 
 use analysis::rotary;
 use experiments::campaign::{History, Outcome, SloshPath};
@@ -9,8 +9,8 @@ use super::figure::{Figure, Panel, line};
 use super::page::{Group, Page, manoeuvre};
 use names::hubslosh::{OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, TAU_CMD};
 
-/// Runs of a group that are drawn over time: all if they are few, else the first, the middle and the
-/// last.
+/// Selects the runs of a group that are plotted over time: all if they are few, otherwise the first, the
+/// middle and the last.
 fn chosen<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
     match runs.len() {
         0..=4 => runs.to_vec(),
@@ -18,7 +18,7 @@ fn chosen<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
     }
 }
 
-/// Torque, rate, slosh angles and residual of some runs of a group.
+/// Plots torque, rate, slosh angles and rate residual of some runs of a group.
 pub(super) fn history(page: &Page, group: &Group) -> Figure {
     let runs = chosen(&group.drawn);
     let mut traces = Vec::new();
@@ -30,9 +30,9 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
         "residual / (rad/s)",
     ];
     let signals = [TAU_CMD, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, "residual"];
-    // a liquid that stays in its plane has nothing to show across it
+    // If the liquid stays in its plane, the radial angle is not plotted.
     let planar = runs.iter().all(|run| run.totals.peak_radial_angle == 0.0);
-    // the largest first, or it would hide the others
+    // The largest curve is drawn first, because it would hide the others.
     for (i, run) in runs.iter().enumerate().rev() {
         let color = colors::ordered(i, runs.len());
         for (p, signal) in signals.iter().enumerate() {
@@ -66,8 +66,8 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// Rate and slosh angle after a manoeuvre, one colour for each group: the run of each whose value
-/// of the axis is in the middle.
+/// Plots rate and slosh angle after a manoeuvre. Each group has one colour and is represented by its middle
+/// run along the axis.
 pub(super) fn after(page: &Page) -> Figure {
     let mut traces = Vec::new();
     let mut from = f64::INFINITY;
@@ -97,7 +97,7 @@ pub(super) fn after(page: &Page) -> Figure {
     }
 }
 
-/// All runs of a plan over each other, if it has no axis to draw them along.
+/// Plots all runs of a plan that has no axis in the same panels.
 pub(super) fn compared(page: &Page) -> Figure {
     let runs =
         || page.groups.iter().flat_map(|group| group.drawn.iter().map(move |run| (group, run)));
@@ -119,7 +119,7 @@ pub(super) fn compared(page: &Page) -> Figure {
             traces.push(line(p, &name, color, dash, &curve));
         }
     }
-    // smallest and largest rate of each stretch of a run's history
+    // Smallest and largest rate in each interval of a run.
     let envelope = |run: &Outcome| -> Vec<[f64; 2]> {
         let rate = run.history.curve(OMEGA_IMU);
         rate.chunks_exact(2).map(|p| [p[0].1.min(p[1].1), p[0].1.max(p[1].1)]).collect()
@@ -145,14 +145,14 @@ pub(super) fn compared(page: &Page) -> Figure {
     }
 }
 
-/// The crest's path seen from above and over time, if the slosh leaves its plane.
+/// Plots the path of the wave's crest seen from above and over time, if the slosh leaves its plane.
 pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     let radial = |run: &Outcome| run.totals.peak_radial_angle;
     let Some(last) = group.drawn.iter().copied().max_by(|a, b| radial(a).total_cmp(&radial(b)))
     else {
         return Vec::new();
     };
-    // a wave that stays in its plane has no path to show, a recording tells of none
+    // A wave that stays in its plane has no path to show, and a recording does not contain it.
     if radial(last).is_nan() || radial(last) < rotary::LEAST {
         return Vec::new();
     }

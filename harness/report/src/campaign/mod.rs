@@ -1,6 +1,5 @@
-//! `report.html`: one self-contained page on a campaign.
+//! Writes `report.html`, one self-contained page about a campaign.
 
-mod along;
 mod chapter;
 mod colors;
 mod compare;
@@ -9,6 +8,7 @@ mod figure;
 mod general;
 mod histories;
 mod notes;
+mod over_axis;
 mod page;
 mod recordings;
 mod responses;
@@ -30,18 +30,18 @@ use self::page::{Group, Page, Varied, axis, best, groups, manoeuvre, runs};
 /// plotly.js, as the global `Plotly`.
 pub(crate) static PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
 
-/// Licence of Plotly, which every page with Plotly contains.
 pub(crate) static PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 
-/// Most groups that get figures of their own; the page states which ones do not.
+/// Largest number of groups that get figures of their own; the page says for which groups figures are
+/// missing.
 const MOST_GROUPS: usize = 24;
 
-/// Most runs of another FMU that get figures.
+/// Largest number of runs of other FMUs that get figures.
 const MOST_RUNS: usize = 6;
 
-/// The campaign's most telling run: that with the largest radial slosh angle, which is rotary slosh; where none leaves its
-/// plane, that with the largest slosh angle. No recording.
-pub fn telling(results: &Results) -> Option<&Outcome> {
+/// Returns the run that is shown in 3-D: the one with the largest radial slosh angle, which has rotary slosh,
+/// or, if no run leaves its plane, the one with the largest slosh angle. Recordings are not considered.
+pub fn run_to_view(results: &Results) -> Option<&Outcome> {
     let simulated = results.outcomes.iter().filter(|run| !run.is_recording());
     let (radial, tangential) =
         (|run: &Outcome| run.totals.peak_radial_angle, |run: &Outcome| run.totals.peak_slosh_angle);
@@ -54,7 +54,8 @@ pub fn telling(results: &Results) -> Option<&Outcome> {
     largest(radial).or_else(|| largest(tangential))
 }
 
-/// Returns the report. `view` is the separate page that shows a named run; `chapters` precede the sections on the runs.
+/// Returns the report of a campaign as HTML. `view` is the file of the separate page that shows a run;
+/// `chapters` come before the sections about the runs.
 pub fn page(
     campaign: &Campaign,
     fmu: &Fmu,
@@ -125,22 +126,22 @@ fn data<'a>(campaign: &'a Campaign, fmu: &Fmu, results: &'a Results) -> Page<'a>
         plan,
         groups: groups(plan, fmu, results),
         axis: axis(plan, fmu, &results.outcomes),
-        varied: plan.varied().iter().map(|n| Varied::of(n, fmu, &results.outcomes)).collect(),
+        varied: plan.varied().iter().map(|n| Varied::new(n, fmu, &results.outcomes)).collect(),
     }
 }
 
-/// Returns true if the runs are sweeps over the thesis's band with several torques.
+/// Returns true if the runs are sweeps over the thesis's frequency band with several torques.
 fn repeats_the_thesis(page: &Page) -> bool {
     let band = !page.groups.is_empty() && page.groups.iter().all(|g| g.band() == Some(BAND));
     band && page.axis.as_ref().is_some_and(|axis| axis.name == "torque amplitude")
 }
 
-/// An element's name in a link.
+/// Converts a title to an anchor for links.
 fn anchor(title: &str) -> String {
     title.to_lowercase().replace(|c: char| !c.is_ascii_alphanumeric(), "-")
 }
 
-/// Titles and contents of the sections on runs of the bench; empty ones are left out.
+/// Returns the titles and contents of the sections about runs of the bench, without empty sections.
 fn bench_sections<'a>(
     page: &Page,
     campaign: &Campaign,
@@ -157,19 +158,19 @@ fn bench_sections<'a>(
     let mut sections: Vec<(&str, Markup)> = Vec::new();
     let mut add = |all: Vec<Figure>| html! { @for figure in all { (figures.add(figure)) } };
 
-    // the plan's question first
+    // The answer to the plan's question comes first.
     let mut first = Vec::new();
     if random && has_response {
         first.extend(groups.iter().flat_map(|group| draws::draws(page, group)));
     } else if let (Some(axis), true) = (axis, has_response) {
-        first.push(along::extrema(page, axis));
+        first.push(over_axis::extrema(page, axis));
     } else if let (Some(axis), false) =
         (axis, groups.iter().all(|g| manoeuvre(g.runs[0]).is_none()))
     {
-        first.push(along::residual_motion(page, axis));
+        first.push(over_axis::residual_motion(page, axis));
         first.push(histories::after(page));
     } else if let Some(axis) = axis {
-        first.push(along::slosh_angles(page, axis));
+        first.push(over_axis::slosh_angles(page, axis));
     } else if results.outcomes.len() > 1 {
         first.push(histories::compared(page));
     }
@@ -187,7 +188,7 @@ fn bench_sections<'a>(
         all.extend(recorded.map(|group| responses::fitted(page, group)));
         sections.push(("Frequency responses", add(all)));
     }
-    sections.push(("Comparison of models with recordings", recordings::beside(results)));
+    sections.push(("Comparison of models with recordings", recordings::comparison_table(results)));
     sections.push(("Time histories", add(histories(&few))));
     if !random {
         let paths = few.iter().flat_map(|group| histories::paths(page, group));
@@ -197,15 +198,15 @@ fn bench_sections<'a>(
         let title = "Against what is varied";
         let mut all = Vec::new();
         if has_response {
-            all.push(along::features(page, axis));
+            all.push(over_axis::features(page, axis));
         }
-        all.push(along::bearing_and_liquid(page, axis));
+        all.push(over_axis::bearing_and_liquid(page, axis));
         if has_response {
-            all.push(along::linear_fit(page, axis));
+            all.push(over_axis::linear_fit(page, axis));
         }
         if swept {
-            all.push(along::cross_axis(page, axis));
-            all.push(along::out_of_the_plane(page, axis));
+            all.push(over_axis::cross_axis(page, axis));
+            all.push(over_axis::out_of_the_plane(page, axis));
         }
         sections.push((title, add(all)));
         if swept && groups.iter().any(|group| group.runs.len() > 2) {
@@ -229,7 +230,7 @@ fn bench_sections<'a>(
     sections
 }
 
-/// Sections on runs of another FMU.
+/// Returns the sections about runs of an FMU other than the bench.
 fn general_sections<'a>(
     fmu: &Fmu,
     results: &Results,
@@ -316,7 +317,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
     }
 }
 
-/// Returns the link to the page of one run.
+/// Returns the link to the page that shows one run.
 fn link(file: &str, run: &Outcome) -> Markup {
     let radial = run.totals.peak_radial_angle;
     let degrees = |angle: f64| format!("{:.1}°", angle.to_degrees());
@@ -333,7 +334,7 @@ fn link(file: &str, run: &Outcome) -> Markup {
     }
 }
 
-/// Antiresonance and resonance of a group's runs.
+/// Returns the summary of a group: ranges of the antiresonance and the resonance of its runs.
 fn card(page: &Page, group: &Group) -> Markup {
     let over = |get: &dyn Fn(&Features) -> Option<f64>| {
         let found = group.runs.iter().filter_map(|run| get(&best(run)?.0.features));
@@ -342,7 +343,9 @@ fn card(page: &Page, group: &Group) -> Markup {
             values.iter().copied().reduce(f64::min).zip(values.iter().copied().reduce(f64::max));
         match ends {
             Some((low, high)) if high - low < 2e-5 * high => format!("{low:.4} Hz"),
-            Some((low, high)) => format!("{}–{} Hz", digits(low, high), digits(high, low)),
+            Some((low, high)) => {
+                format!("{}–{} Hz", format_distinct(low, high), format_distinct(high, low))
+            }
             None => {
                 let doubt = group.runs.iter().find_map(|run| best(run)?.0.doubt);
                 doubt.map_or("none".into(), |doubt| format!("not valid: {doubt}"))
@@ -368,13 +371,13 @@ fn card(page: &Page, group: &Group) -> Markup {
     }
 }
 
-/// A frequency with the digits that tell it from another.
-fn digits(value: f64, other: f64) -> String {
+/// Formats a frequency with enough digits to distinguish it from `other`.
+fn format_distinct(value: f64, other: f64) -> String {
     let places = (1.5 - (value - other).abs().max(1e-6).log10()).ceil().clamp(3.0, 4.0) as usize;
     format!("{value:.places$}")
 }
 
-/// The profiles of the runs, without what is varied along them.
+/// Describes the torque profiles of the runs, without the parameters that are varied.
 fn torques(results: &Results) -> String {
     let analysed = results.outcomes.iter().map(|run| &run.case);
     let cases = analysed.chain(results.unanalysed.iter().map(|run| &run.case));
@@ -384,7 +387,7 @@ fn torques(results: &Results) -> String {
     match profiles[..] {
         [] => "none".into(),
         [one] => one.into(),
-        // what they have in common, key by key
+        // The part that the profiles have in common, key by key.
         [first, ..] => {
             let (name, rest) = first.split_once(':').unwrap_or((first, ""));
             let same = |part: &&str| {

@@ -1,4 +1,4 @@
-//! The text at the end: methods, results table, and what was run.
+//! The text at the end of the page: methods, table of results, and provenance.
 
 use std::f64::consts::TAU;
 
@@ -75,8 +75,8 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     }
 }
 
-/// Describes the shift by the sweep of the last run of a group (the largest torque, if torques differ).
-/// Returns `None` without a resonance.
+/// Describes, for the last run of a group (which has the largest torque, if torques differ), how far the
+/// sweep shifts its resonance. Returns `None` without a resonance.
 fn swept_row(group: &Group) -> Option<Markup> {
     let run = group.runs.last()?;
     let (mode, exact) = (run.linear.modes.first()?, group.exact.last()?.f_res?);
@@ -104,7 +104,7 @@ fn swept_row(group: &Group) -> Option<Markup> {
     })
 }
 
-/// Most rows of the results table. A browser needs seconds to lay out a longer one.
+/// Largest number of rows in the table of results; a browser would need seconds to lay out a longer table.
 const MOST_ROWS: usize = 2000;
 
 pub(super) fn table(page: &Page, results: &Results) -> Markup {
@@ -121,7 +121,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
         let lines: Vec<&str> = label.split(" / ").collect();
         html! { th { @for (i, line) in lines.iter().enumerate() { @if i > 0 { br; } (line) } } }
     };
-    // columns that no run has
+    // Columns without a value in any run are left out.
     let swept = results.outcomes.iter().any(|run| run.passing.is_some());
     let recorded = results.outcomes.iter().any(|run| run.record.is_some());
     let all = results.outcomes.len();
@@ -165,7 +165,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                             }
                             @if swept { (cells(run.passing.as_ref().map(|passing| &passing.rate))) }
                             @if recorded { (cells(run.record.as_ref().map(|record| &record.spa))) }
-                            // of a recording most is unknown
+                            // For recordings most parameters are unknown.
                             @let known = |text: String| if text == "NaN" { String::new() } else { text };
                             td { (known(format!("{:.1}", run.totals.peak_slosh_angle.to_degrees()))) }
                             td { (known(format!("{:.1}", run.totals.peak_wave_height * 1e3))) }
@@ -188,7 +188,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
     }
 }
 
-/// Table cells for one estimate of a run's features.
+/// Returns the table cells for one estimate of a run's features.
 fn cells(estimate: Option<&Estimate>) -> Markup {
     let features = estimate.map_or(Features::default(), |estimate| estimate.features);
     let columns = [
@@ -209,7 +209,8 @@ fn cells(estimate: Option<&Estimate>) -> Markup {
     }
 }
 
-/// A number times `scale`, a drawn one to six digits; any other text as it is.
+/// Formats a number times `scale`; a number with many digits, such as a drawn one, gets six. Any other text
+/// is returned unchanged.
 fn shortened(text: &str, scale: f64) -> String {
     match text.parse::<f64>() {
         Ok(value) if text.len() > 8 => format!("{:.5e}", value * scale),

@@ -1,6 +1,3 @@
-//! Data that the figures of a campaign's page share: the runs in groups, and the axis along which they
-//! are drawn.
-
 use analysis::features::Features;
 use analysis::sweep::Sweep;
 use analysis::{BAND, FrequencyResponse, logarithmic_grid};
@@ -10,20 +7,19 @@ use experiments::profile::Torque;
 use host::fmu::Fmu;
 use names::hubslosh::{slosh, tank};
 
-/// Runs that differ in nothing but the number along which they are drawn (and what is drawn at
-/// random).
+/// Runs that differ only in the parameter along the axis, and in parameters drawn at random.
 pub(super) struct Group<'a> {
     pub model: &'a str,
-    /// m; `None` if it is drawn at random, or what the runs are drawn along.
+    /// Fill height, m; `None` if it is drawn at random or is the axis.
     pub fill: Option<f64>,
-    /// Further differences from the other groups, such as `tank.d 111 mm`.
+    /// Further differences from the other groups, for example `tank.d 111 mm`.
     pub others: Vec<String>,
     pub runs: Vec<&'a Outcome>,
-    /// Runs whose curves are stored.
+    /// Runs whose time histories are stored.
     pub drawn: Vec<&'a Outcome>,
-    /// The sweep of its first run.
+    /// The sweep of the first run, if it is one.
     pub sweep: Option<&'a Sweep>,
-    /// Features of each run's exact linear response on the grid of its band.
+    /// Features of each run's exact linear response, evaluated on a grid over its band.
     pub exact: Vec<Features>,
 }
 
@@ -35,7 +31,7 @@ impl Group<'_> {
         }
     }
 
-    /// Differences from other groups of the same model: `10 cm fill, tank.d 111 mm`.
+    /// Returns the differences from other groups of the same model, for example `10 cm fill, tank.d 111 mm`.
     pub fn plant(&self) -> String {
         let fill = self.fill.map(|fill| format!("{} cm fill", cm(fill)));
         fill.into_iter().chain(self.others.iter().cloned()).collect::<Vec<_>>().join(", ")
@@ -45,48 +41,43 @@ impl Group<'_> {
         band(self.runs[0])
     }
 
-    /// The exact linear response of its first run, on the grid of its band.
+    /// Computes the exact linear response of the first run on a grid over its band.
     pub fn exact_response(&self) -> FrequencyResponse {
         exact_response(self.runs[0])
     }
 }
 
-/// The number along which runs are drawn.
 pub(super) struct Axis {
-    /// Place among what is varied.
     pub place: usize,
     pub name: String,
-    /// Label with unit.
     pub label: String,
-    /// Factor from SI to the displayed unit.
     pub scale: f64,
 }
 
 impl Axis {
-    pub fn of(&self, run: &Outcome) -> Option<f64> {
+    pub fn value(&self, run: &Outcome) -> Option<f64> {
         let value: f64 = run.case.varied[self.place].parse().ok()?;
         Some((value * self.scale * 1e9).round() / 1e9)
     }
 
-    /// Suffix of a value: a space and the unit, or nothing.
+    /// Returns the suffix of a value on this axis: a space and the unit, or nothing.
     pub fn unit(&self) -> &str {
         self.label.find(" / ").map_or("", |at| &self.label[at + 2..])
     }
 }
 
-/// Campaign, groups and axis, shared by all figures.
+/// Campaign, groups and axis, which all figures use.
 pub(super) struct Page<'a> {
     pub plan: &'a Plan,
     pub groups: Vec<Group<'a>>,
     pub axis: Option<Axis>,
-    /// All that is varied, in the plan's order.
+    /// All varied parameters in the order of the plan; `None` for one that cannot be displayed.
     pub varied: Vec<Option<Varied>>,
 }
 
 impl Page<'_> {
-    /// A run's name within its group.
     pub fn name(&self, run: &Outcome) -> String {
-        let value = self.axis.as_ref().and_then(|axis| Some((axis, axis.of(run)?)));
+        let value = self.axis.as_ref().and_then(|axis| Some((axis, axis.value(run)?)));
         match value {
             Some((axis, x)) if axis.unit().is_empty() => format!("{} {x}", axis.label),
             Some((axis, x)) => format!("{x}{}", axis.unit()),
@@ -95,22 +86,22 @@ impl Page<'_> {
     }
 }
 
-/// Most curves in one figure of responses.
+/// Largest number of curves in one figure of frequency responses.
 pub(super) const MOST_CURVES: usize = 24;
 
-/// The estimate that a run's headline is taken from, and its name: of a sweep that of
-/// `features.csv`, else `spa`'s.
+/// Returns the estimate from which the run's headline values are taken, and its name: for a sweep the one in
+/// `features.csv`, otherwise `spa`.
 pub(super) fn best(run: &Outcome) -> Option<(&Estimate, &'static str)> {
     run.estimate().or_else(|| Some((&run.record.as_ref()?.spa, "spa")))
 }
 
-/// Level in dB over the frequency while the sweep passes.
+/// Returns the level in dB over the frequency, estimated while the sweep passes.
 pub(super) fn passing(run: &Outcome) -> Curve {
     let response = run.passing.as_ref().map(|passing| &passing.rate.response);
     response.map_or(Curve::new(), |r| zip(&r.frequency, &r.decibels()))
 }
 
-/// The sweep that drives a run, if it is one.
+/// Returns the sweep that drives a run, or `None` for other torques.
 pub(super) fn sweep(run: &Outcome) -> Option<&Sweep> {
     match &*run.case.torque {
         Torque::Profile(profile) => profile.sweep(),
@@ -118,7 +109,7 @@ pub(super) fn sweep(run: &Outcome) -> Option<&Sweep> {
     }
 }
 
-/// The band in which a run has a frequency response, Hz.
+/// Returns the band in which a run has a frequency response, Hz.
 pub(super) fn band(run: &Outcome) -> Option<(f64, f64)> {
     match &*run.case.torque {
         Torque::Profile(profile) => profile.band(),
@@ -131,33 +122,31 @@ fn exact_response(run: &Outcome) -> FrequencyResponse {
     run.linear.frequency_response(&grid)
 }
 
-/// Features of a run's exact linear response.
 pub(super) fn exact_features(run: &Outcome) -> Features {
     Features::of(&exact_response(run))
 }
 
-/// The unit of a variable, as it is printed.
+/// Returns the unit of a variable in typographic form.
 pub(super) fn unit(fmu: &Fmu, name: &str) -> Option<String> {
     let unit = fmu.description().variable(name).ok()?.attributes().unit.clone()?;
     Some(printed(&unit))
 }
 
-/// A unit in FMI's spelling, as it is printed: N.m, kg.m2, rad/s2.
+/// Converts a unit from FMI's spelling to typographic form, for example N.m to N·m and rad/s2 to rad/s².
 pub(crate) fn printed(unit: &str) -> String {
     unit.replace('.', "·").replace("m2", "m²").replace("s2", "s²")
 }
 
-/// A quantity that a plan varies, as readers see it: a parameter of the profile by its meaning, a variable by its name.
+/// A varied quantity as readers see it: a parameter of the torque profile has a label, a variable its name.
 pub(super) struct Varied {
     pub name: String,
-    /// Displayed unit; empty for a dimensionless quantity.
     pub unit: String,
     /// Factor from SI to the displayed unit.
     pub scale: f64,
 }
 
 impl Varied {
-    pub fn of(variable: &str, fmu: &Fmu, runs: &[Outcome]) -> Option<Varied> {
+    pub fn new(variable: &str, fmu: &Fmu, runs: &[Outcome]) -> Option<Varied> {
         let (name, unit) = match variable.strip_prefix("profile.") {
             Some(name) => {
                 let parameter = runs.iter().find_map(|run| match &*run.case.torque {
@@ -177,17 +166,16 @@ impl Varied {
         Some(Varied { name: name.into(), unit, scale })
     }
 
-    /// One of its values: `tank.d 111 mm`, `slosh.model planar`.
+    /// Formats one of the values, for example `tank.d 111 mm` or `slosh.model planar`.
     pub fn value(&self, text: &str) -> String {
         let number = text.parse::<f64>().ok().map(|value| {
-            // without the dust of binary fractions
+            // Rounded, to remove the errors of binary fractions.
             let value = (value * self.scale * 1e9).round() / 1e9;
             format!("{value} {}", self.unit).trim_end().to_string()
         });
         format!("{} {}", self.name, number.as_deref().unwrap_or(text))
     }
 
-    /// Name and unit.
     pub fn label(&self) -> String {
         match &*self.unit {
             "" => self.name.clone(),
@@ -199,13 +187,13 @@ impl Varied {
 pub(super) fn axis(plan: &Plan, fmu: &Fmu, runs: &[Outcome]) -> Option<Axis> {
     let variable = plan.axis()?;
     let place = plan.varied().iter().position(|n| *n == variable)?;
-    let varied = Varied::of(variable, fmu, runs)?;
+    let varied = Varied::new(variable, fmu, runs)?;
     Some(Axis { place, label: varied.label(), name: varied.name, scale: varied.scale })
 }
 
 pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
     let axis = plan.axis().unwrap_or("");
-    // the indices, among all varied parameters, of those that separate groups, apart from model and fill
+    // Indices of the varied parameters that separate groups, apart from model and fill.
     let grouping = plan.grouping();
     let recorded = results.recordings() > 0;
     let differs = |place: usize| {
@@ -218,16 +206,16 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
         .enumerate()
         .filter(|(_, name)| grouping.contains(name) && *name != axis)
         .filter(|(_, name)| ![slosh::MODEL, tank::H].contains(name))
-        // one recording has its values alone; they tell it from nothing
+        // A single recording needs no such label, because no other recording differs from it.
         .filter(|(i, _)| !recorded || differs(*i))
-        .filter_map(|(i, name)| Some((i, Varied::of(name, fmu, &results.outcomes)?)))
+        .filter_map(|(i, name)| Some((i, Varied::new(name, fmu, &results.outcomes)?)))
         .collect();
     let one_fill = axis != tank::H && (!plan.is_random() || grouping.contains(&tank::H));
     let mut groups: Vec<Group> = Vec::new();
     for run in &results.outcomes {
         let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());
         let key: Vec<String> = match &run.case.listed {
-            // what the plan calls it says more than the values that make it
+            // The plan's own name for the group says more than the values.
             Some(name) => vec![name.replace('_', " ")],
             None => values.map(|(i, varied)| varied.value(&run.case.varied[*i])).collect(),
         };
@@ -258,17 +246,16 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
     groups
 }
 
-/// "1 run", "2 runs".
+/// Returns "1 run", "2 runs" and so on.
 pub(super) fn runs(count: usize) -> String {
     format!("{count} run{}", if count == 1 { "" } else { "s" })
 }
 
-/// End time of the torque, s, if the run continues afterwards (a manoeuvre).
 pub(super) fn manoeuvre(run: &Outcome) -> Option<f64> {
     run.ending.manoeuvre
 }
 
-/// A sentence that lists at most four of several things; nothing if there are none.
+/// Returns a sentence that names at most four `things`; empty if there are none.
 pub(super) fn list_of(what: &str, things: &[String]) -> String {
     match things {
         [] => String::new(),
@@ -277,7 +264,7 @@ pub(super) fn list_of(what: &str, things: &[String]) -> String {
     }
 }
 
-/// Each value once, in the order of the first.
+/// Returns each value once, in the order of its first occurrence.
 pub(super) fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
     for value in values {
@@ -288,7 +275,6 @@ pub(super) fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> 
     found
 }
 
-/// Amplitude of a run's torque, N·m; 0 where there is none.
 pub(super) fn torque_of(run: &Outcome) -> f64 {
     run.case.amplitude.unwrap_or(0.0)
 }
@@ -297,7 +283,7 @@ pub(super) fn zip(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     x.iter().copied().zip(y.iter().copied()).collect()
 }
 
-/// A length in cm to the micrometre.
+/// Converts a length in m to cm, rounded to a micrometre.
 pub(super) fn cm(length: f64) -> f64 {
     (length * 1e6).round() / 1e4
 }

@@ -1,15 +1,13 @@
-//! Compares the model's runs with recordings of the same run.
-
 use experiments::campaign::{Outcome, Results};
 use maud::{Markup, html};
 
 use super::page::{best, cm, distinct};
 use experiments::rounding::thousandths;
 
-/// A value and its standard deviation, if that is known.
 type Value = (f64, Option<f64>);
 
-/// A feature: heading, what it is of a run with its standard deviation, factor, unit and digits of a difference.
+/// A feature that is compared: heading, how it is read from a run with its standard deviation, and number of
+/// digits.
 struct Feature {
     heading: [&'static str; 2],
     of: fn(&Outcome) -> Option<Value>,
@@ -81,7 +79,7 @@ const FEATURES: [Feature; 9] = [
     },
 ];
 
-/// Returns true if two runs differ in nothing but the slosh model.
+/// Returns true if two runs differ at most in the slosh model.
 fn same_run(a: &Outcome, b: &Outcome) -> bool {
     let close = |a: Option<f64>, b: Option<f64>| match (a, b) {
         (Some(a), Some(b)) => (a - b).abs() < 1e-9,
@@ -90,7 +88,7 @@ fn same_run(a: &Outcome, b: &Outcome) -> bool {
     close(a.case.amplitude, b.case.amplitude) && close(a.case.fill, b.case.fill)
 }
 
-/// States the largest deviation of each model from the recordings, one sentence each.
+/// Describes the largest deviation of each model from the recordings, one sentence for each model.
 pub(super) fn result(results: &Results) -> String {
     let (recorded, simulated): (Vec<&Outcome>, Vec<&Outcome>) =
         results.outcomes.iter().partition(|run| run.is_recording());
@@ -115,8 +113,7 @@ pub(super) fn result(results: &Results) -> String {
     sentences.collect::<Vec<_>>().join(" ")
 }
 
-/// The table; empty without recordings.
-pub(super) fn beside(results: &Results) -> Markup {
+pub(super) fn comparison_table(results: &Results) -> Markup {
     let (recorded, simulated): (Vec<&Outcome>, Vec<&Outcome>) =
         results.outcomes.iter().partition(|run| run.is_recording());
     if recorded.is_empty() {
@@ -165,13 +162,14 @@ fn value(feature: &Feature, run: &Outcome) -> String {
     }
 }
 
-/// A model's figure less the recording's.
+/// Formats the difference of a model's value from the recording's; a ✓ marks a difference within the joint 95
+/// % interval.
 fn difference(feature: &Feature, run: &Outcome, recording: &Outcome) -> String {
     let Some(((model, a), (there, b))) = (feature.of)(run).zip((feature.of)(recording)) else {
         return String::new();
     };
     let (factor, places, unit) = feature.difference;
-    // no −0.0
+    // Adding 0 avoids −0.0.
     let unit_of_last = 10f64.powi(places as i32);
     let rounded = ((model - there) * factor * unit_of_last).round() / unit_of_last + 0.0;
     let text = format!("{rounded:+.places$} {unit}").replace('-', "\u{2212}");

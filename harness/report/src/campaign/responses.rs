@@ -1,5 +1,3 @@
-//! Frequency responses, and heat maps over frequency and what the plan varies.
-
 use analysis::{BAND, FrequencyResponse, logarithmic_grid};
 use experiments::campaign::{Curve, Estimate, Outcome};
 use maud::html;
@@ -8,7 +6,7 @@ use super::colors;
 use super::figure::{Figure, Panel, line, number, numbers, thinned};
 use super::page::{Axis, Group, MOST_CURVES, Page, best, cm, distinct, passing, zip};
 
-/// Magnitude and phase of every run of a group.
+/// Plots magnitude and phase of the runs of a group.
 pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     let mut traces = Vec::new();
     let runs = group.drawn.iter().filter_map(|run| Some((run, best(run)?)));
@@ -24,7 +22,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
             None => (page.name(run), "solid"),
         };
         traces.extend(bode(&name, &color, dash, &estimate.response));
-        // of all of them they would hide each other
+        // Intervals of all curves would hide each other.
         if i == 0 || i + 1 == runs.len() {
             traces.extend(intervals(&name, &color, estimate));
         }
@@ -54,8 +52,8 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// The band, Hz, around the antiresonance and the resonance of linear theory and of every run that is drawn. A nonlinear
-/// liquid and a bench have their resonance elsewhere than linear theory.
+/// Returns the band (Hz) around the antiresonance and the resonance of both linear theory and every plotted
+/// run, because a nonlinear liquid or a bench has its resonance elsewhere than linear theory.
 fn near(group: &Group) -> Option<(f64, f64)> {
     let (from, to) = group.band().unwrap_or(BAND);
     let of_runs = group.drawn.iter().filter_map(|run| Some(best(run)?.0.features));
@@ -80,9 +78,10 @@ fn bode(
     ]
 }
 
-/// The area within two standard deviations of a response; nothing where it is as narrow as a line.
+/// Draws the band of two standard deviations around a response; nothing if it is as narrow as the line.
 fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Value> {
-    /// Half-widths that are seen, dB, and the widest that is drawn, in standard deviations of ln |H|.
+    /// Smallest visible half-width, dB, and the largest half-width that is drawn, as standard deviation of ln
+    /// |H|.
     const SEEN: f64 = 0.2;
     const WIDEST: f64 = 0.5;
     let decibel = 20.0 / std::f64::consts::LN_10;
@@ -112,8 +111,8 @@ fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Va
     sides.into_iter().enumerate().map(area).collect()
 }
 
-/// The linear model fitted to the first and to the last recording of a group, and the coherence of its residual with the
-/// torque.
+/// Plots the linear models fitted to the first and the last run of a group, and the coherence of the
+/// residuals with the torque.
 pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
     let ends = [group.drawn.first(), group.drawn.last()];
     let ends = distinct(ends.into_iter().flatten().map(|run| run.case.name.as_str()));
@@ -146,8 +145,6 @@ pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// For each fill, the responses of all models at the smallest and at the largest torque (thesis
-/// figures 7.5 and 7.6); nothing where there is one model only.
 pub(super) fn models(page: &Page) -> Vec<Figure> {
     let comparable: Vec<&Group> = page.groups.iter().filter(|g| g.others.is_empty()).collect();
     let mut fills = distinct(comparable.iter().map(|group| group.fill));
@@ -156,7 +153,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
         .into_iter()
         .map(|fill| {
             let mut groups: Vec<&&Group> = comparable.iter().filter(|g| g.fill == fill).collect();
-            // recordings are drawn over the models
+            // Recordings are drawn on top of the models.
             groups.sort_by_key(|group| group.runs[0].is_recording());
             let mut traces = Vec::new();
             for (i, group) in groups.iter().enumerate() {
@@ -188,18 +185,18 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
         .collect()
 }
 
-/// One quantity: its name, what it is of a run, and the ends of its scale if they are not those of
-/// the values.
+/// A quantity of a heat map: name, how it is read from a run, and the ends of the colour scale if they are
+/// fixed.
 struct Quantity {
     label: &'static str,
     of: fn(&Outcome) -> Curve,
     ends: Option<(f64, f64)>,
 }
 
-/// Cells along the frequency.
+/// Number of cells of a heat map along the frequency.
 const CELLS: usize = 120;
 
-/// Heat maps over frequency and what the plan varies (thesis figures 7.11 to 7.16).
+/// Plots heat maps over frequency and the parameter that the plan varies (thesis figures 7.11 to 7.16).
 pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     let quantities = [
         Quantity { label: "magnitude |H| / dB", of: passing, ends: None },
@@ -237,7 +234,7 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
         let rows: Vec<Vec<serde_json::Value>> =
             group.drawn.iter().map(|run| cells(&(quantity.of)(run), (from, to))).collect();
         let y: Vec<String> =
-            group.drawn.iter().filter_map(|run| axis.of(run)).map(|x| x.to_string()).collect();
+            group.drawn.iter().filter_map(|run| axis.value(run)).map(|x| x.to_string()).collect();
         let mut trace = serde_json::json!({
             "type": "heatmap", "panel": p, "colorscale": "Viridis", "name": quantity.label,
             "x": numbers(grid.iter().copied()), "y": y, "z": rows, "hoverongaps": false,
@@ -269,8 +266,8 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     }
 }
 
-/// Means of a curve's values in cells even in the logarithm; an empty cell between others has its
-/// left neighbour's.
+/// Averages a curve in cells of equal width in log frequency. An empty cell between others takes the value of
+/// its left neighbour.
 fn cells(curve: &Curve, (from, to): (f64, f64)) -> Vec<serde_json::Value> {
     let mut sums = vec![(0.0, 0usize); CELLS];
     for (f, value) in curve.iter().filter(|(_, v)| v.is_finite()) {

@@ -1,4 +1,4 @@
-//! The sentence with which a page begins: what the runs show, from their own numbers.
+//! Writes the sentence with which the page begins: the result of the campaign in numbers.
 
 use experiments::campaign::{Outcome, Results};
 use experiments::profile::Torque;
@@ -11,38 +11,38 @@ use super::recordings;
 /// Features of one run's frequency response.
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    /// Position of the run on the axis, in the axis's unit.
+    /// Position of the run on the axis, in the unit of the axis.
     x: f64,
     antiresonance: Option<f64>,
     resonance: Option<f64>,
     /// Antiresonance and resonance of the exact linear plant, Hz.
     exact: [Option<f64>; 2],
-    /// The slosh was rotary for some time.
+    /// True if the slosh was rotary for some time.
     swirls: bool,
 }
 
 impl Point {
-    fn both(&self) -> [Option<f64>; 2] {
+    fn extrema(&self) -> [Option<f64>; 2] {
         [self.antiresonance, self.resonance]
     }
 }
 
-/// The runs of one group along an axis, in its order.
+/// The runs of one group in the order of the axis.
 #[derive(Clone, Debug)]
 struct Series {
     model: String,
-    /// Differences from other groups apart from the model: `10 cm fill`.
+    /// Differences from other groups apart from the model, for example `10 cm fill`.
     plant: String,
     points: Vec<Point>,
 }
 
 impl Series {
-    fn of(group: &Group, axis: Option<&Axis>) -> Series {
+    fn new(group: &Group, axis: Option<&Axis>) -> Series {
         let point = |run: &&Outcome| {
             let features = best(run)?.0.features;
             let exact = exact_features(run);
             Some(Point {
-                x: axis.map_or(Some(0.0), |axis| axis.of(run))?,
+                x: axis.map_or(Some(0.0), |axis| axis.value(run))?,
                 antiresonance: features.f_dip,
                 resonance: features.f_res,
                 exact: [exact.f_dip, exact.f_res],
@@ -58,7 +58,8 @@ impl Series {
         [SloshModel::Linear.name(), SloshModel::Frozen.name()].contains(&&*self.model)
     }
 
-    /// First and last position with rotary slosh, and true if it continues to the end of the axis.
+    /// Returns the first and last position with rotary slosh, and true if all positions from the first to the
+    /// end of the axis have it.
     fn swirl(&self) -> Option<(f64, f64, bool)> {
         let first = self.points.iter().position(|p| p.swirls)?;
         let last = self.points.iter().rposition(|p| p.swirls)?;
@@ -67,7 +68,8 @@ impl Series {
     }
 }
 
-/// The result in one to three sentences; empty if the runs show nothing that a sentence could say.
+/// Returns the result in one to three sentences, or an empty text if the runs show nothing that a sentence
+/// could say.
 pub(super) fn sentence(page: &Page, results: &Results) -> String {
     if results.recordings() > 0 {
         return recordings::result(results);
@@ -80,10 +82,10 @@ pub(super) fn sentence(page: &Page, results: &Results) -> String {
         }
         if has_response {
             let series: Vec<Series> =
-                page.groups.iter().map(|group| Series::of(group, axis)).collect();
+                page.groups.iter().map(|group| Series::new(group, axis)).collect();
             return match axis {
-                Some(axis) => along(&series, &axis.name, axis.unit()),
-                None => alone(&series),
+                Some(axis) => describe_responses(&series, &axis.name, axis.unit()),
+                None => describe_single_runs(&series),
             };
         }
         return match (axis, manoeuvre(first.runs[0])) {
@@ -91,11 +93,11 @@ pub(super) fn sentence(page: &Page, results: &Results) -> String {
             _ => format!("{} {}", rotation(page), largest_angle(page)).trim().into(),
         };
     }
-    elsewhere(results)
+    largest_angle_of_other_fmus(results)
 }
 
-/// Frequency responses along an axis.
-fn along(series: &[Series], name: &str, unit: &str) -> String {
+/// Describes frequency responses of runs along an axis: how they move, and where the slosh becomes rotary.
+fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
     let mut sentences = Vec::new();
     let nonlinear: Vec<&Series> = series.iter().filter(|s| !s.is_linear()).collect();
     let several = {
@@ -104,30 +106,30 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
         plants.dedup();
         plants.len() > 1
     };
-    // the linear runs of the same plant, else the exact linear plant
+    // The linear runs of the same plant, or else the exact linear plant.
     let measured = |of: &Series| {
         series.iter().find(|s| s.model == SloshModel::Linear.name() && s.plant == of.plant)
     };
     let reference = |of: &Series, point: &Point| -> [Option<f64>; 2] {
         let run = measured(of).and_then(|s| s.points.iter().find(|p| p.x == point.x));
-        run.map_or(point.exact, Point::both)
+        run.map_or(point.exact, Point::extrema)
     };
     let linear = match nonlinear.iter().all(|s| measured(s).is_some()) {
         true => "the linear model",
         false => "the exact linear response",
     };
     if name != "torque amplitude" || nonlinear.is_empty() {
-        sentences.extend(moves(series, name, unit, several));
+        sentences.extend(describe_shifts(series, name, unit, several));
     }
     let swirling: Vec<&&Series> = nonlinear.iter().filter(|s| s.swirl().is_some()).collect();
     let ends = |s: &Series| s.points.first().map(|p| p.x).zip(s.points.last().map(|p| p.x));
-    // before the first swirl, or everywhere
+    // The range before the first rotary slosh, or the whole axis.
     let below = |s: &&Series| -> Vec<Point> {
         s.points.iter().copied().take_while(|p| !p.swirls).collect()
     };
     let apart = nonlinear.iter().flat_map(|s| below(s).into_iter().map(move |p| (s, p)));
     let apart = apart.flat_map(|(s, p)| {
-        let pairs = p.both().into_iter().zip(reference(s, &p));
+        let pairs = p.extrema().into_iter().zip(reference(s, &p));
         pairs.filter_map(|(f, reference)| Some(((f? - reference?).abs(), reference?)))
     });
     let worst = apart.fold(None, |worst: Option<(f64, f64)>, (gap, f)| match worst {
@@ -137,8 +139,8 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
     let within = worst.map(|(gap, f)| {
         format!(
             "{linear} holds within {} mHz ({}\u{a0}%)",
-            digits(1e3 * gap),
-            digits(100.0 * gap / f)
+            format_two_digits(1e3 * gap),
+            format_two_digits(100.0 * gap / f)
         )
     });
     let holds = |where_: &str| {
@@ -179,7 +181,7 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
             format!("in {many} of {} series, from {first}{unit} at the earliest,", series.len())
         }
     };
-    // the largest departure of a resonance in rotary slosh, in the direction in which it goes
+    // The largest deviation of a resonance in rotary slosh, with its sign.
     let shifts = swirling.iter().flat_map(|s| {
         let turning = s.points.iter().filter(|p| p.swirls);
         turning.filter_map(move |p| {
@@ -205,9 +207,9 @@ fn along(series: &[Series], name: &str, unit: &str) -> String {
     finished(&sentences)
 }
 
-/// Describes in sentences how antiresonance and resonance depend on the varied parameter `name`, for three series at most. If there
-/// are series of the linear model, only these are described.
-fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String> {
+/// Describes how antiresonance and resonance depend on the varied parameter `name`, for at most three series.
+/// If there are series of the linear model, only these are described.
+fn describe_shifts(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String> {
     let linear = series.iter().any(|s| s.model == SloshModel::Linear.name());
     let these: Vec<&Series> = series
         .iter()
@@ -221,13 +223,13 @@ fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String
                 let low = values.iter().copied().fold(f64::MAX, f64::min);
                 let high = values.iter().copied().fold(f64::MIN, f64::max);
                 Some(match high - low < 5e-3 * high {
-                    // what does not move
+                    // Values that do not change.
                     true => format!(
                         "stays within {} mHz of {:.3} Hz",
-                        digits(500.0 * (high - low)),
+                        format_two_digits(500.0 * (high - low)),
                         (low + high) / 2.0
                     ),
-                    // a walk from end to end
+                    // Monotonic from one end to the other.
                     false if (last - first).abs() > 0.9 * (high - low) => {
                         format!("moves from {first:.3} to {last:.3} Hz")
                     }
@@ -247,15 +249,15 @@ fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String
     few(these.iter().filter_map(sentence).collect(), 3)
 }
 
-/// Runs with a response and nothing to draw them along.
-fn alone(series: &[Series]) -> String {
+/// Describes the frequency responses of runs without an axis.
+fn describe_single_runs(series: &[Series]) -> String {
     let hertz = |f: Option<f64>| f.map_or("none".into(), |f| format!("{f:.4} Hz"));
     let of = |s: &Series| {
         let point = s.points.first()?;
-        let [antiresonance, resonance] = point.both().map(hertz);
+        let [antiresonance, resonance] = point.extrema().map(hertz);
         let exact = point.exact.map(hertz);
         let what = if series.len() > 1 { format!("{}: ", s.title()) } else { String::new() };
-        Some(match point.both() {
+        Some(match point.extrema() {
             [None, None] => format!(
                 "{what}No antiresonance and resonance that can be trusted; those of the exact linear plant are {} and {}",
                 exact[0], exact[1]
@@ -281,7 +283,7 @@ impl Series {
     }
 }
 
-/// Runs that are drawn at random: mean and standard deviation.
+/// Describes random draws by mean and standard deviation of each group.
 fn scatter(page: &Page) -> String {
     let of = |group: &Group| {
         let parts: Vec<String> = super::draws::QUANTITIES[..2]
@@ -289,7 +291,7 @@ fn scatter(page: &Page) -> String {
             .filter_map(|(name, _, of)| {
                 let values: Vec<f64> = group.runs.iter().filter_map(|run| of(run)).collect();
                 let (mean, deviation) = moments(&values);
-                let deviation = format!("standard deviation {} mHz", digits(deviation));
+                let deviation = format!("standard deviation {} mHz", format_two_digits(deviation));
                 (values.len() > 1)
                     .then(|| format!("the {name} is {:.3} Hz ({deviation})", 1e-3 * mean))
             })
@@ -308,7 +310,7 @@ fn scatter(page: &Page) -> String {
     finished(&few(page.groups.iter().filter_map(of).collect(), 3))
 }
 
-/// Short names of the groups: the model, and further differences if there are any.
+/// Returns short names of the groups: the model, and further differences if there are any.
 fn names(page: &Page) -> Vec<String> {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let name = |group: &Group| match plants.len() {
@@ -318,11 +320,11 @@ fn names(page: &Page) -> Vec<String> {
     page.groups.iter().map(name).collect()
 }
 
-/// States the residual hub rate of each group after a manoeuvre.
+/// Describes the residual hub rate of each group after a manoeuvre.
 fn left_behind(page: &Page) -> String {
     let of = |group: &Group| {
         let rates = group.runs.iter().filter_map(|run| {
-            let x = page.axis.as_ref().and_then(|axis| axis.of(run));
+            let x = page.axis.as_ref().and_then(|axis| axis.value(run));
             Some((1e3 * run.ending.rate?, x))
         });
         let rates: Vec<(f64, Option<f64>)> = rates.collect();
@@ -337,8 +339,9 @@ fn left_behind(page: &Page) -> String {
     if all.is_empty() {
         return String::new();
     }
-    let rate =
-        |rate: f64| if rate < 1e-6 { "none".into() } else { format!("{} mrad/s", digits(rate)) };
+    let rate = |rate: f64| {
+        if rate < 1e-6 { "none".into() } else { format!("{} mrad/s", format_two_digits(rate)) }
+    };
     let unit = page.axis.as_ref().map_or("", Axis::unit);
     let name = page.axis.as_ref().map_or("", |axis| axis.name.as_str());
     let parts = all.iter().map(|(title, most, least)| {
@@ -354,8 +357,8 @@ fn left_behind(page: &Page) -> String {
     finished(&[format!("Largest rate that the manoeuvre leaves{along}: {}", parts.join("; "))])
 }
 
-/// States for each model in how many runs the slosh was rotary, and which of them has the smallest torque. Empty if no
-/// model can leave its plane.
+/// Describes for each model in how many runs the slosh was rotary, and which of these runs has the smallest
+/// torque. Empty if no model can leave its plane.
 fn rotation(page: &Page) -> String {
     let count = |model: &str| {
         let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
@@ -376,7 +379,7 @@ fn rotation(page: &Page) -> String {
     swirling(&models.map(count).collect::<Vec<_>>())
 }
 
-/// Number of runs of a model with rotary slosh.
+/// Number of runs of a model, and how many of them have rotary slosh.
 struct Swirling {
     model: String,
     runs: usize,
@@ -401,7 +404,7 @@ fn swirling(models: &[Swirling]) -> String {
     }
 }
 
-/// The largest slosh angles of runs without a frequency response, by model.
+/// Describes the largest slosh angles of runs without a frequency response, by model.
 fn largest_angle(page: &Page) -> String {
     let part = |model: &str| {
         let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
@@ -411,18 +414,18 @@ fn largest_angle(page: &Page) -> String {
         let tangential = most(|run| run.totals.peak_slosh_angle);
         let radial = most(|run| run.totals.peak_radial_angle);
         let across = match radial > 0.1 * tangential {
-            true => format!(", out of its plane {}°", digits(radial)),
+            true => format!(", out of its plane {}°", format_two_digits(radial)),
             false => String::new(),
         };
-        format!("{}° with {model}{across}", digits(tangential))
+        format!("{}° with {model}{across}", format_two_digits(tangential))
     };
     let models = distinct(page.groups.iter().map(|group| group.model));
     let parts: Vec<String> = models.into_iter().map(part).collect();
     finished(&[format!("Largest slosh angle: {}", parts.join("; "))])
 }
 
-/// The largest slosh angle of runs of another FMU.
-fn elsewhere(results: &Results) -> String {
+/// Describes the largest slosh angle of runs of an FMU other than the bench.
+fn largest_angle_of_other_fmus(results: &Results) -> String {
     let angles = results.unanalysed.iter().filter_map(|run| {
         let (angle, signal) = run.largest_angle.as_ref()?;
         Some((*angle, signal.as_str(), run.case.name.as_str()))
@@ -430,13 +433,13 @@ fn elsewhere(results: &Results) -> String {
     match angles.max_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((angle, signal, run)) if angle > 0.0 => finished(&[format!(
             "Largest slosh angle: {}° ({signal}, run {run})",
-            digits(angle.to_degrees())
+            format_two_digits(angle.to_degrees())
         )]),
         _ => String::new(),
     }
 }
 
-/// Returns at most `most` parts of a text; further ones are replaced by their number.
+/// Keeps the first `most` parts of a text and replaces the others by their number.
 fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
     let further = parts.len().saturating_sub(most);
     if further > 0 {
@@ -446,8 +449,8 @@ fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
     parts
 }
 
-/// A number with two significant digits.
-fn digits(value: f64) -> String {
+/// Formats a number with two significant digits.
+fn format_two_digits(value: f64) -> String {
     let rounded = experiments::rounding::significant(value, 2);
     match rounded.abs() {
         size if size >= 10.0 || size == 0.0 => format!("{rounded:.0}"),
@@ -466,7 +469,10 @@ fn finished(sentences: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Point, Series, Swirling, alone, along, digits, swirling};
+    use super::{
+        Point, Series, Swirling, describe_responses, describe_single_runs, format_two_digits,
+        swirling,
+    };
 
     /// A series with exact responses at 2 and 3 Hz: (x, antiresonance, resonance, rotary).
     fn series(model: &str, plant: &str, points: &[(f64, f64, f64, bool)]) -> Series {
@@ -496,7 +502,7 @@ mod tests {
             series("spherical", "10 cm fill", &[(50.0, 2.0, 3.2, true), (100.0, 2.0, 3.5, true)]),
         ];
         assert_eq!(
-            along(&all, TORQUE, " mN·m"),
+            describe_responses(&all, TORQUE, " mN·m"),
             "At 100 mN·m (5 cm fill) and from 50 mN·m on (10 cm fill) the liquid swirls and the resonance \
              moves up to 3.50 Hz; below, the linear model holds within 30 mHz (1.0\u{a0}%) for antiresonance and resonance."
         );
@@ -506,7 +512,7 @@ mod tests {
     fn swirl_from_the_first_run_on_says_nothing_of_below() {
         let all = [series("spherical", "", &[(50.0, 2.0, 2.9, true), (100.0, 0.0, 0.0, true)])];
         assert_eq!(
-            along(&all, TORQUE, " mN·m"),
+            describe_responses(&all, TORQUE, " mN·m"),
             "From 50 mN·m on the liquid swirls and the resonance moves down to 2.90 Hz."
         );
     }
@@ -519,7 +525,7 @@ mod tests {
             (3.0, 2.0, 3.0, true),
             (4.0, 2.0, 3.0, false),
         ];
-        let says = along(&[series("spherical", "", &points)], TORQUE, " mN·m");
+        let says = describe_responses(&[series("spherical", "", &points)], TORQUE, " mN·m");
         assert_eq!(
             says,
             "Between 2 and 3 mN·m the liquid swirls; below, the exact linear response holds within 0 mHz (0\u{a0}%) \
@@ -532,26 +538,29 @@ mod tests {
         let all =
             [series("spherical", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.002, 2.994, false)])];
         assert_eq!(
-            along(&all, TORQUE, " mN·m"),
+            describe_responses(&all, TORQUE, " mN·m"),
             "No run leaves its plane (no rotary slosh): the exact linear response holds within 6.0 mHz (0.20\u{a0}%) for \
              antiresonance and resonance, from 50 to 100 mN·m."
         );
         let planar =
             [series("planar", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.002, 2.994, false)])];
-        assert!(along(&planar, TORQUE, " mN·m").starts_with("The exact linear response holds"));
+        assert!(
+            describe_responses(&planar, TORQUE, " mN·m")
+                .starts_with("The exact linear response holds")
+        );
     }
 
     #[test]
     fn one_linear_model_is_said_to_stay_or_to_move() {
         let stays = [series("linear", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.0, 3.002, false)])];
         assert_eq!(
-            along(&stays, TORQUE, " mN·m"),
+            describe_responses(&stays, TORQUE, " mN·m"),
             "The antiresonance stays within 0 mHz of 2.000 Hz, the resonance stays within 1.0 mHz of 3.001 Hz \
              (torque amplitude from 50 to 100 mN·m)."
         );
         let moves = [series("linear", "", &[(111.0, 2.4, 2.9, false), (220.0, 1.7, 2.2, false)])];
         assert_eq!(
-            along(&moves, "tank.d", " mm"),
+            describe_responses(&moves, "tank.d", " mm"),
             "The antiresonance moves from 2.400 to 1.700 Hz, the resonance moves from 2.900 to 2.200 Hz \
              (tank.d from 111 to 220 mm)."
         );
@@ -560,9 +569,9 @@ mod tests {
     #[test]
     fn runs_without_a_trusted_response_say_nothing_or_that() {
         let none = [series("linear", "", &[(1.0, 0.0, 0.0, false), (2.0, 0.0, 0.0, false)])];
-        assert_eq!(along(&none, TORQUE, ""), "");
-        assert_eq!(along(&[series("spherical", "", &[])], TORQUE, ""), "");
-        let alone = alone(&none);
+        assert_eq!(describe_responses(&none, TORQUE, ""), "");
+        assert_eq!(describe_responses(&[series("spherical", "", &[])], TORQUE, ""), "");
+        let alone = describe_single_runs(&none);
         assert!(alone.starts_with("No antiresonance and resonance that can be trusted"), "{alone}");
     }
 

@@ -1,7 +1,8 @@
-//! The numbers that the thesis prints about its bench and its synthetic data, compared with the campaign's runs.
+//! Compares the numbers that Rubaga's thesis states about its bench and its synthetic data with the
+//! campaign's runs.
 //!
-//! Numbers that need no run (Bond numbers, flight tanks) are rows of `hubslosh scale thesis`, and wrong ones are in the
-//! errata. Statements without a number are not judged: the figures of the report show the runs.
+//! Numbers that need no run (Bond numbers, flight tanks) are rows of `hubslosh scale thesis`, and wrong ones
+//! are in the errata. Statements without a number are not compared; the figures of the report show the runs.
 
 use analysis::statistics::mean;
 use experiments::campaign::Outcome;
@@ -10,27 +11,29 @@ use maud::{Markup, html};
 
 use super::page::{Group, cm, distinct, torque_of};
 
-/// The smallest and the largest torque of the thesis's sweeps, N·m.
 const SMALLEST: f64 = 0.0125;
 const LARGEST: f64 = 0.25;
 
-/// A number of the thesis.
+/// A number stated in the thesis.
 struct Number {
     section: &'static str,
-    /// Quantity that the number is a value of, with its unit.
+    /// The quantity and its unit.
     quantity: &'static str,
-    /// The number is about the synthetic data, whose liquid is linear; it is compared with the linear model only.
+    /// True if the number is about the synthetic data, whose liquid is linear, so that it is compared only
+    /// with the linear model.
     synthetic: bool,
     /// The number as the thesis prints it.
     printed: &'static str,
-    /// Values that agree with the printed one. The range is that of the thesis where it prints one, otherwise 15 % for an
-    /// acceleration (the thesis states neither the fill nor the filter of its gyro) and half a step between torques.
+    /// Range of values that agree with the thesis. It is the thesis's own range if it states one; otherwise
+    /// ±15 % for an acceleration (because the thesis states neither the fill nor the filter of its gyro) and
+    /// half a step between torques.
     agreeing: [f64; 2],
-    /// The same quantity of a group of runs that differ in torque alone; `None` if runs or estimates are missing.
+    /// Computes the quantity for a group of runs that differ only in torque; `None` if runs or estimates are
+    /// missing.
     ours: fn(&Group) -> Option<f64>,
 }
 
-/// In the order of the thesis's sections.
+/// Numbers in the order of the thesis's sections.
 const NUMBERS: [Number; 8] = [
     Number {
         section: "7.1.1, 8.1",
@@ -115,7 +118,8 @@ fn run_at<'a>(group: &'a Group, torque: f64) -> Option<&'a Outcome> {
     group.runs.iter().copied().find(|run| (torque_of(run) - torque).abs() < 1e-9)
 }
 
-/// A figure of each run from a torque (N·m) on; at least two.
+/// Evaluates `figure` for each run with at least this torque (N·m). Returns `None` if fewer than two runs
+/// have a value.
 fn values_from(
     group: &Group,
     torque: f64,
@@ -126,7 +130,8 @@ fn values_from(
     (values.len() > 1).then_some(values)
 }
 
-/// Returns the table of numbers, with a column for each model and a value for each fill; empty without values.
+/// Returns the table of the thesis's numbers with a column for each model and a value for each fill; empty
+/// without values.
 pub(super) fn numbers(groups: &[Group]) -> Markup {
     let groups: Vec<&Group> = groups.iter().filter(|group| group.others.is_empty()).collect();
     let models = distinct(groups.iter().map(|group| group.model));

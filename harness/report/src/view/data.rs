@@ -1,42 +1,44 @@
-//! A run's columns as they go into the page: every k-th row of what moves, envelopes of what is only plotted.
+//! Columns of a run for the page: every k-th row of the columns that move something, and envelopes of those
+//! that are only plotted.
 
 use base64ct::{Base64, Encoding};
 use serde_json::{Value, json};
 
-/// Most values of what moves in one page, of 32 bits each: 6.4 MB of text.
+/// Largest number of values for the moving objects of one page. With 32 bits each this is 6.4 MB of text.
 const MOST_VALUES: usize = 1_200_000;
 
-/// Intervals of an envelope.
+/// Number of intervals of an envelope.
 const INTERVALS: usize = 4_000;
 
-/// Fewest frames an oscillation may have to be drawn as it is.
+/// Smallest number of frames per oscillation with which the animation shows it correctly.
 const FEWEST_FRAMES: f64 = 8.0;
 
-/// Rule by which rows are thinned.
+/// Rule by which rows are thinned: one of `every` rows is kept.
 pub(super) struct Thinning {
-    /// Every how many rows one is kept.
+    /// Distance between the rows that are kept.
     pub every: usize,
 }
 
 impl Thinning {
-    pub fn of(rows: usize, columns: usize) -> Thinning {
+    pub fn new(rows: usize, columns: usize) -> Thinning {
         Thinning { every: (rows * columns).div_ceil(MOST_VALUES).max(1) }
     }
 
     pub fn rows(&self, rows: usize) -> Vec<usize> {
         let mut kept: Vec<usize> = (0..rows).step_by(self.every).collect();
-        // the end is in the page
+        // The last row is always kept.
         if kept.last() != Some(&(rows - 1)) {
             kept.push(rows - 1);
         }
         kept
     }
 
-    /// Kept rows per oscillation of the fastest of `columns`, if those are too few to draw it.
+    /// Returns the number of kept rows per oscillation of the fastest column, if it is too small to show the
+    /// oscillation.
     pub fn too_few(&self, columns: &[&[f64]]) -> Option<f64> {
         let frames = |column: &&[f64]| {
             let (low, high) = range(column);
-            // with some hysteresis, so that noise is not an oscillation
+            // With hysteresis, so that noise does not count as oscillation.
             let (mut above, mut crossings) = (column[0] > 0.5 * (low + high), 0usize);
             for value in column.iter() {
                 let middle = 0.5 * (low + high) + if above { -0.1 } else { 0.1 } * (high - low);
@@ -58,7 +60,6 @@ fn range(values: &[f64]) -> (f64, f64) {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
 }
 
-/// Largest magnitude.
 pub(super) fn peak(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most, v| f64::max(most, v.abs()))
 }
@@ -68,12 +69,13 @@ fn text(values: impl Iterator<Item = f64>) -> String {
     Base64::encode_string(&bytes)
 }
 
-/// A column's kept rows.
+/// Encodes the kept rows of a column in Base64.
 pub(super) fn thinned(values: &[f64], rows: &[usize]) -> String {
     text(rows.iter().map(|row| values[*row]))
 }
 
-/// Times of the kept rows: by start and step where they are even, else each with 64 bits.
+/// Encodes the times of the kept rows: by start and step if they are equidistant, otherwise each with 64
+/// bits.
 pub(super) fn times(time: &[f64], rows: &[usize]) -> Value {
     let (first, count) = (time[rows[0]], rows.len());
     let step = (time[rows[count - 1]] - first) / (count - 1).max(1) as f64;
@@ -88,7 +90,7 @@ pub(super) fn times(time: &[f64], rows: &[usize]) -> Value {
     json!({ "times": Base64::encode_string(&bytes), "count": count })
 }
 
-/// Least and largest value of all rows in each of equally many.
+/// Returns the smallest and the largest value in each of [`INTERVALS`] groups of rows.
 pub(super) fn envelope(time: &[f64], values: &[f64]) -> Value {
     let each = values.len().div_ceil(INTERVALS);
     let parts = || values.chunks(each);
@@ -101,7 +103,7 @@ pub(super) fn envelope(time: &[f64], values: &[f64]) -> Value {
     })
 }
 
-/// The integral of a rate by the trapezoidal rule, from 0.
+/// Integrates a rate by the trapezoidal rule, from 0.
 pub(super) fn integral(time: &[f64], rate: &[f64]) -> Vec<f64> {
     let mut sum = 0.0;
     let steps = time.windows(2).zip(rate.windows(2));
@@ -119,7 +121,7 @@ mod tests {
     #[test]
     fn the_last_row_is_kept_and_the_page_stays_within_its_budget() {
         for (rows, columns) in [(2, 5), (100_000, 40), (1_000_003, 9)] {
-            let kept = Thinning::of(rows, columns).rows(rows);
+            let kept = Thinning::new(rows, columns).rows(rows);
             assert!(kept.len() * columns <= MOST_VALUES + columns, "{rows} x {columns}");
             assert_eq!((kept[0], kept[kept.len() - 1]), (0, rows - 1));
         }

@@ -1,6 +1,7 @@
-//! Geometry of a run's bench or craft, from its parameters.
+//! Geometry of a run's bench or craft, computed from its parameters.
 //!
-//! A tank's contour is not a parameter of an FMU. Without a contour from the user, an upright cylinder represents the tank:
+//! The contour of a tank is not a parameter of an FMU. Without a contour from the user, an upright cylinder
+//! represents the tank:
 //!
 //! ```text
 //! radius R        from the wave at the wall, w_1 = 2 R/(xi^2 - 1)
@@ -8,8 +9,8 @@
 //! height          its middle at z_liq = [m_0 H_0 + sum m_n (h_n - l_n)]/m_liq
 //! ```
 //!
-//! The result is exact for an upright cylinder. In a tank that drains, the surface is at z_s = d(m z_liq)/dm for any shape,
-//! because added liquid lies on top.
+//! The result is exact for an upright cylinder. In a draining tank the surface is at z_s = d(m z_liq)/dm for
+//! any shape, because added liquid lies on top.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +20,7 @@ use host::description::{ModelDescription, Value};
 use names::Array;
 use names::hubslosh::{self, SloshModel, SloshSource, fluid, tank};
 
-/// Parameters of a run: what was set, else the FMU's start values.
+/// Parameters of a run: the values that were set, and otherwise the FMU's start values.
 pub(super) struct Parameters<'a> {
     pub description: &'a ModelDescription,
     pub set: &'a BTreeMap<String, String>,
@@ -32,13 +33,13 @@ impl Parameters<'_> {
         Some((self.description.value(variable, text).ok()?, text.clone()))
     }
 
-    /// A number in SI units; 0 of what the FMU does not have.
+    /// Returns a number in SI units; 0 if the FMU has no such parameter.
     pub fn number(&self, name: &str) -> f64 {
         let number = self.value(name).map(|(value, _)| value.number());
         number.filter(|number| !number.is_nan()).unwrap_or(0.0)
     }
 
-    /// The name of an enumeration's item.
+    /// Returns the name of the item that an enumeration has.
     pub fn item(&self, name: &str) -> String {
         let Some((Value::Integer(n), text)) = self.value(name) else { return String::new() };
         let variable = self.description.variable(name).expect("it has a value");
@@ -46,7 +47,8 @@ impl Parameters<'_> {
         items.iter().find(|item| item.value == n).map_or(text, |item| item.name.clone())
     }
 
-    /// An enumeration's item, or the one whose number `kind` is, for hosts that cannot set enumerations.
+    /// Returns the item of the enumeration `name`, or the item whose number the parameter `kind` has, which
+    /// serves hosts that cannot set enumerations.
     pub fn choice(&self, name: &str, kind: &str) -> String {
         let number = self.number(kind) as i64;
         let items = self.description.variable(name).map(|v| self.description.items(v));
@@ -54,34 +56,32 @@ impl Parameters<'_> {
         item.map_or_else(|| self.item(name), |item| item.name.clone())
     }
 
-    /// `name[1]` to `name[N]`.
+    /// Returns the elements `name[1]` to `name[N]`.
     pub fn vector<const N: usize>(&self, name: &str) -> [f64; N] {
         std::array::from_fn(|i| self.number(&format!("{name}[{}]", i + 1)))
     }
 }
 
-/// Outline of a tank, m, in the tank's axes.
+/// Outline of a tank, m, in the axes of the tank.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outline {
-    /// (r, z) from the axis along the bottom and up the wall.
     Revolved(Vec<[f64; 2]>),
-    /// Sides along x and y, bottom and top.
+    /// Side lengths along x and y, heights of bottom and top.
     Box([f64; 4]),
 }
 
-/// Surface shapes of the first modes of a tank with a mass of liquid, kg. Each is the elevation at equal steps of the
-/// radius, from the axis or the inner wall to the outer wall, relative to that at the outer wall.
+/// Function that returns the surface shapes of the first modes for a mass of liquid, kg. A shape is the
+/// elevation at equal steps of the radius, from the axis or the inner wall to the outer wall, relative to
+/// that at the outer wall.
 pub type Surfaces = dyn Fn(f64, usize) -> anyhow::Result<Vec<Vec<f64>>>;
 
-/// A tank as somebody has drawn it.
+/// Drawing of a tank that the user has given.
 pub struct Drawing {
-    /// Name of the tank in the page.
     pub name: String,
-    /// Outline.
     pub outline: Outline,
-    /// Masses of liquid, kg, rising, each with the height of its surface at rest, m.
+    /// Masses of liquid, kg, ascending, each with the height of the surface at rest, m.
     pub levels: Vec<[f64; 2]>,
-    /// Surfaces of the modes; none for a box, whose modes are sines.
+    /// Surface shapes of the modes; `None` for a box, whose modes are sines.
     pub surfaces: Option<Box<Surfaces>>,
 }
 
@@ -91,7 +91,7 @@ impl Drawing {
     }
 }
 
-/// The straight line through points with rising x; beyond the ends the value there.
+/// Interpolates linearly between points with ascending x; outside, the value of the nearest end is used.
 fn line(points: &[[f64; 2]], x: f64) -> f64 {
     let after = points.partition_point(|p| p[0] < x);
     match (after.checked_sub(1).map(|i| points[i]), points.get(after)) {
@@ -102,56 +102,55 @@ fn line(points: &[[f64; 2]], x: f64) -> f64 {
     }
 }
 
-/// A pendulum of a tank.
+/// A slosh pendulum of a tank.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pendulum {
     pub mass: f64,
     pub length: f64,
     pub hinge: f64,
     pub wave: f64,
-    /// Index of the mode among those of its direction, from 0.
+    /// Index of the mode among the modes of its direction, from 0.
     pub order: usize,
 }
 
 impl Pendulum {
-    fn of((order, one): (usize, &formulas::cylinder::Pendulum)) -> Pendulum {
+    fn from_formula((order, one): (usize, &formulas::cylinder::Pendulum)) -> Pendulum {
         let formulas::cylinder::Pendulum { mass, length, hinge, wave } = *one;
         Pendulum { mass, length, hinge, wave, order }
     }
 }
 
-/// Index of mode n among those of its direction, from 0.
+/// Returns the index of mode `n` among the modes of its direction, from 0.
 fn order<T: PartialEq>(n: usize, direction: impl Fn(usize) -> T) -> usize {
     (0..n).filter(|m| direction(*m) == direction(n)).count()
 }
 
-/// A tank as the page draws it.
 pub(super) struct Tank {
-    /// `tank[1]`, `tank`, or of the bench nothing.
     pub prefix: String,
     pub position: [f64; 3],
     pub q: [f64; 4],
     pub outline: Outline,
     /// Height of the surface at rest at the start, m.
     pub level: f64,
-    /// Liquid at the start, kg.
+    /// Mass of liquid at the start, kg.
     pub liquid: f64,
     pub modes: Vec<Pendulum>,
-    /// Their surfaces where somebody has drawn the tank and it does not drain, as of [`Surfaces`].
+    /// Surface shapes of the modes (see [`Surfaces`]), if the user has drawn the tank and it does not drain.
     pub shapes: Vec<Vec<f64>>,
-    /// Table of a tank that drains.
+    /// Interpolation table of a draining tank.
     pub fill: Option<Fill>,
-    /// Source of the outline, as a sentence.
+    /// Sentence about the source of the outline.
     pub note: String,
 }
 
 impl Tank {
-    /// The distance from its origin in which it is, m.
+    /// Returns the radius of the sphere about the tank's origin that contains the tank, m.
     pub fn extent(&self) -> f64 {
         self.extent_from(0.0)
     }
 
-    /// The height of its middle above its origin, and the distance from there in which it is, m.
+    /// Returns the height of the tank's middle above its origin, and the radius of the sphere about this
+    /// middle that contains the tank, m.
     pub fn middle_and_extent(&self) -> [f64; 2] {
         let middle = match &self.outline {
             Outline::Revolved(points) => {
@@ -177,22 +176,23 @@ impl Tank {
     }
 }
 
-/// Modes and surface of a tank over the mass of its liquid, interpolated as the FMU does.
+/// Modes and surface height of a draining tank as functions of the mass of liquid, interpolated as in the
+/// FMU.
 pub(super) struct Fill {
     masses: Vec<f64>,
-    /// 1/l_n and h_n - l_n at the points, with slope and second derivative.
+    /// 1/l_n and h_n − l_n at the points, with slope and second derivative.
     modes: Vec<[Vec<[f64; 3]>; 2]>,
-    /// Height of the surface, by mass.
+    /// Height of the surface (m) by mass (kg).
     levels: Vec<[f64; 2]>,
 }
 
 impl Fill {
-    /// Height of the surface at rest, m.
+    /// Interpolates the height of the surface at rest, m, for a mass of liquid in kg.
     pub fn level(&self, liquid: f64) -> f64 {
         line(&self.levels, liquid)
     }
 
-    /// Length and hinge of mode `n`, from 0, m.
+    /// Interpolates length and hinge height of mode `n` (from 0), m, for a mass of liquid in kg.
     pub fn mode(&self, n: usize, liquid: f64) -> [f64; 2] {
         let last = self.masses.len() - 1;
         let liquid = liquid.clamp(self.masses[0], self.masses[last]);
@@ -207,14 +207,15 @@ impl Fill {
     }
 }
 
-/// Height of a cylinder above the liquid in it, in radii: how high it is nobody says.
+/// Height of the cylinder's wall above the liquid, in radii. This is an assumption, because no parameter
+/// states it.
 const FREEBOARD: f64 = 0.7;
 
 fn cylinder(radius: f64, bottom: f64, level: f64) -> Outline {
     Outline::Revolved(vec![[0.0, bottom], [radius, bottom], [radius, level + FREEBOARD * radius]])
 }
 
-/// Depth over radius of the cylinder whose first mode has this part of the liquid's mass.
+/// Returns h/R of the cylinder whose first mode has this share of the liquid's mass, found by bisection.
 fn depth_over_radius(share: f64) -> f64 {
     let xi = XI[0];
     let of = |x: f64| 2.0 * (xi * x).tanh() / (xi * (xi * xi - 1.0) * x);
@@ -226,7 +227,8 @@ fn depth_over_radius(share: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Pendulum length of a mode that is given by its natural frequency, Hz, at the acceleration `g`.
+/// Returns the pendulum length of a mode, m, that is given by its natural frequency (Hz) at the acceleration
+/// `g`.
 fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
     let omega = std::f64::consts::TAU * frequency;
     let stiffness = (omega * omega - k_over_m) / g;
@@ -236,7 +238,7 @@ fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
 const DRAWN: &str = "an upright cylinder that matches the wave at the wall, the first mode's share of the liquid and the \
     liquid's centre of mass, with a cylinder's surface (--tank draws the tank itself)";
 
-/// The tank of the bench, its origin in the middle of the bottom.
+/// Returns the tank of the bench; its origin is the middle of the bottom.
 pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank {
     let number = |name: &str| parameters.number(name);
     let radius = 0.5 * number(tank::D);
@@ -267,12 +269,12 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             let depth = radius * depth_over_radius(mass(0) / m_liq);
             let mut modes = Vec::new();
             let mut bottom = 0.0;
-            // the first mode with its place, and the others that are used
+            // The first mode with its position, and the other modes in use.
             for n in (0..count.max(1)).take_while(|n| *n == 0 || mass(*n) > 0.0) {
                 let l = length(of(LENGTH, n), of(FREQUENCY, n), g, of(K, n) / mass(n));
                 let like = pendulum(n, 2.0 * radius, depth, m_liq);
                 let wave = if of(WAVE, n) > 0.0 { of(WAVE, n) } else { like.wave };
-                // where the table has no heights, those of the cylinder
+                // If the table has no heights, those of the cylinder are used.
                 let hinge = if of(HINGE, n) == 0.0 { bottom + like.hinge } else { of(HINGE, n) };
                 if n == 0 {
                     bottom = (hinge - l) - (like.hinge - like.length);
@@ -293,7 +295,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             level = drawing.level(m_liq);
             bottom = lowest(&drawing.outline);
             match drawing.outline {
-                // its first length, whose modes `hubslosh tank` writes, lies along the tangent
+                // The first side, for which `hubslosh tank` computes the modes, is tangential.
                 Outline::Box([a, b, low, high]) => Outline::Box([b, a, low, high]),
                 Outline::Revolved(_) => drawing.outline.clone(),
             }
@@ -302,7 +304,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
     };
     Tank {
         prefix: String::new(),
-        // it stands on the platform
+        // The tank stands on the platform.
         position: [number(tank::R), 0.0, -bottom],
         q: [1.0, 0.0, 0.0, 0.0],
         outline,
@@ -313,7 +315,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             .enumerate()
             .map(|(n, mode)| {
                 let direction = |n: usize| number(&hubslosh::slosh::table::DIRECTION.at([n + 1]));
-                Pendulum::of((if is_table { order(n, direction) } else { n }, mode))
+                Pendulum::from_formula((if is_table { order(n, direction) } else { n }, mode))
             })
             .collect(),
         shapes: Vec::new(),
@@ -329,7 +331,7 @@ fn lowest(outline: &Outline) -> f64 {
     }
 }
 
-/// A tank of Spacecraft or SloshTank, whose variables begin with `prefix`.
+/// Returns a tank of Spacecraft or SloshTank, whose variables begin with `prefix`.
 pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawing>) -> Tank {
     let number = |key: &str| parameters.number(&format!("{prefix}.{key}"));
     let count = (number("modes") as usize).max(1);
@@ -354,7 +356,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         }
         radius = radius_of(&modes[0]);
         level = fill.level(m_liq);
-        // the first point as a cylinder: its middle is the liquid's centre, the mean of bottom and surface
+        // The first point as a cylinder: the liquid's centre is the mean of bottom and surface.
         let first = fill.levels[0];
         let part = fill.levels[1];
         bottom = first[1] - (part[1] - first[1]) * first[0] / (part[0] - first[0]);
@@ -366,8 +368,9 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         radius = 0.5 * diameter;
         let depth = number("depth");
         m_liq = number("density") * std::f64::consts::PI * radius * radius * depth;
-        modes =
-            (0..count).map(|n| Pendulum::of((n, &pendulum(n, diameter, depth, m_liq)))).collect();
+        modes = (0..count)
+            .map(|n| Pendulum::from_formula((n, &pendulum(n, diameter, depth, m_liq))))
+            .collect();
         (level, bottom) = (depth, 0.0);
         note = format!(
             "{prefix} is drawn by its diameter and depth; how high its wall is, is not a parameter."
@@ -413,7 +416,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
 fn radius_of(mode: &Pendulum) -> f64 {
     match mode.wave {
         wave if wave > 0.0 => 0.5 * wave * (XI[0] * XI[0] - 1.0),
-        // the length of a deep cylinder's first mode is R/xi
+        // The first mode of a deep cylinder has the pendulum length R/xi.
         _ => mode.length * XI[0],
     }
 }
@@ -434,7 +437,8 @@ fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
             [curve(stiffness), curve(bob)]
         })
         .collect();
-    // m z_liq at the points, and its derivative by the parabola through three neighbours: exact for a cylinder
+    // m z_liq at the points, and its derivative by the parabola through three neighbours, which is exact for
+    // a cylinder.
     let moment: Vec<f64> = (0..points)
         .map(|k| {
             let bobs: f64 = (0..count).map(|n| of("mass", n, k)).sum();
@@ -459,7 +463,8 @@ fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
     Fill { masses, modes, levels }
 }
 
-/// The box with the dry craft's mass and moments of inertia, m: `a_x^2 = 6 (Jyy + Jzz - Jxx)/m`; none if there is no such box.
+/// Returns the sides of the homogeneous box with the dry craft's mass and moments of inertia, m: `a_x^2 = 6
+/// (Jyy + Jzz - Jxx)/m`. `None` if there is no such box.
 pub(super) fn craft_box(parameters: &Parameters) -> Option<[f64; 3]> {
     let [m, x, y, z] =
         ["mass", "Jxx", "Jyy", "Jzz"].map(|k| parameters.number(&format!("craft.{k}")));

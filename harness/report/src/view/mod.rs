@@ -1,6 +1,8 @@
-//! One run, to be looked at: a self-contained page with bench or craft in 3-D, its liquid, and plots that follow the time.
+//! A self-contained page that shows one run: the bench or craft in 3-D with its liquid, and plots that follow
+//! the time.
 //!
-//! Nothing is simulated: all that moves stands in the run's table, or follows from a column by a formula that the page names.
+//! Nothing is simulated: every moving object follows a column of the run's table, or a formula of columns
+//! that the page states.
 
 mod data;
 mod geometry;
@@ -26,33 +28,31 @@ use self::geometry::{Parameters, Pendulum, Tank};
 use self::scene::scene;
 use crate::campaign::{PLOTLY, PLOTLY_LICENSE};
 
-/// A run and what is known of it.
 pub struct Run<'a> {
     /// Title of the page.
     pub title: String,
-    /// File, for messages.
     pub source: String,
-    /// The description of the FMU that made it.
+    /// Description of the FMU that was simulated.
     pub description: &'a ModelDescription,
-    /// Parameters that differ from the FMU's start values, or all, by name, as text.
+    /// Values of parameters by name, as text: all of them, or those that differ from the FMU's start values.
     pub parameters: &'a BTreeMap<String, String>,
-    /// True if the parameters come with the run; otherwise they are the FMU's start values and the user's settings.
+    /// True if the parameters come from the run's file. Otherwise they are the FMU's start values and the
+    /// user's settings.
     pub parameters_known: bool,
-    /// Tanks that somebody has drawn, by number from 1.
+    /// Tanks that the user has drawn, by number from 1.
     pub drawings: &'a BTreeMap<usize, Drawing>,
-    /// Columns, `time` among them.
+    /// Columns of the run, which include `time`.
     pub table: &'a Table,
 }
 
-/// A page and its warnings.
+/// An HTML page and its warnings.
 pub struct Page {
-    /// The page.
     pub html: String,
-    /// Sentences on what is not drawn as it is.
+    /// Sentences about objects that are not drawn exactly.
     pub warnings: Vec<String>,
 }
 
-/// Whose variables an FMU has.
+/// The FMU of this project whose variables a description has.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Bench,
@@ -71,7 +71,8 @@ fn kind(description: &ModelDescription) -> Option<Kind> {
     .find_map(|(name, kind)| has(name).then_some(kind))
 }
 
-/// Families of columns that share a panel, the most looked at first; a name with `*` is a beginning.
+/// Columns that share a panel, in the order of interest. A name with `*` stands for all names that begin with
+/// it.
 const BENCH_PANELS: [(&str, &[&str]); 7] = [
     ("Torque on the hub", &[TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FRICTION, TAU_FLUID]),
     ("Rate of the hub", &[OMEGA, OMEGA_IMU]),
@@ -82,10 +83,11 @@ const BENCH_PANELS: [(&str, &[&str]); 7] = [
     ("Energy", &[ENERGY, WORK, HEAT]),
 ];
 
-/// Most panels of plots.
+/// Largest number of panels.
 const MOST_PANELS: usize = 8;
 
-/// All columns that a page can use, in the order of a table: the answer to "which columns shall I record?".
+/// Lists all columns that the page can use, in the order of a table, so that the user knows which columns to
+/// record.
 pub fn columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
@@ -130,7 +132,7 @@ pub fn columns(
     all
 }
 
-/// Beginnings of the tanks' variables and how many modes each tank has; none of the bench.
+/// Lists the prefixes of the tanks' variables, each with the tank's number of modes; empty for the bench.
 fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
     let all: Vec<String> = match kind(parameters.description) {
         Some(Kind::Craft) => (1..=(parameters.number("tanks") as usize).max(1))
@@ -148,7 +150,7 @@ fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
         .collect()
 }
 
-/// The columns that move something, with what is missing.
+/// The columns that the page uses, and those that are missing.
 #[derive(Default)]
 struct Columns<'a> {
     table: Option<&'a Table>,
@@ -161,7 +163,7 @@ impl Columns<'_> {
         self.table.is_some_and(|table| table.column(name).is_some())
     }
 
-    /// Takes all of `names`, or none.
+    /// Takes all columns `names` if they all exist; otherwise none.
     fn take(&mut self, names: &[String]) -> bool {
         let there = names.iter().all(|name| self.has(name));
         if there {
@@ -170,7 +172,8 @@ impl Columns<'_> {
         there
     }
 
-    /// Takes the first list that is there, else the first one is missing.
+    /// Takes the first list of columns that exists completely and returns its index; otherwise records what
+    /// is missing.
     fn need(&mut self, lists: &[Vec<String>]) -> Option<usize> {
         let found = (0..lists.len()).find(|i| self.take(&lists[*i]));
         if found.is_none() {
@@ -181,13 +184,13 @@ impl Columns<'_> {
     }
 }
 
-/// The coordinates of mode `n` of HubSlosh, from 1.
+/// Returns the names of the coordinates of mode `n` (from 1) of HubSlosh.
 fn coordinates(n: usize) -> [String; 2] {
     [slosh::Q_RADIAL, slosh::Q_TANGENTIAL].map(|array| array.at([n]))
 }
 
-/// Slosh angles, radial and tangential, of HubSlosh's modes after the first, of which the FMU shows states alone: as far as
-/// those are recorded.
+/// Returns the radial and tangential slosh angles of HubSlosh's modes after the first, as far as they were
+/// recorded. The FMU has no outputs of these angles, so they are computed from its states.
 fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>; 2]> {
     let Some(coordinate) = Coordinate::of(model) else { return Vec::new() };
     let recorded = (2..).zip(&modes[1..]).map_while(|(n, mode)| {
@@ -195,7 +198,7 @@ fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>
         let y = table.column(&tangential)?;
         let x = match (coordinate, table.column(&radial)) {
             (_, Some(x)) => x.to_vec(),
-            // in a plane it is unused
+            // In motion in a plane the radial coordinate is not used.
             (Coordinate::Angle, None) => vec![0.0; y.len()],
             _ => return None,
         };
@@ -206,10 +209,10 @@ fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>
     recorded.collect()
 }
 
-/// Masses of liquid at which a draining tank's surfaces are computed.
+/// Number of masses of liquid at which the surfaces of a draining tank are computed.
 const MASSES: usize = 9;
 
-/// Evenly from the least of these to the largest.
+/// Returns equidistant values from the smallest to the largest of `values`.
 fn spread(values: &[f64]) -> Vec<f64> {
     let [low, high] =
         [f64::min, f64::max].map(|of| values.iter().copied().reduce(of).unwrap_or(0.0));
@@ -226,10 +229,12 @@ fn three(name: &str) -> Vec<String> {
     (1..=3).map(|i| format!("{name}[{i}]")).collect()
 }
 
-/// Fails with what a page needs and how it is recorded.
+/// Returns the page that shows a run.
 ///
 /// # Errors
-/// If the FMU is none of this project's kinds, columns are missing, or the table has fewer than two rows.
+///
+/// If the FMU is not one of this project's, columns are missing, or the table has fewer than two rows. The
+/// message says how to record the columns.
 pub fn page(run: &Run) -> Result<Page> {
     let Some(kind) = kind(run.description) else {
         anyhow::bail!(
@@ -275,15 +280,15 @@ pub fn page(run: &Run) -> Result<Page> {
     Ok(Page { html, warnings: draft.warnings })
 }
 
-/// A page in the making.
+/// A page that is being assembled.
 struct Draft<'a> {
     run: &'a Run<'a>,
     kind: Kind,
     parameters: Parameters<'a>,
     columns: Columns<'a>,
-    /// Columns that follow from others.
+    /// Columns that are computed from others.
     derived: Vec<(String, Vec<f64>)>,
-    /// Remarks on the drawing, shown on the page.
+    /// Remarks about the drawing, shown on the page.
     notes: Vec<String>,
     warnings: Vec<String>,
 }
@@ -293,14 +298,13 @@ impl Draft<'_> {
         self.run.table.column("time").unwrap_or_default()
     }
 
-    /// The name of a new column.
     fn derive(&mut self, name: String, values: Vec<f64>) -> Value {
         let value = json!(name);
         self.derived.push((name, values));
         value
     }
 
-    /// Columns that move the body.
+    /// Selects the columns that move the hub or craft.
     fn body(&mut self) -> Value {
         let table = self.run.table;
         let mut motion = json!({});
@@ -332,12 +336,12 @@ impl Draft<'_> {
         motion
     }
 
-    /// Tank `i`, counted from 0, as somebody has drawn it.
+    /// Returns the user's drawing of tank `i`, counted from 0.
     fn drawing(&self, i: usize) -> Option<&'_ Drawing> {
         self.run.drawings.get(&(i + 1))
     }
 
-    /// The tanks with their pendulums.
+    /// Returns the tanks with their pendulums.
     fn tanks(&self) -> Result<Vec<Tank>> {
         let tanks: Vec<Tank> = match self.kind {
             Kind::Bench => vec![geometry::bench(&self.parameters, self.drawing(0))],
@@ -356,7 +360,8 @@ impl Draft<'_> {
         Ok(tanks)
     }
 
-    /// Columns that move the liquid of a tank. Modes that the run did not record are removed from the tank.
+    /// Selects the columns that move the liquid of a tank. Modes that were not recorded are removed from the
+    /// tank.
     fn tank(&mut self, i: usize, tank: &mut Tank) -> Result<Value> {
         let modes = match self.kind {
             Kind::Bench => self.modes_of_bench(tank),
@@ -426,7 +431,7 @@ impl Draft<'_> {
         (1..=tank.modes.len()).map(mode).collect()
     }
 
-    /// Level, lengths and hinges of a tank that drains.
+    /// Adds level, lengths and hinges of a draining tank as functions of time.
     fn drain(&mut self, tank: &Tank, moved: &mut Value) {
         let (prefix, Some(fill)) = (&tank.prefix, &tank.fill) else { return };
         let name = format!("{prefix}.liquid");
@@ -444,7 +449,7 @@ impl Draft<'_> {
         }
     }
 
-    /// Surfaces of the modes of a tank that somebody has drawn.
+    /// Computes the surface shapes of the modes of a tank that the user has drawn.
     fn shape_surfaces(&self, i: usize, tank: &mut Tank, moved: &mut Value) -> Result<()> {
         let surfaces = self.drawing(i).and_then(|drawing| drawing.surfaces.as_ref());
         let Some(surfaces) = surfaces.filter(|_| !tank.modes.is_empty()) else { return Ok(()) };
@@ -465,7 +470,7 @@ impl Draft<'_> {
         Ok(())
     }
 
-    /// Refuses a table without the requested columns, or whose time does not increase.
+    /// Returns an error if the table lacks columns, or its time does not increase.
     fn check(&self) -> Result<()> {
         let (run, source, time) = (self.run, &self.run.source, self.time());
         let (missing, has_time) = (&self.columns.missing, self.columns.has("time"));
@@ -510,20 +515,20 @@ impl Draft<'_> {
         }
     }
 
-    /// The rows and columns that go into the page, and its plots.
+    /// Returns the rows and columns of the page, and its plots.
     fn data(&mut self) -> Value {
         let (table, description) = (self.run.table, self.run.description);
         let time = table.column("time").unwrap_or_default();
         let panels = panels(self.kind, table);
         let plotted: BTreeSet<&String> = panels.iter().flat_map(|(_, names)| names).collect();
         let mut moving = self.columns.moving.clone();
-        // where all of it has room, what is only plotted keeps its rows, too
+        // If there is room for every row, columns that are only plotted keep all rows too.
         let all: BTreeSet<String> =
             moving.iter().cloned().chain(plotted.iter().map(|n| n.to_string())).collect();
-        if Thinning::of(time.len(), all.len() + self.derived.len()).every == 1 {
+        if Thinning::new(time.len(), all.len() + self.derived.len()).every == 1 {
             moving = all;
         }
-        let thinning = Thinning::of(time.len(), moving.len() + self.derived.len());
+        let thinning = Thinning::new(time.len(), moving.len() + self.derived.len());
         let rows = thinning.rows(time.len());
         let column = |name: &str| table.column(name).unwrap_or_default();
         if thinning.every > 1 {
@@ -593,12 +598,12 @@ fn ordinal(n: usize) -> String {
     }
 }
 
-/// A number without the dust of binary fractions.
+/// Rounds a number to remove the errors of binary fractions.
 fn shown(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-/// Titles and columns of the plots, in order.
+/// Returns titles and columns of the plots, in order.
 fn panels(kind: Kind, table: &Table) -> Vec<(String, Vec<String>)> {
     let moves = |name: &str| table.column(name).is_some_and(|values| peak(values) > 0.0);
     let mut left: Vec<&String> =
@@ -617,7 +622,7 @@ fn panels(kind: Kind, table: &Table) -> Vec<(String, Vec<String>)> {
             }
         }
     }
-    // elements of one vector share a panel, and the slosh angles of one tank
+    // Elements of one vector share a panel, and so do the slosh angles of one tank.
     let family = |name: &str| {
         let bare =
             name.strip_suffix(']').and_then(|n| n.rsplit_once('[')).map_or(name, |(bare, _)| bare);

@@ -1,4 +1,4 @@
-//! The scene's `geometry` (harness/web/scene/README.md): bodies, tanks and arrows.
+//! Builds the `geometry` of the scene (harness/web/scene/README.md): bodies, tanks and arrows.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use signals::table::Table;
 use super::geometry::{self, Outline, Parameters, Tank};
 use super::{Columns, Kind, three};
 
-/// Angle of a full arc, rad.
+/// Angle of an arc at full length, rad.
 const FULL_ARC: f64 = 2.4;
 
 /// Arrows and arcs, with the columns that they follow.
@@ -26,8 +26,8 @@ struct Arrows<'a, 'c, 't> {
 }
 
 impl Arrows<'_, '_, '_> {
-    /// Adds the one of the columns `names`, if they are there and not 0 throughout. An input that is not in the table has its
-    /// start value throughout.
+    /// Adds an arrow that follows the columns `names`, if they exist and are not always 0. An input without a
+    /// column has its start value.
     fn add(&mut self, name: &str, label: &str, mut arrow: Value, names: &[String]) {
         let constant = |name: &String| {
             let variable = self.parameters.description.variable(name).ok()?;
@@ -54,7 +54,7 @@ impl Arrows<'_, '_, '_> {
         }
     }
 
-    /// Gives all that share a unit one scale, so that lengths can be compared.
+    /// Gives all arrows with the same unit the same scale, so that their lengths can be compared.
     fn share_scales(&mut self) {
         let mut most: BTreeMap<String, f64> = BTreeMap::new();
         for arrow in &self.drawn {
@@ -67,7 +67,7 @@ impl Arrows<'_, '_, '_> {
     }
 }
 
-/// Returns the drawn objects and the columns that move them.
+/// Returns the objects of the scene and the columns that move them.
 pub fn scene(
     kind: Kind,
     parameters: &Parameters,
@@ -89,7 +89,7 @@ pub fn scene(
     json!({ "geometry": geometry, "arrows": arrows.of })
 }
 
-/// A tank with its pendulums.
+/// Converts a tank with its pendulums for the scene.
 fn drawn(tank: &Tank) -> Value {
     let shape = match &tank.outline {
         Outline::Revolved(contour) => json!({ "contour": contour }),
@@ -107,7 +107,7 @@ fn drawn(tank: &Tank) -> Value {
     json!({ "position": tank.position, "q": tank.q, "shape": shape, "level": tank.level, "modes": modes })
 }
 
-/// The bench about its axis, and how far it reaches from there, m.
+/// Returns the bench about its axis, and the distance from the axis that contains it, m.
 fn bench(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let r = tank.position[0];
     let radius = match &tank.outline {
@@ -157,7 +157,7 @@ fn bench(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     (geometry, reach)
 }
 
-/// The craft about O, and how far it reaches from there, m.
+/// Returns the craft about O, and the distance from O that contains it, m.
 fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value, f64) {
     let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let at = |tank: &Tank| length(&tank.position) + tank.extent();
@@ -200,8 +200,8 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
     (geometry, reach)
 }
 
-/// A tank on somebody else's craft about its middle, in which it is seen, with O and full arrows from there; and how far it
-/// reaches, m.
+/// Returns a tank on a host's craft, seen from its middle, with O and the arrows there, and the distance that
+/// contains it, m.
 fn alone(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let [middle, half] = tank.middle_and_extent();
     let [x, y, z] = tank.position;

@@ -477,7 +477,7 @@ fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
             rest.deviation,
             100.0 * rest.outside()
         ));
-        for (file, chart) in report::gyro::rest(rest) {
+        for (file, chart) in report::gyro::rest_charts(rest) {
             let (thesis, caption) = match file {
                 "allan.svg" => (
                     "5.19",

@@ -1,4 +1,4 @@
-//! Figures against the number that the plan varies.
+//! Figures whose horizontal axis is the parameter that the plan varies.
 
 use analysis::features::{Deviations, Features};
 use analysis::rotary;
@@ -9,8 +9,8 @@ use super::colors;
 use super::figure::{Figure, Label, Panel, dots, line};
 use super::page::{Axis, Group, Page, best, distinct, exact_features, list_of};
 
-/// A quantity of a run: label, what it is, whether its axis is logarithmic, and a level to compare
-/// with.
+/// A quantity of a run that is plotted: label, how it is read from the run, whether its axis is logarithmic,
+/// and a level that is drawn for comparison.
 struct Quantity<'a> {
     label: &'a str,
     of: &'a dyn Fn(&Outcome) -> Option<f64>,
@@ -22,19 +22,19 @@ fn quantity<'a>(label: &'a str, of: &'a dyn Fn(&Outcome) -> Option<f64>) -> Quan
     Quantity { label, of, decades: false, level: None }
 }
 
-/// Plots antiresonance and resonance of every group, with the exact linear ones, for plans of sweeps.
-/// The colour shows the group, the line style its model, the marker antiresonance or resonance.
+/// Plots antiresonance and resonance of every group over the axis, together with those of the exact linear
+/// plant. The colour shows the group, the line style its model, the marker antiresonance or resonance.
 pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let models = distinct(page.groups.iter().map(|group| group.model));
-    // solid is the last, which most plans have for the one with the most physics
+    // The last model has the solid line, because most plans list the model with the most physics last.
     let dash = |model: &str| {
         let place = models.iter().rev().position(|other| *other == model).unwrap_or(0);
         colors::line(place)
     };
     let mut traces = Vec::new();
     let mut untrusted = Vec::new();
-    // where the lines end: (frequency, which of the two and plant, model, colour)
+    // Ends of the lines: (frequency, antiresonance or resonance and plant, model, colour).
     let mut ends: Vec<(f64, String, &str, &str)> = Vec::new();
     for group in &page.groups {
         type Side = (
@@ -56,7 +56,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
                 .filter_map(|run| {
                     let (estimate, _) = best(run)?;
                     let value = get(&estimate.features)?;
-                    Some((axis.of(run)?, value, std(&estimate.deviations).map(|std| 2.0 * std)))
+                    Some((axis.value(run)?, value, std(&estimate.deviations).map(|std| 2.0 * std)))
                 })
                 .collect();
             let name = format!("{what}, {}", group.title());
@@ -76,14 +76,14 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
             untrusted.extend(doubt.map(|doubt| format!("{} ({doubt})", run.case.name)));
         }
     }
-    // groups of equal plants share their exact response
+    // Groups with equal plants have the same exact response.
     let mut drawn: Vec<Vec<(f64, f64)>> = Vec::new();
     for group in &page.groups {
         for get in [|f: &Features| f.f_dip, |f: &Features| f.f_res] {
             let points: Vec<(f64, f64)> = group
                 .runs
                 .iter()
-                .filter_map(|run| Some((axis.of(run)?, get(&exact_features(run))?)))
+                .filter_map(|run| Some((axis.value(run)?, get(&exact_features(run))?)))
                 .collect();
             if !drawn.contains(&points) {
                 traces.push(line(0, "exact, linear and viscous", colors::INK, "dot", &points));
@@ -110,11 +110,11 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     }
 }
 
-/// Labels at the ends of lines; lines of one thing that end together share theirs. None where there
-/// are too many to be read.
+/// Returns labels for the ends of lines. Lines that end close together share a label. There are no labels if
+/// they are too many to be read.
 fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     const MOST: usize = 12;
-    /// Labels closer than this share of the axis's span are merged.
+    /// Labels closer than this fraction of the axis are merged.
     const TOGETHER: f64 = 0.03;
     ends.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
     let span = ends.iter().map(|end| end.0).fold(f64::MIN, f64::max)
@@ -137,7 +137,7 @@ fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     labels.into_iter().map(label).collect()
 }
 
-/// Draws rate and slosh angle after the end of a manoeuvre's torque.
+/// Plots the residual rate and slosh angle after the end of a manoeuvre's torque.
 pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
     let rate = |run: &Outcome| Some(1e3 * run.ending.rate?);
     let angle = |run: &Outcome| Some(run.ending.slosh_angle?.to_degrees());
@@ -152,7 +152,7 @@ pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
     Figure { columns: 2, height: 340, ..figure }
 }
 
-/// The largest slosh angles, and the residual motion, for torques without a frequency response.
+/// Plots the largest slosh angles and the residual motion, for torques that have no frequency response.
 pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
     let radial = |run: &Outcome| Some(run.totals.peak_radial_angle.to_degrees());
     let tangential = |run: &Outcome| Some(run.totals.peak_slosh_angle.to_degrees());
@@ -237,7 +237,7 @@ pub(super) fn linear_fit(page: &Page, axis: &Axis) -> Figure {
     Figure { thesis: "7.3, 7.4 and 7.7 to 7.10", ..figure }
 }
 
-/// Cross-axis energy fraction and leakage of recordings, from the rates about three axes.
+/// Plots cross-axis energy fraction and leakage of recordings, which follow from the rates about three axes.
 pub(super) fn cross_axis(page: &Page, axis: &Axis) -> Figure {
     let of = |run: &Outcome| run.off_axis().filter(|_| run.is_recording());
     let figure = small(
@@ -255,7 +255,7 @@ pub(super) fn cross_axis(page: &Page, axis: &Axis) -> Figure {
 }
 
 pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
-    // of a recording these figures come from rates, which `cross_axis` draws
+    // For recordings these figures come from rates and are drawn by `cross_axis`.
     let of = |run: &Outcome| run.off_axis().filter(|_| !run.is_recording());
     small(
         page,
@@ -274,7 +274,7 @@ pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
     )
 }
 
-/// One panel for each quantity, one series for each group.
+/// Plots each quantity in a panel of its own, with one series for each group.
 fn small<'a>(
     page: &Page,
     axis: &Axis,
@@ -290,7 +290,7 @@ fn small<'a>(
             let points: Vec<(f64, f64, Option<f64>)> = group
                 .runs
                 .iter()
-                .filter_map(|run| Some((axis.of(run)?, (quantity.of)(run)?, None)))
+                .filter_map(|run| Some((axis.value(run)?, (quantity.of)(run)?, None)))
                 .filter(|(_, y, _)| y.is_finite() && (!quantity.decades || *y > 0.0))
                 .collect();
             for (x, ..) in &points {
