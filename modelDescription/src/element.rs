@@ -5,7 +5,6 @@ use std::fmt::Display;
 use xml::EmitterConfig;
 use xml::writer::{Error, EventWriter, XmlEvent};
 
-/// An element with its attributes and then its children, each in the order of writing.
 pub(crate) struct Element {
     name: &'static str,
     attributes: Vec<(&'static str, String)>,
@@ -17,24 +16,20 @@ impl Element {
         Self { name, attributes: Vec::new(), children: Vec::new() }
     }
 
-    /// Adds an attribute.
     pub(crate) fn with(self, name: &'static str, value: impl Display) -> Self {
         self.with_some(name, Some(value))
     }
 
-    /// Adds an attribute if it has a value.
     pub(crate) fn with_some(mut self, name: &'static str, value: Option<impl Display>) -> Self {
         self.attributes.extend(value.map(|value| (name, value.to_string())));
         self
     }
 
-    /// Adds children.
     pub(crate) fn holding(mut self, children: impl IntoIterator<Item = Self>) -> Self {
         self.children.extend(children);
         self
     }
 
-    /// The document whose root this is.
     pub(crate) fn document(&self) -> Result<String, Error> {
         let layout = EmitterConfig::new().perform_indent(true).indent_string("  ");
         let mut writer = layout.create_writer(Vec::new());

@@ -1,5 +1,6 @@
-//! Writes modelDescription.xml of FMI 3.0 from the same table: scalars with the names of FMI 2.0. Then follow the independent
-//! variable and the event indicators, which are not variables in FMI 2.0. With arrays an entry of the table is one variable.
+//! Writes modelDescription.xml of FMI 3.0 from the variable table. With scalars the variables have the names
+//! of FMI 2.0; with arrays an entry of the table is one variable. Then follow the independent variable and
+//! the event indicators, which are not variables in FMI 2.0.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -14,11 +15,11 @@ use runtime::version::Version;
 
 use crate::element::Element;
 use crate::{
-    List, Long, Own, default_experiment, folder, items, log_categories, of_type, root, state_of,
-    text, type_definitions, unit, unknown, unknowns, variability,
+    List, Long, Own, default_experiment, folder, items, log_categories, root, state_of, text,
+    type_definitions, unit, unknown, unknowns, variability, with_type_attributes,
 };
 
-/// Path of the committed XML.
+/// Returns the path of the committed XML.
 pub fn path<M: Model>(layout: Layout) -> PathBuf {
     folder::<M>().join(match layout {
         Layout::Scalars => "fmi3/modelDescription.xml",
@@ -26,7 +27,6 @@ pub fn path<M: Model>(layout: Layout) -> PathBuf {
     })
 }
 
-/// The file's text.
 pub fn xml<M: Model>(layout: Layout) -> Result<String, xml::writer::Error> {
     description::<M>(layout).document()
 }
@@ -36,7 +36,7 @@ fn description<M: Model>(layout: Layout) -> Element {
     let used: Vec<_> = table.units().map(|unit| unit.name).collect();
     let units = UNITS.iter().filter(|unit| unit.name == TIME_UNIT || used.contains(&unit.name));
     let variables = Element::new("ModelVariables");
-    // CasADi 3.8 reads no entry without dependencies
+    // CasADi 3.8 cannot read an entry without dependencies.
     let all_unknowns = |list, name| {
         unknowns::<M>(list, name, "valueReference", Long::Dependencies, |s| reference(layout, s))
     };
@@ -77,7 +77,6 @@ fn description<M: Model>(layout: Layout) -> Element {
         ])
 }
 
-/// Attributes that both interfaces have.
 fn interface<M: Model>(name: &'static str) -> Element {
     Element::new(name)
         .with("modelIdentifier", M::table().about.model)
@@ -90,9 +89,7 @@ fn interface<M: Model>(name: &'static str) -> Element {
         .with("providesPerElementDependencies", true)
 }
 
-/// The unit of the independent variable.
 const TIME_UNIT: &str = "s";
-/// The name of the independent variable.
 const TIME: &str = "time";
 
 fn variable<M: Model>(scalar: &Scalar<M>) -> Element {
@@ -101,10 +98,10 @@ fn variable<M: Model>(scalar: &Scalar<M>) -> Element {
         start: scalar.start().map(text),
         derivative: state_of(v, scalar.element).map(Fmi3::reference),
     };
-    of_entry(Layout::Scalars, v, (scalar.name(), Fmi3::reference(scalar)), v.description, own)
+    entry_element(Layout::Scalars, v, (scalar.name(), Fmi3::reference(scalar)), v.description, own)
 }
 
-/// An entry of the table as one variable, of the size it starts with.
+/// Returns an entry of the table as an array variable with its initial size.
 fn array<M: Model>(v: &'static Variable<M>) -> Element {
     let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
     let mut starts: Vec<_> = elements(v)
@@ -112,7 +109,7 @@ fn array<M: Model>(v: &'static Variable<M>) -> Element {
         .filter_map(|element| v.start(&mut parameters, &mut inputs, element))
         .map(text)
         .collect();
-    // One value is for all.
+    // A single value holds for all elements.
     if starts.iter().all(|start| *start == starts[0]) {
         starts.truncate(1);
     }
@@ -131,23 +128,24 @@ fn array<M: Model>(v: &'static Variable<M>) -> Element {
     };
     let description = v.description.replace("[]", "");
     let named = (v.array_name(), arrays::reference(v));
-    of_entry(Layout::Arrays, v, named, &description, own).holding(v.shape.iter().map(size))
+    entry_element(Layout::Arrays, v, named, &description, own).holding(v.shape.iter().map(size))
 }
 
-/// The entry of that name.
+/// Finds an entry of the table by its name.
 fn entry<M: Model>(name: &str) -> Option<&'static Variable<M>> {
     M::table().variables.iter().find(|v| v.name == name)
 }
 
-/// The elements that an entry has at the start, counted by rows in the largest array.
+/// Returns the elements that an entry has with the start values of structural parameters, as row-major
+/// indices of the largest array.
 fn elements<M: Model>(v: &Variable<M>) -> Vec<usize> {
     let all = Arrays::new::<M>(&M::table().starts());
     let scalars = all.of(arrays::reference(v)).unwrap_or_default().iter();
     scalars.map(|reference| M::table().scalars[*reference as usize - 1].element).collect()
 }
 
-/// A variable with the attributes that all elements of its entry share, and its own.
-fn of_entry<M: Model>(
+/// Returns a variable with the attributes that all elements of its entry share, and with its own.
+fn entry_element<M: Model>(
     layout: Layout,
     v: &Variable<M>,
     (name, reference): (String, u32),
@@ -156,7 +154,7 @@ fn of_entry<M: Model>(
 ) -> Element {
     let is_structural = layout == Layout::Arrays && M::table().is_structural(v);
     let (causality, initial) = match v.causality {
-        // That an input is exact is the default, and CasADi refuses to read it.
+        // `initial="exact"` is the default for an input, and CasADi refuses to read it.
         Causality::Input => ("input", None),
         Causality::Output => ("output", Some("calculated")),
         Causality::Local => ("local", Some("calculated")),
@@ -179,10 +177,10 @@ fn of_entry<M: Model>(
         .with("variability", variability(v))
         .with_some("initial", initial)
         .with_some("intermediateUpdate", has_intermediate_update(v).then_some(true));
-    of_type(element, v, own)
+    with_type_attributes(element, v, own)
 }
 
-/// The independent variable and the event indicators, which with arrays are one array.
+/// Returns the independent variable and the event indicators, which with arrays are one array variable.
 fn extra<M: Model>(layout: Layout) -> Vec<Element> {
     let indicators = M::table().about.event_indicators;
     let one = |(reference, name): (u32, String)| {
@@ -212,7 +210,7 @@ fn extra<M: Model>(layout: Layout) -> Vec<Element> {
     }
 }
 
-/// The value reference by which a scalar goes.
+/// Returns the value reference of a scalar; with arrays that of its entry.
 fn reference<M: Model>(layout: Layout, scalar: &Scalar<M>) -> u32 {
     match layout {
         Layout::Scalars => Fmi3::reference(scalar),
@@ -220,7 +218,8 @@ fn reference<M: Model>(layout: Layout, scalar: &Scalar<M>) -> u32 {
     }
 }
 
-/// The event indicators; which inputs and states each depends on is the model's choice of contact and limits.
+/// Returns the event indicators as elements of ModelStructure. They are declared to depend on all inputs and
+/// states, because the dependencies of an indicator change with the contact and the limits in effect.
 fn event_indicators<M: Model>(layout: Layout) -> impl Iterator<Item = Element> {
     let is_known = |s: &&'static Scalar<M>| {
         s.variable.causality == Causality::Input || s.variable.state.is_some()

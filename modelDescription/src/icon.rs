@@ -1,18 +1,17 @@
-//! The FMU's icon as pixels, drawn from `modelDescription/icon/icon.svg`. Importers want a PNG;
-//! only few draw an SVG.
+//! Draws the FMU's icon from `modelDescription/icon/icon.svg`, because importers expect a PNG and only few
+//! can display an SVG.
 //!
-//! `icon/SHA256SUMS` says which drawing the committed pixels are of. Drawing takes the feature
-//! `icon`, for the crate that draws takes longer to compile than all that is needed otherwise.
+//! `icon/SHA256SUMS` identifies the drawing from which the committed picture was made. Drawing needs the
+//! feature `icon`, because its library takes longer to compile than everything else.
 
 use sha2::{Digest, Sha256};
 
-/// Folder of the drawing (`icon.svg`), its picture (`icon.png`, each FMU's `model.png`) and their
-/// hashes.
+/// Folder of the drawing (`icon.svg`), the picture (`icon.png`, which becomes each FMU's `model.png`) and
+/// their hashes.
 pub const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon");
-/// Width and height, px.
 pub const SIZE: u32 = 512;
 
-/// The picture, drawn from the SVG's text.
+/// Draws the picture from the text of the SVG.
 #[cfg(feature = "icon")]
 pub fn draw(svg: &str) -> Result<resvg::tiny_skia::Pixmap, resvg::usvg::Error> {
     use resvg::{tiny_skia, usvg};
@@ -23,7 +22,7 @@ pub fn draw(svg: &str) -> Result<resvg::tiny_skia::Pixmap, resvg::usvg::Error> {
     Ok(picture)
 }
 
-/// The hashes of drawing and picture, as `sha256sum icon.svg icon.png` writes them.
+/// Returns the hashes of drawing and picture in the format of `sha256sum icon.svg icon.png`.
 pub fn hashes() -> std::io::Result<String> {
     let mut lines = String::new();
     for name in ["icon.svg", "icon.png"] {
@@ -42,7 +41,7 @@ mod tests {
         let shown = std::fs::read(format!("{FOLDER}/icon.png")).unwrap();
         let shown = resvg::tiny_skia::Pixmap::decode_png(&shown).unwrap();
         let drawn = draw(&std::fs::read_to_string(format!("{FOLDER}/icon.svg")).unwrap()).unwrap();
-        // Edges may be shaded differently by a step or two where another processor rounds otherwise.
+        // Other processors may round differently and shade edges differently by a step or two.
         let pixels = shown.data().iter().zip(drawn.data());
         assert_eq!(pixels.filter(|(a, b)| a.abs_diff(**b) > 2).count(), 0);
     }

@@ -1,6 +1,6 @@
-//! modelDescription.xml from an FMU's variable table.
+//! Writes modelDescription.xml from an FMU's variable table.
 //!
-//! This crate knows no single variable: the table describes them. The XML is committed so that a
+//! This crate does not know single variables; the table describes them. The XML is committed, so that a
 //! change of the interface shows in a diff.
 
 mod element;
@@ -23,25 +23,23 @@ use runtime::version::Version;
 
 use crate::element::Element;
 
-/// The folder of a model's XML, documentation and pictures.
+/// Returns the folder of a model's XML, documentation and pictures.
 pub fn folder<M: Model>() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(M::table().about.model)
 }
 
-/// Path of the committed XML.
 pub fn path<M: Model>() -> PathBuf {
     folder::<M>().join("modelDescription.xml")
 }
 
-/// The date of the release; not of the build, which the same commit must survive
-/// byte for byte.
+/// Date of the release. It is not the date of the build, because the same commit must always give the same
+/// bytes.
 const RELEASED: &str = "2026-11-22T12:00:00Z";
 
-/// Default stop time: 20 s at the gyro's 50 Hz.
+/// Default stop time, s, with 20 s at the gyro's 50 Hz.
 const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 
-/// The file's text.
 pub fn xml<M: Model>() -> Result<String, xml::writer::Error> {
     description::<M>().document()
 }
@@ -93,7 +91,8 @@ fn description<M: Model>() -> Element {
         ])
 }
 
-/// The root element with the attributes of both versions, which name the token differently.
+/// Returns the root element with the attributes that both versions have; `token_name` is the version's name
+/// of the GUID.
 fn root<M: Model>(version: &str, token_name: &'static str, token: &str) -> Element {
     let about = &M::table().about;
     Element::new("fmiModelDescription")
@@ -124,7 +123,7 @@ fn unit(unit: &Unit) -> Element {
         .holding(unit.display_units.iter().map(display_unit))
 }
 
-/// The enumerations, if there are any.
+/// Returns the enumerations as type definitions, or `None` if there are none.
 fn type_definitions<M: Model>(one: impl Fn(&Enumeration) -> Element) -> Option<Element> {
     let all = M::table().enumerations();
     let some = !all.is_empty();
@@ -180,7 +179,7 @@ fn variable<M: Model>(scalar: &Scalar<M>) -> Element {
         .with("causality", causality)
         .with("variability", variability(v))
         .with_some("initial", initial)
-        .holding([of_type(Element::new(kind), v, own)])
+        .holding([with_type_attributes(Element::new(kind), v, own)])
 }
 
 fn variability<M: Model>(v: &Variable<M>) -> &'static str {
@@ -192,15 +191,15 @@ fn variability<M: Model>(v: &Variable<M>) -> &'static str {
     }
 }
 
-/// Attributes of a variable that its entry in the table does not state.
+/// Attributes of a variable that its entry in the table does not contain.
 struct Own {
     start: Option<String>,
     /// The index (FMI 2.0) or value reference (FMI 3.0) of the state whose derivative the variable is.
     derivative: Option<u32>,
 }
 
-/// Adds the attributes that depend on the type.
-fn of_type<M: Model>(element: Element, v: &Variable<M>, own: Own) -> Element {
+/// Adds the attributes that depend on the type of the variable.
+fn with_type_attributes<M: Model>(element: Element, v: &Variable<M>, own: Own) -> Element {
     let element = match v.kind {
         Kind::Real(quantity) => element
             .with_some("unit", Some(quantity.unit).filter(|unit| !unit.is_empty()))
@@ -226,12 +225,12 @@ fn text(value: Value) -> String {
     }
 }
 
-/// The shortest decimal number that reads back as the same bits.
+/// Formats the shortest decimal number that reads back as the same bits.
 fn real(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// The state whose derivative an element of an entry is.
+/// Returns the state whose derivative an element of an entry is.
 fn state_of<M: Model>(v: &Variable<M>, element: usize) -> Option<&'static Scalar<M>> {
     match v.access {
         Access::Derivative(place) => M::table().state_at(place(element)),
@@ -239,12 +238,10 @@ fn state_of<M: Model>(v: &Variable<M>, element: usize) -> Option<&'static Scalar
     }
 }
 
-/// Place among the variables, counted from 1.
 fn index<M: Model>(scalar: &Scalar<M>) -> u32 {
     scalar.index + 1
 }
 
-/// A list of ModelStructure.
 #[derive(Clone, Copy, PartialEq)]
 enum List {
     Outputs,
@@ -268,24 +265,25 @@ impl List {
     }
 }
 
-/// Longest list of dependencies of an initial value that is written whole. The values that depend on the accelerations depend on
-/// nearly all parameters, and their lists would be most of the file.
+/// Longest list of dependencies of an initial value that is written completely. The values that depend on
+/// accelerations depend on nearly all parameters, and their lists would make up most of the file.
 const LONGEST: usize = 100;
 
-/// Part that is written of a list of dependencies with more than [`LONGEST`] entries.
+/// How a list of dependencies with more than [`LONGEST`] entries is written.
 #[derive(Clone, Copy, PartialEq)]
 enum Long {
-    /// Nothing: a host then takes it that the value depends on everything. The list of an output stays if the output does not
-    /// depend on all inputs, so that no host sees a loop that does not exist.
+    /// The list is left out, so that a host assumes a dependency on everything. However, the list of an
+    /// output is kept if the output does not depend on all inputs, because otherwise a host would see an
+    /// algebraic loop that does not exist.
     Nothing,
-    /// The dependencies without their kinds: a host then takes each as `dependent`, which it is.
+    /// The dependencies without their kinds, so that a host assumes `dependent`, which is correct.
     Dependencies,
 }
 
-/// The scalars of a list in the order of their numbers, each with the numbers of those it depends on. An array depends on
-/// what any of its elements does. `element` and `attribute` are what the version calls them.
-///
-/// `long` is the part that is written of a long list of an initial value.
+/// Returns the elements of a list of ModelStructure in the order of their numbers, each with the numbers of
+/// the scalars on which it depends. An array depends on everything on which one of its elements depends.
+/// `element` and `attribute` are the names in this version of FMI; `long` determines how long lists of
+/// initial values are written.
 fn unknowns<M: Model>(
     list: List,
     element: &'static str,
@@ -318,7 +316,7 @@ fn unknowns<M: Model>(
     unknowns.into_iter().map(one).collect()
 }
 
-/// An entry of ModelStructure with all that it depends on.
+/// Returns an element of ModelStructure with its dependencies.
 fn unknown(
     element: &'static str,
     attribute: &'static str,

@@ -1,6 +1,6 @@
-//! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml,
-//! page of variables and names for the harness from its variable table; with the feature `icon`, the icon's pixels from
-//! its drawing.
+//! Rewrites the committed files that are generated: each FMU's modelDescription.xml, page of variables and
+//! names for the harness from its variable table, and with the feature `icon` the icon's picture from its
+//! drawing.
 
 use model_description::{fmi3, names, path, variables, xml};
 use runtime::Model;

@@ -1,4 +1,5 @@
-//! The harness's module of an FMU's names: variables, items of enumerations and sizes, from the variable table.
+//! Writes the harness's module with an FMU's names: variables, items of enumerations and array sizes, from
+//! the variable table.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -6,13 +7,12 @@ use std::path::PathBuf;
 use runtime::Model;
 use runtime::variable::{Access, Causality, Dimension, Kind, Variable};
 
-/// Path of the committed module.
 pub fn path<M: Model>() -> PathBuf {
     let file = format!("{}.rs", M::table().about.model.to_lowercase());
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../harness/names/src").join(file)
 }
 
-/// Constants of a module, and its modules, in the order of the table.
+/// Constants of a module and its submodules, in the order of the table.
 #[derive(Default)]
 struct Module {
     constants: Vec<String>,
@@ -31,7 +31,7 @@ impl Module {
     fn write(&self, indent: &str, text: &mut String) {
         for constant in &self.constants {
             let line = format!("{indent}pub const {constant};");
-            // as rustfmt breaks lines over 100 columns
+            // rustfmt breaks lines of more than 100 columns in this way.
             let broken = format!(" =\n{indent}    ");
             let line = if line.len() > 100 { line.replacen(" = ", &broken, 1) } else { line };
             let _ = writeln!(text, "{line}");
@@ -44,7 +44,8 @@ impl Module {
     }
 }
 
-/// Returns the module's text: a constant for each variable except derivatives, in a module for each part of its name.
+/// Returns the text of the module: a constant for each variable except derivatives, in a submodule for each
+/// part of its name.
 pub fn module<M: Model>() -> String {
     let table = M::table();
     let mut root = Module::default();
@@ -81,8 +82,8 @@ pub fn module<M: Model>() -> String {
     text
 }
 
-/// Returns the largest value of an integer parameter if it is the length of an array. Parameters that stand for an
-/// enumeration or a Boolean have none.
+/// Returns the largest value of an integer parameter if it is the length of an array. Parameters that stand
+/// for an enumeration or a Boolean are left out.
 fn size<M: Model>(variable: &Variable<M>) -> Option<i32> {
     let Kind::Integer { max: Some(max), .. } = variable.kind else { return None };
     let lengths = |v: &Variable<M>| v.shape.iter().any(|d| i32::try_from(d.most()) == Ok(max));
@@ -90,7 +91,8 @@ fn size<M: Model>(variable: &Variable<M>) -> Option<i32> {
     (counts && M::table().variables.iter().any(lengths)).then_some(max)
 }
 
-/// Returns the constant with the parameters that size arrays, and the arrays with the place of the index.
+/// Returns the text of the constant with the parameters that size arrays, and the arrays with the position of
+/// the sized dimension.
 fn sizes<M: Model>() -> String {
     let mut text = String::new();
     for (parameter, most) in M::table().sizes() {
@@ -116,7 +118,7 @@ fn sizes<M: Model>() -> String {
     )
 }
 
-/// Returns a name with underscores as Rust writes the name of a variant.
+/// Converts a name with underscores to the form of a Rust variant.
 fn camel(name: &str) -> String {
     let parts = name.split('_').filter_map(|part| {
         let first = part.chars().next()?.to_uppercase();

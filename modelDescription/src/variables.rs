@@ -1,4 +1,4 @@
-//! The documentation's page of all variables, from the FMU's variable table.
+//! Writes the documentation's page of all variables from the FMU's variable table.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use runtime::Model;
 use runtime::variable::{Causality, Kind, Value, Variable};
 
-/// Path of the committed page.
 pub fn path<M: Model>() -> PathBuf {
     crate::folder::<M>().join("documentation").join("variables.md")
 }
@@ -38,7 +37,6 @@ const CHAPTERS: [(Causality, &str, &str); 5] = [
     ),
 ];
 
-/// The page's text, Markdown.
 pub fn page<M: Model>() -> String {
     let mut page = String::from(
         "<!-- Written by `cargo run --release -p model-description`; do not edit. -->\n\
@@ -110,7 +108,8 @@ fn has_slosh_model<M: Model>() -> bool {
     M::table().variables.iter().any(|v| v.name == "slosh.model")
 }
 
-/// Start values of all elements: one if they are equal, and of equal blocks along the first index the first block.
+/// Returns the start values of all elements: a single value if they are equal, or the first block if all
+/// blocks along the first index are equal.
 fn start<M: Model>(variable: &Variable<M>) -> String {
     let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
     let starts: Vec<_> = (0..variable.len())
@@ -154,7 +153,7 @@ fn range<M: Model>(variable: &Variable<M>) -> (String, String) {
     }
 }
 
-/// Number in the usual notation: powers of ten only in place of many zeros.
+/// Formats a number in the usual notation, with powers of ten only instead of many zeros.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }

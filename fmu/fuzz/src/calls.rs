@@ -1,6 +1,7 @@
-//! Any calls of the C interface of either version with any arguments: bytes to the hostile host of `host.c`.
+//! Fuzzes the C interface of either FMI version: the bytes choose the calls and arguments of the hostile host
+//! in `host.c`.
 
-// One call of a C function.
+// This module has one call of a C function.
 #![allow(unsafe_code)]
 
 use std::ffi::{CString, c_char};
@@ -10,7 +11,7 @@ use runtime::table::Layout;
 
 use crate::sizes;
 
-/// Same as in `host.h`.
+/// The struct of the same name in `host.h`.
 #[repr(C)]
 struct HostFmu {
     guid: *const c_char,
@@ -19,14 +20,15 @@ struct HostFmu {
 }
 
 unsafe extern "C" {
-    /// Needs a description whose GUID and token end with NUL, and as many bytes as said.
+    /// Runs the hostile host. GUID and token in `fmu` must end with NUL, and `data` must have `size` bytes.
     fn host_run(fmu: *const HostFmu, data: *const u8, size: usize);
 }
 
-/// The FMU that this program is linked with must be that of the model.
+/// Runs the hostile host with `data` against the FMU with which this program is linked, which must be that of
+/// the model `M`.
 pub fn run<M: Model>(data: &[u8]) {
     let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
-    // Of the inputs for FMI 3.0, whose first byte is odd, every fourth is for the FMU with arrays.
+    // Inputs for FMI 3.0 have an odd first byte; every fourth of them is for the FMU with arrays.
     let with_arrays = data.first().is_some_and(|first| first % 8 == 7);
     let layout = if with_arrays { Layout::Arrays } else { Layout::Scalars };
     let (guid, token) = (c_string(M::table().guid()), c_string(M::table().token(layout)));

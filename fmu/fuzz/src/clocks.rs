@@ -1,5 +1,5 @@
-//! One sequence of calls by hosts whose clocks differ: multiplied, added up, off by a unit in the last place, started at 1e9 s.
-//! All get the same outputs.
+//! Makes one sequence of calls by hosts with different clocks: multiplied, accumulated, off by a unit in the
+//! last place, or started at 1e9 s. All of them must get the same outputs.
 
 use arbitrary::{Result, Unstructured};
 
@@ -15,56 +15,54 @@ use runtime::variable::{Access, Causality, Value};
 use crate::states::settings;
 use crate::{Values, place, set, survives_being_saved, to_steps};
 
-/// Calls of one sequence.
 const CALLS: usize = 40;
-/// Relative difference that the outputs of two hosts may have, see [`allowed`].
+/// Allowed relative difference between the outputs of two hosts; see [`allowed`].
 const TOLERANCE: f64 = 1e-9;
 /// Largest number of ticks in one step.
 const LONGEST: u32 = 8;
 
-/// One call, or a few that belong together.
+/// A call, or a group of calls that belong together.
 #[derive(Clone, Copy, Debug)]
 enum Call {
-    /// Sets an input, by its number.
+    /// Sets input number n to a value.
     Input(usize, f64),
-    /// Sets the slope of an input for the next step.
+    /// Sets the slope of input number n for the next step.
     Slope(usize, f64),
-    /// Sets a tunable parameter to a share of its start value.
+    /// Sets tunable parameter number n to a fraction of its start value.
     Tune(usize, f64),
-    /// Saves the state, makes a step, and goes back.
+    /// Saves the state, makes a step of this many ticks, and restores the state.
     GoBack(u32),
-    /// Writes the state out, and goes on from what is read.
+    /// Serialises the state and continues with an instance that is deserialised from it.
     Save,
-    /// Looks at time derivatives of the outputs.
+    /// Reads the time derivatives of the outputs.
     Derivatives,
-    /// Makes a step of so many ticks.
+    /// Makes a step of this many ticks.
     Step(u32),
 }
 
-/// Way in which a host computes its times.
+/// Rule by which a host computes its times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// start + n tick
+    /// start + n tick.
     Multiplied,
-    /// t += h
+    /// t += h.
     Added,
-    /// Off by a unit in the last place, up or down.
+    /// Multiplied, but off by a unit in the last place, up or down.
     Off,
-    /// Multiplied; the step is the difference of two times.
+    /// Multiplied; the step size is the difference of two times.
     Differences,
 }
 
-/// A host's clock.
 #[derive(Clone, Debug)]
 struct Clock {
     kind: Kind,
     start: f64,
-    /// Start of the clock whose differences are the lengths of steps, s.
+    /// Start of the clock from whose differences the step sizes follow, s.
     origin: f64,
     tick: f64,
     ticks: u32,
     time: f64,
-    /// Bits that decide between up and down.
+    /// Random bits that choose between up and down.
     noise: u64,
 }
 
@@ -74,12 +72,13 @@ impl Clock {
         Clock { kind, start, origin: start, tick, ticks: 0, time: start, noise }
     }
 
-    /// Returns a clock from 0 whose steps in Co-Simulation are as long as this clock's to the last bit.
+    /// Returns a clock that starts at 0 and whose step sizes in Co-Simulation are bit-identical to those of
+    /// this clock.
     fn started_at_zero(&self) -> Clock {
         Clock { origin: self.origin, ..Clock::new(self.kind, 0.0, self.tick) }
     }
 
-    /// Returns the host's name for a time.
+    /// Returns the time that this host passes to the FMU for `time`.
     fn name(&mut self, time: f64) -> f64 {
         if self.kind != Kind::Off {
             return time;
@@ -92,7 +91,7 @@ impl Clock {
         self.name(self.time)
     }
 
-    /// Returns the length of a step of so many ticks.
+    /// Returns the size of a step of this many ticks, s.
     fn length(&self, ticks: u32) -> f64 {
         let at = |ticks: u32| self.origin + f64::from(ticks) * self.tick;
         match self.kind {
@@ -114,14 +113,15 @@ impl Clock {
     }
 }
 
-/// Values of the outputs after each step, or the end of the run.
+/// Outputs after each step, up to the end of the run.
 type Rows = Vec<Vec<f64>>;
 
-/// The first byte says by which version of FMI, by which interface, and who handles events.
+/// Runs one case. The first byte chooses the FMI version, the interface, and who handles events; the other
+/// bytes choose parameters and calls. Panics if two hosts get different outputs.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((how, data)) = data.split_first() else { return };
     let data = &mut Unstructured::new(data);
-    // Bytes that run out end the run.
+    // The run ends when the bytes are used up.
     _ = match how % 5 {
         0 => compare::<M, Fmi2>((Interface::CoSimulation, Events::InStep), data),
         1 => compare::<M, Fmi3>((Interface::CoSimulation, Events::InStep), data),
@@ -139,7 +139,7 @@ fn compare<M: Model, V: Values>(
     let mut settings = data.choose(&settings(table.about.model))?.clone();
     let tick = *data.choose(&[0.005, 1.0 / 128.0, 0.01])?;
     if table.find("imu.rate").is_some() {
-        // on the grid, and in Co-Simulation between its points too
+        // On the grid of the communication points; in Co-Simulation also between them.
         let ticks = f64::from(data.int_in_range(1..=6)?);
         let is_between = interface == Interface::CoSimulation && data.ratio(1, 3)?;
         let rate = if is_between { 37.3 } else { 1.0 / (ticks * tick) };
@@ -166,13 +166,13 @@ fn compare<M: Model, V: Values>(
             || format!("{interface:?}, {events:?}, {kind:?}, {start:?}, {settings:?}, {calls:?}");
         assert_eq!(off.len(), same_steps.len(), "another number of steps: {}", what());
         for (n, scalar) in outputs::<M>().enumerate() {
-            // A sample is due at the end of a step that is too short by a last digit of 1e9 s, but not of one that is
-            // known to be too short by as much.
+            // A sample is due at the end of a step that is shorter by the rounding at 1e9 s, but not at the
+            // end of a step that is known to be shorter by as much.
             let is_sampled = scalar.variable.name == "omega_imu" && has_own_steps;
             let exact = if is_sampled { &even_steps } else { same_steps };
             let is_placed = is_sampled || interface == Interface::ModelExchange;
             let mut allowed = allowed(exact, n, tick, is_placed, start);
-            // an output that is a time of the host
+            // An output whose value is a time of the host.
             let is_time = scalar.variable.name == "event_time";
             let begin = if is_time { start } else { 0.0 };
             allowed += if is_time { last_digits(start) } else { 0.0 };
@@ -191,9 +191,9 @@ fn compare<M: Model, V: Values>(
     Ok(())
 }
 
-/// Returns the difference that output n of two hosts may have: 1e-9 of its size. Where the host's clock places the
-/// ends of steps (Model Exchange, samples), its last digits times the output's fastest change are added, because a unit in the
-/// last place is 1.2e-7 s at 1e9 s.
+/// Returns the difference of output number `n` that two hosts may have: 1e-9 of its magnitude. If the host's
+/// clock determines the ends of steps (Model Exchange, samples; `is_placed`), the rounding of its times
+/// multiplied by the output's fastest change is added, because a unit in the last place is 1.2e-7 s at 1e9 s.
 fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64 {
     let size = rows.iter().fold(1.0f64, |most, row| most.max(row[n].abs()));
     let pairs = rows.windows(2).map(|pair| (pair[1][n] - pair[0][n]).abs());
@@ -206,7 +206,8 @@ fn last_digits(start: f64) -> f64 {
     2.0 * f64::EPSILON * (start.abs() + 10.0)
 }
 
-/// Outputs and locals but for derivatives of states, which are slow to read one by one and follow from the states.
+/// Lists outputs and local variables. Derivatives of states are left out, because they are slow to read one
+/// by one and follow from the states.
 fn outputs<M: Model>() -> impl Iterator<Item = &'static Scalar<M>> {
     let is_shown = |s: &&Scalar<M>| {
         matches!(s.variable.causality, Causality::Output | Causality::Local)
@@ -215,7 +216,7 @@ fn outputs<M: Model>() -> impl Iterator<Item = &'static Scalar<M>> {
     M::table().scalars.iter().filter(is_shown)
 }
 
-/// Reads all [`outputs`]. There are none if one of them cannot be read.
+/// Reads all [`outputs`], or returns `None` if one of them cannot be read.
 fn read<M: Model, V: Values>(instance: &mut Instance<M, V>) -> Option<Vec<f64>> {
     let value = |scalar: &Scalar<M>| match instance.get(V::GET[place(scalar)], V::reference(scalar))
     {
@@ -263,7 +264,8 @@ fn begin<M: Model, V: Values>(
     Some(instance)
 }
 
-/// Calls that both interfaces have. Returns the instance to go on with.
+/// Makes a call that exists in both interfaces. Returns the instance with which the run continues, which may
+/// be a deserialised one.
 fn common<M: Model, V: Values>(mut instance: Instance<M, V>, call: Call) -> Instance<M, V> {
     let table = M::table();
     match call {
@@ -330,7 +332,7 @@ fn co_simulation<M: Model, V: Values>(
     rows
 }
 
-/// Makes a step to its end, whatever events stop it. Returns false if it was refused.
+/// Makes a step to its end, handling the events on the way. Returns false if the step was refused.
 fn step_all<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     clock: &mut Clock,
@@ -351,7 +353,7 @@ fn step_all<M: Model, V: Values>(
                 }
                 at = clock.name(instance.time());
                 h = end - at;
-                // At the end but for the host's rounding.
+                // The end is reached except for the host's rounding.
                 if h <= 0.0 {
                     break;
                 }
@@ -379,7 +381,7 @@ fn model_exchange<M: Model, V: Values>(
     rows.extend(read(&mut instance));
     for call in calls {
         let Call::Step(ticks) = *call else {
-            // inputs jump at events
+            // Inputs are discontinuous at events.
             instance.enter_event_mode().expect("allowed");
             instance = common(instance, *call);
             let Ok(info) = instance.new_discrete_states() else { return rows };
@@ -387,7 +389,7 @@ fn model_exchange<M: Model, V: Values>(
             instance.enter_continuous_time_mode().expect("allowed");
             continue;
         };
-        // short enough for Euler's method
+        // Short enough for Euler's method.
         for _ in 0..ticks {
             let h = clock.tick;
             instance.event_indicators(&mut indicators[0]).expect("allowed");
@@ -408,7 +410,7 @@ fn model_exchange<M: Model, V: Values>(
             let Ok(wanted) = instance.completed_integrator_step() else { return rows };
             let [before, after] = &indicators;
             let crossed = before.iter().zip(after).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
-            // The host is there, or as good as there: some hosts are early by a rounding error.
+            // The host is at this time or nearly so; some hosts are early by a rounding error.
             let due = next.is_some_and(|next| next <= now + 0.01 * h);
             if wanted || crossed || due {
                 instance.enter_event_mode().expect("allowed");

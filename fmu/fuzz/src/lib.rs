@@ -1,6 +1,7 @@
-//! Operations of the fuzzer on an instance of any model, as functions of bytes. The tests call them too.
+//! Functions for the fuzzer that exercise an instance of any model with random bytes. The tests call them
+//! too.
 //!
-//! Everything here panics when something happens that must not, whatever the bytes are.
+//! They panic if the instance violates its contract, for any bytes.
 
 #[cfg(feature = "libfuzzer")]
 pub mod calls;
@@ -19,10 +20,11 @@ use runtime::v3::{self, Fmi3};
 use runtime::variable::{Access, Causality, Kind, Value};
 use runtime::version::Version;
 
-/// Fuzz target named by the environment variable `HUBSLOSH_FUZZ_TARGET`.
+/// Runs the fuzz target that the environment variable `HUBSLOSH_FUZZ_TARGET` names.
 ///
 /// # Panics
-/// If it names no target, or if something happened that must not.
+///
+/// If the variable names no target, or the FMU violates its contract.
 #[cfg(feature = "libfuzzer")]
 pub fn run<M: Model>(data: &[u8]) {
     static TARGET: std::sync::OnceLock<fn(&[u8])> = std::sync::OnceLock::new();
@@ -36,8 +38,9 @@ pub fn run<M: Model>(data: &[u8]) {
     target(data);
 }
 
-/// Returns the sizes that the hostile host needs besides GUID and token (`host.h`): the numbers of scalar variables, outputs,
-/// continuous states and event indicators, and the first input's reference in FMI 3.0.
+/// Returns the sizes that the hostile host needs in addition to GUID and token (`host.h`): the numbers of
+/// scalar variables, outputs, continuous states and event indicators, and the value reference of the first
+/// input in FMI 3.0.
 pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     let table = M::table();
     if layout == Layout::Arrays {
@@ -53,11 +56,10 @@ pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     [table.scalars.len(), outputs, states, table.about.event_indicators, input as usize]
 }
 
-/// The calls of a version of FMI that get and set values: of reals, integers, enumerations and Booleans.
+/// Calls that get and set values in a version of FMI, for reals, integers, enumerations and Booleans in this
+/// order.
 pub trait Values: Version {
-    /// Calls that get values.
     const GET: [&'static Call; 4];
-    /// Calls that set values.
     const SET: [&'static Call; 4];
 }
 
@@ -75,7 +77,7 @@ impl Values for Fmi3 {
         [&v3::SET_FLOAT64, &v3::SET_INT32, &v3::SET_INT64, &v3::SET_BOOLEAN];
 }
 
-/// Position of a variable's call.
+/// Index of a variable's type in [`Values::GET`] and [`Values::SET`].
 fn place<M: Model>(scalar: &Scalar<M>) -> usize {
     match scalar.variable.kind {
         Kind::Real(_) => 0,
@@ -85,7 +87,6 @@ fn place<M: Model>(scalar: &Scalar<M>) -> usize {
     }
 }
 
-/// Sets a variable.
 fn set<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     scalar: &Scalar<M>,
@@ -94,7 +95,7 @@ fn set<M: Model, V: Values>(
     instance.set(V::SET[place(scalar)], &[V::reference(scalar)], |_| value)
 }
 
-/// Makes one step. If the instance's host handles events, the step stops at an event and the host handles it.
+/// Makes one step. If the host handles events, the step stops at an event, and the event is handled.
 fn step<M: Model, V: Version>(
     instance: &mut Instance<M, V>,
     at: f64,
@@ -108,7 +109,7 @@ fn step<M: Model, V: Version>(
     Ok(info)
 }
 
-/// Leaves event mode, so that steps can follow.
+/// Leaves event mode, so that steps can follow. Panics if the next event is not in the future.
 fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
     if instance.state() == InstanceState::Event {
         let next = instance.new_discrete_states().expect("in event mode").next_time;
@@ -121,14 +122,16 @@ fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
     }
 }
 
-/// Every output and local variable of a model in motion can be read and is a number.
+/// Checks that every output and local variable of an initialised model can be read and is finite.
 ///
 /// # Panics
-/// If not.
+///
+/// If a variable cannot be read, or is NaN or infinite.
 fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let shown = |scalar: &&Scalar<M>| {
         matches!(scalar.variable.causality, Causality::Output | Causality::Local)
-            // these are read one by one from all states together: slow, and seen in the states
+            // Derivatives are read one by one from all states together, which is slow, and their errors show
+            // in the states.
             && !matches!(scalar.variable.access, Access::Derivative(_))
     };
     for scalar in M::table().scalars.iter().filter(shown) {
@@ -140,10 +143,12 @@ fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     }
 }
 
-/// A state that is written out reads back as itself, and writes the same bytes.
+/// Serialises an instance, deserialises it, and checks that it serialises to the same bytes again. Returns
+/// the new instance.
 ///
 /// # Panics
-/// If not.
+///
+/// If the bytes are refused or differ.
 fn survives_being_saved<M: Model, V: Version>(instance: &Instance<M, V>) -> Instance<M, V> {
     let bytes = to_bytes(instance);
     let again = from_bytes(&bytes).unwrap_or_else(|why| panic!("own bytes are refused: {why}"));

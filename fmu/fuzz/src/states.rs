@@ -1,5 +1,5 @@
-//! Saved states that somebody has changed and given a new checksum: reading them is refused or
-//! gives an instance that lives as any other, and never panics.
+//! Fuzzes saved states that were modified and given a new checksum: deserialising them must be refused or
+//! give an instance that works as any other, and must never panic.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -16,11 +16,12 @@ use runtime::version::Version;
 
 use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
-/// Bytes of the checksum, at the end.
+/// Number of bytes of the checksum at the end of a saved state.
 const CHECKSUM: usize = 16;
 
-/// The bytes are the version of FMI and the state to start from. Patches follow, each a place (two bytes), a length (one byte)
-/// and that many bytes of new content. What is left over, or an odd first byte, is taken as a saved state by itself.
+/// Runs one case. The first byte chooses the FMI version and the saved state. Patches follow, each a place
+/// (two bytes), a length (one byte) and that many bytes of new content. If the first byte is 255, the
+/// remaining bytes are themselves used as a saved state.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((which, patches)) = data.split_first() else { return };
     if *which == u8::MAX {
@@ -50,16 +51,15 @@ fn damaged<M: Model, V: Values>(which: usize, mut patches: &[u8]) {
     bytes[body..].copy_from_slice(&checksum);
     let Ok(read) = from_bytes::<M, V>(&bytes) else { return };
     let read = survives_being_saved(&read);
-    // An instance takes a state of one whose host handles events as its own does.
+    // The state's host must handle events in the same way as the instance's host.
     let mut instance = lives::<V>()
         .filter(|(interface, _)| *interface == read.interface())
         .map(|(interface, events)| Instance::with_events(interface, events))
         .find_map(|mut instance| instance.restore(&read).is_ok().then_some(instance))
         .expect("a state that could be read can be restored");
-    live(&mut instance);
+    simulate(&mut instance);
 }
 
-/// Interface types of a version.
 fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
     let interfaces = [Interface::CoSimulation, Interface::ModelExchange].into_iter();
     let all = interfaces.flat_map(|interface| {
@@ -68,8 +68,9 @@ fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
     all.filter(|(interface, events)| V::allows(*interface, *events))
 }
 
-/// Continues as a host may. The FMU may refuse calls; after a successful step all values are finite.
-fn live<M: Model, V: Values>(instance: &mut Instance<M, V>) {
+/// Continues the simulation as a host might. The FMU may refuse calls, but after a successful step all values
+/// must be finite.
+fn simulate<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let table = M::table();
     for input in table.inputs() {
         _ = set(instance, input, Real(0.1));
@@ -116,8 +117,8 @@ fn live<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     survives_being_saved(instance);
 }
 
-/// Both interfaces, every one of the model's [`settings`], every instance state that can be reached
-/// without an error.
+/// Returns saved states of both interfaces, with each of the model's [`settings`], in every instance state
+/// that can be reached without an error.
 fn bases<M: Model, V: Values>() -> &'static [Vec<u8>] {
     static BASES: Mutex<BTreeMap<[&str; 2], &[Vec<u8>]>> = Mutex::new(BTreeMap::new());
     let mut bases = BASES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -132,7 +133,7 @@ fn bases<M: Model, V: Values>() -> &'static [Vec<u8>] {
     })
 }
 
-/// The saved states of one life.
+/// Adds the saved states of one instance during its life cycle to `all`.
 fn life_of<M: Model, V: Values>(
     interface: Interface,
     events: Events,
@@ -155,7 +156,7 @@ fn life_of<M: Model, V: Values>(
             to_steps(&mut instance);
             instance.step_to_event(1.0, 0.5, true).expect("a good step");
             if events == Events::Reported {
-                // With what waits for event mode, and in it.
+                // Both before event mode, with pending events, and in event mode.
                 all.push(to_bytes(&instance));
                 instance.enter_event_mode().expect("allowed");
             }
@@ -169,14 +170,15 @@ fn life_of<M: Model, V: Values>(
     all.push(to_bytes(&instance));
 }
 
-/// Settings whose states are damaged, by the FMU's name: together they have every part of the
-/// model in use, in motion.
+/// Returns the settings whose saved states are modified. Together they use every part of the model, in
+/// motion.
 ///
 /// # Panics
-/// If there are none for the model.
+///
+/// If there are no settings for the model.
 pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
     match model {
-        // each slosh model, each with a friction law; linear ones with a baffle
+        // Each slosh model with one friction law; the linear ones with a baffle.
         "HubSlosh" => [(1, 2), (2, 3), (3, 4), (4, 5), (5, 3), (2, 5)]
             .map(|(liquid, friction)| {
                 vec![
@@ -194,7 +196,7 @@ pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                 ]
             })
             .into(),
-        // free, on a pivot (2)
+        // Free, and on a pivot (2).
         "Spacecraft" => [(1, 0), (1, 1), (1, 4), (2, 2)]
             .map(|(mount, tanks)| {
                 vec![
@@ -215,7 +217,8 @@ pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                 ]
             })
             .into(),
-        // split, lumped (2), rigid_body (3); two drain, and of one the liquid leaves its bottom
+        // Split, lumped (2), rigid_body (3). Two of them drain, and in one the liquid detaches from the
+        // bottom.
         "SloshTank" => {
             [(1, 0, 0), (1, 1, 0), (1, 3, 0), (2, 2, 0), (3, 1, 8), (1, 2, 8), (1, 2, 0)]
                 .into_iter()

@@ -1,5 +1,5 @@
-//! Any parameters, inputs and step sizes: a run ends in numbers or in an error, a refused call
-//! changes nothing, and going back and stepping again gives the same bits.
+//! Fuzzes parameters, inputs and step sizes: a run must give finite values or an error, a refused call must
+//! change nothing, and repeating a step from a saved state must give the same bits.
 
 use std::time::{Duration, Instant};
 
@@ -15,18 +15,19 @@ use runtime::variable::{Causality, Kind, Quantity, Value};
 
 use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
-/// Steps of one run.
+/// Number of steps of one run.
 const STEPS: usize = 12;
-/// The longest step, s. A step's work is bounded by the model; this keeps the fuzzer fast.
+/// Longest step, s. The model bounds the work of a step; this limit keeps the fuzzer fast.
 const LONGEST: f64 = 2.0;
-/// A run that was this slow ends: stiff models may use up the steps they are allowed each time.
+/// A run that took this long ends, because stiff models may use all allowed solver steps in every step.
 const SLOW: Duration = Duration::from_secs(1);
 
-/// Makes an instance, sets some values, runs it. The first byte says by which version of FMI, and who handles events.
+/// Runs one case: creates an instance, sets some values, and simulates. The first byte chooses the FMI
+/// version and who handles events.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((how, data)) = data.split_first() else { return };
     let data = &mut Unstructured::new(data);
-    // Bytes that run out end the run.
+    // The run ends when the bytes are used up.
     _ = match how % 4 {
         0 | 1 => co_simulation::<M, Fmi2>(Events::InStep, data),
         2 => co_simulation::<M, Fmi3>(Events::InStep, data),
@@ -77,7 +78,7 @@ fn co_simulation<M: Model, V: Values>(events: Events, data: &mut Unstructured) -
         } else if instance.state() == InstanceState::Stepping {
             assert!(to_bytes(&instance) == before, "a refused step has changed something");
         } else {
-            // It stands where it was, and can be read.
+            // The instance has kept its time, and its variables can be read.
             everything_is_a_number(&mut instance);
             assert_eq!(instance.time(), at);
         }
@@ -87,7 +88,7 @@ fn co_simulation<M: Model, V: Values>(events: Events, data: &mut Unstructured) -
     Ok(())
 }
 
-/// Sets a parameter or an input, mostly to something allowed; refusals change nothing.
+/// Sets a parameter or an input, usually to an allowed value. A refusal must change nothing.
 fn set_something<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     data: &mut Unstructured,
@@ -112,13 +113,14 @@ fn set_something<M: Model, V: Values>(
     Ok(())
 }
 
-/// An input within what a simulation sees: at 1e12 N.m a step uses up all that it is allowed.
+/// Limits an input to magnitudes that occur in simulations, because at 1e12 N.m every step would use all
+/// allowed solver steps.
 fn everyday(quantity: Quantity) -> Quantity {
     let near = |limit: Option<f64>| limit.filter(|limit| limit.abs() <= 1e6);
     Quantity { min: near(quantity.min), max: near(quantity.max), ..quantity }
 }
 
-/// A value of a quantity: at its limits, between them, of its order of magnitude, or anything.
+/// Draws a value of a quantity: at its limits, between them, of its nominal magnitude, or any number.
 fn within(quantity: Quantity, data: &mut Unstructured) -> Result<f64> {
     let (min, max) = (quantity.min.unwrap_or(-1e3), quantity.max.unwrap_or(1e3));
     let share = f64::from(data.int_in_range(0..=1000u16)?) / 1000.0;
@@ -126,14 +128,14 @@ fn within(quantity: Quantity, data: &mut Unstructured) -> Result<f64> {
         0 => min,
         1 => max,
         2 => min + share * (max - min),
-        // uniformly in the logarithm
+        // Uniform in the logarithm.
         3 | 4 if min > 0.0 => min * (max / min).powf(share),
         5 | 6 => quantity.nominal.unwrap_or(1.0) * (2.0 * share - 1.0),
         _ => real(data)?,
     })
 }
 
-/// A number of everyday size, mostly; else any.
+/// Draws a number, usually between 1e-6 and 1e3, otherwise with any bits.
 fn real(data: &mut Unstructured) -> Result<f64> {
     if data.ratio(1, 8)? {
         return Ok(f64::from_bits(data.arbitrary()?));

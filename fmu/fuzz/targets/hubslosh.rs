@@ -1,4 +1,3 @@
-//! HubSlosh under the fuzzer: see [`hubslosh_fuzz`].
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| hubslosh_fuzz::run::<HubSlosh::HubSlosh>(data));

@@ -1,4 +1,3 @@
-//! SloshTank under the fuzzer: see [`hubslosh_fuzz`].
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| hubslosh_fuzz::run::<SloshTank::Model>(data));

@@ -1,4 +1,3 @@
-//! Spacecraft under the fuzzer: see [`hubslosh_fuzz`].
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| hubslosh_fuzz::run::<Spacecraft::Model>(data));

@@ -2,8 +2,8 @@
 //!
 //! The thesis does not state the length of the segments, which is decisive for a sweep: a sweep is at one
 //! frequency only for a moment, and if only one segment contains this moment, nothing is averaged, and the
-//! coherence is 1 for any two signals. The sweep stays within the resolution 1/L of a segment for 1/(L ·
-//! rate), and half-overlapping segments follow each other by L/2, so that 2/(rate · L²) segments contain each
+//! coherence is 1 for any two signals. The sweep stays within the resolution 1/L of a segment for 1/(L rate),
+//! and half-overlapping segments follow each other by L/2, so that 2/(rate L²) segments contain each
 //! frequency.
 //!
 //! * for coherence [`SEGMENT`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then shows whether

@@ -1,14 +1,15 @@
-//! Names of our FMUs' variables, items of their enumerations, and the sizes that their counts allow.
+//! Names of the variables of this project's FMUs, the items of their enumerations, and the sizes of their
+//! arrays.
 //!
-//! The harness links no model. model-description writes one module per FMU from its variable table, so a
-//! misspelt or renamed variable does not compile.
+//! The harness does not link the models. Instead model-description writes one module per FMU from its
+//! variable table, so that a misspelt or renamed variable does not compile.
 
 /// Name of an array variable with `D` indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Array<const D: usize>(&'static str);
 
 impl<const D: usize> Array<D> {
-    /// Returns the name of the element at these indices, which count from 1.
+    /// Returns the name of the element at these indices, which count from 1, for example `tank[2].p[1,3]`.
     pub fn at(self, indices: [usize; D]) -> String {
         let (mut name, mut left) = (self.0.to_string(), &indices[..]);
         while let (Some(place), [index, rest @ ..]) = (name.find("[]"), left) {
@@ -23,36 +24,32 @@ impl<const D: usize> Array<D> {
     }
 }
 
-/// A parameter that says how many elements of arrays are used.
+/// A parameter that determines how many elements of arrays are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
-    /// Name of the parameter.
     pub parameter: &'static str,
     /// Largest value of the parameter.
     pub most: usize,
-    /// True if each element has its event indicators.
+    /// True if each element has event indicators of its own.
     pub has_indicators: bool,
-    /// The arrays, each with the place among its indices of the one that the parameter limits.
+    /// The arrays that the parameter sizes, each with the position of this dimension among its indices.
     pub arrays: &'static [(&'static str, usize)],
 }
 
 macro_rules! enumeration {
     ($name:ident: $($item:ident = $value:literal $text:literal),+) => {
-        /// Enumeration of the FMU.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum $name {
             $($item = $value),+
         }
 
         impl $name {
-            /// Returns the item's name.
             pub const fn name(self) -> &'static str {
                 match self {
                     $($name::$item => $text),+
                 }
             }
 
-            /// Returns the item of this name.
             pub fn named(name: &str) -> Option<$name> {
                 match name {
                     $($text => Some($name::$item),)+

@@ -1,4 +1,4 @@
-//! The `.fmu` as a zip archive (FMI 2.0, section 2.3): same files, same bytes.
+//! Writes the `.fmu` as a zip archive (FMI 2.0, section 2.3). The same files always give the same bytes.
 
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -12,39 +12,37 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::fmi::Fmi;
 
-/// Names in the archive and contents, in the archive's order; modelDescription.xml first, as some
-/// hosts expect.
+/// Names in the archive and their contents, in the order of the archive. modelDescription.xml comes first,
+/// because some hosts expect that.
 pub type Files = Vec<(String, Vec<u8>)>;
 
-/// Deflate's best level.
+/// Highest compression level of Deflate.
 const QUICK: i64 = 9;
-/// Above 9 the crate `zip` takes Zopfli, with so many iterations more. Five would make a binary smaller by 0.2 % and take a third longer.
+/// Above 9 the crate `zip` uses Zopfli, with one iteration per level above that. Five iterations would make a
+/// binary smaller by 0.2 % and take a third longer.
 const SMALL: i64 = 10;
 
-/// A binary to be packed.
+/// A binary that is packed into an FMU.
 pub struct Packed {
-    /// Folder under `binaries/`.
     pub folder: &'static str,
-    /// Ending of its name there.
     pub ending: &'static str,
-    /// The file.
     pub bytes: Vec<u8>,
 }
 
 impl Packed {
-    /// A binary for the platform this program runs on.
+    /// Reads the binary for the platform on which this program runs.
     pub fn native(binary: &Path) -> Result<Packed> {
         let bytes = read(binary)?;
         Ok(Packed { folder: PLATFORM, ending: std::env::consts::DLL_SUFFIX, bytes })
     }
 
-    /// Returns the name in the FMU 2.0 of that modelIdentifier.
+    /// Returns the binary's path in an FMU 2.0 with this modelIdentifier.
     pub fn name(&self, identifier: &str) -> String {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
     }
 
-    /// Returns names and contents in the FMU of a version of FMI. A folder that is for one processor gets only its part of a
-    /// universal binary.
+    /// Returns the binary's paths and contents in an FMU of version `fmi`. A folder for one processor gets
+    /// only its part of a universal binary.
     pub fn files(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = (String, &[u8])> {
         fmi.folders(self.folder).iter().map(move |folder| {
             let bytes = match folder.strip_suffix("-darwin") {
@@ -57,10 +55,11 @@ impl Packed {
     }
 }
 
-/// Packs an FMU from its parts alone: description, binary for this platform, and every file below
-/// `extra` under its name relative to that folder (`resources/a.txt`, `sources/b.c`).
+/// Packs an FMU from its parts: description, binary for this platform, and every file below `extra` under its
+/// path relative to that folder (`resources/a.txt`, `sources/b.c`).
 ///
 /// # Errors
+///
 /// If a file cannot be read or written.
 pub fn plain(
     xml: &str,
@@ -80,19 +79,20 @@ pub fn plain(
     write(&files, out)
 }
 
-/// The archive of some files, as bytes.
+/// Returns a zip archive of the files, as bytes.
 pub fn zipped(files: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     let mut out = std::io::Cursor::new(Vec::new());
     zip(&mut out, files, QUICK)?;
     Ok(out.into_inner())
 }
 
-/// Packs files; the archive appears whole or not at all.
+/// Packs files into the archive `out`, which is either written completely or not at all.
 pub fn write(files: &Files, out: &Path) -> Result<()> {
     write_at(files, out, QUICK)
 }
 
-/// Packs files for others: as [`write`], by Zopfli, which makes binaries smaller by 3.6 % and takes 1.5 s of CPU a megabyte.
+/// Packs files for distribution: like [`write`], but by Zopfli, which makes binaries smaller by 3.6 % and
+/// takes 1.5 s of CPU time per megabyte.
 pub fn write_small(files: &Files, out: &Path) -> Result<()> {
     write_at(files, out, SMALL)
 }
@@ -105,7 +105,7 @@ fn write_at(files: &Files, out: &Path, level: i64) -> Result<()> {
         .with_context(|| format!("{} was not packed", out.display()))
 }
 
-/// All files below a folder, their names relative to it, sorted.
+/// Reads all files below a folder; their names are relative to it and sorted.
 pub fn below(folder: &Path) -> Result<Files> {
     let mut entries: Vec<_> = folder
         .read_dir()
@@ -126,16 +126,15 @@ pub fn below(folder: &Path) -> Result<Files> {
     Ok(files)
 }
 
-/// A whole file.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))
 }
 
-/// Same files, same bytes: order, times and attributes are fixed.
+/// Writes the archive. Order, times and attributes are fixed, so that the same files give the same bytes.
 fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)], level: i64) -> Result<()> {
     let mut archive = ZipWriter::new(out);
     for (name, bytes) in files {
-        // an FMU's binaries, a wheel's command
+        // An FMU's binaries and a wheel's command are executable.
         let program = name.starts_with("binaries/") || name.contains(".data/scripts/");
         let mode = if program { 0o755 } else { 0o644 };
         let options = SimpleFileOptions::default()

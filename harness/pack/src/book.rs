@@ -1,5 +1,5 @@
-//! The book as a static site: Sphinx makes it from the project's Markdown files and the docstrings of the Python package, as
-//! `book/conf.py` says.
+//! Builds the book as a static site. Sphinx renders the project's Markdown files and the docstrings of the
+//! Python package, as configured in `book/conf.py`.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -13,16 +13,18 @@ use crate::archive::below;
 use crate::metadata::{REPOSITORY, VERSION};
 use crate::{build_native, needs_source, root};
 
-/// Returns the address at which this version's book can be read without the project's source.
+/// Returns the address at which the book of this version can be read without the source.
 pub fn address() -> String {
     format!("{REPOSITORY}/blob/v{VERSION}/book/index.md")
 }
 
-/// Builds the book and writes its files to `out`. The first time, Sphinx is installed into an environment of its own.
+/// Builds the book and writes its files to `out`. At the first call Sphinx is installed into an environment
+/// of its own.
 ///
 /// # Errors
-/// If there is no source, if Python or a package is missing, and at every warning of Sphinx: links and figures that do not exist,
-/// pages that no list names, equations that are not LaTeX, docstrings that are not reStructuredText.
+///
+/// If the source, Python or a package is missing, and at every warning of Sphinx: links and figures that do
+/// not exist, pages in no list, equations that are not LaTeX, docstrings that are not reStructuredText.
 pub fn write(out: &Path) -> Result<()> {
     needs_source("the book")?;
     let root = root();
@@ -30,7 +32,7 @@ pub fn write(out: &Path) -> Result<()> {
     let target = native.ancestors().nth(2).context("no target directory")?;
     let python = environment(target)?;
 
-    // pages about names that the package no longer has
+    // Removed first, because it may have pages about names that the package no longer has.
     match fs::remove_dir_all(root.join("book/api")) {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error).context("book/api")?,
         _ => {}
@@ -55,7 +57,7 @@ pub fn write(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Returns the Python with the packages of `book/requirements.txt`.
+/// Returns the Python interpreter of the environment with the packages of `book/requirements.txt`.
 fn environment(target: &Path) -> Result<PathBuf> {
     let python = if cfg!(windows) { "python" } else { "python3" };
     let made = Command::new(python)

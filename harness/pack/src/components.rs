@@ -1,8 +1,7 @@
-//! Third-party components of the FMU's binaries, from the lock file and from the binaries:
-//! the note on licences and the software bill of materials, SBOM (CycloneDX 1.6).
+//! Third-party components of the FMU's binaries, found in the lock file and in the binaries: the note on
+//! licences and the SBOM (CycloneDX 1.6).
 //!
-//! Licence texts are committed in modelDescription/licenses; their sources are named in
-//! [`licence_note`].
+//! Licence texts are committed in modelDescription/licenses; [`licence_note`] names their sources.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -21,32 +20,27 @@ use serde_json::json;
 
 /// Licence of the project's own parts, SPDX.
 const OWN: &str = "MIT OR Apache-2.0";
-/// Texts of that licence, at the project's root.
 pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 
-/// One part of a binary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Component {
-    /// Name where it comes from.
     pub name: String,
-    /// Version; `None` if it is that of the tool that linked it.
+    /// Version; `None` if it is the version of the tool that linked it.
     pub version: Option<String>,
-    /// Licence as an SPDX expression.
     pub licence: String,
-    /// Files with the licence's text, in `documentation/licenses/`.
+    /// Files with the text of the licence, in `documentation/licenses/`.
     pub texts: Vec<String>,
-    /// Package URL.
     pub purl: String,
     /// SHA-256 of the package, if Cargo.lock has it.
     pub sha256: Option<String>,
     /// Source and purpose of the component.
     pub origin: String,
-    /// Folders under `binaries/` whose binary has it.
+    /// Folders under `binaries/` whose binary contains the component.
     pub platforms: BTreeSet<&'static str>,
 }
 
-/// Crates that Rust's standard library is made from. Panic messages name those whose code is linked
-/// and can panic, with their versions.
+/// Crates of Rust's standard library. Panic messages in a binary name those whose code is linked and can
+/// panic, with their versions.
 const STANDARD: [(&str, &str); 10] = [
     ("addr2line", "Apache-2.0 OR MIT"),
     ("adler2", "0BSD OR MIT OR Apache-2.0"),
@@ -61,9 +55,9 @@ const STANDARD: [(&str, &str); 10] = [
 ];
 const STANDARD_TEXT: &str = "rust-standard-library.txt";
 
-/// A run-time library that a linker adds.
+/// A run-time library that a linker adds to a binary.
 struct RunTime {
-    /// A text that reveals it in a binary, [`backwards`].
+    /// Text that reveals the library in a binary, reversed by [`backwards`].
     mark: &'static [u8],
     name: &'static str,
     licence: &'static str,
@@ -71,7 +65,8 @@ struct RunTime {
     origin: &'static str,
 }
 
-/// Reverses a text at compile time. This program, in which a wheel's components are searched, then does not contain the text itself.
+/// Reverses a text at compile time. This program is itself searched for the components of a wheel, and so
+/// must not contain the text.
 const fn backwards<const N: usize>(text: [u8; N]) -> [u8; N] {
     let (mut reversed, mut place) = ([0; N], 0);
     while place < N {
@@ -90,7 +85,7 @@ const RUN_TIME: [RunTime; 4] = [
         origin: "Unwinding of panics, from zig's distribution; the text is its lib/libunwind/LICENSE.TXT",
     },
     RunTime {
-        // the two come together: zig links both where it builds for an old glibc
+        // Zig links both libraries together when it builds for an old glibc.
         mark: &backwards(*b"libunwind: "),
         name: "glibc-nonshared",
         licence: "LicenseRef-LGPL-2.1-or-later-with-unlimited-permission-to-link",
@@ -115,8 +110,11 @@ const RUN_TIME: [RunTime; 4] = [
     },
 ];
 
-/// Everything that is linked into the `binaries` of a package. Fails if something is there whose
-/// licence is not known here.
+/// Lists the components that are linked into the `binaries` of a package.
+///
+/// # Errors
+///
+/// If a component's licence is unknown here.
 pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
     let everywhere: BTreeSet<&str> = binaries.iter().map(|binary| binary.folder).collect();
     let mut all = crates(package, &everywhere)?;
@@ -178,7 +176,7 @@ pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
     Ok(all)
 }
 
-/// The FMU's package and all that Cargo links into it.
+/// Lists the package and all crates that Cargo links into it.
 fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Component>> {
     let root = project::root();
     let metadata = MetadataCommand::new()
@@ -195,7 +193,7 @@ fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Compo
     while place < wanted.len() {
         let node = nodes.iter().find(|node| node.id == *wanted[place]);
         for dependency in node.into_iter().flat_map(|node| &node.deps) {
-            // neither of tests nor of build scripts
+            // Without dependencies of tests and build scripts.
             let linked = dependency.dep_kinds.iter().any(|d| d.kind == DependencyKind::Normal);
             if linked && !wanted.contains(&&dependency.pkg) {
                 wanted.push(&dependency.pkg);
@@ -229,7 +227,7 @@ fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Compo
     Ok(all)
 }
 
-/// "1.95.0"
+/// Returns the version of rustc, for example "1.95.0".
 fn rust_version() -> Result<String> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let said =
@@ -245,13 +243,14 @@ fn contains_backwards(bytes: &[u8], text: &[u8]) -> bool {
     bytes.windows(text.len()).any(|window| window.iter().rev().eq(text))
 }
 
-/// Crates of the standard library named in a binary, as in "/rust/deps/gimli-0.32.3/src".
+/// Lists the crates of the standard library that a binary names, with their versions, from paths such as
+/// "/rust/deps/gimli-0.32.3/src".
 fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
     const BEFORE: &[u8] = b"/rust/deps";
     let mut all = BTreeSet::new();
     let places = bytes.windows(BEFORE.len()).enumerate().filter(|(_, w)| *w == BEFORE);
     for (place, _) in places {
-        // one separator, of this or of the target's system, on either side
+        // One path separator, of this or of the target's system, on either side.
         let separator = |b: &u8| b"/\\".contains(b);
         let Some((first, rest)) = bytes[place + BEFORE.len()..].split_first() else { continue };
         let of_a_name = |b: &u8| b.is_ascii_alphanumeric() || b"-_.+".contains(b);
@@ -274,7 +273,7 @@ fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
     Ok(all)
 }
 
-/// `documentation/licenses/license.txt`: what is linked, and under which licence.
+/// Returns the text of `documentation/licenses/license.txt`: the linked components and their licences.
 pub fn licence_note(description: &ModelDescription, components: &[Component]) -> String {
     let mut note = format!(
         "{} {}\nSPDX-License-Identifier: {OWN}\n\n\
@@ -299,7 +298,8 @@ pub fn licence_note(description: &ModelDescription, components: &[Component]) ->
     note
 }
 
-/// Everything that is linked into the command `hubslosh` and the compiled half of the Python package.
+/// Lists the components that are linked into the command `hubslosh` and the compiled half of the Python
+/// package.
 fn linked_in_wheel(command: Packed) -> Result<Vec<Component>> {
     let native = crates(project::NATIVE, &BTreeSet::from([command.folder]))?;
     let mut all = linked("hubslosh", &[command])?;
@@ -311,8 +311,8 @@ fn linked_in_wheel(command: Packed) -> Result<Vec<Component>> {
     Ok(all)
 }
 
-/// Licences of what is linked into the wheel's binaries for one platform, with all texts: those of
-/// crates from the crates themselves.
+/// Returns the licences of everything that is linked into a wheel's binaries for one platform, with all
+/// texts; texts of crates are read from the crates.
 pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     let binary = Packed { folder, ending: "", bytes: binary.to_vec() };
     let metadata = MetadataCommand::new()
@@ -320,7 +320,7 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
         .exec()
         .context("`cargo metadata` failed, which lists the crates of the program")?;
     let ours = project::root().join("modelDescription/licenses");
-    // the same text once, with all that is under it
+    // Each text once, with the components under it.
     let mut texts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     let mut list = String::new();
     for component in linked_in_wheel(binary)? {
@@ -358,7 +358,7 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     Ok(notices)
 }
 
-/// The files of a crate that are licences or notices.
+/// Reads the files of a crate that are licences or notices.
 fn texts_in(folder: &Path) -> Result<Vec<Vec<u8>>> {
     const BEGINNINGS: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"];
     let mut found = Vec::new();
@@ -373,7 +373,7 @@ fn texts_in(folder: &Path) -> Result<Vec<Vec<u8>>> {
     Ok(found)
 }
 
-/// The software bill of materials (SBOM) of an FMU, CycloneDX 1.6.
+/// Returns the SBOM of an FMU (CycloneDX 1.6).
 pub fn sbom(
     model: &Model,
     fmi: Fmi,
@@ -394,11 +394,12 @@ pub fn sbom(
     product.sbom(components)
 }
 
-/// The SBOM of a wheel: what is linked into its command and its library for one platform; `files` are the names and SHA-256 of its binaries
-/// and FMUs.
+/// Returns the SBOM of a wheel: the components of its command and its library for one platform. `files` are
+/// the names and SHA-256 of its binaries and FMUs.
 ///
 /// # Errors
-/// If something is linked whose licence is not known.
+///
+/// If a component's licence is unknown.
 pub fn sbom_of_wheel(
     command: &[u8],
     folder: &'static str,
@@ -415,19 +416,20 @@ pub fn sbom_of_wheel(
     Ok(product.sbom(&linked_in_wheel(binary)?))
 }
 
-/// Product that an SBOM describes.
+/// The product that an SBOM describes.
 struct Product<'a> {
-    /// Type of CycloneDX.
+    /// Component type of CycloneDX.
     kind: &'static str,
     name: &'a str,
     version: &'a str,
     description: &'a str,
-    /// Names of its binaries, and their SHA-256.
+    /// Names and SHA-256 of its binaries.
     files: Vec<(String, String)>,
 }
 
 impl Product<'_> {
-    /// Neither a time nor a random number is in it, so the same binaries have the same SBOM.
+    /// Returns the SBOM. It contains neither a time nor a random number, so that the same binaries have the
+    /// same SBOM.
     fn sbom(&self, components: &[Component]) -> String {
         let Product { kind, name, version, description, files } = self;
         let this = format!("{name}@{version}");
@@ -541,7 +543,7 @@ mod tests {
     }
 
     #[test]
-    fn of_other_people_s_crates_an_fmu_links_libm_alone() {
+    fn an_fmu_links_libm_as_its_only_foreign_crate() {
         for model in &MODELS {
             let all = crates(model.package, &BTreeSet::from(["linux64"])).unwrap();
             assert_eq!(all[0].name, model.package);

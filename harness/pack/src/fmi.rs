@@ -1,27 +1,24 @@
-//! File and folder names that differ between archives of FMI 2.0 and 3.0.
+//! Names of files and folders that differ between archives of FMI 2.0 and 3.0.
 
 use std::path::{Path, PathBuf};
 
-/// A version of FMI that FMUs are packed for: the same binary, another description, other names in the archive.
+/// A kind of FMU that is packed: the same binary with another description and other names in the archive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fmi {
-    /// FMI 2.0
     V2,
-    /// FMI 3.0
     V3,
-    /// FMI 3.0 with arrays as variables, some of them sized by structural parameters.
+    /// FMI 3.0 with array variables, some of which are sized by structural parameters.
     V3Arrays,
 }
 
 impl Fmi {
-    /// All of them.
     pub const ALL: [Fmi; 3] = [Fmi::V2, Fmi::V3, Fmi::V3Arrays];
 
-    /// Versions of FMI in releases and wheels.
+    /// Kinds of FMU in releases and wheels.
     pub const RELEASED: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
-    /// Folders under `binaries/` for a platform that is known by its folder in FMI 2.0. The two parts of a universal binary
-    /// for macOS lie in two of FMI 3.0.
+    /// Returns the folders under `binaries/` for a platform that is given by its folder in FMI 2.0. For a
+    /// universal binary of macOS FMI 3.0 has two folders.
     pub fn folders(self, platform: &'static str) -> &'static [&'static str] {
         match (self, platform) {
             (Fmi::V3 | Fmi::V3Arrays, "linux64") => &["x86_64-linux"],
@@ -37,7 +34,7 @@ impl Fmi {
         }
     }
 
-    /// The icon's name in the archive.
+    /// Returns the icon's name in the archive.
     pub fn icon(self) -> &'static str {
         match self {
             Fmi::V2 => "model.png",
@@ -45,7 +42,7 @@ impl Fmi {
         }
     }
 
-    /// Suffix of the FMU's file name.
+    /// Returns the suffix of the FMU's file name.
     pub fn suffix(self) -> &'static str {
         match self {
             Fmi::V2 => "",
@@ -54,8 +51,9 @@ impl Fmi {
         }
     }
 
-    /// The FMU of that name in a folder: `NAME.fmu`, of FMI 3.0 `NAME-fmi3.fmu` and `NAME-fmi3-arrays.fmu`. Hosts take the name of the library
-    /// from the description, not from the file.
+    /// Returns the path of an FMU in a folder: `NAME.fmu`, for FMI 3.0 `NAME-fmi3.fmu` and
+    /// `NAME-fmi3-arrays.fmu`. Hosts take the name of the library from the description, not from the file
+    /// name.
     pub fn path(self, folder: &Path, name: &str) -> PathBuf {
         folder.join(format!("{name}{}.fmu", self.suffix()))
     }

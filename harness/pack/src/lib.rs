@@ -28,20 +28,20 @@ pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, model, named};
 pub use crate::platforms::Built;
 pub use crate::project::{build, build_native, has_source, needs_source, root};
 
-/// Builds the binary of an FMU for the platform this program runs on and packs it to `out`.
+/// Builds the binary of an FMU for the platform on which this program runs and packs the FMU to `out`.
 pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     let binary = Packed::native(&build(model.package, false)?)?;
     archive::write(&files(model, fmi, &[binary])?, out)
 }
 
-/// Builds the binaries of an FMU for all platforms and packs them to `out`.
+/// Builds the binaries of an FMU for all platforms and packs the FMU to `out`.
 pub fn pack_all(model: &Model, fmi: Fmi, out: &Path) -> Result<Vec<Built>> {
     let all = platforms::build(model)?;
     pack_built(model, fmi, &all, out)?;
     Ok(all)
 }
 
-/// Packs what was built for all platforms.
+/// Packs binaries that were built for all platforms.
 fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> {
     let binaries: Vec<_> = all
         .iter()
@@ -50,28 +50,31 @@ fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> 
     archive::write_small(&files(model, fmi, &binaries)?, out)
 }
 
-/// The packed HubSlosh for tests: [`packed_model_for_tests`].
+/// Returns the packed HubSlosh for tests; see [`packed_model_for_tests`].
 ///
 /// # Panics
+///
 /// If it cannot be built.
 pub fn packed_for_tests() -> &'static Path {
     packed_model_for_tests(HUBSLOSH)
 }
 
-/// A packed FMU for tests: built and packed once per process to `test-fmu/<name>.fmu` in the target
-/// directory. Processes do not disturb each other: each renames its own whole file there, and all
-/// of them hold the same bytes.
+/// Returns a packed FMU for tests, which is built and packed once per process to `test-fmu/<name>.fmu` in the
+/// target directory. Several processes may do so at the same time, because each renames a complete file and
+/// all have the same bytes.
 ///
 /// # Panics
+///
 /// If it cannot be built.
 pub fn packed_model_for_tests(model: &Model) -> &'static Path {
     packed_version_for_tests(model, Fmi::V2)
 }
 
-/// Like [`packed_model_for_tests`] for one version of FMI: `test-fmu/<name>-fmi3.fmu` for 3.0, with arrays
-/// `test-fmu/<name>-fmi3-arrays.fmu`.
+/// Returns a packed FMU of one FMI version for tests, like [`packed_model_for_tests`]:
+/// `test-fmu/<name>-fmi3.fmu` for 3.0, with arrays `test-fmu/<name>-fmi3-arrays.fmu`.
 ///
 /// # Panics
+///
 /// If it cannot be built.
 pub fn packed_version_for_tests(model: &Model, fmi: Fmi) -> &'static Path {
     static PACKED: Mutex<BTreeMap<(&str, &str), &Path>> = Mutex::new(BTreeMap::new());
@@ -91,7 +94,8 @@ fn pack_for_tests(model: &Model, fmi: Fmi) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// The list of files that belong to the FMU: the example's inputs and the result they lead to. FMI-LS-REF, 1.0.0-beta.1.
+/// Returns the list of related files in the FMU: the inputs of the example and its result (FMI-LS-REF,
+/// 1.0.0-beta.1).
 fn references(model: &Model) -> String {
     let name = model.name;
     format!(
@@ -105,11 +109,10 @@ fn references(model: &Model) -> String {
     )
 }
 
-/// Files of the FMU.
 fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
     let source = model.folder();
     let xml = model.description(fmi)?;
-    // What is read of it here is the same in all versions.
+    // The parts that are used here are the same in all versions.
     let first = model.description(Fmi::V2)?;
     let description = ModelDescription::from_xml(&String::from_utf8_lossy(&first))?;
     let icon = read(&root().join("modelDescription/icon/icon.png"))?;
@@ -137,8 +140,8 @@ fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
         files.push((format!("documentation/licenses/{text}"), read(&folder.join(text))?));
     }
 
-    // No terminalsAndIcons.xml: no terminal describes this plant, and FMI Library logs an FMU 2.0 that has it as
-    // fatal.
+    // There is no terminalsAndIcons.xml: this plant has no terminals, and FMI Library logs a fatal error for
+    // an FMU 2.0 that contains the file.
     let extra = source.join("extra");
     if extra.is_dir() {
         let extra = below(&extra)?.into_iter();

@@ -1,6 +1,6 @@
 //! The core metadata of the Python package, version 2.4 (packaging.python.org, "Core metadata
-//! specifications"): from `[project]` of pyproject.toml, from Cargo.toml (version, authors, licence,
-//! repository) and README.md.
+//! specifications"). They are taken from `[project]` of pyproject.toml, Cargo.toml (version, authors,
+//! licence, repository) and README.md.
 
 use std::ops::Range;
 
@@ -11,18 +11,16 @@ use toml::{Table, Value};
 use crate::archive::read;
 use crate::root;
 
-/// Name of the package, and of the command in it.
+/// Name of the Python package and of its command.
 pub const PACKAGE: &str = "hubslosh";
-/// Version.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Address of the project's source.
 pub const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
-/// Texts of the project's licence.
+/// Files with the project's licence.
 pub const LICENSES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
-/// Licences and notices of what is linked into a wheel's command.
+/// File with the licences and notices of everything that is linked into a wheel's command.
 pub const NOTICES: &str = "THIRD-PARTY.txt";
 
-/// The text of METADATA and PKG-INFO.
+/// Returns the text of METADATA and PKG-INFO.
 pub fn text() -> Result<String> {
     let project = read(&root().join("harness/python/pyproject.toml"))?;
     let readme = String::from_utf8(read(&root().join("README.md"))?).context("README.md")?;
@@ -73,8 +71,8 @@ fn compose(pyproject: &Table, readme: &str) -> Result<String> {
     Ok(format!("{}\n\n{}", lines.join("\n"), published(readme)))
 }
 
-/// A page of Markdown with links that work where the page stands alone: those to the project's
-/// files lead to the repository, at this version.
+/// Rewrites the links of a Markdown page so that they work outside the project: links to the project's files
+/// lead to the repository at this version.
 fn published(page: &str) -> String {
     let mut changes: Vec<(Range<usize>, String)> = Vec::new();
     for (event, range) in Parser::new_ext(page, Options::ENABLE_TABLES).into_offset_iter() {
@@ -93,7 +91,7 @@ fn published(page: &str) -> String {
             }
             _ => continue,
         };
-        // "](…" of this link is its last in the range: what is inside ends before
+        // The last "](…" in the range belongs to this link, because those inside it end earlier.
         let written = format!("]({to}");
         if !to.contains("://")
             && !to.starts_with('#')
@@ -104,7 +102,7 @@ fn published(page: &str) -> String {
             changes.push((start..start + to.len(), address));
         }
     }
-    // an image within a link comes after it, and stands before its end
+    // An image within a link is reported after the link, but comes before the link's end.
     changes.sort_by_key(|(range, _)| range.start);
     let mut published = page.to_string();
     for (range, address) in changes.into_iter().rev() {

@@ -1,4 +1,4 @@
-//! The FMUs that this project packs. Another one is another entry in [`MODELS`].
+//! The FMUs that this project packs. Another FMU is another entry in [`MODELS`].
 
 use std::path::PathBuf;
 
@@ -9,34 +9,33 @@ use crate::archive::read;
 use crate::fmi::Fmi;
 use crate::project::root;
 
-/// The folder of the layered standard FMI-LS-REF in an FMU.
+/// Folder of the layered standard FMI-LS-REF in an FMU.
 pub const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref";
 
-/// An FMU of this project.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Model {
-    /// Its `modelIdentifier`; the folder `modelDescription/<name>` has all that travels with the
-    /// binary: `modelDescription.xml`, `documentation/`, and, if
-    /// there is one, `extra/`.
+    /// The `modelIdentifier`. The folder `modelDescription/<name>` has everything that is packed with the
+    /// binary: `modelDescription.xml`, `documentation/` and, if it exists, `extra/`.
     pub name: &'static str,
     /// Cargo package whose cdylib is the binary.
     pub package: &'static str,
 }
 
-/// All of them; the first is packed unless another is named.
+/// All FMUs of this project.
 pub const MODELS: [Model; 3] = [
     Model { name: "HubSlosh", package: "hubslosh-fmu" },
     Model { name: "Spacecraft", package: "spacecraft-fmu" },
     Model { name: "SloshTank", package: "sloshtank-fmu" },
 ];
 
-/// The FMU that is packed unless another is named.
+/// The FMU that is packed by default.
 pub const HUBSLOSH: &Model = &MODELS[0];
 
-/// The FMU of that name.
+/// Finds an FMU by its name.
 ///
 /// # Errors
-/// If there is none; the error names those there are.
+///
+/// If there is none; the text lists the existing names.
 pub fn model(name: &str) -> Result<&'static Model> {
     MODELS.iter().find(|model| model.name == name).with_context(|| {
         let names = MODELS.iter().map(|model| model.name);
@@ -46,7 +45,7 @@ pub fn model(name: &str) -> Result<&'static Model> {
     })
 }
 
-/// Finds an FMU by its name: `Spacecraft`, for FMI 3.0 `Spacecraft-fmi3`.
+/// Finds an FMU by its file name: `Spacecraft`, or `Spacecraft-fmi3` for FMI 3.0.
 pub fn named(name: &str) -> Option<(Model, Fmi)> {
     let fmi = Fmi::ALL.into_iter().rev().find(|fmi| name.ends_with(fmi.suffix()))?;
     let model = model(name.strip_suffix(fmi.suffix())?).ok()?;
@@ -54,7 +53,7 @@ pub fn named(name: &str) -> Option<(Model, Fmi)> {
 }
 
 impl Model {
-    /// Returns the committed modelDescription.xml.
+    /// Reads the committed modelDescription.xml.
     pub(crate) fn description(&self, fmi: Fmi) -> Result<Vec<u8>> {
         let file = match fmi {
             Fmi::V2 => "modelDescription.xml",
@@ -64,18 +63,19 @@ impl Model {
         read(&self.folder().join(file))
     }
 
-    /// The folder with all that travels with the binary.
+    /// Returns the folder with everything that is packed with the binary.
     pub fn folder(&self) -> PathBuf {
         root().join("modelDescription").join(self.name)
     }
 
-    /// The example with its reference result, in the FMU and in the model's own folder: where the layered standard
-    /// FMI-LS-REF has such files. Folders in `extra` are named by reversed domain names, and the project has no domain.
+    /// Returns the folder with the example and its reference result, in the FMU as well as in the model's
+    /// folder. The layered standard FMI-LS-REF keeps such files there. (Folders in `extra` are named after
+    /// reversed domain names, and the project has no domain.)
     pub fn example(&self) -> PathBuf {
         self.folder().join(REFERENCES)
     }
 
-    /// The software bill of materials (SBOM) in the FMU: what is in the binary, and under which licence.
+    /// Returns the path of the SBOM in the FMU.
     pub fn sbom(&self) -> String {
         format!("documentation/licenses/{}.cdx.json", self.name)
     }

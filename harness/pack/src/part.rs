@@ -1,4 +1,4 @@
-//! FMUs with a part of the variables for the same binary: see [`host::part`].
+//! Packs FMUs that have only part of the variables, for the same binary; see [`host::part`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,10 +9,11 @@ use host::part::{Limit, START_VALUES, describe};
 
 use crate::archive::{self, Files};
 
-/// Writes to `out` the packed FMU with the variables within the limits, and with other start values by name.
+/// Packs to `out` the variables of `fmu` that are within the limits. `starts` are other start values by name.
 ///
 /// # Errors
-/// Those of [`describe`]; if the FMU cannot be read or `out` not written.
+///
+/// Errors of [`describe`], and if the FMU cannot be read or `out` cannot be written.
 pub fn pack(
     fmu: &Path,
     limits: &[Limit],

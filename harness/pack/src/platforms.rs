@@ -1,8 +1,7 @@
-//! The platforms an FMU and the program for everybody are built for, and what building for each
-//! takes.
+//! The platforms for which FMUs and the command are built, and the tools that each build needs.
 //!
-//! Rust's compiler writes code for all of them. Each target also needs Rust's standard library and a linker.
-//! `harness/platforms/setup` gets both on a Debian machine, into `target/tools`.
+//! Rust's compiler generates code for all of them. Each target also needs Rust's standard library and a
+//! linker. `harness/platforms/setup` installs both on a Debian machine, into `target/tools`.
 
 use std::collections::BTreeMap;
 use std::env;
@@ -18,29 +17,26 @@ use host::fmi2::Fmu;
 use crate::models::Model;
 use crate::project;
 
-/// A platform of FMI 2.0.5, section 2.3.
 #[derive(Debug)]
 pub struct Platform {
-    /// Folder under `binaries/` of the FMU.
+    /// Folder under `binaries/` of the FMU (FMI 2.0.5, section 2.3).
     pub folder: &'static str,
-    /// Ending of the binary's name there.
     pub ending: &'static str,
-    /// Build targets; several are joined into one universal binary.
+    /// Build targets. If there are several, their binaries are joined into a universal binary.
     pub targets: &'static [Target],
     /// Programs that the build needs in addition to Rust.
     tools: &'static [Tool],
-    /// Subcommand of Cargo, or another program with the same arguments.
+    /// The program that builds: Cargo, or one with the same arguments.
     cargo: Cargo,
-    /// Arguments of the linker.
+    /// Arguments for the linker.
     link: &'static [&'static str],
 }
 
-/// One system on one processor.
+/// An operating system on one processor.
 #[derive(Debug)]
 pub struct Target {
-    /// Target triple of rustc.
     pub triple: &'static str,
-    /// Appended for `cargo-zigbuild`: the oldest glibc.
+    /// Suffix of the triple for `cargo-zigbuild`: the oldest glibc.
     suffix: &'static str,
     /// Name in [`Binary::architectures`].
     pub architecture: &'static str,
@@ -48,9 +44,9 @@ pub struct Target {
 
 #[derive(Clone, Copy, Debug)]
 enum Cargo {
-    /// The linker that Rust takes for the target.
+    /// With the default linker of the target.
     Plain,
-    /// Zig as linker, which brings the symbols of every glibc and of macOS.
+    /// With Zig as the linker, which includes the symbols of every glibc and of macOS.
     Zig,
 }
 
@@ -76,7 +72,7 @@ const MINGW: Tool = Tool {
 /// All platforms, in the order of the archive.
 pub const PLATFORMS: [Platform; 4] = [
     Platform {
-        // FMI 2.0's own names are for x86; for other processors it takes the tuples of FMI 3.0.
+        // The names of FMI 2.0 itself are for x86; for other processors it uses the tuples of FMI 3.0.
         folder: "aarch64-linux",
         ending: ".so",
         targets: &[Target {
@@ -97,7 +93,8 @@ pub const PLATFORMS: [Platform; 4] = [
         ],
         tools: &[CARGO_ZIGBUILD, ZIG],
         cargo: Cargo::Zig,
-        // Without debug information (-S) the identifier that zig gives it depends on no folder of this machine.
+        // Without debug information (-S) the identifier that zig writes does not depend on folders of this
+        // machine.
         link: &["-Wl,-S"],
     },
     Platform {
@@ -118,15 +115,16 @@ pub const PLATFORMS: [Platform; 4] = [
         targets: &[Target { triple: "x86_64-pc-windows-gnu", suffix: "", architecture: "x86_64" }],
         tools: &[MINGW],
         cargo: Cargo::Plain,
-        // same source, same bytes: no time of building in the file
+        // Without the time of the build the same source gives the same bytes.
         link: &["-Wl,--no-insert-timestamp"],
     },
 ];
 
-/// The platform of that folder.
+/// Finds a platform by its folder.
 ///
 /// # Errors
-/// If there is none; the error names those there are.
+///
+/// If there is none; the text lists the existing folders.
 pub fn platform(folder: &str) -> Result<&'static Platform> {
     PLATFORMS.iter().find(|platform| platform.folder == folder).with_context(|| {
         let all = PLATFORMS.each_ref().map(|platform| platform.folder);
@@ -134,22 +132,22 @@ pub fn platform(folder: &str) -> Result<&'static Platform> {
     })
 }
 
-/// One platform's binary, checked.
+/// A binary for one platform that has been built and checked.
 pub struct Built {
-    /// Folder under `binaries/`.
     pub folder: &'static str,
-    /// Ending of its name there.
     pub ending: &'static str,
-    /// The file.
     pub bytes: Vec<u8>,
     /// Imports and exports of the binary.
     pub binary: Binary,
 }
 
-/// Builds and checks the binaries of an FMU for all platforms. Before anything is built, everything
-/// that is missing is named; after, every fault of every binary.
+/// Builds and checks the binaries of an FMU for all platforms.
+///
+/// # Errors
+///
+/// Before building, everything that is missing; after building, every fault of every binary.
 pub fn build(model: &Model) -> Result<Vec<Built>> {
-    let toolchain = Toolchain::look()?;
+    let toolchain = Toolchain::find()?;
     toolchain.check(&PLATFORMS.each_ref())?;
     let mut faults = Vec::new();
     let mut all = Vec::new();
@@ -173,7 +171,7 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
     Ok(all)
 }
 
-/// Fails if there are faults, with all of them.
+/// Returns an error with all faults, if there are any.
 pub fn refuse(faults: &[String]) -> Result<()> {
     if !faults.is_empty() {
         bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());
@@ -181,32 +179,28 @@ pub fn refuse(faults: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Product of a cross-build.
+/// The library or program that is built.
 pub enum Product<'a> {
-    /// The library of an FMU.
     Fmu(&'a Model),
-    /// The compiled half of the Python package.
     Native,
-    /// The command `hubslosh`.
     Command,
 }
 
-/// Paths of the build tools on this machine.
+/// The build tools on this machine.
 pub struct Toolchain {
     root: PathBuf,
     /// PATH with `target/tools/bin` in front.
     path: OsString,
     /// Folder of the Rust installation in use.
     sysroot: PathBuf,
-    /// Source of the standard library, for targets whose compiled one is not installed.
+    /// Source of the standard library, for targets whose compiled library is not installed.
     source: Option<PathBuf>,
-    /// Cargo's home.
     home: String,
 }
 
 impl Toolchain {
-    /// Looks at this machine.
-    pub fn look() -> Result<Self> {
+    /// Finds the build tools on this machine.
+    pub fn find() -> Result<Self> {
         let root = project::root();
         let tools = root.join("target").join("tools");
         let mut folders = vec![tools.join("bin")];
@@ -220,7 +214,7 @@ impl Toolchain {
             Ok(String::from_utf8_lossy(&said.stdout).trim().into())
         };
         let sysroot = PathBuf::from(rustc(&["--print", "sysroot"])?);
-        // "rustc 1.95.0 (…)": a standard library of another version does not compile
+        // "rustc 1.95.0 (…)": only the standard library of the same version compiles.
         let version = rustc(&["--version"])?;
         let version = version.split_whitespace().nth(1).unwrap_or_default();
         let source = [
@@ -241,7 +235,7 @@ impl Toolchain {
         })
     }
 
-    /// Builds for one target.
+    /// Builds a product for one target and returns the binary.
     pub fn build(
         &self,
         product: &Product,
@@ -253,7 +247,7 @@ impl Toolchain {
         std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
     }
 
-    /// Lists the faults of a binary: those `found`, and references to this machine.
+    /// Lists the faults of a binary: those in `found`, and paths of this machine that it contains.
     pub fn faults(&self, platform: &Platform, bytes: &[u8], found: Vec<String>) -> Vec<String> {
         let private = self.private().into_iter();
         let named = private
@@ -263,7 +257,7 @@ impl Toolchain {
         all.map(|fault| format!("\n  {}: {fault}", platform.folder)).collect()
     }
 
-    /// Folders of this machine that no binary may name.
+    /// Folders of this machine that no binary may contain.
     fn private(&self) -> Vec<String> {
         let folders = [self.root.to_string_lossy().into_owned(), self.home.clone()];
         folders.into_iter().filter(|folder| folder.len() > 1).collect()
@@ -282,7 +276,11 @@ impl Toolchain {
         folder.read_dir().is_ok_and(|mut entries| entries.any(named))
     }
 
-    /// Returns an error with all missing tools, their platforms, and how to install them.
+    /// Checks that all tools for these platforms are installed.
+    ///
+    /// # Errors
+    ///
+    /// All missing tools with the platforms that need them, and how to install them.
     pub fn check(&self, platforms: &[&Platform]) -> Result<()> {
         let mut missing: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for platform in platforms {
@@ -312,7 +310,7 @@ impl Toolchain {
         )
     }
 
-    /// Command that builds the binary for one target.
+    /// Returns the command that builds the binary for one target.
     fn command(&self, product: &Product, platform: &Platform, target: &Target) -> Command {
         let mut command = match platform.cargo {
             Cargo::Plain => project::cargo(),
@@ -321,7 +319,8 @@ impl Toolchain {
         command.env("PATH", &self.path);
         command.args(["rustc", "--locked", "--target"]);
         command.arg(format!("{}{}", target.triple, target.suffix));
-        // No path of this machine in the file: same source, same bytes, wherever it is built.
+        // Paths of this machine are replaced, so that the same source gives the same bytes wherever it is
+        // built.
         let registry = Path::new(&self.home).join("registry").join("src");
         let mut flags = vec![
             format!("--remap-path-prefix={}=.", self.root.display()),
@@ -330,13 +329,13 @@ impl Toolchain {
         if !self.has_standard_library(target.triple)
             && let Some(source) = &self.source
         {
-            // Building std is an unstable feature of Cargo, which these two names open.
+            // Building std is an unstable feature of Cargo, which these two variables enable.
             command.env("RUSTC_BOOTSTRAP", "1").env("__CARGO_TESTS_ONLY_SRC_ROOT", source);
             command.arg("-Zbuild-std=std,panic_unwind");
             flags.push(format!("--remap-path-prefix={}=library", source.display()));
         }
         if matches!(product, Product::Native | Product::Command) {
-            // optimised as a whole, as an FMU's binary: the command is a quarter smaller
+            // With link-time optimisation, as for an FMU, the command is a quarter smaller.
             command.env("CARGO_PROFILE_RELEASE_LTO", "fat");
             command.env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1");
         }
@@ -361,11 +360,11 @@ impl Toolchain {
         };
         let mut link: Vec<_> = platform.link.iter().map(|&argument| argument.to_string()).collect();
         if let (Some(name), "darwin64") = (&name, platform.folder) {
-            // hosts load it by its path; its name must not be that of a folder on this machine
+            // Hosts load the library by its path; its install name must not be a folder of this machine.
             link.push(format!("-Wl,-install_name,@rpath/{name}{}", platform.ending));
         }
         if let (Product::Native | Product::Command, "darwin64") = (product, platform.folder) {
-            // zig brings macOS's C library alone; the others' names are here
+            // Zig includes only the C library of macOS; the names of the other libraries are here.
             link.push(format!("-F{}", self.root.join("harness/platforms/macos").display()));
         }
         command.args(link.iter().map(|argument| format!("-Clink-arg={argument}")));

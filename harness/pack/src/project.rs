@@ -1,4 +1,4 @@
-//! The project as Cargo builds it: where its source is, and how an FMU's binary is made from it.
+//! The project as Cargo builds it: the location of its source, and the builds of its binaries.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -7,13 +7,13 @@ use anyhow::{Context, Result, bail, ensure};
 use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{Message, TargetKind};
 
-/// The project's root: the current folder, for a program that others have built.
+/// Returns the project's root: the current folder, because this program was built elsewhere.
 #[cfg(feature = "shipped")]
 pub fn root() -> PathBuf {
     std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."))
 }
 
-/// The project's root: two folders above this crate when it was compiled.
+/// Returns the project's root: two folders above this crate at the time of compilation.
 #[cfg(not(feature = "shipped"))]
 pub fn root() -> PathBuf {
     let crate_root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -25,7 +25,7 @@ pub fn has_source() -> bool {
     root().join("Cargo.toml").is_file()
 }
 
-/// Fails unless the project's source is there, which `what` is made from.
+/// Returns an error if the project's source, from which `what` is built, is missing.
 pub fn needs_source(what: &str) -> Result<()> {
     ensure!(
         has_source(),
@@ -35,14 +35,15 @@ pub fn needs_source(what: &str) -> Result<()> {
     Ok(())
 }
 
-/// Cargo profile that binaries of FMUs are built with.
+/// Cargo profile for the binaries of FMUs.
 const PROFILE: &str = "fmu";
 
-/// Builds the cdylib of a package of this workspace, as an FMU's binary for the platform this
-/// program runs on, and returns where Cargo put it. `quiet`: without Cargo's progress.
+/// Builds the cdylib of a package of this workspace, with the profile of FMUs, for the platform on which this
+/// program runs, and returns its path. `quiet` suppresses Cargo's progress.
 ///
 /// # Errors
-/// If there is no source or no Cargo, or if it does not compile.
+///
+/// If source or Cargo are missing, or the package does not compile.
 pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     let mut command = cargo();
     command.arg("rustc");
@@ -50,45 +51,46 @@ pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     cargo_build(command, quiet)
 }
 
-/// Cargo, the one that runs this program if there is one.
+/// Returns a command that runs Cargo: the one that runs this program, if there is one.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Arguments of `cargo rustc` for the FMU's binary. `cargo build` would make the rlib in the same
-/// call, and then leave out the link-time optimisation without a word: 70 % more code.
+/// Adds the arguments of `cargo rustc` for the FMU's binary; arguments that follow go to the compiler. `cargo
+/// build` would also build the rlib in the same call and then silently omit the link-time optimisation, which
+/// would give 70 % more code.
 ///
-/// The compiler may do two numbers at once where that saves much, as with vectors. Where it saves little, it costs time: a pair
-/// is loaded just after its halves were stored one by one, and the processor waits. The linear model's step takes a fifth longer.
-///
-/// What follows goes to the compiler.
+/// The compiler may process two numbers at once (SLP vectorisation) only where this saves much, as for
+/// vectors. Where it saves little, it costs time, because a pair is loaded just after its halves were stored
+/// separately, and the processor waits: the linear model's step would take a fifth longer.
 pub(crate) fn arguments(command: &mut Command, package: &str) {
     command.args(["--profile", PROFILE, "--package", package, "--lib", "--crate-type", "cdylib"]);
     command.args(["--message-format", "json-render-diagnostics"]);
     command.args(["--", "-Cllvm-args=-slp-threshold=10"]);
 }
 
-/// Arguments of `cargo rustc` for the command `hubslosh` as others get it. What follows goes to the
-/// compiler.
+/// Adds the arguments of `cargo rustc` for the command `hubslosh` as it is distributed; arguments that follow
+/// go to the compiler.
 pub(crate) fn program_arguments(command: &mut Command) {
     command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
     command.args(["--features", "shipped", "--message-format", "json-render-diagnostics"]);
     command.args(["--", "-Cstrip=symbols"]);
 }
 
-/// Cargo package of the compiled half of the Python package.
 pub(crate) const NATIVE: &str = "hubslosh-native";
 
-/// Arguments of `cargo rustc` for the compiled half of the Python package. What follows goes to the compiler.
+/// Adds the arguments of `cargo rustc` for the compiled half of the Python package; arguments that follow go
+/// to the compiler.
 pub(crate) fn native_arguments(command: &mut Command) {
     command.args(["--release", "--package", NATIVE, "--lib", "--crate-type", "cdylib"]);
     command.args(["--message-format", "json-render-diagnostics", "--", "-Cstrip=symbols"]);
 }
 
-/// Builds the compiled half of the Python package for the platform this program runs on, and returns where Cargo put it:
-/// where the package finds it in the source tree.
+/// Builds the compiled half of the Python package for the platform on which this program runs and returns its
+/// path, at which the package finds it in the source tree.
 ///
 /// # Errors
+///
 /// As [`build`].
 pub fn build_native(quiet: bool) -> Result<PathBuf> {
     let mut command = cargo();
@@ -97,7 +99,7 @@ pub fn build_native(quiet: bool) -> Result<PathBuf> {
     cargo_build(command, quiet)
 }
 
-/// Runs Cargo and returns where it put the binary; Cargo's own progress goes to stderr.
+/// Runs Cargo and returns the path of the binary. Cargo's progress goes to stderr.
 pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> {
     let root = root();
     needs_source("an FMU's binary")?;

@@ -1,5 +1,6 @@
-//! Makes the files of a release. Each FMU is for all platforms, in both versions of FMI, with its SBOM and the report of its
-//! check. The wheels' SBOM and the wheel for Linux follow. [`MANIFEST`] lists the SHA-256 of all files, [`PRESENT`] of those in the folder.
+//! Makes the files of a release: each FMU for all platforms, in both versions of FMI, with its SBOM and the
+//! report of its check; then the wheels' SBOM and the wheel for Linux. [`MANIFEST`] lists the SHA-256 of all
+//! files, [`PRESENT`] that of the files in the folder.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -11,19 +12,21 @@ use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};
 use crate::{Fmi, Model, pack_built, platforms, wheel};
 
-/// Name of the list of the files in the folder, those of one version, with their SHA-256, as `sha256sum --check` reads it.
+/// Name of the list of the files in the folder, which are those of one version, with their SHA-256 in the
+/// format of `sha256sum --check`.
 pub const PRESENT: &str = "SHA256SUMS";
 
-/// Name of the list of all files of all releases, with their SHA-256: [`PRESENT`], the files of older versions, and the wheels
-/// that the folder does not keep.
+/// Name of the list of all files of all releases with their SHA-256: those in [`PRESENT`], files of older
+/// versions, and wheels that are not kept in the folder.
 pub const MANIFEST: &str = "SHA256SUMS.all";
 
-/// Bytes up to which the wheel for Linux is in the release, for it lies in the project's history forever. Of 17.1 MB the command
-/// has 6.9, the FMUs 8.6 and the package's compiled half 1.3. Solving tanks in Python takes 0.6 of these. An FMU 3.0
-/// repeats the binary of the FMU 2.0, 4 MB in all: a zip archive cannot share it.
+/// Largest wheel for Linux that is kept in the release, bytes. It is limited because the wheel stays in the
+/// project's history forever. Of its 17.1 MB the command has 6.9, the FMUs 8.6 and the package's compiled
+/// half 1.3, of which solving tanks takes 0.6. An FMU 3.0 repeats the binary of the FMU 2.0 (4 MB in all),
+/// because a zip archive cannot share it.
 pub const LARGEST_WHEEL: u64 = 20_000_000;
 
-/// One file of an FMU.
+/// Reads one file of an FMU or wheel.
 pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
     let cannot = || format!("{name} in {} cannot be read", fmu.display());
     let file = std::fs::File::open(fmu).with_context(cannot)?;
@@ -33,15 +36,16 @@ pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Returns the path of the present version's release of an FMU in `folder`: `NAME-VERSION.fmu`, for FMI 3.0
+/// Returns the path of an FMU of the present version in `folder`: `NAME-VERSION.fmu`, for FMI 3.0
 /// `NAME-VERSION-fmi3.fmu`.
 pub fn path(model: &Model, fmi: Fmi, folder: &Path) -> PathBuf {
     fmi.path(folder, &format!("{}-{}", model.name, env!("CARGO_PKG_VERSION")))
 }
 
-/// Builds an FMU for all platforms, checks it, and writes its files to `folder`. For each version of FMI these are the FMU, its
-/// SBOM (`.cdx.json`), and the report (`.check.txt`) that `check` returns. Lists them in [`MANIFEST`] and removes those of older
-/// versions. Returns what was written. If `check` refuses the FMU of one version, neither is released.
+/// Builds an FMU for all platforms, checks it, and writes its files to `folder`: for each version of FMI the
+/// FMU, its SBOM (`.cdx.json`) and the report (`.check.txt`) that `check` returns. Updates [`MANIFEST`] and
+/// removes the files of older versions. Returns the paths of the written files. If `check` refuses the FMU of
+/// one version, nothing is written.
 pub fn write(
     model: &Model,
     folder: &Path,
@@ -54,7 +58,7 @@ pub fn write(
     let mut files = Vec::new();
     for fmi in Fmi::RELEASED {
         let fmu = path(model, fmi, folder);
-        for (ending, bytes) in of_version(model, fmi, &all, &check)? {
+        for (ending, bytes) in version_files(model, fmi, &all, &check)? {
             files.push((file_name(&fmu.with_extension(ending)), bytes));
         }
     }
@@ -65,18 +69,20 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Returns true if a file's name is `NAME-VERSION`, followed by `-` or `.`.
-fn is_of(file: &str, name: &str, version: &str) -> bool {
+/// Returns true if a file's name is `NAME-VERSION` followed by `-` or `.`.
+fn belongs_to(file: &str, name: &str, version: &str) -> bool {
     let rest = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-'));
     rest.and_then(|rest| rest.strip_prefix(version))
         .is_some_and(|rest| rest.starts_with(['-', '.']))
 }
 
-/// Writes files of the present version of `name` to `folder`. Updates this version's entries of [`MANIFEST`]: these files and
-/// `elsewhere`, names and SHA-256 of files that the folder does not keep. Removes listed files of `name` that are no longer kept.
-/// Returns what was written.
+/// Writes files of the present version of `name` to `folder` and updates this version's entries in
+/// [`MANIFEST`] with these files and with `elsewhere`, the names and SHA-256 of files that are not kept in
+/// the folder. Removes listed files of `name` that are no longer kept. Returns the paths of the written
+/// files.
 ///
 /// # Errors
+///
 /// If a file cannot be read or written. Files are removed last.
 fn record(
     folder: &Path,
@@ -94,7 +100,7 @@ fn record(
     let listed = |line: &str| line.split_once("  ").map(|(_, file)| file.to_string());
     let is_own = |file: &String| file.strip_prefix(name).is_some_and(|rest| rest.starts_with('-'));
     let mut lines: Vec<String> = old.lines().map(String::from).collect();
-    lines.retain(|line| !listed(line).is_some_and(|file| is_of(&file, name, VERSION)));
+    lines.retain(|line| !listed(line).is_some_and(|file| belongs_to(&file, name, VERSION)));
     let mut new: Vec<String> =
         files.iter().map(|(file, bytes)| format!("{}  {file}", sha256(bytes))).collect();
     new.extend(elsewhere.iter().map(|(file, hash)| format!("{hash}  {file}")));
@@ -123,8 +129,8 @@ fn record(
     Ok(written)
 }
 
-/// The release's files of one version of FMI: endings of their names, and bytes.
-fn of_version(
+/// Returns the release files of one FMI version: endings of their names, and contents.
+fn version_files(
     model: &Model,
     fmi: Fmi,
     all: &[Built],
@@ -139,9 +145,9 @@ fn of_version(
     Ok([("fmu", bytes), ("cdx.json", sbom), ("check.txt", report.into_bytes())])
 }
 
-/// Builds the wheels of all platforms to `made` and lists them in [`MANIFEST`] of `folder`. Writes their SBOM there, and the
-/// wheel for Linux on x86-64 unless it is larger than [`LARGEST_WHEEL`]. Removes an older version's wheel. Returns what was
-/// written there.
+/// Builds the wheels of all platforms in the folder `made` and lists them in [`MANIFEST`] of `folder`. Writes
+/// their SBOM to `folder`, and the wheel for Linux on x86-64 unless it is larger than [`LARGEST_WHEEL`].
+/// Removes an older version's wheel. Returns the paths of the files written to `folder`.
 pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut wheels = wheel::write_for(&PLATFORMS.each_ref(), made)?;
     wheels.sort();

@@ -1,5 +1,5 @@
-//! The project's source as a Python sdist (packaging.python.org, "Source distribution format"), from
-//! which pip builds the wheel where Rust and a C compiler are: same files, same bytes.
+//! Packs the project's source as a Python sdist (packaging.python.org, "Source distribution format"), from
+//! which pip builds the wheel if Rust and a C compiler are installed. The same files give the same bytes.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,20 +14,21 @@ use crate::archive::{Files, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::root;
 
-/// Path of the build backend from pyproject.toml's own folder, and from the sdist's root.
+/// Path of the build backend relative to the folder of pyproject.toml, and relative to the root of the sdist.
 const BACKEND: [&str; 2] = ["backend-path = [\".\"]", "backend-path = [\"harness/python\"]"];
 
-/// Writes the sdist to `folder` and returns where it is.
+/// Writes the sdist to `folder` and returns its path.
 ///
 /// # Errors
-/// If git does not list the project's files, or one cannot be read or written.
+///
+/// If git does not list the project's files, or a file cannot be read or written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     let name = format!("{PACKAGE}-{VERSION}");
     let out = folder.join(format!("{name}.tar.gz"));
     let files = files()?;
     output::directory(folder)?;
     output::atomically(&out, |file| {
-        // no name and no time in gzip's header
+        // Without name and time in the header of gzip.
         let mut archive = Builder::new(GzEncoder::new(file, Compression::best()));
         for (path, bytes) in &files {
             let mut header = Header::new_ustar();
@@ -42,8 +43,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// Files under version control, without releases and without files that only a checkout needs; pyproject.toml and the metadata
-/// stand at the root.
+/// Reads the files under version control, except releases and files that only a checkout needs.
+/// pyproject.toml and the metadata are placed at the root.
 fn files() -> Result<Files> {
     let said = Command::new("git")
         .current_dir(root())
@@ -54,7 +55,7 @@ fn files() -> Result<Files> {
     ensure!(said.status.success(), "git does not list the files of the source: {}", why.trim());
     let mut files = Files::new();
     for name in String::from_utf8(said.stdout)?.split('\0').filter(|name| !name.is_empty()) {
-        // deleted in the working tree, but not yet in git
+        // Deleted in the working tree, but still in git's index.
         let path = root().join(name);
         if !name.starts_with("dist/") && !name.starts_with(".git") && path.is_file() {
             files.push((name.into(), read(&path)?));

@@ -1,9 +1,10 @@
-//! Builds the wheels of the Python package `hubslosh`, one for each platform, with the FMUs of both versions of FMI and the
-//! command `hubslosh` (packaging.python.org, "Binary distribution format"). The same files give the same bytes.
+//! Builds the wheels of the Python package `hubslosh`, one for each platform, with the FMUs of both versions
+//! of FMI and the command `hubslosh` (packaging.python.org, "Binary distribution format"). The same files
+//! give the same bytes.
 //!
-//! Its Python runs anywhere, its binaries do not: the tag says which Linux, Windows or macOS they
-//! need, and is read from the binaries themselves. Its compiled half uses the stable ABI of Python alone: one wheel for
-//! every CPython from [`ABI`]'s version on.
+//! The Python code runs anywhere, but the binaries do not: the tag states which Linux, Windows or macOS they
+//! need, and is derived from the binaries. The compiled half uses only the stable ABI of Python, so that one
+//! wheel serves every CPython from the version in [`ABI`] on.
 
 use std::path::{Path, PathBuf};
 
@@ -19,44 +20,46 @@ use crate::metadata::{self, PACKAGE, VERSION};
 use crate::platforms::{self, Platform, Product, Target, Toolchain};
 use crate::{Fmi, MODELS, build, build_native, components, files as files_of_fmu, pack, root};
 
-/// Tags of the oldest Python, and of the stable ABI.
+/// Tags of the oldest supported Python and of the stable ABI.
 const ABI: &str = "cp311-abi3";
 
-/// Path of the software bill of materials in `.dist-info` (PEP 770).
+/// Path of the SBOM in `.dist-info` (PEP 770).
 const SBOM: &str = "sboms/hubslosh.cdx.json";
 
 /// The binaries of a wheel.
 struct Binaries {
     /// Folder under `binaries/` of the FMUs.
     folder: &'static str,
-    /// Names and bytes of the packed FMUs.
+    /// Names and contents of the packed FMUs.
     fmus: Files,
-    /// Name and bytes of the package's compiled half.
+    /// Name and content of the package's compiled half.
     native: (&'static str, Vec<u8>),
-    /// Name and bytes of the command.
+    /// Name and content of the command.
     command: Option<(String, Vec<u8>)>,
-    /// The libraries and the command, as read.
+    /// Properties of the libraries and the command.
     read: Vec<Binary>,
 }
 
-/// Builds and packs every FMU of this project and the wheel with them, to `folder`, for this machine's
-/// platform. Returns where it is.
+/// Builds and packs every FMU of this project and the wheel that contains them, for this machine's platform.
+/// Returns the path of the wheel in `folder`.
 ///
 /// # Errors
+///
 /// If something cannot be built, read or written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     check_folder(folder)?;
     write_one(folder, native()?, archive::write)
 }
 
-/// The same for other platforms, a wheel for each processor.
+/// Builds wheels for other platforms, one for each processor, and returns their paths in `folder`.
 ///
 /// # Errors
-/// As [`write`]; if a binary would not run on every machine of its platform, nothing is written.
+///
+/// As [`write`]. If a binary would not run on every machine of its platform, nothing is written.
 pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>> {
     check_folder(folder)?;
     let write = |binaries| write_one(folder, binaries, archive::write_small);
-    cross(platforms)?.into_iter().map(write).collect()
+    cross_build(platforms)?.into_iter().map(write).collect()
 }
 
 fn check_folder(folder: &Path) -> Result<()> {
@@ -69,11 +72,12 @@ fn check_folder(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A wheel for tests, with these FMUs and without the command: to the folder of the first of them.
-/// Returns where it is.
+/// Writes a wheel with these FMUs and without the command to the folder of the first FMU, for tests. Returns
+/// its path.
 ///
 /// # Panics
-/// If it cannot be made.
+///
+/// If it cannot be built.
 pub fn for_tests(fmus: &[&Path]) -> PathBuf {
     let make = || {
         let library = read(&build_native(true)?)?;
@@ -88,7 +92,7 @@ pub fn for_tests(fmus: &[&Path]) -> PathBuf {
     make().unwrap_or_else(|error| panic!("the wheel for the tests could not be packed: {error:#}"))
 }
 
-/// Builds for the platform that this program runs on; the command is this program.
+/// Builds the binaries for the platform on which this program runs; the command is this program.
 fn native() -> Result<Binaries> {
     let made = tempfile::tempdir().context("there is no place for temporary files")?;
     let mut fmus = Files::new();
@@ -114,9 +118,9 @@ fn native() -> Result<Binaries> {
     })
 }
 
-/// Builds for other platforms, and checks that the binaries run on all of their machines.
-fn cross(platforms: &[&Platform]) -> Result<Vec<Binaries>> {
-    let toolchain = Toolchain::look()?;
+/// Builds the binaries for other platforms and checks that they run on all machines of these platforms.
+fn cross_build(platforms: &[&Platform]) -> Result<Vec<Binaries>> {
+    let toolchain = Toolchain::find()?;
     toolchain.check(platforms)?;
     let mut faults = Vec::new();
     let mut all = Vec::new();
@@ -142,7 +146,7 @@ fn cross_one(
         let bytes = toolchain.build(product, platform, target)?;
         let mut binary = Binary::read(&bytes).context(target.triple)?;
         if matches!(product, Product::Native) {
-            // Python itself loads it
+            // Python itself loads this library.
             binary.libraries.retain(|library| library != "python3.dll");
         }
         let found = binary.loading_faults_for(&[target.architecture]);
@@ -172,7 +176,7 @@ fn cross_one(
     })
 }
 
-/// The name by which Python finds the compiled half, by the ending of the platform's libraries.
+/// Returns the file name of the compiled half, for the ending of the platform's libraries.
 fn native_name(ending: &str) -> &'static str {
     if ending == ".dll" { "_native.pyd" } else { "_native.abi3.so" }
 }
@@ -188,8 +192,8 @@ fn write_one(
     Ok(out)
 }
 
-/// The tags of a platform on which all these binaries run ("Platform compatibility tags"); for
-/// glibc 2.17 also its older name.
+/// Returns the tags of a platform on which all these binaries run ("Platform compatibility tags"). For glibc
+/// 2.17 the older name is added.
 fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
     let Some(Binary { kind, architectures, .. }) = binaries.first() else {
         bail!("a wheel without binaries has no platform")
@@ -207,12 +211,13 @@ fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
             [format!("manylinux_{major}_{minor}_{machine}")].into_iter().chain(older).collect()
         }
         Kind::Windows => vec!["win_amd64".into()],
-        // from 11 on the second number is not a release of its own
+        // From version 11 on the second number is not a release of its own.
         Kind::MacOs => vec![format!("macosx_{}_0_{architecture}", needed(MACOS).0)],
     })
 }
 
-/// Files of the wheel: metadata last, as the standard recommends, and RECORD at the very end.
+/// Returns the files of the wheel. The metadata come last, as the standard recommends, and RECORD at the very
+/// end.
 fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     let package = below(&root().join("harness").join("python").join(PACKAGE))?.into_iter();
     let mut files: Files = package
@@ -259,9 +264,11 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     Ok(files)
 }
 
-/// Returns scripts and pages of the examples in Python, without tests; the scripts draw the pictures.
+/// Reads the Python scripts and pages of the examples, without tests. Pictures are left out, because the
+/// scripts draw them.
 ///
 /// # Errors
+///
 /// If a file cannot be read.
 pub fn examples(folder: &Path) -> Result<Files> {
     let mut files = below(folder)?;
@@ -273,7 +280,7 @@ pub fn examples(folder: &Path) -> Result<Files> {
     Ok(files)
 }
 
-/// Returns the name of the SBOM in a wheel.
+/// Returns the path of the SBOM in a wheel.
 pub fn sbom_name() -> String {
     format!("{PACKAGE}-{VERSION}.dist-info/{SBOM}")
 }
@@ -282,7 +289,7 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// `name,sha256=…,size`: the hash in base64 of its own alphabet, without padding.
+/// Formats `name,sha256=…,size`: the hash in URL-safe base64 without padding.
 fn record_line(name: &str, bytes: &[u8]) -> String {
     let hash = Base64UrlUnpadded::encode_string(&Sha256::digest(bytes));
     format!("{name},sha256={hash},{}\n", bytes.len())

@@ -1,5 +1,5 @@
-//! `documentation/index.html` of an FMU: its introduction and the pages that its introduction lists,
-//! as one file with everything in it but the figures, which are in the same folder.
+//! Renders `documentation/index.html` of an FMU: its introduction, and the pages that the introduction lists,
+//! as one file. Only the figures are separate files in the same folder.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,18 +9,18 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::page::{Gathered, Page};
 
-/// Files below `documentation/` in an FMU.
+/// Files for the folder `documentation/` of an FMU.
 pub struct Documentation {
-    /// `index.html`.
     pub page: String,
-    /// The figures it shows: name and content.
+    /// Names and contents of the figures.
     pub figures: BTreeMap<String, Vec<u8>>,
 }
 
-/// Renders an introduction and the pages in its lists under a title. Paths are from `root`.
+/// Renders an introduction, and the pages in its lists, under one title. Paths are relative to `root`.
 ///
 /// # Errors
-/// With every link that leads nowhere, every missing figure and every equation that is not LaTeX.
+///
+/// All broken links, missing figures and equations that are not LaTeX.
 pub fn render(root: &Path, introduction: &str, title: &str) -> Result<Documentation> {
     let first = Page::read(root, introduction)?;
     let listed = first.listed();
@@ -33,7 +33,7 @@ pub fn render(root: &Path, introduction: &str, title: &str) -> Result<Documentat
     Ok(Documentation { page, figures: all.figures()? })
 }
 
-/// All pages as one file.
+/// Renders all pages as one file.
 fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> Markup {
     html! {
         (DOCTYPE)

@@ -1,4 +1,4 @@
-//! One Markdown file: its headings, links, figures and equations.
+//! A Markdown file: its headings, links, figures and equations.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -9,46 +9,41 @@ use maud::{Markup, PreEscaped, html};
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd};
 use pulldown_latex::config::{DisplayMode, RenderConfig};
 
-/// One Markdown file.
 #[derive(Debug)]
 pub struct Page {
     /// Path from the project's root, with `/`.
     pub path: String,
-    /// Name in addresses, such as `hubslosh-model` for
-    /// `modelDescription/HubSlosh/documentation/model.md`.
+    /// Name for anchors, for example `hubslosh-model` for `modelDescription/HubSlosh/documentation/model.md`.
     pub name: String,
-    /// The title: its first heading.
     pub title: String,
-    /// All headings.
     pub headings: Vec<Heading>,
     text: String,
 }
 
-/// A heading.
 #[derive(Debug)]
 pub struct Heading {
-    /// 1 for the page's title.
+    /// Level; 1 for the page's title.
     pub level: usize,
-    /// Text.
     pub title: String,
     /// Anchor that GitHub derives from the heading.
     pub slug: String,
 }
 
-/// Requirements and errors of the pages, collected while they are written.
+/// Figures and faults that are collected while pages are rendered.
 #[derive(Debug, Default)]
 pub struct Gathered {
     /// File name and content of each figure.
     pub figures: BTreeMap<String, Vec<u8>>,
-    /// Dead links, missing figures, equations that cannot be read.
+    /// Broken links, missing figures, and equations that cannot be parsed.
     pub faults: Vec<String>,
 }
 
 impl Gathered {
-    /// The figures.
+    /// Returns the figures.
     ///
     /// # Errors
-    /// If there are faults: all of them.
+    ///
+    /// All faults, if there are any.
     pub fn figures(mut self) -> Result<BTreeMap<String, Vec<u8>>> {
         self.faults.sort();
         self.faults.dedup(); // pages are rendered more than once
@@ -70,7 +65,6 @@ impl Page {
         format!("#{}", self.id(slug))
     }
 
-    /// Reads a file of the project.
     pub fn read(root: &Path, path: &str) -> Result<Self> {
         let text = std::fs::read_to_string(root.join(path))
             .with_context(|| format!("the documentation's page {path} cannot be read"))?;
@@ -85,7 +79,7 @@ impl Page {
         Ok(page)
     }
 
-    /// The paths of the pages in this one's lists, from the project's root, in their order.
+    /// Returns the paths of the pages that this page lists, from the project's root, in their order.
     pub fn listed(&self) -> Vec<String> {
         let (mut items, mut paths) = (0, Vec::new());
         for event in events(&self.text) {
@@ -103,13 +97,12 @@ impl Page {
         paths
     }
 
-    /// The headings of the second level.
     pub fn chapters(&self) -> impl Iterator<Item = &Heading> {
         self.headings.iter().filter(|heading| heading.level == 2)
     }
 
-    /// The page as HTML. A link to one of `pages` leads there; of another link that leads to a file of
-    /// the project only the text is left.
+    /// Renders the page as HTML. A link to one of `pages` leads to that page; of a link to another file of
+    /// the project only the text is kept.
     pub fn html(&self, root: &Path, pages: &[Page], all: &mut Gathered) -> Markup {
         let mut headings = self.headings.iter();
         let mut dropped = false; // inside a link that leads out of the documentation
@@ -149,7 +142,7 @@ impl Page {
             Event::End(TagEnd::Table) => Some(Event::Html("</tbody></table></div>\n".into())),
             Event::InlineMath(latex) => Some(Event::InlineHtml(self.equation(&latex, false, all))),
             Event::DisplayMath(latex) => Some(Event::InlineHtml(self.equation(&latex, true, all))),
-            // remarks for those who edit the page
+            // Comments for people who edit the page.
             Event::Html(text) if text.trim_start().starts_with("<!--") => None,
             other => Some(other),
         });
@@ -158,7 +151,8 @@ impl Page {
         PreEscaped(page)
     }
 
-    /// Target of a link; `None` if it leaves the documentation.
+    /// Returns the target of a link, or `None` if it leads out of the documentation. The inner error is a
+    /// broken link.
     fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>, String> {
         if link.contains("://") {
             return Ok(None);
@@ -175,7 +169,6 @@ impl Page {
         Ok(Some(page.address(slug)))
     }
 
-    /// An equation as MathML.
     fn equation<'a>(&self, latex: &str, block: bool, all: &mut Gathered) -> CowStr<'a> {
         let storage = pulldown_latex::Storage::new();
         let parsed: Result<Vec<_>, _> = pulldown_latex::Parser::new(latex, &storage).collect();
@@ -190,9 +183,9 @@ impl Page {
         let config = RenderConfig { display_mode, ..RenderConfig::default() };
         let mut mathml = String::new();
         let events = events.into_iter().map(Ok::<_, Infallible>);
-        // writing to a String does not fail
+        // Writing to a String cannot fail.
         let _ = pulldown_latex::push_mathml(&mut mathml, events, config);
-        // what pulldown-latex 0.8.0 gets wrong: a space counts as the base of a script
+        // Corrects a fault of pulldown-latex 0.8.0: a space counts as the base of a script.
         if ["<msup><mspace", "<msub><mspace", "&amp;nbsp;"]
             .iter()
             .any(|wrong| mathml.contains(wrong))
@@ -214,7 +207,6 @@ fn events(text: &str) -> impl Iterator<Item = Event<'_>> {
     Parser::new_ext(text, Options::ENABLE_TABLES | Options::ENABLE_MATH)
 }
 
-/// The headings of a page.
 fn headings(text: &str) -> Vec<Heading> {
     let mut all: Vec<Heading> = Vec::new();
     let mut open = false;
@@ -244,14 +236,14 @@ fn headings(text: &str) -> Vec<Heading> {
     all
 }
 
-/// A heading as GitHub writes it into an address.
+/// Converts a heading to the anchor that GitHub gives it.
 fn slug(title: &str) -> String {
     let kept = title.to_lowercase();
     let kept = kept.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// The name of a page: its path without what all pages have.
+/// Returns the name of a page: its path without the parts that all pages have.
 fn name(path: &str) -> String {
     let common = ["modelDescription", "documentation", "book", "README"];
     let path = path.strip_suffix(".md").unwrap_or(path);
@@ -259,7 +251,7 @@ fn name(path: &str) -> String {
     kept.join("-").to_lowercase()
 }
 
-/// The path of a link in a file, from the project's root.
+/// Returns the path of a link in the file `from`, from the project's root.
 fn resolve(from: &str, link: &str) -> String {
     let mut parts: Vec<&str> = from.split('/').collect();
     parts.pop();

@@ -596,7 +596,7 @@ mod tests {
 
     #[test]
     fn numbers_have_two_digits() {
-        let of = [0.0, 0.0123, 1.0, 1.24, 12.4, 124.0].map(digits);
+        let of = [0.0, 0.0123, 1.0, 1.24, 12.4, 124.0].map(format_two_digits);
         assert_eq!(of, ["0", "0.012", "1.0", "1.2", "12", "120"]);
     }
 }
