@@ -140,7 +140,7 @@ fn entry<M: Model>(name: &str) -> Option<&'static Variable<M>> {
 /// indices of the largest array.
 fn elements<M: Model>(v: &Variable<M>) -> Vec<usize> {
     let all = Arrays::new::<M>(&M::table().starts());
-    let scalars = all.of(arrays::reference(v)).unwrap_or_default().iter();
+    let scalars = all.scalars(arrays::reference(v)).unwrap_or_default().iter();
     scalars.map(|reference| M::table().scalars[*reference as usize - 1].element).collect()
 }
 

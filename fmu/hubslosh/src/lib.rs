@@ -1,5 +1,5 @@
-//! HubSlosh as an FMU: its variables ([`table`]) and the runtime's `Model` for its plant ([`model`]).
-//! The physics is in the crate `plant`, FMI is in the crate `runtime`.
+//! HubSlosh as an FMU: its table of variables ([`table`]) and the runtime's `Model` for the plant
+//! ([`model`]). The physics is in the crate `plant`, FMI in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]
@@ -18,12 +18,16 @@ pub type Instance = runtime::instance::Instance<HubSlosh, Fmi2>;
 /// One scalar of the FMU's variables.
 pub type Scalar = runtime::table::Scalar<HubSlosh>;
 
-/// Returns an instance as a host gets it through FMI 2.0, for hosts and tests in Rust.
+/// Creates an instance as a host would through FMI 2.0, for hosts and tests in Rust.
 pub fn instance(interface: Interface) -> Instance {
     Instance::new(interface)
 }
 
-/// Reads a saved state from bytes. Returns the reason if they do not hold a saved state.
+/// Restores an instance from the bytes of a saved state.
+///
+/// # Errors
+///
+/// If the bytes are not a saved state; the text is the reason.
 pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     runtime::snapshot::from_bytes(bytes)
 }

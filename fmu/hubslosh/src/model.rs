@@ -1,5 +1,3 @@
-//! Implements the runtime's `Model` for the plant.
-
 use std::ops::{Deref, DerefMut};
 
 use plant::{
@@ -13,54 +11,46 @@ use runtime::table::Table;
 
 use crate::table::{self, TABLE};
 
-/// Hub, bearing, tank, wheel and gyro.
+/// The bench: hub, bearing, tank, wheel and gyro.
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
-    /// True once the current inputs are applied, see [`Model::apply_present_inputs`].
+    /// True after [`Model::apply_present_inputs`], so that outputs belong to the present inputs.
     present: bool,
 }
 
 impl HubSlosh {
-    /// Values calculated from the parameters.
     pub fn calculated(&self) -> &Calculated {
         self.plant.calculated()
     }
 
-    /// See [`Plant::damping_ratio`].
     pub fn damping_ratio(&self, n: usize, inputs: &Inputs) -> [f64; 2] {
         self.plant.damping_ratio(n, inputs)
     }
 }
 
-/// The plant's parameters, and integer twins of enumerations (for hosts that cannot set them) and of Booleans (for
-/// hosts that misread them). By default the liquid is released at [`START_ANGLE`].
+/// The plant's parameters, together with integer twins of enumerations (for hosts that cannot set them) and
+/// of Booleans (for hosts that misread them). By default the liquid is released at [`START_ANGLE`].
 #[derive(Clone, Debug)]
 pub struct Parameters {
     plant: plant::Parameters,
-    /// Integer twin of `slosh.model`: number of its item, 0 to use the enumeration; likewise for the enumerations below.
+    /// Integer twin of the enumeration `slosh.model`: number of the item, or 0 to use the enumeration. The
+    /// next fields are twins in the same way.
     pub slosh_kind: i32,
-    /// Integer twin of `slosh.source`.
     pub slosh_source_kind: i32,
-    /// Integer twin of `slosh.damping_law`.
     pub damping_law_kind: i32,
-    /// Integer twin of `friction.model`.
     pub friction_kind: i32,
-    /// Integer twin of `slosh.zeta_from_correlation`: 1 for false, 2 for true, 0 to use the Boolean; likewise for the
-    /// Booleans below.
+    /// Integer twin of the Boolean `slosh.zeta_from_correlation`: 1 for false, 2 for true, 0 to use the
+    /// Boolean. The next fields are twins in the same way.
     pub zeta_from_correlation_kind: i32,
-    /// Integer twin of `slosh.capillarity`.
     pub capillarity_kind: i32,
-    /// Integer twin of `slosh.table.one_axis`.
     pub one_axis_kind: i32,
-    /// Integer twin of `wheel.enabled`.
     pub wheel_enabled_kind: i32,
-    /// Integer twin of `imu.enabled`.
     pub imu_enabled_kind: i32,
 }
 
-/// Start value of `init.slosh_angle`, rad: 2 degrees, so that a first plot without settings shows the liquid swinging,
-/// the hub's response and the bearing sticking.
+/// Start value of `init.slosh_angle`, rad. It is 2 degrees, so that a first plot without settings shows the
+/// swinging liquid, the hub's response and the sticking bearing.
 pub const START_ANGLE: f64 = 0.035;
 
 impl Default for Parameters {
@@ -97,8 +87,12 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the plant's parameters with the integer twins applied. Refuses an enumeration that contradicts its
-    /// twin. A Boolean may contradict its twin, because the hosts that need the twin set the Boolean at random.
+    /// Returns the plant's parameters with the integer twins applied.
+    ///
+    /// # Errors
+    ///
+    /// If an enumeration contradicts its twin. A Boolean may contradict its twin, because the hosts that need
+    /// the twin set the Boolean to any value.
     fn resolved(&self) -> Result<plant::Parameters, Vec<String>> {
         let mut p = self.plant;
         let start = plant::Parameters::default();

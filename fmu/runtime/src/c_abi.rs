@@ -1,7 +1,7 @@
-//! Common parts of the C interfaces of all versions of FMI: status of a call, the host's logger, texts and arrays, handles of
-//! instances and saved states. Panics end here: one poisons the instance.
+//! Common parts of the C interfaces of all FMI versions: status of a call, the host's logger, texts and
+//! arrays, handles of instances and saved states. Panics end here; a panic makes the instance unusable.
 //!
-//! Pointers may be NULL wherever the standard does not forbid it, and mostly where it does.
+//! Pointers may be NULL wherever the standard does not forbid it, and mostly also where it does.
 
 #![allow(unsafe_code)]
 // The safety contract of every function is the FMI standard's: a handle comes from this FMU and is
@@ -22,15 +22,15 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// Return value of a call.
+/// Return value of a function.
 pub type Status = c_int;
-/// All is well.
+/// The call succeeded.
 pub const OK: Status = 0;
-/// Never returned, but logged with.
+/// Status of warnings in the log; no function returns it.
 pub const WARNING: Status = 1;
-/// The question has no answer.
+/// The FMU cannot compute the result, and the instance is unchanged.
 pub const DISCARD: Status = 2;
-/// The call was refused or failed.
+/// The call was refused or has failed.
 pub const ERROR: Status = 3;
 /// The instance is unusable.
 pub const FATAL: Status = 4;
@@ -43,31 +43,31 @@ fn status(severity: Severity) -> Status {
     }
 }
 
-/// The host's logger, in terms of no version: status, category, message.
+/// The host's logger, independent of the FMI version: status, category, message.
 pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 
-/// The way to the host's logger.
+/// Sends messages to the host's logger.
 pub struct Log {
     logger: Option<Logger>,
     /// Filter of the log.
     pub filter: Filter,
-    /// True once the host was warned of how it drives the model.
+    /// True after the warning about the host's steps, which is given only once.
     step_warned: bool,
 }
 
 impl Log {
-    /// Log of a new instance.
+    /// Creates the log of a new instance.
     pub fn new(logger: Option<Logger>) -> Log {
         Log { logger, filter: Filter::FAILURES, step_warned: false }
     }
 
-    /// Logs the reason why a call has failed.
+    /// Logs why a call has failed.
     pub fn report(&self, fault: &Fault) {
         self.write(status(fault.severity), Topic::Failure(fault.severity), || fault.text.clone());
     }
 
     #[cold]
-    /// Logs the model's warnings at the start of a motion.
+    /// Logs the model's warnings at the start of the simulation.
     pub fn report_warnings<M: Model, V: Version>(&self, instance: &Instance<M, V>) {
         if self.filter.wants(Topic::Warning) {
             for warning in instance.warnings() {
@@ -76,13 +76,13 @@ impl Log {
         }
     }
 
-    /// Warns of side effects of a call.
+    /// Logs a warning about a side effect of a call.
     #[cold]
     pub fn report_effect(&self, call: &Call, effect: impl FnOnce() -> String) {
         self.write(WARNING, Topic::Warning, || format!("{}: {}", call.name, effect()));
     }
 
-    /// Warns, once, of how the host drives the model.
+    /// Logs a warning about the host's steps, once, if the model has one.
     pub fn report_step_warning<M: Model, V: Version>(&mut self, instance: &Instance<M, V>) {
         if !self.step_warned
             && self.filter.wants(Topic::Warning)
@@ -93,7 +93,7 @@ impl Log {
         }
     }
 
-    /// Logs the last event, if there was one since `before` were counted and if somebody wants to know.
+    /// Logs the last event if events have occurred since the number of events was `before`.
     #[inline(always)]
     pub fn report_event<M: Model, V: Version>(
         &self,
@@ -129,12 +129,12 @@ impl Log {
 
 // ---- Texts and arrays ----
 
-/// A text for the host.
+/// Converts a text for the host; NUL characters become spaces.
 pub fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-/// The host's text: `None` for NULL.
+/// Reads a text of the host; `None` for NULL.
 pub unsafe fn text(string: *const c_char) -> Option<String> {
     if string.is_null() {
         return None;
@@ -142,7 +142,8 @@ pub unsafe fn text(string: *const c_char) -> Option<String> {
     Some(unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned())
 }
 
-/// The host's array; NULL is fine when it is empty.
+/// Borrows an array of the host. NULL is allowed for an empty array; otherwise it is an error that names the
+/// argument.
 pub unsafe fn array<'a, T>(
     call: &Call,
     name: &str,
@@ -158,7 +159,7 @@ pub unsafe fn array<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// [`array`] for writing.
+/// Borrows an array of the host for writing; otherwise like [`array`].
 pub unsafe fn array_mut<'a, T>(
     call: &Call,
     name: &str,
@@ -174,47 +175,52 @@ pub unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
-/// A place of the host's to write one thing to.
+/// Borrows a variable of the host for one result.
+///
+/// # Errors
+///
+/// If the pointer is NULL.
 pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
     unsafe { pointer.as_mut() }.ok_or_else(|| null(call, name))
 }
 
-/// An argument may not be NULL.
+/// Returns the fault for an argument that must not be NULL.
 pub fn null(call: &Call, name: &str) -> Fault {
     call.error(format_args!("argument {name} is NULL"))
 }
 
 // ---- Instances ----
 
-/// Marks a live component, so that a wrong handle is an error and no crash.
+/// Marks a live component, so that a wrong handle gives an error instead of a crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
-/// The first word of a live component or saved state of this model, this version of FMI and this loaded copy of the
-/// library, at this address. Other FMUs, the other version's functions and a second copy of the library have other marks: the
-/// address of the variable table and the digit of the version differ. No address has the upper 16 bits of a mark.
+/// Returns the first word of a live component or saved state of this model, FMI version and loaded copy of
+/// the library, at this address. Other FMUs, functions of the other version, and a second copy of the library
+/// have different marks, because the address of the variable table and the digit of the version differ. The
+/// upper 16 bits of a mark are those of no address.
 fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     let table = ptr::from_ref(M::table()).addr() as u64;
-    // Below the table's alignment, so that the two do not mix.
+    // Below the alignment of the table, so that the two parts do not overlap.
     let version = V::PREFIX.bytes().last().unwrap_or_default() & 7;
     kind ^ table ^ u64::from(version) ^ handle.addr() as u64
 }
 
-/// No object stands at a lower address on any platform that FMUs are built for.
+/// Lowest address of an object on the platforms for which FMUs are built.
 const LOWEST_ADDRESS: usize = 1024;
 
-/// Target of a component handle.
+/// The object to which a component handle points.
 #[repr(C)]
 pub struct Component<M: Model, V: Version> {
     mark: u64,
-    /// The instance.
+    /// The instance with its state.
     pub instance: Instance<M, V>,
-    /// Way to the host's logger.
+    /// The log of the instance.
     pub log: Log,
-    /// Further data about the host that its version keeps.
+    /// Data about the host that this version of FMI needs.
     pub host: V::Host<M>,
 }
 
-/// A handle of a new component.
+/// Creates a component and returns its handle.
 pub fn new_component<M: Model, V: Version>(
     instance: Instance<M, V>,
     log: Log,
@@ -225,24 +231,24 @@ pub fn new_component<M: Model, V: Version>(
     Box::into_raw(component).cast()
 }
 
-/// Returns true if a handle is that of a live `T`, whose first field is a mark.
+/// Returns true if a handle points to a live `T`, whose first field is a mark.
 unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bool {
     handle.addr() >= LOWEST_ADDRESS
         && handle.cast::<T>().is_aligned()
         && unsafe { ptr::read(handle.cast::<u64>()) } == mark::<M, V>(kind, handle)
 }
 
-/// Frees what a live handle points to.
+/// Frees the object to which a live handle points.
 unsafe fn free<T>(handle: *mut c_void) {
     unsafe {
-        // A later call with this handle should be an error as long as nobody
-        // else got the memory.
+        // The mark is cleared, so that a later call with this handle is an error as long as the memory is
+        // not used again.
         ptr::write_volatile(handle.cast::<u64>(), 0);
         drop(Box::from_raw(handle.cast::<T>()));
     }
 }
 
-/// Frees a component; what is none is left alone.
+/// Frees a component. Any other handle is ignored.
 pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
     unsafe {
         if is_live::<Component<M, V>, M, V>(handle, COMPONENT) {
@@ -251,8 +257,8 @@ pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
     }
 }
 
-/// Does `body` on the component behind the handle: failures are logged and become
-/// the status, a panic poisons the instance.
+/// Runs `body` on the component behind a handle. A fault is logged and becomes the returned status; a panic
+/// makes the instance unusable.
 #[inline]
 pub unsafe fn on<M: Model, V: Version>(
     handle: *mut c_void,
@@ -280,7 +286,8 @@ pub unsafe fn on<M: Model, V: Version>(
     status(fault.severity)
 }
 
-/// [`on`] for the calls that look at their arguments only in an instance state that allows the call.
+/// Runs `body` like [`on`], but only if the instance state allows the call. It is for calls that must not
+/// look at their arguments otherwise.
 #[inline]
 pub unsafe fn on_allowed<M: Model, V: Version>(
     handle: *mut c_void,
@@ -294,8 +301,8 @@ pub unsafe fn on_allowed<M: Model, V: Version>(
     unsafe { on(handle, call, if_allowed) }
 }
 
-/// [`on`] for the calls with which the motion can begin: they log warnings about the initial parameters and
-/// inputs.
+/// Runs `body` like [`on`], and logs warnings about initial parameters and inputs if the simulation starts
+/// with this call.
 pub unsafe fn on_start<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -317,10 +324,10 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no text")
 }
 
-/// Stops std from printing panics: the host's logger reports them. The hook belongs to this library's own copy of
-/// std, not to the host.
+/// Stops the standard library from printing panics, because the host's logger reports them. The hook belongs
+/// to this library's own copy of the standard library, not to the host.
 pub fn silence_panics() {
-    // In this crate's own tests std is the test runner's.
+    // In this crate's own tests the standard library is that of the test runner.
     #[cfg(not(test))]
     {
         static ONCE: std::sync::Once = std::sync::Once::new();
@@ -333,21 +340,25 @@ pub fn silence_panics() {
 /// Marks a live saved state.
 const STATE: u64 = 0x5374_6174_6548_7562;
 
-/// Target of a state handle.
+/// The object to which a handle of a saved state points.
 #[repr(C)]
 struct SavedState<M: Model, V: Version> {
     mark: u64,
     instance: Instance<M, V>,
 }
 
-/// A handle of a new saved state.
+/// Creates a saved state and returns its handle.
 pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void {
     let mut state = Box::new(SavedState { mark: 0, instance });
     state.mark = mark::<M, V>(STATE, ptr::from_ref(&*state).cast());
     Box::into_raw(state).cast()
 }
 
-/// The instance that is saved behind a handle, which the version's function calls by a name.
+/// Returns the saved instance behind a handle; `name` is the argument's name for messages.
+///
+/// # Errors
+///
+/// If the handle is NULL or not that of a saved state of this FMU.
 pub unsafe fn saved_state<'a, M: Model, V: Version>(
     call: &Call,
     name: &str,
@@ -362,7 +373,7 @@ pub unsafe fn saved_state<'a, M: Model, V: Version>(
     Ok(unsafe { &mut (*handle.cast::<SavedState<M, V>>()).instance })
 }
 
-/// Saves an instance, into the handle that is there or into a new one.
+/// Saves an instance into the saved state behind `handle`, or into a new one if it is NULL.
 pub unsafe fn save_state<M: Model, V: Version>(
     call: &Call,
     name: &str,
@@ -381,6 +392,10 @@ pub unsafe fn save_state<M: Model, V: Version>(
 }
 
 /// Writes a saved state to `size` bytes of the host.
+///
+/// # Errors
+///
+/// If `size` is too small.
 pub unsafe fn serialize<M: Model, V: Version>(
     call: &Call,
     saved: &Instance<M, V>,
@@ -398,7 +413,8 @@ pub unsafe fn serialize<M: Model, V: Version>(
     Ok(())
 }
 
-/// Makes a saved state like those of `like` from bytes. The handle is written, never read: the host need not have set it.
+/// Restores a saved state from bytes. Its variables must be those of `like`. The handle is written and never
+/// read, because the host need not have initialised it.
 pub unsafe fn deserialize<M: Model, V: Version>(
     call: &Call,
     like: &Instance<M, V>,
@@ -418,8 +434,9 @@ pub unsafe fn deserialize<M: Model, V: Version>(
     Ok(())
 }
 
-/// Frees a saved state and clears the handle; NULL is allowed. fmusim (0.0.39) passes the state itself in place of the handle's
-/// address. Its mark, which no address equals, identifies it, and it is freed too.
+/// Frees a saved state and sets the handle to NULL; NULL is allowed. fmusim (0.0.39) passes the state itself
+/// instead of the handle's address. The state is then recognised by its mark, which cannot be an address, and
+/// is freed too.
 pub unsafe fn free_state<M: Model, V: Version>(
     call: &Call,
     name: &str,

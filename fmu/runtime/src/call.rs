@@ -1,6 +1,7 @@
-//! Calls of a host as data: the function's name and the instance states in which it is allowed, and the message if it is not.
+//! Functions of FMI as data: name, the instance states in which they are allowed, and the message if they are
+//! not.
 //!
-//! The calls themselves are listed by each version of FMI (see [`Version`](crate::version::Version)).
+//! Each version of FMI lists its functions (see [`Version`](crate::version::Version)).
 
 use std::fmt;
 
@@ -15,7 +16,7 @@ pub enum Interface {
 }
 
 impl Interface {
-    /// Name in messages.
+    /// Returns the name for messages.
     pub const fn name(self) -> &'static str {
         match self {
             Interface::ModelExchange => "Model Exchange",
@@ -24,54 +25,54 @@ impl Interface {
     }
 }
 
-/// Handler of events.
+/// The party that handles events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Events {
-    /// The FMU, within the steps that it makes.
+    /// The FMU handles events within its steps.
     InStep = 0,
-    /// The host, in event mode: what is discrete changes there alone.
+    /// The host handles events in event mode, and discrete values change only there.
     ByHost = 1,
-    /// The FMU, within the steps that it makes; but what is discrete is shown to the host in event mode alone.
+    /// The FMU handles events within its steps, but discrete values change for the host only in event mode.
     Reported = 2,
 }
 
 impl Events {
-    /// All of them, each at the place of its number.
+    /// All values, each at the index of its number.
     pub const ALL: [Events; 3] = [Events::InStep, Events::ByHost, Events::Reported];
 }
 
-/// The state of an instance, as in the state machines of the standard.
+/// The state of an instance in the state machine of the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum InstanceState {
-    /// Just made, or reset.
+    /// After instantiation or reset.
     Instantiated = 0,
-    /// Parameters and inputs are set, initial values can be read.
+    /// Initialization mode: parameters and inputs are set, and initial values can be read.
     Initialization = 1,
-    /// Co-Simulation: ready for a step.
+    /// Ready for a step (Co-Simulation).
     Stepping = 2,
-    /// At an event that the host handles.
+    /// In event mode, at an event that the host handles.
     Event = 3,
-    /// Model Exchange: between events.
+    /// In continuous-time mode, between events (Model Exchange).
     Continuous = 4,
-    /// The simulation has ended: the last values can still be read.
+    /// The simulation has ended, and the last values can still be read.
     Terminated = 5,
-    /// A step failed. The last values can be read, a saved state restored.
+    /// A step has failed. The last values can be read, and a saved state can be restored.
     Failed = 6,
-    /// A call panicked. Only freeing is left.
+    /// A call has panicked. The instance can only be freed.
     Fatal = 7,
-    /// Event mode after initialization mode. Parameters can still be set, as
-    /// OpenModelica does; the first call that goes on makes it an event as any other.
+    /// Event mode directly after initialization mode. Parameters can still be set here, because OpenModelica
+    /// does so; the next call that continues the simulation makes it an ordinary event mode.
     Initialized = 8,
-    /// Before initialization mode: structural parameters are set.
+    /// Configuration mode, before initialization: structural parameters can be set.
     Configuration = 9,
-    /// Within a step that the host looks into.
+    /// Within a step, during an intermediate update.
     Intermediate = 10,
 }
 
 impl InstanceState {
-    /// All of them, each at the place of its number.
+    /// All states, each at the index of its number.
     pub const ALL: [InstanceState; 11] = [
         InstanceState::Instantiated,
         InstanceState::Initialization,
@@ -86,7 +87,7 @@ impl InstanceState {
         InstanceState::Intermediate,
     ];
 
-    /// Name in messages.
+    /// Returns the name for messages.
     pub const fn name(self) -> &'static str {
         match self {
             InstanceState::Instantiated => "instantiated",
@@ -102,11 +103,12 @@ impl InstanceState {
         }
     }
 
-    /// Returns true if an instance for this interface and with this policy can reach the state and stay in it.
+    /// Returns true if an instance with this interface and handler of events can reach this state and remain
+    /// in it.
     pub fn is_reachable(self, interface: Interface, events: Events) -> bool {
         match self {
             InstanceState::Stepping => interface == Interface::CoSimulation,
-            // Calls come and go there; no saved state is of them.
+            // These states exist only during calls; they are never saved.
             InstanceState::Configuration | InstanceState::Intermediate => false,
             InstanceState::Continuous => interface == Interface::ModelExchange,
             InstanceState::Event | InstanceState::Initialized => events != Events::InStep,
@@ -119,21 +121,21 @@ impl InstanceState {
     }
 }
 
-/// The C types that values are got and set with.
+/// C types in which values are read and set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum CType {
     Real,
     Integer,
-    /// Enumeration, in versions with a type for it.
+    /// Enumeration, in FMI versions with a type of their own for it.
     Enumeration,
-    /// Structural parameter, in versions with a type for it.
+    /// Structural parameter, in FMI versions with a type of their own for it.
     Size,
     Boolean,
     String,
 }
 
-/// Sets of instance states, to write down where a call is allowed.
+/// Sets of instance states, as bits, in which a function is allowed.
 #[allow(missing_docs)]
 pub(crate) mod states {
     use super::InstanceState;
@@ -145,45 +147,49 @@ pub(crate) mod states {
     pub const C: u16 = InstanceState::Continuous.bit();
     pub const T: u16 = InstanceState::Terminated.bit();
     pub const F: u16 = InstanceState::Failed.bit();
-    /// All but fatal.
+    /// All states except fatal.
     pub const ANY: u16 = I | M | S | E | C | T | F;
-    /// All in which the model moves or has moved.
+    /// All states in which the simulation has started.
     pub const RUN: u16 = S | E | C | T | F;
     pub const FATAL: u16 = InstanceState::Fatal.bit();
     pub const CONFIGURATION: u16 = InstanceState::Configuration.bit();
     pub const INTERMEDIATE: u16 = InstanceState::Intermediate.bit();
 }
 
-/// A function of one version of FMI, as far as an instance is concerned.
+/// A function of one version of FMI and the conditions under which it may be called.
 #[derive(Debug)]
 pub struct Call {
-    /// The function's name, which messages begin with.
+    /// Name of the function, with which its messages begin.
     pub name: &'static str,
-    /// The states in which it may be called.
+    /// The states in which it may be called, as bits.
     allowed: u16,
-    /// The C type of the values it passes, if that is its business.
+    /// The C type of the values that it reads or sets, if it does.
     pub c_type: Option<CType>,
-    /// The interface it belongs to, if not to both.
+    /// The only interface to which it belongs, or `None` for both.
     only_in: Option<Interface>,
 }
 
 impl Call {
-    /// A function that may be called in some [`states`].
+    /// Creates a function that may be called in these [`states`].
     pub(crate) const fn new(name: &'static str, allowed: u16) -> Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
 
-    /// Makes it a call that passes values of a type.
-    pub(crate) const fn of(self, c_type: CType) -> Call {
+    /// Marks the function as one that reads or sets values of a type.
+    pub(crate) const fn with_type(self, c_type: CType) -> Call {
         Call { c_type: Some(c_type), ..self }
     }
 
-    /// Makes it a call of one interface only.
+    /// Restricts the function to one interface.
     pub(crate) const fn only_in(self, interface: Interface) -> Call {
         Call { only_in: Some(interface), ..self }
     }
 
-    /// Refuses a call that is not allowed in this state; the message names the states in which it is.
+    /// Checks that the call is allowed.
+    ///
+    /// # Errors
+    ///
+    /// If it is not; the message names the states in which it is.
     #[inline]
     pub fn check(
         &self,
@@ -225,7 +231,7 @@ impl Call {
         let possible = InstanceState::ALL
             .iter()
             .filter(|s| s.is_reachable(interface, events) || passing.contains(s));
-        // To a host the first event mode is one as any other.
+        // For a host the first event mode is like any other.
         let possible = possible.filter(|s| **s != InstanceState::Initialized);
         let allowed: Vec<_> =
             possible.filter(|s| self.allowed & s.bit() != 0).map(|s| s.name()).collect();
@@ -236,36 +242,36 @@ impl Call {
         )))
     }
 
-    /// Returns the fault of a failed call.
+    /// Returns the fault of a call that was refused or has failed.
     #[cold]
     pub fn error(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Error, text: format!("{}: {why}", self.name) }
     }
 
-    /// Returns the fault of a call without an answer; the instance is unharmed.
+    /// Returns the fault of a call whose result cannot be computed; the instance is unchanged.
     #[cold]
     pub fn discard(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Discard, text: format!("{}: {why}", self.name) }
     }
 }
 
-/// Severity of a failure.
+/// Severity of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
-    /// The call has no answer.
+    /// The result cannot be computed.
     Discard,
-    /// The call was refused or failed.
+    /// The call was refused or has failed.
     Error,
     /// The instance is unusable.
     Fatal,
 }
 
-/// Failure of a call.
+/// The reason why a call has failed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// Status to return.
+    /// Determines the status that the function returns.
     pub severity: Severity,
-    /// Message for the log: the call, the variable, the allowed values.
+    /// Message for the log: the function, the variable, and the allowed values.
     pub text: String,
 }
 

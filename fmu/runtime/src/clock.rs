@@ -1,40 +1,41 @@
-//! The clock of an instance. Times of the host are compared here only, with one tolerance.
+//! The clock of an instance. Times of the host are compared only here, with one tolerance.
 //!
-//! A host may multiply (k h), add up (t += h) or convert counters, may start at 1e9 s, and may be off by a few units in
-//! the last place. The motion must not depend on that: in Co-Simulation the host's time only names instants, and a model that
-//! needs the time since its start adds up the lengths of its steps.
+//! A host may multiply (k h), accumulate (t += h) or convert counters, may start at 1e9 s, and may be off by
+//! a few units in the last place. The simulation must not depend on that: in Co-Simulation the host's time is
+//! only a label for an instant, and a model that needs the time since the start adds up the step sizes.
 
 use crate::call::Interface;
 use crate::variable::{is_finite, text};
 
-/// Part of the time since the start by which the clock of a host that adds up its steps may drift: 1e7 steps of 0.1 s are off
-/// by 2e-10.
+/// Allowed drift of the clock of a host that accumulates step sizes, as a fraction of the time since the
+/// start: after 1e7 steps of 0.1 s such a clock is off by 2e-10.
 const DRIFT: f64 = 1e-9;
 
-/// Rounding errors of a host's time, in parts of the largest number that it computes with: 8 to 16 units in the last place.
+/// Allowed rounding error of a host's time, relative to the largest number from which it is computed: 8 to 16
+/// units in the last place.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// A time of the host, as a model sees it.
+/// An instant for the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
-    /// The host's time, s. It names the instant in messages and outputs.
+    /// Time of the host, s. It is a label of the instant in messages and outputs.
     pub time: f64,
-    /// Time since the start, s, for a host that integrates itself. In Co-Simulation the model adds up its steps.
+    /// Time since the start, s, in Model Exchange. In Co-Simulation the model adds up the step sizes.
     pub since_start: Option<f64>,
-    /// Times of the host that differ by less than this are the same, s.
+    /// Times of the host that differ by less than this are equal, s.
     pub resolution: f64,
 }
 
-/// Start, stop and present time of an instance.
+/// Start time, stop time and present time of an instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Clock {
     pub start: f64,
     pub stop: Option<f64>,
     /// The host's time, s.
     pub time: f64,
-    /// True for a host that integrates itself.
+    /// True in Model Exchange, where the host determines the time.
     pub is_hosts: bool,
-    /// The last event, behind which a host that integrates itself may not go back, s.
+    /// Time of the last event, s. In Model Exchange the host may not go back before it.
     pub last_event: f64,
 }
 
@@ -50,34 +51,39 @@ impl Clock {
         self.at(self.time, 0.0)
     }
 
-    /// Returns the present instant, which the host calls `time`, before a step of length `h`.
+    /// Returns the present instant before a step of size `h`; `time` is the host's time of it.
     pub fn at(&self, time: f64, h: f64) -> Instant {
         let resolution = self.resolution(time).max(self.resolution(time + h));
         let since_start = self.is_hosts.then_some(time - self.start);
         Instant { time, since_start, resolution }
     }
 
-    /// Returns the difference, s, below which two times of the host near `time` are the same.
+    /// Returns the difference, s, below which two times of the host near `time` are equal.
     fn resolution(&self, time: f64) -> f64 {
         ROUNDING * self.start.abs().max(time.abs())
     }
 
-    /// Returns the difference, s, below which a time near `time` is the one that was expected after a step of length `h`.
+    /// Returns the difference, s, below which a time near `time` counts as the expected end of a step of size
+    /// `h`.
     fn tolerance(&self, time: f64, h: f64) -> f64 {
         DRIFT * (time - self.start).abs().max(h) + self.resolution(time)
     }
 
-    /// Returns true if two times are the same but for rounding.
+    /// Returns true if two times are equal within rounding.
     pub fn is_same(&self, a: f64, b: f64) -> bool {
         (a - b).abs() <= self.resolution(a)
     }
 
-    /// Returns true if `time` is finite and lies before `end` by more than rounding.
+    /// Returns true if `time` is finite and before `end` by more than rounding.
     pub fn is_before(&self, time: f64, end: f64) -> bool {
         is_finite(time) && time < end - self.resolution(end)
     }
 
-    /// Returns why no step can begin at `at` with length `h`.
+    /// Checks a step from `at` with size `h`.
+    ///
+    /// # Errors
+    ///
+    /// The reason why such a step is not allowed.
     #[inline(always)]
     pub fn check_step(&self, at: f64, h: f64) -> Result<(), String> {
         if !(is_finite(h) && h > 0.0) {
@@ -100,7 +106,11 @@ impl Clock {
         }
     }
 
-    /// Returns why the host cannot set this time.
+    /// Checks a time that the host sets; `goes_back` says that it may be before the last event.
+    ///
+    /// # Errors
+    ///
+    /// The reason why it cannot be set.
     pub fn check_time(&self, time: f64, goes_back: bool) -> Result<(), String> {
         if !is_finite(time) {
             return Err(format!("time = {} s (allowed: any finite number)", text(time)));
@@ -115,7 +125,7 @@ impl Clock {
         Ok(())
     }
 
-    /// Returns the stop time if the present time lies behind it.
+    /// Returns the stop time if the present time is after it.
     pub fn passed_stop(&self) -> Option<f64> {
         self.stop.filter(|stop| self.time > stop + self.tolerance(*stop, 1.0))
     }

@@ -1,8 +1,9 @@
-//! Model descriptions with a part of the variables, for hosts that show every variable: those that few tanks and modes use. The
-//! binary is the same.
+//! Model descriptions with only part of the variables, for hosts that show every variable to the user: only
+//! those for few tanks and modes. The binary is the same.
 //!
-//! The GUID (in FMI 3.0 the instantiationToken) of such a description is that of the whole one but for its last eight
-//! hexadecimal digits, so that the binary knows which states and event indicators the host has read of:
+//! The GUID (in FMI 3.0 the instantiationToken) of a reduced description equals that of the full one except
+//! for the last eight hexadecimal digits, from which the binary learns which states and event indicators the
+//! host knows:
 //!
 //! ```text
 //! {........-....-....-....-....tmsscccc}   t, m   largest values of the parameters in `Table::sizes`
@@ -10,8 +11,8 @@
 //!                                          cccc   checksum of resources/start_values.txt, 0000 without the file
 //! ```
 //!
-//! The file has the start values that the description states instead of the table's, a line `name = value` for each, in the
-//! table's order.
+//! The file has the start values that differ from those of the table, one line `name = value` for each, in
+//! the order of the table.
 
 use std::path::Path;
 
@@ -20,27 +21,28 @@ use crate::model::Model;
 use crate::table::{GUID_LENGTH, Scalar, Table};
 use crate::variable::{Dimension, Value};
 
-/// The file of start values, in the folder of resources.
+/// Name of the file of start values, in the folder of resources.
 pub const START_VALUES: &str = "start_values.txt";
 
-/// Digits of a token that say what the description has, before its closing brace.
+/// Number of hexadecimal digits of a token that describe the extent.
 const DIGITS: usize = 8;
 
-/// The part of the table that a description has.
+/// The part of the table that a reduced description contains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extent {
     token: String,
     /// Names and largest values of the parameters that size arrays.
     sizes: Vec<(&'static str, usize)>,
-    /// Places in the model of the continuous states, in the host's order.
+    /// Indices in the model of the continuous states, in the host's order.
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
 }
 
 impl Extent {
-    /// Returns the part of the table that the description with this token has, with the table's start values. `whole` is the
-    /// token of the whole description. Returns `None` if the token does not belong to a part of this table.
+    /// Returns the extent of the description with this token, with the start values of the table. `whole` is
+    /// the token of the full description. Returns `None` if the token does not belong to a reduced
+    /// description of this table.
     pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
@@ -81,10 +83,12 @@ impl Extent {
         Some(Extent { token: token.into(), sizes, places, indicators, starts })
     }
 
-    /// Reads the start values of the description from the folder of resources, if it has others than the table.
+    /// Reads the description's start values from the folder of resources, if they differ from those of the
+    /// table.
     ///
     /// # Errors
-    /// If the file is not there, or is not the one of the description, or does not suit the table.
+    ///
+    /// If the file is missing, belongs to another description, or does not fit the table.
     pub fn read_starts<M: Model>(&mut self, resources: Option<&Path>) -> Result<(), String> {
         let expected = &self.token[GUID_LENGTH - 5..GUID_LENGTH - 1];
         if expected == "0000" {
@@ -125,27 +129,28 @@ impl Extent {
         Ok(())
     }
 
-    /// GUID or instantiationToken.
+    /// Returns the GUID or instantiationToken.
     pub fn token(&self) -> &str {
         &self.token
     }
 
-    /// Places in the model of the continuous states, in the host's order.
+    /// Returns the indices in the model of the continuous states, in the host's order.
     pub fn places(&self) -> &[usize] {
         &self.places
     }
 
-    /// Number of event indicators.
+    /// Returns the number of event indicators.
     pub fn indicators(&self) -> usize {
         self.indicators
     }
 
-    /// The parameters' start values, in the table's order.
+    /// Returns the start values of the parameters, in the order of the table.
     pub fn starts(&self) -> &[Value] {
         &self.starts
     }
 
-    /// Error in the value of a parameter that sizes arrays: the description has no variables for more.
+    /// Returns an error if `value` is too large for a parameter that sizes arrays, because the description
+    /// has no variables for more elements.
     pub fn problem<M: Model>(&self, scalar: &Scalar<M>, value: Value) -> Option<String> {
         let (_, most) = self.sizes.iter().find(|(name, _)| *name == scalar.variable.name)?;
         match value {
@@ -158,7 +163,7 @@ impl Extent {
     }
 }
 
-/// The event indicators that belong to the elements within the sizes.
+/// Returns the number of event indicators that belong to the elements within the sizes.
 fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) -> usize {
     let all = table.about.event_indicators;
     let size = sizes.iter().find(|(name, _)| Some(*name) == of);
@@ -169,15 +174,16 @@ fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) 
     }
 }
 
-/// The checksum in a token of a file of start values.
+/// Returns the checksum of a file of start values for a token.
 pub fn checksum(text: &str) -> String {
-    // 0 is for no file.
+    // 0 means that there is no file.
     let sum = (Hash::new().bytes(text.as_bytes()).value() & 0xffff).max(1);
     format!("{sum:04x}")
 }
 
 impl<M: Model> Table<M> {
-    /// Names and largest values of the parameters that size arrays, in the order of their first array.
+    /// Returns the names and largest values of the parameters that size arrays, in the order of their first
+    /// array.
     pub fn sizes(&self) -> Vec<(&'static str, usize)> {
         let mut sizes: Vec<(&'static str, usize)> = Vec::new();
         for dimension in self.variables.iter().flat_map(|variable| variable.shape) {
@@ -192,7 +198,7 @@ impl<M: Model> Table<M> {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns true if its indices are within these sizes of the parameters.
+    /// Returns true if the element's indices are within these sizes.
     pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
         let indices = self.variable.indices(self.element);
         self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {
@@ -204,8 +210,8 @@ impl<M: Model> Scalar<M> {
     }
 }
 
-/// Returns the folder that a URI names, as FMI 2.0 passes that of the resources: `file:///a%20b`, on Windows `file:///C:/a`. A
-/// path that is no URI is taken as it is.
+/// Returns the folder of a URI, in which form FMI 2.0 passes the resources: `file:///a%20b`, on Windows
+/// `file:///C:/a`. A path that is not a URI is returned unchanged.
 pub fn folder_of_uri(uri: &str) -> Option<std::path::PathBuf> {
     let Some(rest) = uri.strip_prefix("file:") else {
         return (!uri.is_empty() && !uri.contains("://")).then(|| uri.into());

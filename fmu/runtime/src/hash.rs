@@ -1,17 +1,17 @@
-//! FNV-1a with 128 bits: tells tables and byte strings apart, the same way on
-//! every platform. It guards against mistakes, not against attackers.
+//! FNV-1a with 128 bits, which distinguishes tables and byte strings identically on every platform. It
+//! protects against mistakes, not against attackers.
 
-/// A hash in the making.
+/// A hash value that is being computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Hash(u128);
 
 impl Hash {
-    /// The hash of nothing.
+    /// Returns the hash of an empty string.
     pub const fn new() -> Hash {
         Hash(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
 
-    /// The hash of what came before and `bytes`.
+    /// Returns the hash after appending `bytes`.
     pub fn bytes(mut self, bytes: &[u8]) -> Hash {
         for byte in bytes {
             self.0 ^= u128::from(*byte);
@@ -20,12 +20,12 @@ impl Hash {
         self
     }
 
-    /// Adds a text and its end: "ab", "c" differs from "a", "bc".
+    /// Returns the hash after appending a text and its end, so that "ab", "c" differs from "a", "bc".
     pub fn text(self, text: &str) -> Hash {
         self.bytes(text.as_bytes()).bytes(&[0xff])
     }
 
-    /// The number.
+    /// Returns the hash value.
     pub const fn value(self) -> u128 {
         self.0
     }

@@ -1,10 +1,11 @@
-//! Effects of the host's calls on one instance, the same for every version of FMI's C interface.
+//! Effects of the host's calls on an instance, which are the same for every version of FMI.
 //!
-//! A call that is refused changes nothing. The one exception is a step that the model could not compute. The model keeps its
-//! state, but the instance goes to "step failed", where it can be read, reset, or given a saved state.
+//! A refused call changes nothing. The only exception is a step that the model cannot compute: the model
+//! keeps its state, but the instance enters the state "step failed", in which it can be read, reset, or given
+//! a saved state.
 //!
-//! In Model Exchange the host integrates: it sets time and states. Where the host handles events
-//! ([`Events::ByHost`]), what is discrete changes in [`Instance::new_discrete_states`] alone.
+//! In Model Exchange the host integrates: it sets time and states. If the host handles events
+//! ([`Events::ByHost`]), discrete values change only in [`Instance::new_discrete_states`].
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -17,51 +18,52 @@ use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Causality, Value, Variable, is_finite, text};
 use crate::version::Version;
 
-/// The tolerance when the host names none.
+/// Relative tolerance if the host gives none.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
-/// The tolerances that a host can ask for.
+/// Range of tolerances that a host can set.
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
-/// The size that a continuous state may not reach: powers and products of states overflow beyond it, although no such motion is
-/// one.
+/// Limit of the magnitude of continuous states. Powers and products of larger states could overflow, although
+/// no real motion reaches it.
 pub const MAX_STATE: f64 = 1e30;
 
-/// An instance of an FMU, for hosts that speak a version of FMI.
+/// An instance of an FMU, for one version of FMI.
 ///
-/// Cloning it is saving its state: there is nothing else to an instance.
+/// A clone is a saved state, because an instance consists of nothing else.
 #[derive(Debug)]
 pub struct Instance<M: Model, V: Version> {
     version: PhantomData<V>,
     pub(crate) interface: Interface,
-    /// Handler of events.
+    /// The party that handles events.
     pub(crate) events: Events,
-    /// Form in which the host sees the variables.
+    /// Whether arrays are variables for the host, or their elements.
     pub(crate) layout: Layout,
-    /// Part of the variables that the host sees, if it does not see them all.
+    /// The part of the variables that the host knows; `None` for all.
     pub(crate) extent: Option<Arc<Extent>>,
     pub(crate) state: InstanceState,
     pub(crate) clock: Clock,
     pub(crate) tolerance: f64,
-    /// The parameters' values in the table's order, right or wrong.
+    /// Values of the parameters in the order of the table, even if they are not allowed.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
     /// True if an input has a slope for the next step.
     pub(crate) sloped: bool,
-    /// True while the inputs have the slopes of the step that has just ended: until an input is
-    /// set, outputs are limits from the left.
+    /// True while the inputs have the slopes of the step that has just ended. Until an input is set, outputs
+    /// are then limits from the left.
     pub(crate) past_slopes: bool,
-    /// There from the first look at it in initialization mode; gone when a parameter or an
-    /// input is set before the instance runs.
+    /// The model. It is created when it is needed for the first time in initialization mode, and dropped when
+    /// a parameter or input is set before the simulation starts.
     pub(crate) model: Option<M>,
-    /// The outputs now, if somebody has asked.
+    /// The present outputs, if they have been computed.
     pub(crate) outputs: Option<M::Outputs>,
-    /// Values of the discrete outputs as the host last saw them in event mode, by slot ([`Events::Reported`]). Empty until
-    /// initialization has ended: before, discrete outputs are computed as all others are.
+    /// Values of the discrete outputs as the host saw them last in event mode, by slot
+    /// ([`Events::Reported`]). Empty until initialization has ended; before that discrete outputs are
+    /// computed like all others.
     pub(crate) shown: Vec<i32>,
-    /// Room for the continuous states in the model's order, for directions and derivatives.
+    /// Memory for vectors of continuous states in the model's order.
     scratch: [Vec<f64>; 2],
 }
 
-/// Places of the continuous states, in the host's order.
+/// Indices in the model of the continuous states, in the host's order.
 struct Places<M: Model> {
     extent: Option<Arc<Extent>>,
     next: usize,
@@ -99,7 +101,7 @@ impl<M: Model> ExactSizeIterator for Places<M> {}
 /// Result of a step that may stop at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepInfo {
-    /// There is an event to be handled.
+    /// True if there is an event that must be handled.
     pub event: bool,
     /// True if the step has stopped before its end.
     pub early: bool,
@@ -108,13 +110,13 @@ pub struct StepInfo {
 /// Result of handling an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventInfo {
-    /// The FMU has changed continuous states.
+    /// True if the FMU has changed continuous states.
     pub states_changed: bool,
-    /// Latest time of the next event, s.
+    /// Time of the next time event, s, if there is one.
     pub next_time: Option<f64>,
 }
 
-// Derived, the second would take memory anew.
+// A derived `clone_from` would allocate memory again.
 impl<M: Model, V: Version> Clone for Instance<M, V> {
     fn clone(&self) -> Self {
         Instance {
@@ -127,7 +129,7 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
         }
     }
 
-    /// Copies without allocating if the memory is large enough.
+    /// Copies without allocating memory if the existing memory is large enough.
     fn clone_from(&mut self, other: &Self) {
         let mut parameters = std::mem::take(&mut self.parameters);
         parameters.clone_from(&other.parameters);
@@ -142,12 +144,12 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
 }
 
 impl<M: Model, V: Version> Instance<M, V> {
-    /// Just made.
+    /// Creates an instance with the default handler of events.
     pub fn new(interface: Interface) -> Self {
         Instance::with_events(interface, V::events(interface))
     }
 
-    /// Just made, for a host that says who handles events.
+    /// Creates an instance for a host that chooses who handles events.
     pub fn with_events(interface: Interface, events: Events) -> Self {
         let states = M::table().derivatives().len();
         Instance {
@@ -170,7 +172,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// The same for a host that has read the description of a part of the variables.
+    /// Restricts a new instance to the variables of a reduced description.
     pub fn with_extent(mut self, extent: Option<Arc<Extent>>) -> Self {
         if let Some(extent) = &extent {
             self.parameters = extent.starts().to_vec();
@@ -179,7 +181,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self
     }
 
-    /// GUID or token of the description that the host has read.
+    /// Returns the GUID or token of the description that the host has read.
     pub(crate) fn token(&self) -> &str {
         match &self.extent {
             Some(extent) => extent.token(),
@@ -187,46 +189,50 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// The places in the model of the continuous states, in the host's order.
+    /// Returns the indices in the model of the continuous states, in the host's order.
     fn places(&self) -> Places<M> {
         Places { extent: self.extent.clone(), next: 0, model: PhantomData }
     }
 
-    /// Interface type of the instance.
+    /// Returns the interface of the instance.
     pub fn interface(&self) -> Interface {
         self.interface
     }
 
-    /// Refuses a call that is not allowed in the present state.
+    /// Checks that a call is allowed in the present state.
+    ///
+    /// # Errors
+    ///
+    /// If it is not.
     #[inline]
     pub fn check(&self, call: &'static Call) -> Result<&'static Call, Fault> {
         call.check(self.interface, self.events, self.state)?;
         Ok(call)
     }
 
-    /// The state it is in.
+    /// Returns the instance state.
     pub fn state(&self) -> InstanceState {
         self.state
     }
 
-    /// The communication point the host has reached.
+    /// Returns the simulation time that has been reached, s.
     pub fn time(&self) -> f64 {
         self.clock.time
     }
 
-    /// Makes the instance unusable after a panic: its values cannot be trusted.
+    /// Makes the instance unusable after a panic, because its values cannot be trusted.
     pub fn poison(&mut self) {
         self.state = InstanceState::Fatal;
     }
 
-    /// Changes the instance state after a failed call.
+    /// Changes the instance state after a failed call, if this version of FMI requires that.
     pub(crate) fn after_error(&mut self) {
         if let Some(state) = V::AFTER_ERROR.filter(|_| self.state != InstanceState::Fatal) {
             self.state = state;
         }
     }
 
-    /// Tolerance and times: `None` where the host defines nothing.
+    /// Sets tolerance, start time and stop time (s); `None` if the host does not define it.
     pub fn setup_experiment(
         &mut self,
         tolerance: Option<f64>,
@@ -259,14 +265,18 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Enters initialization mode; all variables can be read from here on.
+    /// Enters initialization mode, from which on all variables can be read.
     pub fn enter_initialization_mode(&mut self) -> Result<(), Fault> {
         self.check(V::ENTER_INITIALIZATION)?;
         self.state = InstanceState::Initialization;
         Ok(())
     }
 
-    /// The motion can begin: here at the latest bad parameters come up.
+    /// Leaves initialization mode, so that the simulation can start.
+    ///
+    /// # Errors
+    ///
+    /// If parameters are not allowed, at the latest here.
     pub fn exit_initialization_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::EXIT_INITIALIZATION)?;
         self.outputs(call)?;
@@ -280,13 +290,13 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Start values of the parameters in the description that the host has read.
+    /// Returns the start values of the parameters in the description that the host has read.
     fn starts(&self) -> Vec<Value> {
         self.extent.as_ref().map_or_else(|| M::table().starts(), |extent| extent.starts().to_vec())
     }
 
-    /// Warnings about the motion that begins: those of [`Model::warnings`], and one for each reason for which parameters that
-    /// differ from their start values have no effect ([`Model::overridden`]).
+    /// Returns warnings at the start of the simulation: those of [`Model::warnings`], and one for each reason
+    /// for which parameters that differ from their start values have no effect ([`Model::overridden`]).
     pub fn warnings(&self) -> Vec<String> {
         let Some(model) = &self.model else { return Vec::new() };
         let parameters = self.given_parameters();
@@ -320,7 +330,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         warnings
     }
 
-    /// The host goes on from initialization: parameters are what they are now.
+    /// Continues after initialization in Model Exchange, where parameters can be set until now.
     fn leave_initialized(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state == InstanceState::Initialized {
             self.model(call)?;
@@ -346,17 +356,17 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns one value, for a call of the version.
+    /// Reads a value, for the function `call` of the FMI version.
     pub fn get(&mut self, call: &'static Call, reference: u32) -> Result<Value, Fault> {
         let call = self.check(call)?;
         self.value(call, reference)
     }
 
-    /// Returns one value, for a call that [`Instance::check`] allows.
+    /// Reads a value for a call that was already checked.
     #[inline(always)]
     pub fn value(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
         let scalar = scalar::<M, V>(call, reference)?;
-        // A state is never looked up among the outputs.
+        // A state is read directly and not looked up among the outputs.
         match (scalar.state, scalar.access, &self.model, &self.outputs) {
             (Some(place), _, Some(model), _) => {
                 Ok(Value::Real(model.continuous_states()[place(scalar.element)]))
@@ -421,7 +431,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         })
     }
 
-    /// Sets all of the values, or none, by one of the version's calls.
+    /// Sets all values for the function `call`, or none of them if one is refused.
     #[inline]
     pub fn set(
         &mut self,
@@ -452,8 +462,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Gives inputs and parameters the values that they start with, all elements of the variables that are `meant`. Returns
-    /// those of which an element had another value, in the table's order.
+    /// Resets all elements of the variables selected by `meant` to their start values. Returns the variables
+    /// of which an element had another value, in the order of the table.
     pub(crate) fn restart(
         &mut self,
         meant: impl Fn(&Variable<M>) -> bool,
@@ -476,7 +486,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         lost
     }
 
-    /// Brings what the host is shown of what is discrete up to date.
+    /// Updates the discrete values that the host sees.
     fn show_discrete(&mut self, call: &Call) -> Result<(), Fault> {
         let outputs = *self.outputs(call)?;
         self.shown.clear();
@@ -491,7 +501,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(all.any(|(scalar, shown)| discrete(scalar, &outputs) != *shown))
     }
 
-    /// Sets an input or a parameter; what follows from it has to be computed anew.
+    /// Sets an input or a parameter, and drops results that depend on it.
     #[inline(always)]
     fn put(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
@@ -507,7 +517,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Sets a parameter, or a continuous state where a host may.
+    /// Sets a parameter, or a continuous state if the host may set single states.
     fn put_any(&mut self, scalar: &Scalar<M>, value: Value) {
         match value {
             Value::Real(x) if V::SETS_STATES && scalar.state.is_some() => {
@@ -525,7 +535,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Parameters that are fixed can no longer be set, and the motion has begun.
+    /// Returns true if the simulation has started, after which fixed parameters cannot be set.
     #[inline]
     pub(crate) fn is_running(&self) -> bool {
         !matches!(
@@ -552,8 +562,8 @@ impl<M: Model, V: Version> Instance<M, V> {
                 _ => Err(call.discard(state_refusal(scalar, value))),
             };
         }
-        // Wrong parameters are refused all together when initialization ends, everything
-        // else on the spot.
+        // Parameters that are not allowed are refused all together when initialization ends; everything else
+        // is refused immediately.
         if !is_input {
             self.check_set_parameter(call, scalar)?;
         }
@@ -600,14 +610,14 @@ impl<M: Model, V: Version> Instance<M, V> {
         )))
     }
 
-    /// Gives the running model what has been set among its tunable parameters.
+    /// Passes changed tunable parameters to the running model.
     fn tune(
         &mut self,
         call: &Call,
         references: &[u32],
         value: &impl Fn(usize) -> Value,
     ) -> Result<(), Fault> {
-        // All of them are in their ranges: so it was when the motion began, and since.
+        // All other parameters are in their ranges, because they were when the simulation started.
         let mut parameters = self.given_parameters();
         for (n, reference) in references.iter().enumerate() {
             let scalar = scalar::<M, V>(call, *reference)?;
@@ -619,7 +629,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             .map_err(|problems| call.error(problems.join("; ")))
     }
 
-    /// Slopes of inputs: they hold for the next step only.
+    /// Sets slopes of inputs for the next step only.
     pub fn set_input_derivatives(
         &mut self,
         references: &[u32],
@@ -644,8 +654,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Time derivatives of variables, the inputs
-    /// running along the slopes that are set for the next step.
+    /// Computes time derivatives of variables, with the input slopes that are set for the next step.
     pub fn output_derivatives(
         &mut self,
         references: &[u32],
@@ -678,9 +687,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.derivatives_along(call, references, &along, answers)
     }
 
-    /// The derivative of the unknowns in a direction of the
-    /// knowns. Knowns are inputs and continuous states; in initialization mode, where
-    /// the motion's start is still to be found, inputs and real parameters.
+    /// Computes the derivative of `unknowns` in the direction `direction` of `knowns`. Knowns are inputs and
+    /// continuous states; in initialization mode, before the initial state is computed, they are inputs and
+    /// real parameters.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -712,8 +721,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.derivatives_along(call, unknowns, &along, answers)
     }
 
-    /// Derivatives of the unknowns in the direction of the states in the first scratch vector and
-    /// of the slopes of `along`.
+    /// Computes the derivatives of the unknowns in the direction of the states in the first scratch vector
+    /// and of the input slopes in `along`.
     fn derivatives_along(
         &mut self,
         call: &Call,
@@ -753,9 +762,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         done
     }
 
-    /// Returns the value references that a variable depends on. Before the motion begins these are the dependencies of its
-    /// initial value. Then they are the declared inputs and states that act at present: in stick or slip, with the chosen models.
-    /// Derivatives that vanish at the very point count if they do not close by.
+    /// Returns the value references on which a variable depends. Before the simulation starts, these are the
+    /// dependencies of its initial value. Afterwards they are the declared inputs and states that have an
+    /// effect at present: in stick or slip, with the selected models. A derivative that is zero exactly at
+    /// the present point counts if it is not zero nearby.
     pub(crate) fn dependencies(
         &mut self,
         call: &Call,
@@ -772,7 +782,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if scalar.state.is_some() || !has_derivative {
             return Ok(declared.into_iter().map(V::reference).collect());
         }
-        /// Distance of the points, in orders of magnitude.
+        /// Distances of the points, in nominal values.
         const NEAR: f64 = 1e-3;
         const POINTS: u64 = 4;
         let mut depends = vec![false; declared.len()];
@@ -800,9 +810,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(found.map(|(known, _)| V::reference(known)).collect())
     }
 
-    /// Moves states and inputs aside by up to `share` of their orders of magnitude, each point by others.
+    /// Displaces states and inputs by up to `share` of their nominal values, differently for each `point`.
     fn move_aside(&mut self, share: f64, point: u64) {
-        // The golden ratio's multiples fill the interval evenly.
+        // Multiples of the golden ratio fill the interval uniformly.
         let part = |n: u64| 2.0 * (0.618_033_988_749_895 * (n + 1) as f64).fract() - 1.0;
         if let Some(model) = &mut self.model {
             self.scratch[0].copy_from_slice(model.continuous_states());
@@ -828,9 +838,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.outputs = None;
     }
 
-    /// Computes the derivatives in initialization mode by central differences with Richardson extrapolation, between instances
-    /// with changed starts. Each known changes by a thousandth of its value, or of its order of magnitude if the value is
-    /// smaller.
+    /// Computes derivatives in initialization mode by central differences with Richardson extrapolation,
+    /// between instances with different start values. Each known is changed by a thousandth of its value, or
+    /// of its nominal value if that is larger.
     fn initial_derivative(
         &self,
         call: &Call,
@@ -880,14 +890,15 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// A step from `at` on by `h`. Does not allocate unless it fails.
+    /// Makes a step from `at` by `h`, s. It allocates no memory unless it fails.
     pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
         let call = self.check(V::DO_STEP)?;
         self.step_by(call, at, h, |model, inputs| model.step(inputs, h).map(|()| StepEnd::End))?;
         Ok(())
     }
 
-    /// [`Instance::do_step`] for a host that is notified of events; it stops at the first event if the host allows that.
+    /// Makes a step like [`Instance::do_step`] for a host that is told of events; with `stops` it stops at
+    /// the first event.
     #[inline(always)]
     pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
         let call = self.check(V::DO_STEP)?;
@@ -899,7 +910,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.step_reported(call, at, h, stops)
     }
 
-    /// Makes a step for a host that handles events.
+    /// Makes a step for a host to which events are reported.
     fn step_reported(
         &mut self,
         call: &Call,
@@ -920,7 +931,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
     }
 
-    /// Refuses a step from `at` by `h` that is invalid whatever happens during it.
+    /// Refuses a step from `at` by `h` that can never be valid.
     #[inline(always)]
     pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
         self.clock.check_step(at, h).map_err(|why| call.error(why))
@@ -955,7 +966,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 model.set_time(self.clock.now());
                 let end = at + h;
                 let why = format_args!("step from {at:?} s to {end:?} s failed: {text}");
-                // Where failing has a state of its own, there is no going on with a shorter step.
+                // If a failed step has a state of its own, a shorter step cannot be tried.
                 if shorter_may_succeed && V::AFTER_ERROR.is_some() {
                     return Err(call.discard(why));
                 }
@@ -980,7 +991,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(ended)
     }
 
-    /// Drops the slopes of the last step: inputs are held unless slopes are set.
+    /// Drops the slopes of the last step, so that inputs are held unless new slopes are set.
     #[inline]
     fn drop_past_slopes(&mut self) {
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
@@ -989,14 +1000,18 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    // ---- Within a step, by the host ----
+    // ---- Within a step: intermediate update ----
 
-    /// The host looks in.
+    /// Enters the state of an intermediate update.
     pub(crate) fn enter_intermediate(&mut self) {
         self.state = InstanceState::Intermediate;
     }
 
-    /// Ends an intermediate update.
+    /// Leaves the state of an intermediate update.
+    ///
+    /// # Errors
+    ///
+    /// If a call of the host has failed meanwhile.
     pub(crate) fn leave_intermediate(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state != InstanceState::Intermediate {
             return Err(call.error("a call of the host's failed within the intermediate update"));
@@ -1005,7 +1020,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Lets inputs run along lines for the next step, to where they are after `h`.
+    /// Gives inputs slopes for the next `h` seconds, at the end of which they have the values `ends`.
     pub(crate) fn ramp_to(
         &mut self,
         call: &Call,
@@ -1031,7 +1046,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Puts inputs exactly where the step has taken them but for rounding.
+    /// Sets inputs exactly to the values at the end of the step, which differ from the result of the slopes
+    /// by rounding.
     pub(crate) fn end_ramps(&mut self, references: &[u32], ends: &M::Inputs) {
         let mut ends = *ends;
         for reference in references {
@@ -1044,13 +1060,13 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.outputs = None;
     }
 
-    /// Holds the inputs after all.
+    /// Removes the slopes, so that the inputs are held.
     pub(crate) fn drop_ramps(&mut self) {
         hold::<M>(&mut self.inputs);
         self.sloped = false;
     }
 
-    // ---- Events and continuous time, by the host ----
+    // ---- Events and continuous time, handled by the host ----
 
     /// Enters event mode.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
@@ -1063,8 +1079,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Does everything that is due now. Once is enough; calling it
-    /// again, after other inputs, does no harm.
+    /// Handles all events that are due. One call is enough; repeated calls, for example after other inputs,
+    /// have no further effect.
     pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
         let call = self.check(V::NEW_DISCRETE_STATES)?;
         if self.events == Events::Reported {
@@ -1078,8 +1094,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
 
-    /// The same where the FMU has handled events within its step: takes over what the present inputs change, and
-    /// shows all that is discrete.
+    /// Handles events whose effects within the step were already computed: applies changes by the present
+    /// inputs, and shows all discrete values to the host.
     fn report_discrete_states(&mut self, call: &Call) -> Result<EventInfo, Fault> {
         let inputs = self.inputs;
         let now = self.clock.now();
@@ -1088,19 +1104,19 @@ impl<M: Model, V: Version> Instance<M, V> {
         model.take_present_inputs(&inputs);
         self.outputs = None;
         self.show_discrete(call)?;
-        // what a damaged saved state has left overdue, the next step takes
+        // The next step handles what is still due, for example in a damaged saved state.
         let next_time = self.model(call)?.next_time_event().filter(|next| *next > now.time);
         Ok(EventInfo { states_changed: false, next_time })
     }
 
-    /// Into configuration mode or back.
+    /// Enters or leaves configuration mode.
     pub fn configure(&mut self, call: &'static Call, to: InstanceState) -> Result<(), Fault> {
         self.check(call)?;
         self.state = to;
         Ok(())
     }
 
-    /// The host goes on with steps.
+    /// Leaves event mode, so that steps can follow.
     pub fn enter_step_mode(&mut self, call: &'static Call) -> Result<(), Fault> {
         self.check(call)?;
         self.state = InstanceState::Stepping;
@@ -1115,7 +1131,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// The host has accepted a step: whether an event has to be handled now.
+    /// Accepts a step of the host's integrator. Returns true if an event must be handled now.
     pub fn completed_integrator_step(&mut self) -> Result<bool, Fault> {
         let call = self.check(V::COMPLETED_STEP)?;
         let time = self.clock.time;
@@ -1132,7 +1148,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         })
     }
 
-    /// The present time.
+    /// Sets the simulation time, s (Model Exchange).
     pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
         let call = self.check(V::SET_TIME)?;
         self.clock.check_time(time, !V::SETS_STATES).map_err(|why| call.error(why))?;
@@ -1145,8 +1161,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// The continuous states. Those that are not finite, or whose squares and products may not be, are
-    /// discarded: the integrator should try a shorter step.
+    /// Sets the continuous states. States that are NaN, infinite or larger than [`MAX_STATE`] are discarded,
+    /// because the integrator should then try a shorter step.
     pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
         let call = self.check(V::SET_CONTINUOUS_STATES)?;
         if let (Some(_), Some(model)) = (&self.extent, &self.model) {
@@ -1174,7 +1190,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// The continuous states, in the host's order.
+    /// Reads the continuous states, in the host's order.
     pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_CONTINUOUS_STATES)?;
         let places = self.places();
@@ -1186,7 +1202,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// The states' derivatives. NaN and infinity are discarded, as above.
+    /// Computes the derivatives of the states. NaN and infinity are discarded, because the integrator should
+    /// then try a shorter step.
     pub fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_DERIVATIVES)?;
         let places = self.places();
@@ -1210,7 +1227,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Functions that cross zero at events.
+    /// Computes the event indicators, which change sign at events.
     pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_EVENT_INDICATORS)?;
         let count = match &self.extent {
@@ -1229,7 +1246,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Functions that cross zero at events, for a call that reads variables.
+    /// Computes the event indicators for a call that reads variables.
     pub(crate) fn indicators_for(
         &mut self,
         call: &Call,
@@ -1245,7 +1262,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
     }
 
-    /// The states' orders of magnitude.
+    /// Reads the nominal values of the states.
     pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_NOMINALS)?;
         let places = self.places();
@@ -1256,9 +1273,13 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    // ---- Saved states and what is behind it all ----
+    // ---- Saved states, and the model ----
 
-    /// Takes a saved state.
+    /// Restores a saved state.
+    ///
+    /// # Errors
+    ///
+    /// If it belongs to another interface, handler of events or set of variables.
     pub fn restore(&mut self, saved: &Self) -> Result<(), Fault> {
         let call = self.check(V::SET_STATE)?;
         if saved.interface != self.interface {
@@ -1278,7 +1299,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Refuses a saved state of an instance whose host sees other variables.
+    /// Refuses a saved state of an instance whose host knows other variables.
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
         if saved.layout != self.layout {
             return Err(call.error(
@@ -1295,7 +1316,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// The model; it is made when it is first asked for.
+    /// Returns the model, and creates it if necessary.
     #[inline]
     fn model(&mut self, call: &Call) -> Result<&mut M, Fault> {
         if self.model.is_none() {
@@ -1324,7 +1345,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// The parameters as the model takes them, or all that is wrong with them.
+    /// Converts the parameters for the model.
+    ///
+    /// # Errors
+    ///
+    /// Everything that is not allowed.
     pub(crate) fn model_parameters(&self) -> Result<M::Parameters, Vec<String>> {
         let all = M::table().parameters().iter().zip(&self.parameters);
         let problem = |(scalar, value): (&Scalar<M>, &Value)| {
@@ -1335,7 +1360,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
     }
 
-    /// The parameters as they were set, in their ranges or not.
+    /// Converts the parameters for the model even if they are not allowed.
     fn given_parameters(&self) -> M::Parameters {
         let mut parameters = M::Parameters::default();
         for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {
@@ -1344,7 +1369,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         parameters
     }
 
-    /// The outputs now; they are computed when they are first asked for.
+    /// Returns the present outputs, and computes them if necessary.
     #[inline(always)]
     fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
         if self.outputs.is_none() {
@@ -1356,12 +1381,12 @@ impl<M: Model, V: Version> Instance<M, V> {
     fn evaluate(&mut self, call: &Call) -> Result<(), Fault> {
         self.model(call)?;
         if let Instance { events, model: Some(model), inputs, outputs, .. } = self {
-            *outputs = Some(answer(*events, model, inputs, M::outputs));
+            *outputs = Some(query_model(*events, model, inputs, M::outputs));
         }
         Ok(())
     }
 
-    /// Asks the model, as [`answer`] does.
+    /// Evaluates a function of the model, as [`query_model`] does.
     fn query<T>(
         &mut self,
         call: &Call,
@@ -1371,30 +1396,30 @@ impl<M: Model, V: Version> Instance<M, V> {
         let Instance { events, model: Some(model), inputs, .. } = self else {
             return Err(call.error("the instance was never initialised"));
         };
-        Ok(answer(*events, model, inputs, question))
+        Ok(query_model(*events, model, inputs, question))
     }
 
-    /// Warning about how the host drives the model, see [`Model::step_warning`].
+    /// Returns a warning about the host's steps, see [`Model::step_warning`].
     pub fn step_warning(&self) -> Option<&'static str> {
         self.model.as_ref().and_then(M::step_warning)
     }
 
-    /// Number of events since the start.
+    /// Returns the number of events since the start.
     #[inline]
     pub fn event_count(&self) -> i32 {
         self.model.as_ref().map_or(0, M::event_count)
     }
 
-    /// The last event, for the log.
+    /// Describes the last event for the log.
     pub fn last_event(&self) -> String {
         self.model.as_ref().map_or(String::new(), M::last_event)
     }
 }
 
-/// Queries the model: with the present inputs applied if it handles events
-/// itself, unchanged if the host does.
+/// Evaluates a function of the model. The present inputs are applied first if the FMU handles events; they
+/// are not if the host does.
 #[inline(always)]
-fn answer<M: Model, T>(
+fn query_model<M: Model, T>(
     events: Events,
     model: &mut M,
     inputs: &M::Inputs,
@@ -1411,7 +1436,7 @@ fn answer<M: Model, T>(
     }
 }
 
-/// The number by which the host is shown an output that is discrete.
+/// Returns the number that the host sees for a discrete output.
 fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
     match scalar.access {
         Access::OutputInteger(get) => get(outputs, scalar.element),
@@ -1420,7 +1445,7 @@ fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
     }
 }
 
-/// Returns a computed number as a value, if it is one.
+/// Returns a computed number as a value, or a fault if it is NaN or infinite.
 #[inline(always)]
 fn finite<M: Model>(call: &Call, scalar: &Scalar<M>, x: f64) -> Result<Value, Fault> {
     if is_finite(x) { Ok(Value::Real(x)) } else { Err(not_finite(call, scalar, x)) }
@@ -1448,7 +1473,7 @@ fn state_refusal<M: Model>(scalar: &Scalar<M>, value: Value) -> String {
     format!("{} = {value} (allowed: magnitudes below {MAX_STATE:e})", scalar.name())
 }
 
-/// Why a state cannot have this value at the start.
+/// Returns the reason why a state cannot start with this value.
 fn start_problem<M: Model>(scalar: &Scalar<M>, x: f64) -> Option<String> {
     if is_finite(x) && x.abs() < MAX_STATE {
         return None;
@@ -1462,7 +1487,8 @@ fn start_problem<M: Model>(scalar: &Scalar<M>, x: f64) -> Option<String> {
     ))
 }
 
-/// Takes the inputs to where their slopes lead in `h`, which is in their ranges. The host knows `h` to the `resolution` of time.
+/// Advances the inputs along their slopes by `h` seconds, within their ranges. The host knows `h` only to
+/// `resolution`, s.
 #[inline(always)]
 fn follow_slopes<M: Model>(
     call: &Call,
@@ -1487,7 +1513,7 @@ fn follow_slopes<M: Model>(
     Ok(())
 }
 
-/// Takes the inputs' slopes away.
+/// Sets the slopes of all inputs to 0.
 fn hold<M: Model>(inputs: &mut M::Inputs) {
     for scalar in M::table().inputs() {
         if let Access::Input(ramp) = scalar.access {
@@ -1496,7 +1522,8 @@ fn hold<M: Model>(inputs: &mut M::Inputs) {
     }
 }
 
-/// Value of an input after `h`. A ramp down to the smallest value may miss it by rounding errors of slope, value and time.
+/// Returns the value of an input after `h` seconds. At the smallest allowed value a deviation by rounding of
+/// slope, value and time is corrected.
 #[inline]
 fn end_of_ramp<M: Model>(
     scalar: &Scalar<M>,
@@ -1521,7 +1548,7 @@ fn no_value<M: Model>(call: &Call, scalar: &Scalar<M>) -> Fault {
     call.error(format_args!("{} has no value", scalar.name()))
 }
 
-/// Refuses a derivative that the input cannot have.
+/// Checks that the input may have this derivative.
 #[inline(always)]
 fn check_slope<M: Model>(
     call: &Call,
@@ -1580,7 +1607,7 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
     Err(call.error(format_args!("{name} = {given} (allowed: {needed})")))
 }
 
-/// The variable of a value reference, if it has the type that the call is for.
+/// Finds the scalar of a value reference, which must have the type of the call.
 #[inline]
 fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
     V::scalar(reference, call.c_type).map_err(|why| call.error(why))

@@ -1,10 +1,11 @@
-//! Common base of the project's FMUs. It knows FMI and no physics; a model knows its physics
-//! and no FMI. They meet in one trait, [`Model`].
+//! Common base of the project's FMUs. It knows FMI and no physics; a model knows its physics and no FMI. They
+//! meet in the trait [`Model`].
 //!
-//! [`variable`] and [`table`] define a model's variables, [`call`] the states that allow a call, [`instance`] the effect of
-//! calls. [`snapshot`] saves states, and [`log`] writes to the host's log. The trait [`version::Version`] holds the differences
-//! between versions of FMI. Each version is one file ([`v2`], [`v3`]) with its C interface, on top of the common [`c_abi`]. These
-//! files hold the only unsafe code.
+//! [`variable`] and [`table`] define a model's variables, [`call`] the states in which functions are allowed,
+//! [`instance`] the effects of calls. [`snapshot`] saves states, and [`log`] selects messages for the host's
+//! log. The trait [`version::Version`] contains the differences between versions of FMI. Each version is one
+//! module ([`v2`], [`v3`]) with its C interface, on top of the common [`c_abi`]. Only these modules have
+//! unsafe code.
 //!
 //! An FMU is a crate with a table, an implementation of [`Model`] and two lines:
 //! `runtime::export_fmi2!(TheModel);` and `runtime::export_fmi3!(TheModel);`.
@@ -29,7 +30,7 @@ pub mod version;
 
 pub use model::Model;
 
-// The runtime's own tests drive the FMU of tests/spring.
+// The runtime's own tests use the FMU of tests/spring.
 #[cfg(test)]
 extern crate self as runtime;
 #[cfg(test)]

@@ -1,9 +1,10 @@
-//! Selection of messages for the host's logger.
+//! Selects the messages for the host's logger.
 //!
-//! Calls that fail, what to be warned of when the motion begins or a size changes, and, for those
-//! who ask, the model's events. A host gets only the messages that it requests. `loggingOn` of a new instance has no effect:
-//! failures are always logged, because a status without a reason helps nobody, and events only if a category is switched on.
-//! Setting the debug logging is one and is obeyed: off means silence, and no category named means all.
+//! There are messages about calls that fail, warnings when the simulation starts or a size changes, and the
+//! model's events. `loggingOn` of a new instance has no effect: failures are always logged, because a status
+//! without a reason helps nobody, and events are logged only if a category is switched on. However,
+//! fmi2SetDebugLogging and fmi3SetDebugLogging are obeyed: off means no messages, and on without categories
+//! means all messages.
 
 use crate::call::Severity;
 use crate::model::Model;
@@ -24,15 +25,15 @@ pub enum Topic {
 /// A log category of the model description.
 #[derive(Clone, Debug)]
 pub struct Category {
-    /// Name for hosts.
+    /// Name in the standard.
     pub name: &'static str,
     /// Description of its messages.
     pub description: String,
-    /// Topic; `None` includes all.
+    /// Topic of the messages; `None` for all topics.
     pub topic: Option<Topic>,
 }
 
-/// The categories' names, which the standard gives, with their topics.
+/// Names of the categories in the standard, with their topics.
 const NAMES: [(&str, Option<Topic>); 6] = [
     ("logEvents", Some(Topic::Event)),
     ("logStatusWarning", Some(Topic::Warning)),
@@ -42,12 +43,12 @@ const NAMES: [(&str, Option<Topic>); 6] = [
     ("logAll", None),
 ];
 
-/// The categories of a model.
+/// Returns the categories of a model; one without events has no `logEvents`.
 fn names_of<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option<Topic>)] {
     if table.about.events.is_empty() { &NAMES[1..] } else { &NAMES }
 }
 
-/// The categories of a model as a version of FMI describes them.
+/// Returns the categories of a model with the descriptions for a version of FMI.
 pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
     let description = |topic| match topic {
         Some(Topic::Event) => table.about.events.into(),
@@ -63,12 +64,12 @@ pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
     all.map(|&(name, topic)| Category { name, description: description(topic), topic }).collect()
 }
 
-/// The category of messages on this topic.
+/// Returns the category of messages on a topic.
 pub fn category(topic: Topic) -> &'static str {
     NAMES.iter().find(|(_, of)| *of == Some(topic)).map_or("logAll", |(name, _)| name)
 }
 
-/// Filter of one instance's messages.
+/// Selection of the messages of one instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
     events: bool,
@@ -79,26 +80,29 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Every failure and warning; this is how an instance starts.
+    /// Failures and warnings, with which an instance starts.
     pub const FAILURES: Filter =
         Filter { events: false, warning: true, discard: true, error: true, fatal: true };
-    /// Everything.
+    /// All messages.
     pub const ALL: Filter = Filter { events: true, ..Filter::FAILURES };
-    /// Silence.
+    /// No messages.
     pub const NONE: Filter =
         Filter { events: false, warning: false, discard: false, error: false, fatal: false };
 
-    /// Reasons of failed calls only.
+    /// Only the reasons of failed calls.
     pub const ERRORS: Filter = Filter { warning: false, ..Filter::FAILURES };
 
-    /// The same, with why calls fail.
+    /// Adds the reasons of failed calls to a selection.
     pub fn with_errors(self) -> Filter {
         Filter { discard: true, error: true, fatal: true, ..self }
     }
 
-    /// Only these categories; none given means all. Unknown names are an error
-    /// that lists them and the known ones.
-    pub fn of<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
+    /// Selects only these categories; an empty list selects all.
+    ///
+    /// # Errors
+    ///
+    /// If names are unknown; the text lists them and the known ones.
+    pub fn from_categories<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
         let known = names_of(table);
         if names.is_empty() {
             return Ok(Filter::ALL);
@@ -141,18 +145,18 @@ mod tests {
     use crate::model::Model;
     use crate::spring::Spring;
 
-    fn of(names: &[String]) -> Result<Filter, String> {
-        Filter::of(names, Spring::table())
+    fn spring_filter(names: &[String]) -> Result<Filter, String> {
+        Filter::from_categories(names, Spring::table())
     }
 
     #[test]
     fn no_category_means_all() {
-        assert_eq!(of(&[]), Ok(Filter::ALL));
+        assert_eq!(spring_filter(&[]), Ok(Filter::ALL));
     }
 
     #[test]
     fn only_the_categories_asked_for_are_wanted() {
-        let filter = of(&["logStatusFatal".into()]).unwrap();
+        let filter = spring_filter(&["logStatusFatal".into()]).unwrap();
         assert!(filter.wants(Topic::Failure(Severity::Fatal)));
         assert!(!filter.wants(Topic::Failure(Severity::Error)));
         assert!(!filter.wants(Topic::Event));
@@ -173,7 +177,7 @@ mod tests {
 
     #[test]
     fn unknown_category_is_named_with_the_known_ones() {
-        let message = of(&["logStatusEror".into()]).unwrap_err();
+        let message = spring_filter(&["logStatusEror".into()]).unwrap_err();
         assert!(message.contains("logStatusEror") && message.contains("logStatusError"));
     }
 

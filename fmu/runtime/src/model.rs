@@ -1,4 +1,4 @@
-//! Interface that a model implements to become an FMU.
+//! The interface that a model implements to become an FMU.
 
 use std::fmt::Debug;
 
@@ -8,13 +8,13 @@ use crate::table::Table;
 /// Failure of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepFailure {
-    /// Reason, in words.
+    /// Reason, as a sentence.
     pub text: String,
     /// True if a shorter step may succeed.
     pub shorter_may_succeed: bool,
 }
 
-/// Makes a failure from a text: a shorter step may succeed, as when a step takes too much work.
+/// Creates a failure after which a shorter step may succeed, for example because a step takes too much work.
 impl From<&str> for StepFailure {
     fn from(text: &str) -> StepFailure {
         StepFailure { text: text.into(), shorter_may_succeed: true }
@@ -24,42 +24,46 @@ impl From<&str> for StepFailure {
 /// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepEnd {
-    /// The end of the step.
+    /// The step has reached its end.
     End,
-    /// The end of the step, at an event.
+    /// The step has reached its end, where there is an event.
     EventAtEnd,
-    /// An event before the end, this long after the step's beginning, s.
+    /// There is an event before the end, this long after the start of the step, s.
     Event(f64),
 }
 
 /// A dynamic system with inputs, parameters, continuous states and events.
 ///
-/// A clone is a saved state: nothing about a model is kept elsewhere. Times are in s.
-/// Functions that a smooth model without events does not need have a default.
+/// A clone is a saved state, so a model must keep no data elsewhere. Times are in s. Functions that a smooth
+/// model without events does not need have a default.
 pub trait Model: Clone + Debug + Sized + 'static {
-    /// All parameters; the default holds the start values.
+    /// All parameters; the default has the start values.
     type Parameters: Clone + Debug + Default;
-    /// All inputs, each with its value now and its slope over the step; the default holds the
-    /// start values, slopes 0.
+    /// All inputs, each with its present value and its slope over the step; the default has the start values
+    /// and slopes of 0.
     type Inputs: Copy + Debug + Default;
-    /// All that follows from states and inputs at one instant. The same type holds the outputs'
-    /// derivatives along a direction.
+    /// Everything that follows from states and inputs at one instant. The same type holds the derivatives of
+    /// the outputs in a direction.
     type Outputs: Copy + Debug;
-    /// Discrete values that inputs can change at once; `()` for a model without events.
+    /// Discrete values that inputs can change immediately; `()` for a model without events.
     type Discrete: Default;
 
-    /// True if outputs depend on the inputs' slopes, not only on their values.
+    /// True if outputs depend not only on the inputs' values but also on their slopes.
     const OUTPUTS_USE_SLOPES: bool = false;
 
-    /// The parameter that counts what the event indicators belong to, the same number to each, in order.
+    /// The parameter that counts the elements to which the event indicators belong, with the same number of
+    /// indicators per element, in order.
     const INDICATORS_OF: Option<&'static str> = None;
 
-    /// The variables and what else the model description says.
+    /// Returns the table of variables and further contents of the model description.
     fn table() -> &'static Table<Self>;
 
-    /// The model at the start of its motion, with the inputs that act then. `tolerance` is the
-    /// relative error allowed. Single parameters are within their ranges; all that is wrong with
-    /// them together is returned.
+    /// Creates the model at the start of the simulation, with the inputs at that time. `tolerance` is
+    /// relative.
+    ///
+    /// # Errors
+    ///
+    /// Everything that is wrong with combinations of parameters; single parameters are in their ranges.
     fn new(
         parameters: &Self::Parameters,
         inputs: &Self::Inputs,
@@ -67,40 +71,41 @@ pub trait Model: Clone + Debug + Sized + 'static {
         tolerance: f64,
     ) -> Result<Self, Vec<String>>;
 
-    /// Lists where parameters and initial inputs leave the known range of the model,
-    /// one sentence each.
+    /// Lists where parameters and initial inputs are outside the range in which the model was verified, one
+    /// sentence each.
     fn warnings(&self, parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
         let _ = (parameters, inputs);
         Vec::new()
     }
 
-    /// Returns why the value of a parameter is not used although the part of the model that it describes is, as "name = value" of
-    /// the parameter that replaces it. `name` is the table's, `indices` are the element's, from 0, none for a scalar. Hosts get a
-    /// warning of such parameters that differ from their start values. Parts that are switched off need none: the same
+    /// Returns the reason why a parameter is not used although the part of the model that it describes is, as
+    /// "name = value" of the parameter that replaces it. `name` is the name in the table, `indices` are those
+    /// of the element, from 0 (empty for a scalar). Hosts get a warning about such parameters if they differ
+    /// from their start values. Parameters of parts that are switched off give no warning, because the same
     /// parameters often serve several models.
     fn overridden(parameters: &Self::Parameters, name: &str, indices: &[usize]) -> Option<String> {
         let _ = (parameters, name, indices);
         None
     }
 
-    /// Appends the saved state other than parameters and inputs as words: always
-    /// [`About::saved_words`](crate::table::About::saved_words) of them.
+    /// Appends the saved state except parameters and inputs: always
+    /// [`About::saved_words`](crate::table::About::saved_words) words.
     fn save(&self, words: &mut Vec<u64>);
 
-    /// The reverse, with the same parameters; `None` when the words are no state.
+    /// Restores a saved state with the same parameters. Returns `None` if the words are not a state.
     fn resume(parameters: &Self::Parameters, words: &[u64], tolerance: f64) -> Option<Self>;
 
-    /// Moves on by exactly `h` > 0 seconds; the inputs run along their slopes. On an error the
-    /// model is as before. Does not allocate unless it fails.
+    /// Advances by exactly `h` > 0 seconds while the inputs change with their slopes. After an error the
+    /// model is unchanged. It allocates no memory unless it fails.
     fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), StepFailure>;
 
-    /// [`Model::step`] that stops at the first event. A step from there to the same end with the same inputs ends
-    /// bit-identical to the whole step.
+    /// Advances like [`Model::step`], but stops at the first event. A second step from there to the same end
+    /// with the same inputs gives a bit-identical result to the whole step.
     fn step_to_event(&mut self, inputs: &Self::Inputs, h: f64) -> Result<StepEnd, StepFailure> {
         self.step(inputs, h).map(|()| StepEnd::End)
     }
 
-    /// Changes for good what the present inputs change at once of what is discrete, see
+    /// Applies permanently the discrete changes that the present inputs cause, see
     /// [`Model::apply_present_inputs`].
     fn take_present_inputs(&mut self, inputs: &Self::Inputs) {
         let _ = inputs;
@@ -109,29 +114,30 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// Returns the current outputs.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
 
-    /// Sets the slopes, over a step of length `h`, of inputs that follow from others during it, such
-    /// as a rate from its derivative: those declared by
-    /// [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs). Returns whether there are any.
+    /// Sets the slopes, over a step of size `h` (s), of inputs that follow from other inputs during the step,
+    /// for example a rate from its derivative; these inputs are declared by
+    /// [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs). Returns true if there are
+    /// any.
     fn set_dependent_slopes(inputs: &mut Self::Inputs, h: f64) -> bool {
         let _ = (inputs, h);
         false
     }
 
-    /// The continuous states, in an order of the model's own (see `Variable::state`).
+    /// Returns the continuous states in the model's own order (see `Variable::state`).
     fn continuous_states(&self) -> &[f64];
 
-    /// Takes the continuous states from the host.
+    /// Sets the continuous states (Model Exchange).
     fn set_continuous_states(&mut self, x: &[f64]);
 
-    /// Takes the present time from the host's clock.
+    /// Sets the present time of the host's clock.
     fn set_time(&mut self, now: Instant);
 
-    /// The derivatives of the continuous states.
+    /// Computes the derivatives of the continuous states.
     fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);
 
-    /// Derivatives in the direction of the states `dx` and of the slopes of `along`: of the states'
-    /// derivatives (into `dx_dot`), and of the outputs. What is discrete is held, and so are the
-    /// slopes of `inputs`.
+    /// Computes derivatives in the direction of the states `dx` and of the input slopes in `along`: those of
+    /// the state derivatives are written to `dx_dot`, those of the outputs are returned. Discrete values and
+    /// the slopes of `inputs` are held constant.
     fn directional_derivative(
         &mut self,
         inputs: &Self::Inputs,
@@ -140,20 +146,20 @@ pub trait Model: Clone + Debug + Sized + 'static {
         dx_dot: &mut [f64],
     ) -> Self::Outputs;
 
-    /// Changes what the present inputs change at once of what is discrete, before the model is looked
-    /// at; what is returned goes to [`Model::revert`] afterwards. Where the host handles events,
-    /// discrete changes happen there alone, and neither is called.
+    /// Applies the discrete changes that the present inputs cause, before the model is evaluated. The result
+    /// is passed to [`Model::revert`] afterwards. If the host handles events, discrete values change only in
+    /// event mode, and neither function is called.
     fn apply_present_inputs(&mut self, inputs: &Self::Inputs) -> Self::Discrete {
         let _ = inputs;
         Self::Discrete::default()
     }
 
-    /// Undoes [`Model::apply_present_inputs`].
+    /// Reverts [`Model::apply_present_inputs`].
     fn revert(&mut self, before: Self::Discrete) {
         let _ = before;
     }
 
-    /// Takes over the parameters that can change while the simulation runs.
+    /// Applies changes of tunable parameters while the simulation runs.
     fn tune(
         &mut self,
         parameters: &Self::Parameters,
@@ -163,43 +169,47 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Ok(())
     }
 
-    /// Functions of the states that cross zero at events, [`About::event_indicators`](crate::table::About::event_indicators) of them;
-    /// of a part of the variables the first ones ([`Model::INDICATORS_OF`]).
+    /// Computes the event indicators, functions that change sign at events:
+    /// [`About::event_indicators`](crate::table::About::event_indicators) of them. With a reduced description
+    /// only the first ones are used ([`Model::INDICATORS_OF`]).
     fn event_indicators(&mut self, inputs: &Self::Inputs, indicators: &mut [f64]) {
         let _ = (inputs, indicators);
     }
 
-    /// Does what is due at the present instant and returns whether continuous states have
-    /// changed. On an error nothing has changed.
+    /// Handles the events that are due now. Returns true if continuous states have changed. After an error
+    /// nothing has changed.
     fn handle_event(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
         let _ = inputs;
         Ok(false)
     }
 
-    /// Time of the next event that depends on time alone.
+    /// Returns the time of the next time event, s.
     fn next_time_event(&self) -> Option<f64> {
         None
     }
 
-    /// Model Exchange: the host has accepted a step. Returns whether an event has to be handled
-    /// now, or why the states that the host has set mean nothing.
+    /// Accepts a step of a Model Exchange host. Returns true if an event must be handled now.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the states that the host has set are not valid.
     fn accept_step(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
         let _ = inputs;
         Ok(false)
     }
 
-    /// Warning about the motion so far, or about how a Model Exchange host has driven it; queried
-    /// after each step until there is one.
+    /// Returns a warning about the simulation so far, or about the steps of a Model Exchange host. It is
+    /// called after each step until there is a warning.
     fn step_warning(&self) -> Option<&'static str> {
         None
     }
 
-    /// Number of events since the start.
+    /// Returns the number of events since the start.
     fn event_count(&self) -> i32 {
         0
     }
 
-    /// The last event, for the log: what happened, and when.
+    /// Describes the last event for the log: what happened, and when.
     fn last_event(&self) -> String {
         String::new()
     }

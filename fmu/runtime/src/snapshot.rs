@@ -1,24 +1,25 @@
 //! A saved state as bytes.
 //!
-//! A saved state is a copy of the instance; its bytes are the copy written out,
-//! little-endian, so that they can be moved to another process or machine:
+//! A saved state is a copy of the instance, which is written here in little-endian form, so that it can be
+//! moved to another process or machine:
 //!
 //! | part | bytes |
 //! | --- | --- |
 //! | "FMUstate" | 8 |
 //! | version of this format | 4 |
-//! | length of the whole | 4 |
+//! | total length | 4 |
 //! | GUID or token of the variable table | 38 |
-//! | instance state, flags (1: stop time, 2: model, 4: slopes, 8: slopes of the step before, 16: values of discrete outputs) | 1 + 1 |
-//! | interface, who handles events | 1 + 1 |
+//! | instance state, flags (1: stop time, 2: model, 4: slopes, 8: slopes of the step before, 16: values of
+//! discrete outputs) | 1 + 1 |
+//! | interface, handler of events | 1 + 1 |
 //! | start, stop, tolerance, time, last event | 5 x 8 |
 //! | parameters in the table's order: number, or 0/1 | 8 each |
 //! | inputs: value, slope | 16 each |
-//! | the outputs that are discrete, as the host is shown them | 4 each |
+//! | discrete outputs as the host sees them | 4 each |
 //! | the model's words | 8 each |
 //! | checksum of all before | 16 |
 //!
-//! Everything else about a model follows from its parameters.
+//! Everything else in a model follows from its parameters.
 
 use std::sync::Arc;
 
@@ -40,7 +41,7 @@ const HAS_SLOPES: u8 = 4;
 const HAS_PAST_SLOPES: u8 = 8;
 const HAS_SHOWN: u8 = 16;
 
-/// The number of bytes; the same for every state of a model.
+/// Returns the number of bytes, which is the same for every state of a model.
 pub fn size<M: Model>() -> usize {
     let table = M::table();
     let head = 8 + 4 + 4 + 38 + 4 + 5 * 8;
@@ -49,7 +50,7 @@ pub fn size<M: Model>() -> usize {
     head + set + table.about.saved_words * 8 + 16
 }
 
-/// A state as bytes.
+/// Serialises a saved state.
 pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     let (table, size) = (M::table(), size::<M>());
     let mut bytes = Vec::with_capacity(size);
@@ -64,7 +65,7 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
         | flag(saved.past_slopes, HAS_PAST_SLOPES)
         | flag(!saved.shown.is_empty(), HAS_SHOWN);
     bytes.extend([saved.state as u8, flags, saved.interface as u8, saved.events as u8]);
-    // Until there is one, any finite number serves.
+    // Until the start time is set, any finite number serves.
     let Clock { start, stop, time, last_event, .. } = saved.clock;
     let last_event = last_event.max(f64::MIN);
     let stop = stop.unwrap_or(0.0);
@@ -102,7 +103,11 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     bytes
 }
 
-/// The state that the bytes hold, or why they hold none.
+/// Restores a saved state from bytes.
+///
+/// # Errors
+///
+/// The reason why the bytes are not a saved state of this model.
 pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, String> {
     let (table, size) = (M::table(), size::<M>());
     let model = table.about.model;
@@ -224,8 +229,8 @@ impl Reader<'_> {
         if x.is_finite() { Ok(x) } else { Err(format!("the saved state is damaged: {what}")) }
     }
 
-    /// A parameter's value, of the same type as `like`. Wrong values are
-    /// possible: they can be saved before initialization ends.
+    /// Reads the value of a parameter of the same type as `like`. It need not be in its range, because a
+    /// state can be saved before initialization ends.
     fn value<M: Model>(&mut self, scalar: &Scalar<M>, like: Value) -> Result<Value, String> {
         let bytes = self.take()?;
         let number = i32::try_from(i64::from_le_bytes(bytes));

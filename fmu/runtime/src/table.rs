@@ -1,7 +1,7 @@
-//! A model's table of variables, and what follows from it.
+//! A model's table of variables, and everything that follows from it.
 //!
-//! A variable exists exactly when it has an entry in the table. The model description, the value
-//! references, get and set, start values, range checks, saved states and the GUID follow.
+//! A variable exists exactly if it has an entry in the table. The model description, the value references,
+//! reading and setting, start values, range checks, saved states and the GUID follow from it.
 
 use std::sync::OnceLock;
 
@@ -14,9 +14,9 @@ use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Va
 /// Properties of the FMU as a whole.
 #[derive(Clone, Copy, Debug)]
 pub struct About {
-    /// The FMU's name in every sense: modelName, modelIdentifier, file name.
+    /// Name of the FMU: modelName, modelIdentifier and file name.
     pub model: &'static str,
-    /// The version of model and table.
+    /// Version of the model and its table.
     pub version: &'static str,
     /// Description of the FMU.
     pub description: &'static str,
@@ -28,15 +28,15 @@ pub struct About {
     pub saved_words: usize,
 }
 
-/// All data of a model's variables. It takes no memory from the heap: a host may
-/// load and unload the FMU as often as it likes.
+/// All data about a model's variables. It uses no heap memory, so that a host may load and unload the FMU any
+/// number of times.
 #[derive(Debug)]
 pub struct Table<M: Model> {
     /// Properties of the FMU as a whole.
     pub about: About,
     /// The variables.
     pub variables: &'static [Variable<M>],
-    /// Every scalar. Made by [`scalars`].
+    /// All scalars, made by [`scalars`].
     pub scalars: &'static [Scalar<M>],
     inputs: Span,
     parameters: Span,
@@ -45,29 +45,29 @@ pub struct Table<M: Model> {
     tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
 }
 
-/// Form of a table's entries as FMI variables.
+/// Correspondence of the table's entries to variables of FMI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Layout {
     /// Each element of an array is a variable.
     Scalars = 0,
-    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that size arrays are
-    /// structural.
+    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that size arrays
+    /// are structural.
     Arrays = 1,
 }
 
 impl Layout {
-    /// Both.
+    /// Both layouts.
     pub const ALL: [Layout; 2] = [Layout::Scalars, Layout::Arrays];
 }
 
-/// Length of a GUID in braces.
+/// Length of a GUID with braces.
 pub const GUID_LENGTH: usize = 38;
 
-/// Scalars that follow each other: the first, and the one after the last.
+/// Consecutive scalars: index of the first, and of the one after the last.
 type Span = (usize, usize);
 
-/// Range of the scalars of one kind in a table.
+/// Returns the range of the scalars of one kind: 'i' inputs, 'p' parameters, otherwise derivatives.
 const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
     let (mut begin, mut end, mut n) = (0, 0, 0);
     while n < scalars.len() {
@@ -91,27 +91,28 @@ const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
     (begin, end)
 }
 
-/// One scalar of the table.
+/// A scalar of the table.
 #[derive(Debug)]
 pub struct Scalar<M: Model> {
-    /// Entry.
+    /// Entry of the table.
     pub variable: &'static Variable<M>,
     /// Access of the entry, copied here because every call needs it.
     pub access: Access<M>,
-    /// The C type that it is got and set with, likewise.
+    /// C type in which it is read and set, copied here for the same reason.
     pub c_type: CType,
-    /// Place among the model's continuous states, if it is one, likewise.
+    /// Index function of a continuous state, copied here for the same reason.
     pub state: Option<Place>,
-    /// Place among all scalars, from which its value reference follows (see
+    /// Index among all scalars, from which the value reference follows (see
     /// [`Version`](crate::version::Version)).
     pub index: u32,
-    /// Place in the array, 0 for the first.
+    /// Number of the element in its array, 0 for the first.
     pub element: usize,
-    /// Number of scalar parameters before it; for a discrete output, number of discrete outputs before it.
+    /// For a parameter the number of scalar parameters before it; for a discrete output the number of
+    /// discrete outputs before it.
     pub slot: usize,
 }
 
-// Derived, these would ask the same of M.
+// Derived implementations would require the same of M.
 impl<M: Model> Clone for Scalar<M> {
     fn clone(&self) -> Self {
         *self
@@ -119,7 +120,7 @@ impl<M: Model> Clone for Scalar<M> {
 }
 impl<M: Model> Copy for Scalar<M> {}
 
-/// Number of scalars of a table.
+/// Returns the number of scalars of a table.
 pub const fn scalar_count<M: Model>(variables: &[Variable<M>]) -> usize {
     let (mut count, mut entry) = (0, 0);
     while entry < variables.len() {
@@ -129,7 +130,7 @@ pub const fn scalar_count<M: Model>(variables: &[Variable<M>]) -> usize {
     count
 }
 
-/// Every scalar of a table; N is [`scalar_count`].
+/// Returns all scalars of a table; N is [`scalar_count`].
 pub const fn scalars<M: Model, const N: usize>(
     variables: &'static [Variable<M>],
 ) -> [Scalar<M>; N] {
@@ -177,30 +178,30 @@ const fn is_discrete<M: Model>(variable: &Variable<M>) -> bool {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns the name, with its indices in an array.
+    /// Returns the name, with indices for the element of an array.
     pub fn name(&self) -> String {
         self.variable.element_name(self.element)
     }
 
-    /// Returns the place among the model's continuous states, if it is one.
+    /// Returns the index among the model's continuous states, if it is one.
     #[inline]
     pub fn state(&self) -> Option<usize> {
         self.state.map(|place| place(self.element))
     }
 
-    /// Error in a value of it, in words.
+    /// Returns an error if the value is not allowed.
     #[inline]
     pub fn problem(&self, value: Value) -> Option<String> {
         self.variable.problem(self.element, value)
     }
 
-    /// Returns the value before the host sets anything: `None` when it is computed.
+    /// Returns the start value, or `None` if the scalar is computed.
     pub fn start(&self) -> Option<Value> {
         let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
         self.variable.start(&mut parameters, &mut inputs, self.element)
     }
 
-    /// The inputs and continuous states that it depends on without delay.
+    /// Returns the inputs and continuous states on which it depends without delay.
     pub fn depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
         let known = M::table()
             .scalars
@@ -209,7 +210,7 @@ impl<M: Model> Scalar<M> {
         known.filter(|s| self.names(self.variable.depends_on, s))
     }
 
-    /// The inputs and parameters that its initial value depends on.
+    /// Returns the inputs and parameters on which its initial value depends.
     pub fn initial_depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
         let known = M::table()
             .scalars
@@ -221,7 +222,7 @@ impl<M: Model> Scalar<M> {
         })
     }
 
-    /// Returns true if `other` is among the names of a list of dependencies.
+    /// Returns true if a list of dependencies contains `other`.
     fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
         let v = other.variable;
         names.iter().any(|name| match name.strip_suffix("[]") {
@@ -236,7 +237,7 @@ impl<M: Model> Scalar<M> {
 }
 
 impl<M: Model> Table<M> {
-    /// A model's table.
+    /// Creates a model's table.
     pub const fn new(
         about: About,
         variables: &'static [Variable<M>],
@@ -254,13 +255,13 @@ impl<M: Model> Table<M> {
         }
     }
 
-    /// The index of a scalar's name, which is its value reference in FMI 2.0.
+    /// Finds a scalar by its name and returns its index, which is its value reference in FMI 2.0.
     pub fn find(&self, name: &str) -> Option<u32> {
         self.scalars.iter().position(|s| s.name() == name).map(|n| n as u32)
     }
 
-    /// A hash of what a host depends on and of the version: a host that brings another one has
-    /// read another model description. Descriptions do not count.
+    /// Returns a hash of everything on which a host depends, and of the version. A host that passes another
+    /// GUID has read another model description. Descriptions of variables do not count.
     pub fn guid(&self) -> &str {
         let bytes = self.guid.get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
@@ -270,8 +271,8 @@ impl<M: Model> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// Returns the instantiationToken of a model description of FMI 3.0, a hash like the GUID. Scalars and arrays have different
-    /// tokens, so the binary knows which description a host has read.
+    /// Returns the instantiationToken of a model description of FMI 3.0, a hash like the GUID. The layouts
+    /// have different tokens, so that the binary knows which description a host has read.
     pub fn token(&self, layout: Layout) -> &str {
         let bytes = self.tokens[layout as usize].get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
@@ -292,48 +293,48 @@ impl<M: Model> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// Returns true if a parameter sizes arrays: it is structural if arrays are variables.
+    /// Returns true if a parameter sizes arrays, which makes it structural if arrays are variables.
     pub fn is_structural(&self, variable: &Variable<M>) -> bool {
         let sizes =
             |d: &Dimension| matches!(d, Dimension::Sized(name, _) if *name == variable.name);
         self.variables.iter().any(|v| v.shape.iter().any(sizes))
     }
 
-    /// The outputs that are discrete, in the table's order, each at its slot.
+    /// Returns the discrete outputs in the order of the table, each at its slot.
     pub fn discrete(&self) -> impl Iterator<Item = &'static Scalar<M>> + use<M> {
         self.scalars.iter().filter(|scalar| is_discrete(scalar.variable))
     }
 
-    /// The parameters' start values, in the table's order.
+    /// Returns the start values of the parameters in the order of the table.
     pub fn starts(&self) -> Vec<Value> {
         let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
         let start = |s: &Scalar<M>| s.variable.start(&mut parameters, &mut inputs, s.element);
         self.parameters().iter().filter_map(start).collect()
     }
 
-    /// The scalar inputs, in the table's order.
+    /// Returns the scalar inputs in the order of the table.
     #[inline]
     pub const fn inputs(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.inputs;
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// The scalar parameters, in the table's order.
+    /// Returns the scalar parameters in the order of the table.
     #[inline]
     pub const fn parameters(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.parameters;
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// The derivatives of the continuous states: this is the order in which a Model Exchange host
-    /// has states, derivatives and nominals.
+    /// Returns the derivatives of the continuous states. Their order is that of states, derivatives and
+    /// nominal values in Model Exchange.
     #[inline]
     pub const fn derivatives(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.derivatives;
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// The places in the model of the continuous states, in the host's order.
+    /// Returns the indices in the model of the continuous states, in the host's order.
     pub fn places(&self) -> impl ExactSizeIterator<Item = usize> + use<M> {
         self.derivatives().iter().map(|s| match s.access {
             Access::Derivative(place) => place(s.element),
@@ -341,12 +342,12 @@ impl<M: Model> Table<M> {
         })
     }
 
-    /// The variable of the continuous state at a place in the model.
+    /// Finds the scalar of the continuous state with this index in the model.
     pub fn state_at(&self, place: usize) -> Option<&'static Scalar<M>> {
         self.scalars.iter().find(|s| s.state() == Some(place))
     }
 
-    /// The units that the variables use.
+    /// Returns the units that the variables use.
     pub fn units(&self) -> impl Iterator<Item = &'static Unit> {
         let used = |unit: &&Unit| {
             self.variables
@@ -356,7 +357,7 @@ impl<M: Model> Table<M> {
         unit::UNITS.iter().filter(used)
     }
 
-    /// The enumeration types that the variables use, in the order of their first use.
+    /// Returns the enumerations that the variables use, in the order of their first use.
     pub fn enumerations(&self) -> Vec<&'static Enumeration> {
         let mut all: Vec<&'static Enumeration> = Vec::new();
         for v in self.variables {
@@ -417,7 +418,7 @@ impl<M: Model> Table<M> {
     }
 }
 
-/// A hash in the form of a GUID.
+/// Formats a hash like a GUID.
 fn braced(hash: Hash) -> String {
     let hex = format!("{:032x}", hash.value());
     format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])

@@ -1,13 +1,13 @@
-//! Units: a table of variables names them, the model description defines them.
+//! Units, which tables of variables name and the model description defines.
 
-/// A unit as a product of powers of SI base units, and what people read instead.
+/// A unit as a product of powers of SI base units, with its display units.
 #[derive(Debug)]
 pub struct Unit {
-    /// Name in variables.
+    /// Name that variables use.
     pub name: &'static str,
-    /// Exponents of kg, m, s, rad; `None` when they are not integers.
+    /// Exponents of kg, m, s, rad; `None` if they are not integers.
     pub base: Option<[i32; 4]>,
-    /// Units to display it in, each with the number that multiplies the value.
+    /// Display units, each with the factor by which a value is multiplied.
     pub display_units: &'static [(&'static str, f64)],
 }
 
@@ -22,7 +22,7 @@ const fn unit(
     Unit { name, base: Some([kg, m, s, rad]), display_units }
 }
 
-/// Every unit known; a model description holds those that its variables use.
+/// All units; a model description contains those that its variables use.
 #[rustfmt::skip]
 pub static UNITS: &[Unit] = &[
     //                kg  m   s  rad
@@ -52,7 +52,8 @@ pub static UNITS: &[Unit] = &[
     unit("N.m",     [ 1,  2, -2, 0], &[("mN.m", 1e3)]),
     unit("N.m.s",   [ 1,  2, -1, 0], &[]),
     unit("N.m/s",   [ 1,  2, -3, 0], &[]),
-    // The radian of a torsional stiffness or damping is what the torque is proportional to.
+    // The radian of a torsional stiffness or damping is that of the angle or rate to which the torque is
+    // proportional.
     unit("N.m/rad", [ 1,  2, -2, -1], &[]),
     unit("N.m.s/rad", [ 1, 2, -1, -1], &[]),
     unit("kg.m2",   [ 1,  2,  0, 0], &[]),
@@ -63,7 +64,7 @@ pub static UNITS: &[Unit] = &[
     Unit { name: "rad/s/sqrt(s)", base: None, display_units: &[] },
 ];
 
-/// The unit of this name.
+/// Finds a unit by its name.
 pub fn find(name: &str) -> Option<&'static Unit> {
     UNITS.iter().find(|unit| unit.name == name)
 }

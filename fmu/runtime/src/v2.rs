@@ -1,9 +1,13 @@
-//! FMI 2.0, Model Exchange and Co-Simulation: 44 functions, their names, signatures and numbers.
+//! The C interface of FMI 2.0 for Model Exchange and Co-Simulation: 44 functions with their names, signatures
+//! and constants. The standard documents them; comments here describe only what is particular to this
+//! implementation.
 //!
-//! Every function is generic in the model; [`crate::export_fmi2`] exports them for one model under
-//! their names. What the functions mean is in [`crate::instance`] and [`crate::snapshot`], what C
-//! asks for in any version in [`crate::c_abi`].
+//! Every function is generic in the model; [`crate::export_fmi2`] exports them for one model under their
+//! names. Their effects are implemented in [`crate::instance`] and [`crate::snapshot`], the common part of
+//! the C interface in [`crate::c_abi`].
 
+// The standard documents these names.
+#![allow(missing_docs)]
 #![allow(unsafe_code)]
 // The names are the standard's.
 #![allow(non_camel_case_types, non_upper_case_globals, non_snake_case)]
@@ -32,61 +36,37 @@ use crate::table::{Layout, Scalar};
 use crate::variable::Value;
 use crate::version::Version;
 
-/// An instance, opaque to the host.
 pub type fmi2Component = *mut c_void;
-/// The host's own pointer, handed back to it.
 pub type fmi2ComponentEnvironment = *mut c_void;
-/// A saved state, opaque to the host.
 pub type fmi2FMUstate = *mut c_void;
-/// The number of a variable.
 pub type fmi2ValueReference = c_uint;
-/// A real number.
 pub type fmi2Real = f64;
-/// An integer.
 pub type fmi2Integer = c_int;
-/// 0 is false, everything else true.
+/// 0 is false, any other value is true.
 pub type fmi2Boolean = c_int;
-/// A character.
 pub type fmi2Char = c_char;
-/// Text that ends with NUL.
 pub type fmi2String = *const fmi2Char;
-/// A byte of a saved state.
 pub type fmi2Byte = c_char;
 
-/// Return value of a call.
 pub type fmi2Status = c_abi::Status;
-/// All is well.
 pub const fmi2OK: fmi2Status = c_abi::OK;
-/// Never returned.
 pub const fmi2Warning: fmi2Status = c_abi::WARNING;
-/// The question has no answer.
 pub const fmi2Discard: fmi2Status = c_abi::DISCARD;
-/// The call was refused or failed.
 pub const fmi2Error: fmi2Status = c_abi::ERROR;
-/// The instance is unusable.
 pub const fmi2Fatal: fmi2Status = c_abi::FATAL;
-/// Never returned.
 pub const fmi2Pending: fmi2Status = 5;
 
-/// Interface type that the host requests.
 pub type fmi2Type = c_int;
-/// Model Exchange.
 pub const fmi2ModelExchange: fmi2Type = 0;
-/// Co-Simulation.
 pub const fmi2CoSimulation: fmi2Type = 1;
 
-/// Kind of status queried by fmi2GetStatus and related functions.
 pub type fmi2StatusKind = c_int;
-/// The result of an asynchronous step.
 pub const fmi2DoStepStatus: fmi2StatusKind = 0;
-/// Status of an asynchronous step.
 pub const fmi2PendingStatus: fmi2StatusKind = 1;
-/// Time that the last step reached.
 pub const fmi2LastSuccessfulTime: fmi2StatusKind = 2;
-/// True if the FMU wants to end the simulation.
 pub const fmi2Terminated: fmi2StatusKind = 3;
 
-/// The host's logger: printf with a few words before.
+/// The host's logger, which formats the message like printf.
 pub type fmi2CallbackLogger = Option<
     unsafe extern "C" fn(
         environment: fmi2ComponentEnvironment,
@@ -98,7 +78,7 @@ pub type fmi2CallbackLogger = Option<
     ),
 >;
 
-/// The host's functions. Only the logger is used; each may be NULL.
+/// Callbacks of the host. Only the logger is used; each may be NULL.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
@@ -112,12 +92,8 @@ pub struct fmi2CallbackFunctions {
 
 // ---- Which functions there are, and when each may be called ----
 
-const fn both(name: &'static str, allowed: u16) -> Call {
-    Call::new(name, allowed)
-}
-
-const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
-    Call::new(name, allowed).of(c_type)
+const fn typed(c_type: CType, name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed).with_type(c_type)
 }
 
 /// Restricts a call to Co-Simulation.
@@ -130,39 +106,37 @@ const fn me(call: Call) -> Call {
     call.only_in(Interface::ModelExchange)
 }
 
-/// Functions of FMI 2.0, with the instance states that allow them: those for several types of one operation, and those that only
-/// the C interface has.
+/// Functions of FMI 2.0 with the instance states that allow them, as far as they are not in [`Version`].
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {
     use super::*;
-    pub static SET_DEBUG_LOGGING:   Call = both("fmi2SetDebugLogging", ANY);
-    // Parameters and inputs can be read from the start; everything else has a
-    // value from initialization mode on. Which variable can be set when is the
-    // variable's business.
-    pub static GET_REAL:            Call = of(CType::Real, "fmi2GetReal", ANY);
-    pub static GET_INTEGER:         Call = of(CType::Integer, "fmi2GetInteger", ANY);
-    pub static GET_BOOLEAN:         Call = of(CType::Boolean, "fmi2GetBoolean", ANY);
-    pub static GET_STRING:          Call = of(CType::String, "fmi2GetString", ANY);
-    pub static SET_REAL:            Call = of(CType::Real, "fmi2SetReal", I | M | S | E | C);
-    pub static SET_INTEGER:         Call = of(CType::Integer, "fmi2SetInteger", I | M | S | E | C);
-    pub static SET_BOOLEAN:         Call = of(CType::Boolean, "fmi2SetBoolean", I | M | S | E | C);
-    pub static SET_STRING:          Call = of(CType::String, "fmi2SetString", I | M | S | E | C);
-    pub static GET_STATE:           Call = both("fmi2GetFMUstate", ANY);
-    pub static FREE_STATE:          Call = both("fmi2FreeFMUstate", ANY | FATAL);
-    pub static SERIALIZED_SIZE:     Call = both("fmi2SerializedFMUstateSize", ANY);
-    pub static SERIALIZE:           Call = both("fmi2SerializeFMUstate", ANY);
-    pub static DESERIALIZE:         Call = both("fmi2DeSerializeFMUstate", ANY);
-    pub static CANCEL_STEP:         Call = cs(both("fmi2CancelStep", S));
-    pub static GET_STATUS:          Call = cs(both("fmi2GetStatus", ANY));
-    pub static GET_REAL_STATUS:     Call = cs(both("fmi2GetRealStatus", ANY));
-    pub static GET_INTEGER_STATUS:  Call = cs(both("fmi2GetIntegerStatus", ANY));
-    pub static GET_BOOLEAN_STATUS:  Call = cs(both("fmi2GetBooleanStatus", ANY));
-    pub static GET_STRING_STATUS:   Call = cs(both("fmi2GetStringStatus", ANY));
+    pub static SET_DEBUG_LOGGING:   Call = Call::new("fmi2SetDebugLogging", ANY);
+    // Parameters and inputs can be read from the start; all other variables have values from initialization
+    // mode on. When a variable can be set depends on the variable.
+    pub static GET_REAL:            Call = typed(CType::Real, "fmi2GetReal", ANY);
+    pub static GET_INTEGER:         Call = typed(CType::Integer, "fmi2GetInteger", ANY);
+    pub static GET_BOOLEAN:         Call = typed(CType::Boolean, "fmi2GetBoolean", ANY);
+    pub static GET_STRING:          Call = typed(CType::String, "fmi2GetString", ANY);
+    pub static SET_REAL:            Call = typed(CType::Real, "fmi2SetReal", I | M | S | E | C);
+    pub static SET_INTEGER:         Call = typed(CType::Integer, "fmi2SetInteger", I | M | S | E | C);
+    pub static SET_BOOLEAN:         Call = typed(CType::Boolean, "fmi2SetBoolean", I | M | S | E | C);
+    pub static SET_STRING:          Call = typed(CType::String, "fmi2SetString", I | M | S | E | C);
+    pub static GET_STATE:           Call = Call::new("fmi2GetFMUstate", ANY);
+    pub static FREE_STATE:          Call = Call::new("fmi2FreeFMUstate", ANY | FATAL);
+    pub static SERIALIZED_SIZE:     Call = Call::new("fmi2SerializedFMUstateSize", ANY);
+    pub static SERIALIZE:           Call = Call::new("fmi2SerializeFMUstate", ANY);
+    pub static DESERIALIZE:         Call = Call::new("fmi2DeSerializeFMUstate", ANY);
+    pub static CANCEL_STEP:         Call = cs(Call::new("fmi2CancelStep", S));
+    pub static GET_STATUS:          Call = cs(Call::new("fmi2GetStatus", ANY));
+    pub static GET_REAL_STATUS:     Call = cs(Call::new("fmi2GetRealStatus", ANY));
+    pub static GET_INTEGER_STATUS:  Call = cs(Call::new("fmi2GetIntegerStatus", ANY));
+    pub static GET_BOOLEAN_STATUS:  Call = cs(Call::new("fmi2GetBooleanStatus", ANY));
+    pub static GET_STRING_STATUS:   Call = cs(Call::new("fmi2GetStringStatus", ANY));
 }
 pub use list::*;
 
-/// FMI 2.0
+/// FMI 2.0.
 #[derive(Clone, Copy, Debug)]
 pub struct Fmi2;
 
@@ -177,31 +151,31 @@ impl Version for Fmi2 {
     const FIRST_EVENT: InstanceState = InstanceState::Initialized;
     const SETS_STATES: bool = false;
 
-    const SETUP_EXPERIMENT:       &'static Call = &both("fmi2SetupExperiment", I);
-    const ENTER_INITIALIZATION:   &'static Call = &both("fmi2EnterInitializationMode", I);
-    const EXIT_INITIALIZATION:    &'static Call = &both("fmi2ExitInitializationMode", M);
-    const TERMINATE:              &'static Call = &both("fmi2Terminate", S | E | C | F);
-    const RESET:                  &'static Call = &both("fmi2Reset", ANY);
-    const SET_STATE:              &'static Call = &both("fmi2SetFMUstate", ANY);
-    const DIRECTIONAL_DERIVATIVE: &'static Call = &of(CType::Real, "fmi2GetDirectionalDerivative", M | RUN);
+    const SETUP_EXPERIMENT:       &'static Call = &Call::new("fmi2SetupExperiment", I);
+    const ENTER_INITIALIZATION:   &'static Call = &Call::new("fmi2EnterInitializationMode", I);
+    const EXIT_INITIALIZATION:    &'static Call = &Call::new("fmi2ExitInitializationMode", M);
+    const TERMINATE:              &'static Call = &Call::new("fmi2Terminate", S | E | C | F);
+    const RESET:                  &'static Call = &Call::new("fmi2Reset", ANY);
+    const SET_STATE:              &'static Call = &Call::new("fmi2SetFMUstate", ANY);
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &typed(CType::Real, "fmi2GetDirectionalDerivative", M | RUN);
 
-    const SET_INPUT_DERIVATIVES:  &'static Call = &cs(of(CType::Real, "fmi2SetRealInputDerivatives", I | M | S));
-    const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(of(CType::Real, "fmi2GetRealOutputDerivatives", RUN));
-    const DO_STEP:                &'static Call = &cs(both("fmi2DoStep", S));
+    const SET_INPUT_DERIVATIVES:  &'static Call = &cs(typed(CType::Real, "fmi2SetRealInputDerivatives", I | M | S));
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(typed(CType::Real, "fmi2GetRealOutputDerivatives", RUN));
+    const DO_STEP:                &'static Call = &cs(Call::new("fmi2DoStep", S));
 
-    // The standard has this in continuous-time mode alone; OpenModelica up to 1.27 calls it in
-    // the event mode after initialization too.
-    const ENTER_EVENT:            &'static Call = &me(both("fmi2EnterEventMode", E | C));
-    const NEW_DISCRETE_STATES:    &'static Call = &me(both("fmi2NewDiscreteStates", E));
-    const ENTER_CONTINUOUS_TIME:  &'static Call = &me(both("fmi2EnterContinuousTimeMode", E));
-    const COMPLETED_STEP:         &'static Call = &me(both("fmi2CompletedIntegratorStep", C));
-    const SET_TIME:               &'static Call = &me(both("fmi2SetTime", E | C));
-    // As above.
-    const SET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi2SetContinuousStates", E | C));
-    const GET_DERIVATIVES:        &'static Call = &me(both("fmi2GetDerivatives", M | E | C | T | F));
-    const GET_EVENT_INDICATORS:   &'static Call = &me(both("fmi2GetEventIndicators", M | E | C | T | F));
-    const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi2GetContinuousStates", M | E | C | T | F));
-    const GET_NOMINALS:           &'static Call = &me(both("fmi2GetNominalsOfContinuousStates", ANY));
+    // The standard allows this only in continuous-time mode, but OpenModelica up to 1.27 also calls it in
+    // the event mode after initialization.
+    const ENTER_EVENT:            &'static Call = &me(Call::new("fmi2EnterEventMode", E | C));
+    const NEW_DISCRETE_STATES:    &'static Call = &me(Call::new("fmi2NewDiscreteStates", E));
+    const ENTER_CONTINUOUS_TIME:  &'static Call = &me(Call::new("fmi2EnterContinuousTimeMode", E));
+    const COMPLETED_STEP:         &'static Call = &me(Call::new("fmi2CompletedIntegratorStep", C));
+    const SET_TIME:               &'static Call = &me(Call::new("fmi2SetTime", E | C));
+    // As for `ENTER_EVENT`.
+    const SET_CONTINUOUS_STATES:  &'static Call = &me(Call::new("fmi2SetContinuousStates", E | C));
+    const GET_DERIVATIVES:        &'static Call = &me(Call::new("fmi2GetDerivatives", M | E | C | T | F));
+    const GET_EVENT_INDICATORS:   &'static Call = &me(Call::new("fmi2GetEventIndicators", M | E | C | T | F));
+    const GET_CONTINUOUS_STATES:  &'static Call = &me(Call::new("fmi2GetContinuousStates", M | E | C | T | F));
+    const GET_NOMINALS:           &'static Call = &me(Call::new("fmi2GetNominalsOfContinuousStates", ANY));
 
     fn token<M: Model>(_: Layout) -> &'static str {
         M::table().guid()
@@ -244,7 +218,7 @@ fn wrong_reference<M: Model>(reference: u32, found: Option<&Scalar<M>>) -> Strin
 
 // ---- Inquiry, life and death ----
 
-/// "default": the C types above.
+/// Returns "default": the C types of this file.
 pub fn fmi2GetTypesPlatform() -> fmi2String {
     c"default".as_ptr()
 }
@@ -254,7 +228,6 @@ pub fn fmi2GetVersion() -> fmi2String {
     c"2.0".as_ptr()
 }
 
-/// Chooses what is logged.
 pub unsafe fn fmi2SetDebugLogging<M: Model>(
     c: fmi2Component,
     loggingOn: fmi2Boolean,
@@ -272,13 +245,13 @@ pub unsafe fn fmi2SetDebugLogging<M: Model>(
             for category in array(call, "categories", categories, nCategories)? {
                 names.push(text(*category).ok_or_else(|| null(call, "categories[]"))?);
             }
-            component.log.filter = Filter::of(&names, M::table()).map_err(|why| call.error(why))?;
+            component.log.filter =
+                Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))?;
             Ok(())
         })
     }
 }
 
-/// Makes an instance. On failure it returns NULL and logs the reason.
 pub unsafe fn fmi2Instantiate<M: Model>(
     instanceName: fmi2String,
     fmuType: fmi2Type,
@@ -310,19 +283,23 @@ pub unsafe fn fmi2Instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// The host's logger. Its struct need not outlive fmi2Instantiate.
+/// Wraps the host's logger. The struct of callbacks need not exist after fmi2Instantiate has returned.
 fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Option<Logger> {
     let logger = functions.logger?;
     let environment = functions.componentEnvironment;
     let name = c_string(instance_name.unwrap_or(""));
-    // The text is an argument, not the format: it may contain a percent sign.
+    // The text is passed as an argument and not as the format, because it may contain a percent sign.
     Some(Box::new(move |status, category, message| unsafe {
         let (category, message) = (category.as_ptr(), message.as_ptr());
         logger(environment, name.as_ptr(), status, category, c"%s".as_ptr(), message);
     }))
 }
 
-/// Interface of the requested instance and the part of the variables that the host knows, or the reason why it cannot be created.
+/// Returns the interface of the requested instance and the part of the variables that the host knows.
+///
+/// # Errors
+///
+/// The reason why the instance cannot be created.
 fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,
@@ -354,12 +331,10 @@ fn interface<M: Model>(
     }
 }
 
-/// Frees an instance; NULL is fine.
 pub unsafe fn fmi2FreeInstance<M: Model>(c: fmi2Component) {
     unsafe { free_component::<M, Fmi2>(c) }
 }
 
-/// Sets start time, stop time and tolerance.
 pub unsafe fn fmi2SetupExperiment<M: Model>(
     c: fmi2Component,
     toleranceDefined: fmi2Boolean,
@@ -377,7 +352,7 @@ pub unsafe fn fmi2SetupExperiment<M: Model>(
     }
 }
 
-/// Enters initialization mode; all variables can be read from here on.
+/// Enters initialization mode, from which on all variables can be read.
 pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on::<M, Fmi2>(c, Fmi2::ENTER_INITIALIZATION, |component| {
@@ -386,7 +361,8 @@ pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Sta
     }
 }
 
-/// Leaves initialization mode: parameters are fixed (in Model Exchange from the next call that goes on), and steps are allowed.
+/// Leaves initialization mode: parameters are fixed from here on (in Model Exchange from the next call that
+/// continues the simulation), and steps are allowed.
 pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on_start::<M, Fmi2>(c, Fmi2::EXIT_INITIALIZATION, |component| {
@@ -395,19 +371,17 @@ pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Stat
     }
 }
 
-/// Ends the simulation; values can still be read.
 pub unsafe fn fmi2Terminate<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe { on_start::<M, Fmi2>(c, Fmi2::TERMINATE, |component| component.instance.terminate()) }
 }
 
-/// Resets the instance to its state after instantiation.
 pub unsafe fn fmi2Reset<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe { on::<M, Fmi2>(c, Fmi2::RESET, |component| component.instance.reset()) }
 }
 
 // ---- Values ----
 
-/// The values of all references, each turned into its C type by `as_c`.
+/// Reads the variables of all references and converts each value to its C type by `as_c`.
 #[inline]
 unsafe fn get<M: Model, T>(
     c: fmi2Component,
@@ -428,7 +402,7 @@ unsafe fn get<M: Model, T>(
     }
 }
 
-/// Sets all references, each from its C type by `from_c`.
+/// Sets the variables of all references; each value is converted from its C type by `from_c`.
 #[inline]
 unsafe fn set<M: Model, T: Copy>(
     c: fmi2Component,
@@ -445,8 +419,9 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Functions that get or set variables of a type by `$access`, with a conversion from or to the C type.
-macro_rules! of_type {
+/// Defines functions that read or set variables of one type by `$access`, with a conversion to or from the C
+/// type.
+macro_rules! accessors {
     ($($(#[$doc:meta])* $name:ident($value:ty): $access:ident, $call:expr, $convert:expr;)*) => {$(
         $(#[$doc])*
         pub unsafe fn $name<M: Model>(
@@ -460,28 +435,23 @@ macro_rules! of_type {
     )*};
 }
 
-of_type! {
-    /// Reads reals.
+accessors! {
     fmi2GetReal(*mut fmi2Real): get, &GET_REAL, Value::real;
-    /// Reads integers and enumerations.
     fmi2GetInteger(*mut fmi2Integer): get, &GET_INTEGER, Value::integer;
-    /// Reads Booleans: 0 or 1.
+    /// Reads Booleans as 0 or 1.
     fmi2GetBoolean(*mut fmi2Boolean): get, &GET_BOOLEAN, |value| value.boolean().map(i32::from);
-    /// There are no strings.
     fmi2GetString(*mut fmi2String): get, &GET_STRING, |_| None;
-    /// Sets reals.
     fmi2SetReal(*const fmi2Real): set, &SET_REAL, Value::Real;
-    /// Sets integers and enumerations.
     fmi2SetInteger(*const fmi2Integer): set, &SET_INTEGER, Value::Integer;
-    /// Sets Booleans: everything but 0 is true.
+    /// Sets Booleans; every value except 0 is true.
     fmi2SetBoolean(*const fmi2Boolean): set, &SET_BOOLEAN, |b| Value::Boolean(b != 0);
-    /// There are no strings: the value is never looked at.
+    /// Refuses every reference, because there are no strings; the values are never read.
     fmi2SetString(*const fmi2String): set, &SET_STRING, |_| Value::Boolean(false);
 }
 
 // ---- Saved states ----
 
-/// Saves the state, into the handle that is there or into a new one.
+/// Saves the state into the existing handle, or into a new one if it is NULL.
 pub unsafe fn fmi2GetFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: *mut fmi2FMUstate,
@@ -494,7 +464,7 @@ pub unsafe fn fmi2GetFMUstate<M: Model>(
     }
 }
 
-/// Takes a saved state, this instance's or another's, in any instance state.
+/// Restores a saved state of this or another instance, in any instance state.
 pub unsafe fn fmi2SetFMUstate<M: Model>(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
     let call = Fmi2::SET_STATE;
     unsafe {
@@ -504,7 +474,7 @@ pub unsafe fn fmi2SetFMUstate<M: Model>(c: fmi2Component, FMUstate: fmi2FMUstate
     }
 }
 
-/// Frees a saved state and clears the handle; NULL is fine.
+/// Frees a saved state and sets the handle to NULL; NULL is allowed.
 pub unsafe fn fmi2FreeFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: *mut fmi2FMUstate,
@@ -513,7 +483,6 @@ pub unsafe fn fmi2FreeFMUstate<M: Model>(
     unsafe { on::<M, Fmi2>(c, call, |_| free_state::<M, Fmi2>(call, "FMUstate", FMUstate)) }
 }
 
-/// Returns the size of a saved state in bytes.
 pub unsafe fn fmi2SerializedFMUstateSize<M: Model>(
     c: fmi2Component,
     FMUstate: fmi2FMUstate,
@@ -529,7 +498,6 @@ pub unsafe fn fmi2SerializedFMUstateSize<M: Model>(
     }
 }
 
-/// Writes a saved state to the host's bytes.
 pub unsafe fn fmi2SerializeFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: fmi2FMUstate,
@@ -545,7 +513,6 @@ pub unsafe fn fmi2SerializeFMUstate<M: Model>(
     }
 }
 
-/// Makes a saved state from bytes.
 pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
     c: fmi2Component,
     serializedState: *const fmi2Byte,
@@ -561,7 +528,7 @@ pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
     }
 }
 
-/// Derivative of the unknowns along a direction of the knowns.
+/// Computes the derivative of the unknowns in a direction of the knowns.
 pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
     c: fmi2Component,
     vUnknown_ref: *const fmi2ValueReference,
@@ -598,14 +565,13 @@ pub struct fmi2EventInfo {
     pub nextEventTime: fmi2Real,
 }
 
-/// Enters event mode.
 pub unsafe fn fmi2EnterEventMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode())
     }
 }
 
-/// Does what is due at the event.
+/// Handles the events that are due.
 pub unsafe fn fmi2NewDiscreteStates<M: Model>(
     c: fmi2Component,
     eventInfo: *mut fmi2EventInfo,
@@ -629,7 +595,6 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(
     }
 }
 
-/// Enters continuous-time mode.
 pub unsafe fn fmi2EnterContinuousTimeMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| {
@@ -638,8 +603,8 @@ pub unsafe fn fmi2EnterContinuousTimeMode<M: Model>(c: fmi2Component) -> fmi2Sta
     }
 }
 
-/// The host has made a step and will not go back behind it. No past is kept, so
-/// `noSetFMUStatePriorToCurrentPoint` changes nothing.
+/// Accepts a step of the host's integrator. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has
+/// no effect.
 pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
     c: fmi2Component,
     _noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
@@ -659,12 +624,11 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
     }
 }
 
-/// The present time.
 pub unsafe fn fmi2SetTime<M: Model>(c: fmi2Component, time: fmi2Real) -> fmi2Status {
     unsafe { on_start::<M, Fmi2>(c, Fmi2::SET_TIME, |component| component.instance.set_time(time)) }
 }
 
-/// The states as the host has integrated them.
+/// Sets the continuous states that the host has integrated.
 pub unsafe fn fmi2SetContinuousStates<M: Model>(
     c: fmi2Component,
     x: *const fmi2Real,
@@ -679,7 +643,7 @@ pub unsafe fn fmi2SetContinuousStates<M: Model>(
     }
 }
 
-/// Fills the host's array by `body`.
+/// Fills an array of the host by `body`.
 unsafe fn fill<M: Model>(
     c: fmi2Component,
     call: &'static Call,
@@ -693,7 +657,7 @@ unsafe fn fill<M: Model>(
     }
 }
 
-/// The derivatives of the states, in the order of the model description.
+/// Computes the derivatives of the states, in the order of the model description.
 pub unsafe fn fmi2GetDerivatives<M: Model>(
     c: fmi2Component,
     derivatives: *mut fmi2Real,
@@ -703,7 +667,7 @@ pub unsafe fn fmi2GetDerivatives<M: Model>(
     unsafe { fill::<M>(c, Fmi2::GET_DERIVATIVES, into, Instance::derivatives) }
 }
 
-/// Functions that cross zero at events.
+/// Computes the event indicators, which change sign at events.
 pub unsafe fn fmi2GetEventIndicators<M: Model>(
     c: fmi2Component,
     eventIndicators: *mut fmi2Real,
@@ -713,7 +677,7 @@ pub unsafe fn fmi2GetEventIndicators<M: Model>(
     unsafe { fill::<M>(c, Fmi2::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
 }
 
-/// The states, in the order of the model description.
+/// Reads the states, in the order of the model description.
 pub unsafe fn fmi2GetContinuousStates<M: Model>(
     c: fmi2Component,
     x: *mut fmi2Real,
@@ -722,7 +686,6 @@ pub unsafe fn fmi2GetContinuousStates<M: Model>(
     unsafe { fill::<M>(c, Fmi2::GET_CONTINUOUS_STATES, ("x", x, nx), Instance::continuous_states) }
 }
 
-/// The states' orders of magnitude.
 pub unsafe fn fmi2GetNominalsOfContinuousStates<M: Model>(
     c: fmi2Component,
     x_nominal: *mut fmi2Real,
@@ -734,7 +697,7 @@ pub unsafe fn fmi2GetNominalsOfContinuousStates<M: Model>(
 
 // ---- Co-Simulation ----
 
-/// The slopes of inputs over the next step.
+/// Sets the slopes of inputs for the next step.
 pub unsafe fn fmi2SetRealInputDerivatives<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
@@ -753,7 +716,7 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Model>(
     }
 }
 
-/// The derivatives of some outputs.
+/// Computes the time derivatives of outputs.
 pub unsafe fn fmi2GetRealOutputDerivatives<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
@@ -772,7 +735,7 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Model>(
     }
 }
 
-/// Makes one step. `noSetFMUStatePriorToCurrentPoint` has no effect: no past is kept.
+/// Makes one step. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has no effect.
 pub unsafe fn fmi2DoStep<M: Model>(
     c: fmi2Component,
     currentCommunicationPoint: fmi2Real,
@@ -791,7 +754,7 @@ pub unsafe fn fmi2DoStep<M: Model>(
     }
 }
 
-/// Steps are never asynchronous, so there is nothing to cancel.
+/// Refuses the call, because steps are never asynchronous.
 pub unsafe fn fmi2CancelStep<M: Model>(c: fmi2Component) -> fmi2Status {
     let call = &CANCEL_STEP;
     unsafe {
@@ -801,8 +764,8 @@ pub unsafe fn fmi2CancelStep<M: Model>(c: fmi2Component) -> fmi2Status {
     }
 }
 
-/// Answers a question about the last step, or discards it.
-unsafe fn answer<M: Model, T>(
+/// Returns a property of the last step, or discards the call if `known` has no value for this kind.
+unsafe fn write_step_status<M: Model, T>(
     c: fmi2Component,
     call: &'static Call,
     kind: fmi2StatusKind,
@@ -820,7 +783,7 @@ unsafe fn answer<M: Model, T>(
     }
 }
 
-/// Status of the last step.
+/// Returns the status of the last step.
 pub unsafe fn fmi2GetStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
@@ -830,10 +793,10 @@ pub unsafe fn fmi2GetStatus<M: Model>(
         let ended = if instance.state() == InstanceState::Failed { fmi2Error } else { fmi2OK };
         (s == fmi2DoStepStatus).then_some(ended)
     };
-    unsafe { answer::<M, _>(c, &GET_STATUS, s, value, known) }
+    unsafe { write_step_status::<M, _>(c, &GET_STATUS, s, value, known) }
 }
 
-/// Time that the last step reached.
+/// Returns the time that the last step reached.
 pub unsafe fn fmi2GetRealStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
@@ -841,39 +804,39 @@ pub unsafe fn fmi2GetRealStatus<M: Model>(
 ) -> fmi2Status {
     let known =
         |instance: &Instance<M, Fmi2>| (s == fmi2LastSuccessfulTime).then_some(instance.time());
-    unsafe { answer::<M, _>(c, &GET_REAL_STATUS, s, value, known) }
+    unsafe { write_step_status::<M, _>(c, &GET_REAL_STATUS, s, value, known) }
 }
 
-/// No integer says anything about the last step.
+/// Discards the call, because no property of the last step is an integer.
 pub unsafe fn fmi2GetIntegerStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2Integer,
 ) -> fmi2Status {
-    unsafe { answer::<M, _>(c, &GET_INTEGER_STATUS, s, value, |_| None) }
+    unsafe { write_step_status::<M, _>(c, &GET_INTEGER_STATUS, s, value, |_| None) }
 }
 
-/// The FMU never ends the simulation by itself.
+/// Returns false for fmi2Terminated, because the FMU never ends the simulation by itself.
 pub unsafe fn fmi2GetBooleanStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2Boolean,
 ) -> fmi2Status {
     let known = |_: &Instance<M, Fmi2>| (s == fmi2Terminated).then_some(0);
-    unsafe { answer::<M, _>(c, &GET_BOOLEAN_STATUS, s, value, known) }
+    unsafe { write_step_status::<M, _>(c, &GET_BOOLEAN_STATUS, s, value, known) }
 }
 
-/// No step is ever pending.
+/// Discards the call, because no step is ever pending.
 pub unsafe fn fmi2GetStringStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2String,
 ) -> fmi2Status {
-    unsafe { answer::<M, _>(c, &GET_STRING_STATUS, s, value, |_| None) }
+    unsafe { write_step_status::<M, _>(c, &GET_STRING_STATUS, s, value, |_| None) }
 }
 
-/// Exports the functions of FMI 2.0 for a model, under their names in C and as Rust functions of
-/// the module where it stands. A macro, because each FMU has to define these symbols itself.
+/// Exports the functions of FMI 2.0 for a model, under their C names and as Rust functions of the module in
+/// which the macro is used. It is a macro because each FMU must define these symbols itself.
 #[macro_export]
 macro_rules! export_fmi2 {
     ($model:ty) => {

@@ -1,15 +1,18 @@
-//! FMI 3.0, Model Exchange and Co-Simulation: 75 functions, their names, signatures and numbers.
+//! The C interface of FMI 3.0 for Model Exchange and Co-Simulation: 75 functions with their names, signatures
+//! and constants. The standard documents them; comments here describe only what is particular to this
+//! implementation.
 //!
-//! Every function is generic in the model; [`crate::export_fmi3`] exports them for one model under
-//! their names. What the functions mean is in [`crate::instance`] and [`crate::snapshot`], what C
-//! asks for in any version in [`crate::c_abi`].
+//! Every function is generic in the model; [`crate::export_fmi3`] exports them for one model under their
+//! names. Their effects are implemented in [`crate::instance`] and [`crate::snapshot`], the common part of
+//! the C interface in [`crate::c_abi`].
 //!
-//! A value reference is a scalar's place among the variables, counted from 1. Behind the table's follow the
-//! independent variable and the event indicators, which FMI 2.0 has no variables for. There are no clocks and no binary
-//! variables: functions for these answer as the standard asks of an FMU that has none.
+//! The value reference of a scalar is its position among the variables, counted from 1. After the variables
+//! of the table follow the independent variable and the event indicators, which are not variables in FMI 2.0.
+//! There are no clocks and no binary variables; functions for these answer as the standard requires of an FMU
+//! without them.
 //!
-//! A host that has read the description with arrays, known by its token, counts the table's entries instead, and means
-//! all scalars of an array by its reference ([`arrays`]).
+//! A host that has read the description with arrays, which is known from its token, counts the entries of the
+//! table instead, and its references stand for all scalars of an array ([`arrays`]).
 
 // The names are the standard's.
 #![allow(non_camel_case_types, non_upper_case_globals, non_snake_case)]
@@ -43,8 +46,8 @@ pub use self::stepping::*;
 pub use self::types::*;
 pub use self::values::*;
 
-/// Exports the functions of FMI 3.0 for a model, under their names in C and as Rust functions of
-/// the module where it stands. A macro, because each FMU has to define these symbols itself.
+/// Exports the functions of FMI 3.0 for a model, under their C names and as Rust functions of the module in
+/// which the macro is used. It is a macro because each FMU must define these symbols itself.
 #[macro_export]
 macro_rules! export_fmi3 {
     ($model:ty) => {

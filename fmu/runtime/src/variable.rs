@@ -1,10 +1,9 @@
-//! Variables of an FMU: the vocabulary of a model's table.
+//! Variables of an FMU: the types from which a model's table is built.
 
 use crate::call::CType;
 use crate::model::Model;
 
-/// The value of one scalar, as it crosses the C interface. Enumerations are
-/// integers there.
+/// The value of one scalar in the C interface. Enumerations are integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     /// A real number.
@@ -16,7 +15,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// Returns the number of a Real, else `None`.
+    /// Returns the number of a Real, otherwise `None`.
     #[inline]
     pub fn real(self) -> Option<f64> {
         match self {
@@ -25,7 +24,7 @@ impl Value {
         }
     }
 
-    /// Returns the number of an Integer or enumeration, else `None`.
+    /// Returns the number of an Integer or an enumeration, otherwise `None`.
     #[inline]
     pub fn integer(self) -> Option<i32> {
         match self {
@@ -34,7 +33,7 @@ impl Value {
         }
     }
 
-    /// Returns the value of a Boolean, else `None`.
+    /// Returns the value of a Boolean, otherwise `None`.
     #[inline]
     pub fn boolean(self) -> Option<bool> {
         match self {
@@ -44,25 +43,25 @@ impl Value {
     }
 }
 
-/// The role of a variable, as FMI names it.
+/// The role of a variable, as in FMI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Causality {
     /// Set by the host, at any time.
     Input,
-    /// Meant to be connected or plotted.
+    /// A result to connect or plot.
     Output,
     /// Internal value.
     Local,
-    /// Set by the host before the end of the initialization mode.
+    /// Set by the host before the end of initialization mode.
     Parameter,
-    /// Follows from the parameters.
+    /// Computed from the parameters.
     CalculatedParameter,
 }
 
-/// A real quantity. Units are names of [`crate::unit::UNITS`].
+/// A real quantity with its unit, one of [`crate::unit::UNITS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// SI; "" where it is not the same for all parameters.
+    /// Unit, SI; "" if it depends on parameters.
     pub unit: &'static str,
     /// Unit for display.
     pub display_unit: Option<&'static str>,
@@ -74,7 +73,7 @@ pub struct Quantity {
     pub nominal: Option<f64>,
 }
 
-/// An item of an enumeration; the first has the number 1.
+/// An item of an enumeration; the first item has the number 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Item {
     /// Name.
@@ -84,12 +83,12 @@ pub struct Item {
 }
 
 impl Item {
-    /// An item in a table.
+    /// Creates an item.
     pub const fn new(name: &'static str, description: &'static str) -> Item {
         Item { name, description }
     }
 
-    /// Items of names and descriptions.
+    /// Creates items from pairs of name and description.
     pub const fn list<const N: usize>(rows: [(&'static str, &'static str); N]) -> [Item; N] {
         let mut items = [Item { name: "", description: "" }; N];
         let mut i = 0;
@@ -104,7 +103,7 @@ impl Item {
 /// An enumeration type.
 #[derive(Debug)]
 pub struct Enumeration {
-    /// The type's name.
+    /// Name of the type.
     pub name: &'static str,
     /// Purpose of the enumeration.
     pub description: &'static str,
@@ -117,38 +116,38 @@ pub struct Enumeration {
 pub enum Kind {
     /// A quantity with a unit.
     Real(Quantity),
-    /// A number of something.
+    /// An integer.
     Integer {
         /// Smallest value allowed.
         min: Option<i32>,
         /// Largest value allowed.
         max: Option<i32>,
     },
-    /// Yes or no.
+    /// A truth value.
     Boolean,
     /// Item of an enumeration.
     Enumeration(&'static Enumeration),
 }
 
-/// Maps an array element's number,
-/// 0 for the first, to the index of a continuous state.
+/// Maps the number of an array's element, 0 for the first, to the index of a continuous state.
 pub type Place = fn(usize) -> usize;
 
 /// Length of an array along one dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
-    /// Always so long.
+    /// Constant length.
     Fixed(usize),
-    /// Size from the integer parameter of this name, and the largest size. If every element is a variable of its own, the largest
-    /// size always applies; if the array is one variable, the parameter is structural (see [`Layout`](crate::table::Layout)).
+    /// Length given by the integer parameter of this name, and the largest length. If every element is a
+    /// variable of its own, the largest length always applies; if the array is one variable, the parameter is
+    /// structural (see [`Layout`](crate::table::Layout)).
     Sized(&'static str, usize),
-    /// Always of the largest size, of which the integer parameter of this name says how many elements are used. A description
-    /// with a part of the variables leaves the others out (see [`extent`](crate::extent)).
+    /// Always of the largest length; the integer parameter of this name says how many elements are used. A
+    /// reduced description leaves the other elements out (see [`extent`](crate::extent)).
     Used(&'static str, usize),
 }
 
 impl Dimension {
-    /// The most that it can be.
+    /// Returns the largest length.
     pub const fn most(self) -> usize {
         match self {
             Dimension::Fixed(length) | Dimension::Sized(_, length) | Dimension::Used(_, length) => {
@@ -158,68 +157,69 @@ impl Dimension {
     }
 }
 
-/// Access to a variable in the model. The last argument is the element's number in an array,
-/// 0 for the first and for a scalar.
+/// Access to a variable in the model. The last argument is the number of the element in an array, 0 for the
+/// first and for a scalar.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub enum Access<M: Model> {
-    /// Value and slope.
+    /// Value and slope of an input.
     Input(fn(&mut M::Inputs, usize) -> [&mut f64; 2]),
     Output(fn(&M::Outputs, usize) -> f64),
     OutputInteger(fn(&M::Outputs, usize) -> i32),
     OutputBoolean(fn(&M::Outputs, usize) -> bool),
-    /// Function of parameters and present inputs: value, and rate along the inputs' slopes.
+    /// Function of parameters and present inputs that returns the value, and its rate for the inputs' slopes.
     OfInputs(fn(&M, &M::Inputs, usize) -> [f64; 2]),
     Real(fn(&mut M::Parameters, usize) -> &mut f64),
     Boolean(fn(&mut M::Parameters) -> &mut bool),
     Integer(fn(&mut M::Parameters, usize) -> &mut i32),
-    /// A parameter that the model does not keep as an i32.
+    /// A parameter that the model does not store as an i32.
     Choice {
         get: fn(&M::Parameters, usize) -> i32,
         set: fn(&mut M::Parameters, usize, i32),
     },
-    /// Function of the model, constant in time.
+    /// Function of the model that is constant in time.
     Calculated(fn(&M, usize) -> f64),
-    /// A continuous state that is not among the outputs.
+    /// A continuous state that is not an output.
     State,
     /// The derivative of a continuous state.
     Derivative(Place),
 }
 
-/// A scalar variable, or an array of them.
+/// A scalar variable or an array.
 #[derive(Debug)]
 pub struct Variable<M: Model> {
-    /// Name. An array's element has its indices, counted from 1, in the name's empty brackets. Further indices follow in
-    /// brackets of their own: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
+    /// Name. The element of an array has its indices, counted from 1, in the empty brackets of the name;
+    /// further indices follow in brackets of their own. For example `tank[].p` with the shape 4, 3, 3 has the
+    /// elements `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
     pub name: &'static str,
     /// Description with sign and frame.
     pub description: &'static str,
-    /// Role.
+    /// Causality.
     pub causality: Causality,
     /// Type.
     pub kind: Kind,
-    /// Access in the model.
+    /// Access to its value in the model.
     pub access: Access<M>,
-    /// An array's dimensions, none for a scalar.
+    /// Dimensions of an array; empty for a scalar.
     pub shape: &'static [Dimension],
-    /// Place, if it is a continuous state.
+    /// Index of the continuous state, if it is one.
     pub state: Option<Place>,
-    /// True if an event can make this state jump.
+    /// True if events can make this state discontinuous.
     pub reinit: bool,
-    /// True if this input's slope over a step follows from other inputs
+    /// True if the slope of this input over a step follows from other inputs
     /// ([`Model::set_dependent_slopes`]), whatever slope the host sets.
     pub follows_inputs: bool,
     /// True if this parameter can be set during the simulation.
     pub tunable: bool,
-    /// Inputs and continuous states that it depends on without delay. The name of an array stands for all elements, with "[]" for
-    /// the element of the same index.
+    /// Inputs and continuous states on which it depends without delay. The name of an array stands for all
+    /// elements, and with "[]" for the element with the same index.
     pub depends_on: &'static [&'static str],
-    /// The parameters and inputs that its initial value depends on besides; a
-    /// name that ends with a dot stands for all parameters that begin like that.
+    /// Further parameters and inputs on which its initial value depends. A name that ends with a dot stands
+    /// for all parameters that begin with it.
     pub initial_depends_on: &'static [&'static str],
 }
 
-// Derived, these would ask the same of M.
+// Derived implementations would require the same of M.
 impl<M: Model> Clone for Access<M> {
     fn clone(&self) -> Self {
         *self
@@ -233,18 +233,20 @@ impl<M: Model> Clone for Variable<M> {
 }
 impl<M: Model> Copy for Variable<M> {}
 
-/// No input goes through its range in less, s: what follows from faster ones may overflow.
+/// Shortest time in which an input may cross its range, s, because values that follow from faster changes may
+/// overflow.
 const CROSSING: f64 = 1e-9;
 
-/// Returns true if x is finite. It tests the bits: comparing with NaN would end the process of a host that traps invalid
-/// operations.
+/// Returns true if x is finite. It tests the bits, because comparing with NaN would end the process of a host
+/// that traps invalid operations.
 #[inline]
 pub const fn is_finite(x: f64) -> bool {
     const EXPONENT: u64 = f64::INFINITY.to_bits();
     x.to_bits() & EXPONENT != EXPONENT
 }
 
-/// A number in a message. Printing compares it with others, which NaN must not be: see [`is_finite`].
+/// Formats a number for a message. Formatting compares numbers, which must not be done with NaN, see
+/// [`is_finite`].
 pub fn text(x: f64) -> String {
     let is_nan = x.to_bits() << 1 > f64::INFINITY.to_bits() << 1;
     if is_nan { "NaN".into() } else { format!("{x:?}") }
@@ -278,7 +280,7 @@ const fn quantity(unit: &'static str) -> Kind {
 }
 
 impl<M: Model> Variable<M> {
-    /// An input: its value and its slope.
+    /// Declares an input with its value and slope.
     pub const fn input(
         name: &'static str,
         ramp: fn(&mut M::Inputs, usize) -> [&mut f64; 2],
@@ -288,7 +290,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Input, quantity(unit), Access::Input(ramp), description)
     }
 
-    /// An output.
+    /// Declares an output.
     pub const fn output(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> f64,
@@ -298,7 +300,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Output, quantity(unit), Access::Output(get), description)
     }
 
-    /// A real quantity to look at.
+    /// Declares a real local variable.
     pub const fn local(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> f64,
@@ -308,8 +310,8 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, quantity(unit), Access::Output(get), description)
     }
 
-    /// A real quantity to look at that follows from parameters and present inputs alone; with its
-    /// rate along the inputs' slopes.
+    /// Declares a real local variable that follows only from parameters and present inputs, with its rate for
+    /// the inputs' slopes.
     pub const fn local_of_inputs(
         name: &'static str,
         get: fn(&M, &M::Inputs, usize) -> [f64; 2],
@@ -319,7 +321,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, quantity(unit), Access::OfInputs(get), description)
     }
 
-    /// A continuous state that is not among the outputs.
+    /// Declares a continuous state that is not an output.
     pub const fn state(
         name: &'static str,
         place: Place,
@@ -329,7 +331,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, quantity(unit), Access::State, description).is_state(place)
     }
 
-    /// The derivative of a continuous state; its name is "der(" the state's name ")".
+    /// Declares the derivative of a continuous state, whose name is "der(", the name of the state, and ")".
     pub const fn derivative(
         name: &'static str,
         of: Place,
@@ -339,7 +341,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, quantity(unit), Access::Derivative(of), description)
     }
 
-    /// A Boolean to look at.
+    /// Declares a Boolean local variable.
     pub const fn local_boolean(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> bool,
@@ -348,7 +350,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, Kind::Boolean, Access::OutputBoolean(get), description)
     }
 
-    /// An integer to look at.
+    /// Declares an integer local variable.
     pub const fn local_integer(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> i32,
@@ -358,7 +360,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, kind, Access::OutputInteger(get), description)
     }
 
-    /// An item of an enumeration to look at.
+    /// Declares a local variable that is an enumeration.
     pub const fn local_enumeration(
         name: &'static str,
         of: &'static Enumeration,
@@ -369,7 +371,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, kind, Access::OutputInteger(get), description)
     }
 
-    /// A real parameter.
+    /// Declares a real parameter.
     pub const fn parameter(
         name: &'static str,
         field: fn(&mut M::Parameters, usize) -> &mut f64,
@@ -379,7 +381,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, quantity(unit), Access::Real(field), description)
     }
 
-    /// A Boolean parameter.
+    /// Declares a Boolean parameter.
     pub const fn switch(
         name: &'static str,
         field: fn(&mut M::Parameters) -> &mut bool,
@@ -388,7 +390,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, Kind::Boolean, Access::Boolean(field), description)
     }
 
-    /// An integer parameter.
+    /// Declares an integer parameter.
     pub const fn integer(
         name: &'static str,
         field: fn(&mut M::Parameters, usize) -> &mut i32,
@@ -398,7 +400,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, kind, Access::Integer(field), description)
     }
 
-    /// An integer parameter that the model keeps in another type.
+    /// Declares an integer parameter that the model stores in another type.
     pub const fn count(
         name: &'static str,
         get: fn(&M::Parameters, usize) -> i32,
@@ -409,7 +411,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
     }
 
-    /// A parameter that is an item of an enumeration.
+    /// Declares a parameter that is an enumeration.
     pub const fn choice(
         name: &'static str,
         of: &'static Enumeration,
@@ -421,7 +423,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
     }
 
-    /// A calculated parameter.
+    /// Declares a calculated parameter.
     pub const fn calculated(
         name: &'static str,
         get: fn(&M, usize) -> f64,
@@ -432,7 +434,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::CalculatedParameter, quantity(unit), access, description)
     }
 
-    /// People read it in this unit.
+    /// Sets the display unit.
     pub const fn display_unit(mut self, unit: &'static str) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.display_unit = Some(unit);
@@ -440,7 +442,7 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Allowed are `min` to `max`.
+    /// Sets the allowed range of a real quantity.
     pub const fn range(mut self, min: f64, max: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.min = Some(min);
@@ -449,13 +451,13 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Allowed are the integers `min` to `max`.
+    /// Sets the allowed range of an integer.
     pub const fn between(mut self, min: i32, max: i32) -> Self {
         self.kind = Kind::Integer { min: Some(min), max: Some(max) };
         self
     }
 
-    /// Allowed is `min` and more.
+    /// Sets the smallest allowed value of a real quantity.
     pub const fn at_least(mut self, min: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.min = Some(min);
@@ -463,7 +465,7 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Sets the order of magnitude.
+    /// Sets the nominal value.
     pub const fn nominal(mut self, nominal: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.nominal = Some(nominal);
@@ -471,49 +473,49 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Makes it an array with these dimensions.
+    /// Makes the variable an array with these dimensions.
     pub const fn shape(mut self, shape: &'static [Dimension]) -> Self {
         self.shape = shape;
         self
     }
 
-    /// Makes it a continuous state of the model.
+    /// Makes the variable a continuous state of the model.
     pub const fn is_state(mut self, place: Place) -> Self {
         self.state = Some(place);
         self
     }
 
-    /// An event can make this state jump.
+    /// Declares that events can make this state discontinuous.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self
     }
 
-    /// During a step this input goes where other inputs take it.
+    /// Declares that during a step this input follows from other inputs.
     pub const fn follows_inputs(mut self) -> Self {
         self.follows_inputs = true;
         self
     }
 
-    /// Makes it tunable: it can be set while the simulation runs.
+    /// Makes the parameter tunable, so that it can be set while the simulation runs.
     pub const fn tunable(mut self) -> Self {
         self.tunable = true;
         self
     }
 
-    /// Lists the inputs and states that it depends on without delay.
+    /// Declares the inputs and states on which the variable depends without delay.
     pub const fn depends_on(mut self, known: &'static [&'static str]) -> Self {
         self.depends_on = known;
         self
     }
 
-    /// Adds parameters and inputs on which the initial value depends.
+    /// Declares further parameters and inputs on which the initial value depends.
     pub const fn initial_depends_on(mut self, known: &'static [&'static str]) -> Self {
         self.initial_depends_on = known;
         self
     }
 
-    /// Number of scalars.
+    /// Returns the number of scalars.
     pub const fn len(&self) -> usize {
         let (mut len, mut n) = (1, 0);
         while n < self.shape.len() {
@@ -523,22 +525,22 @@ impl<M: Model> Variable<M> {
         len
     }
 
-    /// The most that each of its dimensions can be.
+    /// Returns the largest length of each dimension.
     pub fn lengths(&self) -> impl DoubleEndedIterator<Item = usize> + ExactSizeIterator + use<M> {
         self.shape.iter().map(|dimension| dimension.most())
     }
 
-    /// Returns the name where an array is one variable: `tank[].p` is `tank.p`.
+    /// Returns the name for the layout in which an array is one variable: `tank[].p` becomes `tank.p`.
     pub fn array_name(&self) -> String {
         self.name.replace("[]", "")
     }
 
-    /// No variable is.
+    /// Returns false, because every variable has at least one scalar.
     pub const fn is_empty(&self) -> bool {
         false
     }
 
-    /// The indices of an element, 0 for the first, each from 0.
+    /// Returns the indices, each from 0, of an element (0 for the first).
     pub fn indices(&self, element: usize) -> Vec<usize> {
         let mut indices = Vec::with_capacity(self.shape.len());
         let mut rest = element;
@@ -550,13 +552,13 @@ impl<M: Model> Variable<M> {
         indices
     }
 
-    /// The name of an element, 0 for the first.
+    /// Returns the name of an element (0 for the first).
     pub fn element_name(&self, element: usize) -> String {
         let indices: Vec<_> = self.indices(element).iter().map(|i| (i + 1).to_string()).collect();
         self.indexed(&indices)
     }
 
-    /// The name of an array with the range of its indices, `slosh.mass[1..10]`.
+    /// Returns the name of an array with the ranges of its indices, for example `slosh.mass[1..10]`.
     pub fn pattern(&self) -> String {
         let ranges: Vec<_> = self.lengths().map(|length| format!("1..{length}")).collect();
         self.indexed(&ranges)
@@ -581,7 +583,7 @@ impl<M: Model> Variable<M> {
         name + closing
     }
 
-    /// Returns the value before the host sets anything: `None` when it is computed.
+    /// Returns the start value, or `None` if the variable is computed.
     pub fn start(
         &self,
         parameters: &mut M::Parameters,
@@ -594,8 +596,8 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// Returns the value in `parameters`: `None` when it is not a parameter. They are not changed: the
-    /// accessors that lend a field to be written serve reading as well.
+    /// Returns the value in `parameters`, or `None` if the variable is not a parameter. `parameters` are not
+    /// changed; they are borrowed mutably because the same accessors serve reading and writing.
     pub fn parameter_value(&self, parameters: &mut M::Parameters, element: usize) -> Option<Value> {
         match self.access {
             Access::Real(field) => Some(Value::Real(*field(parameters, element))),
@@ -606,7 +608,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// Puts a value of its own type into `parameters`.
+    /// Stores a value of the parameter's type in `parameters`.
     pub fn set_parameter(&self, parameters: &mut M::Parameters, element: usize, value: Value) {
         match (self.access, value) {
             (Access::Real(field), Value::Real(x)) => *field(parameters, element) = x,
@@ -617,7 +619,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// The smallest value of a quantity that has one.
+    /// Returns the smallest allowed value of a quantity.
     pub const fn min(&self) -> Option<f64> {
         match self.kind {
             Kind::Real(quantity) => quantity.min,
@@ -625,7 +627,8 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// The largest rate of an input: the size of its range in [`CROSSING`] seconds; any if it has none.
+    /// Returns the largest rate of an input: the larger bound of its range divided by [`CROSSING`], or
+    /// infinity without a range.
     pub fn fastest(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { min: Some(min), max: Some(max), .. }) => {
@@ -635,17 +638,18 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// Returns true if an input may change at this rate: finite, and at most [`Variable::fastest`].
+    /// Returns true if an input may change at this rate, which must be finite and at most
+    /// [`Variable::fastest`].
     #[inline]
     pub fn allows_rate(&self, rate: f64) -> bool {
         let Kind::Real(Quantity { min, max, .. }) = &self.kind else { return is_finite(rate) };
-        // NaN is multiplied with nothing: see [`is_finite`].
+        // NaN must not be multiplied, see [`is_finite`].
         let change = if is_finite(rate) { rate.abs() } else { 0.0 } * CROSSING;
         is_finite(rate)
             && (max.is_none_or(|max| change <= max) || min.is_none_or(|min| change <= -min))
     }
 
-    /// The unit of a quantity.
+    /// Returns the unit of a quantity; "" for other types.
     pub const fn unit(&self) -> &'static str {
         match self.kind {
             Kind::Real(quantity) => quantity.unit,
@@ -653,7 +657,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// The order of magnitude of a quantity; 1 unless set.
+    /// Returns the nominal value of a quantity; 1 if none is set.
     pub const fn nominal_value(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { nominal: Some(nominal), .. }) => nominal,
@@ -661,7 +665,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// The C type it is got and set with.
+    /// Returns the C type in which the variable is read and set.
     #[inline]
     pub const fn c_type(&self) -> CType {
         match self.kind {
@@ -671,7 +675,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// Error in `value` of an element, in words: `name = value unit (allowed: …)`.
+    /// Returns an error if `value` is not allowed for an element, as `name = value unit (allowed: …)`.
     #[inline]
     pub fn problem(&self, element: usize, value: Value) -> Option<String> {
         if self.allows(value) { None } else { Some(self.refusal(element, value)) }
@@ -681,7 +685,7 @@ impl<M: Model> Variable<M> {
     fn allows(&self, value: Value) -> bool {
         match (&self.kind, value) {
             (Kind::Real(Quantity { min, max, .. }), Value::Real(x)) => {
-                // NaN is compared with nothing: see [`is_finite`].
+                // NaN must not be compared, see [`is_finite`].
                 let number = if is_finite(x) { x } else { f64::INFINITY };
                 is_finite(x) && min.is_none_or(|m| number >= m) && max.is_none_or(|m| number <= m)
             }
@@ -708,7 +712,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// The range in words.
+    /// Describes the allowed range.
     fn allowed(&self) -> String {
         match self.kind {
             Kind::Real(Quantity { min, max, .. }) => match (min, max) {

@@ -1,28 +1,28 @@
-//! Properties of a version of FMI: its functions' names, when they may be called, the handler of
-//! events, and the numbering of value references.
+//! Properties of a version of FMI: the names of its functions, the states in which they are allowed, the
+//! handler of events, and the numbering of value references.
 
 use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
 use crate::model::Model;
 use crate::table::{Layout, Scalar};
 
-/// A version of FMI. Each constant is the call by which it asks for an operation of
-/// [`Instance`](crate::instance::Instance); getting and setting values, for which a version has several
-/// functions, name theirs themselves.
+/// A version of FMI. Each constant is the function that performs an operation of
+/// [`Instance`](crate::instance::Instance). Functions that read and set values are not listed, because a
+/// version has several of them.
 #[allow(missing_docs)]
 pub trait Version: std::fmt::Debug + 'static {
-    /// Prefix of its functions and types.
+    /// Prefix of the names of functions and types.
     const PREFIX: &'static str;
 
-    /// Data that an instance keeps about its host in addition to the logger.
+    /// Data about the host, other than the logger, that an instance needs.
     type Host<M: Model>;
 
-    /// The state after a call that failed, if it is another than before.
+    /// The instance state after a failed call, if it changes.
     const AFTER_ERROR: Option<InstanceState>;
-    /// Severity of a value outside its range, if it is refused at once.
+    /// Severity of a value outside its range that is refused immediately.
     const OUT_OF_RANGE: Severity;
-    /// The state in which a host that handles events is after initialization mode.
+    /// The instance state after initialization mode if the host handles events.
     const FIRST_EVENT: InstanceState;
-    /// True if Model Exchange hosts may set single continuous states, and may not go back behind an event.
+    /// True if Model Exchange hosts may set single continuous states, and may not go back before an event.
     const SETS_STATES: bool;
 
     const SETUP_EXPERIMENT: &'static Call;
@@ -48,21 +48,25 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_CONTINUOUS_STATES: &'static Call;
     const GET_NOMINALS: &'static Call;
 
-    /// GUID (FMI 2.0) or instantiationToken (FMI 3.0).
+    /// Returns the GUID (FMI 2.0) or instantiationToken (FMI 3.0).
     fn token<M: Model>(layout: Layout) -> &'static str;
 
-    /// Default handler of events for this interface.
+    /// Returns the default handler of events for an interface.
     fn events(interface: Interface) -> Events;
 
-    /// Returns true if a host may choose this handler of events for this interface.
+    /// Returns true if a host may choose this handler of events for an interface.
     fn allows(interface: Interface, events: Events) -> bool {
         events == Self::events(interface)
     }
 
-    /// The value reference of a scalar.
+    /// Returns the value reference of a scalar.
     fn reference<M: Model>(scalar: &Scalar<M>) -> u32;
 
-    /// The scalar of a value reference, if its values pass as this C type; if not, why.
+    /// Finds the scalar of a value reference.
+    ///
+    /// # Errors
+    ///
+    /// If there is none, or it does not have this C type.
     fn scalar<M: Model>(
         reference: u32,
         c_type: Option<CType>,

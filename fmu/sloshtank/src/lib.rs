@@ -1,5 +1,5 @@
-//! SloshTank as an FMU: one sloshing tank on a spacecraft that the host simulates. Its variables are in [`table`], its
-//! physics is in the crate `craft`, FMI is in the crate `runtime`.
+//! SloshTank as an FMU: one sloshing tank on a spacecraft that the host simulates. Its variables are in
+//! [`table`], its physics in the crate `craft`, FMI in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]

@@ -1,5 +1,3 @@
-//! Implements the runtime's `Model` for the tank.
-
 use std::ops::{Deref, DerefMut};
 
 use craft::{
@@ -12,54 +10,51 @@ use runtime::table::Table;
 
 use crate::table::TABLE;
 
-/// Limit of `coupling_ratio` for the warning. Coupling by the total wrench, extrapolated on both sides, is stable up to
-/// 2/sqrt(3) - 1 = 0.155.
+/// Limit of `coupling_ratio` for the warning. Coupling by the total wrench with extrapolation on both sides
+/// is stable up to 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
-/// Warning that a run logs once.
+/// Warning that is logged once per run.
 const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range). Thrust pulls the tank off its liquid and nothing \
                             centres the liquid, or a bob is more than 45 degrees from the axis. Results are not \
                             physical from here on";
 
-/// Warning that a run logs once.
+/// Warning that is logged once per run.
 const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached liquid (tank.ball.state). Times and \
                     momenta of crossings are valid. Impact forces, and the motion after an impact, are right only to an \
                     order of magnitude. The host must apply impulse";
 
-/// One tank of sloshing liquid.
 #[derive(Clone, Debug)]
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// True once the current inputs are applied. In Co-Simulation `in_range` belongs to the current motion.
+    /// True while the present inputs are applied. In Co-Simulation `in_range` belongs to the present motion.
     present: bool,
-    /// True once the motion of a tank without a model of detached liquid has left its range.
+    /// True after a tank without a model of detached liquid has left its range.
     has_left_range: bool,
-    /// True once the liquid of a tank with a model of detached liquid has detached.
+    /// True after the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
 }
 
 impl Model {
-    /// Returns the largest eigenvalue of the host's inverse mass matrix times the added mass, or 0 if the host's mass
-    /// is unknown.
+    /// Returns the largest eigenvalue of the host's inverse mass matrix multiplied by the added mass, or 0 if
+    /// the host's mass is unknown.
     pub fn coupling_ratio(&self) -> f64 {
         self.coupling_ratio
     }
 }
 
-/// The tank's parameters, with counts as integers.
+/// The tank's parameters, with counts as integers for FMI.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     tank: TankParameters,
-    /// Integer twin of `coupling`, for hosts that cannot set enumerations; 0 to use the enumeration.
+    /// Integer twin of the enumeration `coupling`, for hosts that cannot set enumerations; 0 to use the
+    /// enumeration.
     pub coupling_kind: i32,
-    /// Integer twin of `tank.damping_law`.
     pub damping_law_kind: i32,
-    /// Number of slosh modes.
     pub modes: i32,
     /// Number of points of the tank's fill table.
     pub points: i32,
-    /// The host's mass properties; mass 0 if they are unknown.
     pub host: Craft,
 }
 
@@ -87,7 +82,11 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the tank's parameters with the integer twins applied. Refuses an enumeration that contradicts its twin.
+    /// Returns the tank's parameters with the integer twins applied.
+    ///
+    /// # Errors
+    ///
+    /// If an enumeration contradicts its twin.
     fn resolved(&self) -> Result<TankParameters, Vec<String>> {
         let mut p = self.tank;
         let (coupling, kind) = (p.coupling as i32, self.coupling_kind);
@@ -119,11 +118,10 @@ impl Parameters {
     }
 }
 
-/// The host's motion, by default rest without specific force. The slope of omega follows from omega_dot; a slope that the host
-/// sets has no effect.
+/// Inputs: the host's motion, by default rest without specific force. The slope of omega follows from
+/// omega_dot, whatever slope the host sets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
-    /// Inputs of the tank model.
     pub tank: TankInputs,
     /// The slope of omega, rad/s2.
     pub omega_slope: [f64; 3],
@@ -166,7 +164,8 @@ impl runtime::Model for Model {
         }
         let ratio = self.coupling_ratio;
         let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
-        // With a model of detached liquid, host.mass is required and the host uses bias and added_mass anyway.
+        // With a model of detached liquid host.mass is required, and the host uses bias and added_mass in
+        // any case.
         if !is_split || ratio <= LIMIT || self.tank.has_ball() {
             return warnings;
         }
@@ -254,8 +253,8 @@ impl runtime::Model for Model {
     }
 
     fn set_dependent_slopes(inputs: &mut Inputs, h: f64) -> bool {
-        // With this slope omega at the step's end is omega + omega_dot h + omega_dot' h^2/2. If that overflows, the
-        // step is refused.
+        // With this slope omega at the end of the step is omega + omega_dot h + omega_dot' h^2/2. If that
+        // overflows, the step is refused.
         let rate = &inputs.tank.omega_dot;
         let slope = [0, 1, 2].map(|i| rate.value[i] + rate.slope[i] * h / 2.0);
         inputs.omega_slope = slope.map(|x| if x.is_finite() { x } else { 0.0 });

@@ -1,5 +1,5 @@
-//! Spacecraft as an FMU: a free spacecraft with sloshing tanks. Its variables are in [`table`], its physics is in the
-//! crate `craft`, FMI is in the crate `runtime`.
+//! Spacecraft as an FMU: a free spacecraft with sloshing tanks. Its variables are in [`table`], its physics
+//! in the crate `craft`, FMI in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]

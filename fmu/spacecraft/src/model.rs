@@ -1,5 +1,3 @@
-//! Implements the runtime's `Model` for the spacecraft.
-
 use std::ops::{Deref, DerefMut};
 
 use craft::{DampingLaw, INPUTS, Inputs, Mount, Outputs, STATES, Spacecraft, State, TANKS};
@@ -9,38 +7,37 @@ use runtime::table::Table;
 
 use crate::table::TABLE;
 
-/// A spacecraft with its tanks.
 #[derive(Clone, Debug)]
 pub struct Model {
     craft: Spacecraft,
-    /// True once the current inputs are applied. In Co-Simulation a jump of the wheels' momentum or of an outflow
-    /// acts at once.
+    /// True while the present inputs are applied. In Co-Simulation a jump of the wheels' momentum or of an
+    /// outflow acts immediately.
     present: bool,
     wheels: Wheels,
-    /// True once a tank without a model of detached liquid has left its range.
+    /// True after a tank without a model of detached liquid has left its range.
     has_left_range: bool,
-    /// True once the liquid of a tank with a model of detached liquid has detached.
+    /// True after the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
 }
 
-/// Warning that a run logs once.
+/// Warning that is logged once per run.
 const OUT_OF_RANGE: &str = "a tank leaves its range (tank[].in_range). Thrust pulls the tank off its liquid and nothing \
                             centres the liquid, or a bob is more than 45 degrees from the axis. Results for this tank \
                             are not physical from here on";
 
-/// Warning that a run logs once.
+/// Warning that is logged once per run.
 const LUMP: &str = "the liquid of a tank leaves the bottom and moves on as detached liquid (tank[].ball.state). Times \
                     and momenta of crossings are valid. Impact forces, and the motion after an impact, are right only \
                     to an order of magnitude";
 
-/// Detects a Model Exchange host that omits the wheels' reaction -h_w' from the torque: h_wheels changes on an axis on
-/// which torque has always been 0.
+/// Detects a Model Exchange host that omits the wheels' reaction −h_w' from the torque: h_wheels changes
+/// about an axis about which torque has always been 0.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wheels {
-    /// True for each axis on which torque has been other than 0.
+    /// True for each axis about which torque has been different from 0.
     torque: [bool; 3],
-    /// Number of steps in which h_wheels changed without torque. One such step may be the end of a ramp whose torque has
-    /// ended.
+    /// Number of steps in which h_wheels changed without torque. One such step may be the end of a ramp whose
+    /// torque has already ended.
     moved: [u8; 3],
 }
 
@@ -51,7 +48,7 @@ impl Wheels {
         }
     }
 
-    /// Records a step in which h_wheels changed from `before` to its current value.
+    /// Records a step in which h_wheels changed from `before` to its present value.
     fn see_step(&mut self, before: [f64; 3], inputs: &Inputs) {
         self.see_torque(inputs);
         for i in 0..3 {
@@ -66,15 +63,15 @@ impl Wheels {
     }
 }
 
-/// The craft's parameters, with counts as integers.
+/// The craft's parameters, with counts as integers for FMI.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     craft: craft::Parameters,
-    /// Integer twin of `mount`, for hosts that cannot set enumerations; 0 to use the enumeration.
+    /// Integer twin of the enumeration `mount`, for hosts that cannot set enumerations; 0 to use the
+    /// enumeration.
     pub mount_kind: i32,
     /// Integer twins of `tank[].damping_law`.
     pub damping_law_kind: [i32; TANKS],
-    /// Number of tanks.
     pub tanks: i32,
     /// Number of slosh modes of each tank.
     pub modes: [i32; TANKS],
@@ -107,7 +104,11 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the craft's parameters with the integer twins applied. Refuses an enumeration that contradicts its twin.
+    /// Returns the craft's parameters with the integer twins applied.
+    ///
+    /// # Errors
+    ///
+    /// If an enumeration contradicts its twin.
     fn resolved(&self) -> Result<craft::Parameters, Vec<String>> {
         let mut p = self.craft;
         let (mount, kind) = (p.mount as i32, self.mount_kind);
@@ -147,7 +148,7 @@ impl runtime::Model for Model {
     type Outputs = Outputs;
     type Discrete = ();
 
-    // h_wheels turns the craft by its slope.
+    // The slope of h_wheels is a torque on the craft.
     const OUTPUTS_USE_SLOPES: bool = true;
     const INDICATORS_OF: Option<&'static str> = Some("tanks");
 

@@ -156,7 +156,7 @@ fn categories_are_switched_by_name() {
     ];
     let wanted = |names: &[&str]| {
         let names: Vec<String> = names.iter().map(|name| name.to_string()).collect();
-        Filter::of(&names, &TABLE).map(|filter| all.map(|topic| filter.wants(topic)))
+        Filter::from_categories(&names, &TABLE).map(|filter| all.map(|topic| filter.wants(topic)))
     };
     assert_eq!(wanted(&[]), Ok([true; 5]));
     assert_eq!(wanted(&["logAll"]), Ok([true; 5]));
@@ -171,7 +171,7 @@ fn categories_are_switched_by_name() {
              logStatusError, logStatusFatal, logAll"
             .into())
     );
-    let events = Filter::of(&["logEvents".into()], Spring::table());
+    let events = Filter::from_categories(&["logEvents".into()], Spring::table());
     assert!(events.unwrap_err().ends_with(
         "known: logStatusWarning, logStatusDiscard, \
          logStatusError, logStatusFatal, logAll"

@@ -15,7 +15,7 @@ const fn call(name: &'static str) -> Call {
     Call::new(name, u16::MAX)
 }
 
-static GET_FLOAT: Call = call("otherGetFloat").of(CType::Real);
+static GET_FLOAT: Call = call("otherGetFloat").with_type(CType::Real);
 
 #[rustfmt::skip]
 impl Version for Other {
@@ -34,10 +34,10 @@ impl Version for Other {
     const TERMINATE:              &'static Call = &call("otherTerminate");
     const RESET:                  &'static Call = &call("otherReset");
     const SET_STATE:              &'static Call = &call("otherSetState");
-    const DIRECTIONAL_DERIVATIVE: &'static Call = &call("otherDirectionalDerivative").of(CType::Real);
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &call("otherDirectionalDerivative").with_type(CType::Real);
 
-    const SET_INPUT_DERIVATIVES:  &'static Call = &call("otherSetInputDerivatives").of(CType::Real);
-    const GET_OUTPUT_DERIVATIVES: &'static Call = &call("otherGetOutputDerivatives").of(CType::Real);
+    const SET_INPUT_DERIVATIVES:  &'static Call = &call("otherSetInputDerivatives").with_type(CType::Real);
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &call("otherGetOutputDerivatives").with_type(CType::Real);
     const DO_STEP:                &'static Call = &call("otherDoStep");
 
     const ENTER_EVENT:            &'static Call = &call("otherEnterEventMode");

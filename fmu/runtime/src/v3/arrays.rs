@@ -1,7 +1,8 @@
-//! The layout in which an entry of the table is one variable: which scalars stand behind a value reference.
+//! The layout in which each entry of the table is one variable: finds the scalars of a value reference.
 //!
-//! An instance knows scalars alone. This module first translates a host's arrays to scalars: an array is the list of its
-//! elements, row by row, with the present sizes of its structural parameters. An element that is beyond keeps its start value.
+//! An instance knows only scalars. This module translates a host's arrays to scalars: an array is the list of
+//! its elements in row-major order, with the present sizes of its structural parameters. An element outside
+//! these sizes keeps its start value.
 
 use super::references::{scalar_reference, time_reference, type_of};
 use crate::call::CType;
@@ -9,23 +10,24 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Dimension, Value, Variable};
 
-/// The scalars behind each variable, at the present sizes.
+/// The scalars of each variable, with the present sizes.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
-    /// References of scalars, variable by variable.
+    /// Value references of the scalars, variable by variable.
     scalars: Vec<u32>,
-    /// End of each variable's elements.
+    /// End of each variable's elements in `scalars`.
     ends: Vec<usize>,
-    /// The C type in which each variable passes.
+    /// The C type of each variable.
     types: Vec<CType>,
-    /// Each scalar's array with its place in it from 1; place 0 is beyond the present size.
+    /// For each scalar its array and its position in it, counted from 1; position 0 is outside the present
+    /// size.
     places: Vec<(u32, usize)>,
-    /// The places of the states that there are among the most that there can be, in a host's order.
+    /// Indices of the existing states among the largest possible number of states, in the host's order.
     states: Vec<usize>,
 }
 
 impl Arrays {
-    /// Returns the arrays with the sizes in an instance's parameters, in the table's order.
+    /// Creates the arrays with the sizes in an instance's parameters, which are in the order of the table.
     pub fn new<M: Model>(parameters: &[Value]) -> Arrays {
         let table = M::table();
         let mut arrays = Arrays::default();
@@ -62,20 +64,20 @@ impl Arrays {
         arrays
     }
 
-    /// The scalars behind a value reference.
-    pub fn of(&self, reference: u32) -> Option<&[u32]> {
+    /// Returns the scalars of a value reference.
+    pub fn scalars(&self, reference: u32) -> Option<&[u32]> {
         let n = (reference as usize).checked_sub(1)?;
         let begin = if n == 0 { 0 } else { *self.ends.get(n - 1)? };
         self.scalars.get(begin..*self.ends.get(n)?)
     }
 
-    /// The C type in which a variable passes: those behind the table's are real.
+    /// Returns the C type of a variable; variables after those of the table are real.
     pub fn c_type(&self, reference: u32) -> CType {
         let n = (reference as usize).wrapping_sub(1);
         self.types.get(n).copied().unwrap_or(CType::Real)
     }
 
-    /// Number of variables.
+    /// Returns the number of variables.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
@@ -85,24 +87,26 @@ impl Arrays {
         self.ends.is_empty()
     }
 
-    /// The array of a scalar of the table with its place there, counted from 1, unless it is beyond the present size.
+    /// Returns the array of a scalar and the scalar's position in it, counted from 1, or `None` if it is
+    /// outside the present size.
     pub fn place(&self, scalar: u32) -> Option<(u32, usize)> {
         let place = *self.places.get((scalar as usize).checked_sub(1)?)?;
         (place.1 > 0).then_some(place)
     }
 
-    /// The places of the states that there are among the most that there can be, in a host's order.
+    /// Returns the indices of the existing states among the largest possible number of states, in the host's
+    /// order.
     pub fn states(&self) -> &[usize] {
         &self.states
     }
 }
 
-/// The place of the first derivative among the scalars.
+/// Returns the index of the first derivative among the scalars.
 fn first_derivative<M: Model>() -> usize {
     M::table().derivatives().first().map_or(0, |scalar| scalar.index as usize)
 }
 
-/// Value of a parameter that sizes arrays.
+/// Returns the value of a parameter that sizes arrays.
 fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     let is_it = |scalar: &&Scalar<M>| scalar.variable.name == name;
     let slot = M::table().parameters().iter().find(is_it).map(|scalar| scalar.slot);
@@ -112,7 +116,7 @@ fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     }
 }
 
-/// Lengths of a variable along its dimensions for these values of the structural parameters.
+/// Returns the lengths of a variable along its dimensions for these values of the structural parameters.
 pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -> Vec<usize> {
     let length = |dimension: &Dimension| match dimension {
         Dimension::Fixed(length) | Dimension::Used(_, length) => *length,
@@ -121,7 +125,7 @@ pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -
     variable.shape.iter().map(length).collect()
 }
 
-/// Returns true if an element, counted by rows in the largest array, is within these lengths.
+/// Returns true if an element, counted in row-major order in the largest array, is within these lengths.
 fn is_within<M: Model>(variable: &Variable<M>, element: usize, lengths: &[usize]) -> bool {
     let mut rest = element;
     variable.lengths().zip(lengths).rev().all(|(most, length)| {
@@ -131,21 +135,22 @@ fn is_within<M: Model>(variable: &Variable<M>, element: usize, lengths: &[usize]
     })
 }
 
-/// The value reference of an entry of the table.
+/// Returns the value reference of an entry of the table.
 pub fn reference<M: Model>(variable: &Variable<M>) -> u32 {
     let place = M::table().variables.iter().position(|v| v.name == variable.name);
     place.map_or(0, |place| place as u32 + 1)
 }
 
-/// The value reference of the independent variable, behind the table's; the event indicators', one array, follows.
+/// Returns the value reference of the independent variable, which follows the table; the next one is the
+/// array of event indicators.
 pub fn time<M: Model>() -> u32 {
     M::table().variables.len() as u32 + 1
 }
 
-/// The event indicators' name.
+/// Name of the event indicators.
 pub const INDICATORS: &str = "event_indicator";
 
-/// The name of a variable.
+/// Returns the name of a variable.
 pub fn name<M: Model>(reference: u32) -> Option<String> {
     let beyond = reference.checked_sub(time::<M>());
     match beyond {
@@ -158,7 +163,7 @@ pub fn name<M: Model>(reference: u32) -> Option<String> {
     }
 }
 
-/// A variable in messages, with its lengths at present if it is an array: `tank.p[1,3,3]`.
+/// Returns the name of a variable for messages, with the present lengths if it is an array: `tank.p[1,3,3]`.
 pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     let name = name::<M>(reference).unwrap_or_default();
     let lengths = match M::table().variables.get((reference as usize).wrapping_sub(1)) {
@@ -170,7 +175,7 @@ pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     if lengths.is_empty() { name } else { format!("{name}[{}]", lengths.join(",")) }
 }
 
-/// Array data for this layout; `None` if scalars are the variables.
+/// Returns the arrays for this layout, or `None` if scalars are the variables.
 pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
     (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
 }
@@ -190,10 +195,11 @@ mod tests {
     /// Variables from 1: level, square, der(level), q, rows, w, m, k, time, indicators. By rows, of 3 trays; time is scalar 25.
     #[test]
     fn an_array_is_the_row_of_its_elements_as_long_as_its_parameter_says() {
-        let of = |rows: i32| {
+        let scalars_of_rows = |rows: i32| {
             let arrays = Arrays::new::<Trays>(&parameters(rows));
-            let all: Vec<Vec<u32>> = (1..=10).map(|n| arrays.of(n).unwrap().to_vec()).collect();
-            assert_eq!((arrays.len(), arrays.of(0), arrays.of(11)), (10, None, None));
+            let all: Vec<Vec<u32>> =
+                (1..=10).map(|n| arrays.scalars(n).unwrap().to_vec()).collect();
+            assert_eq!((arrays.len(), arrays.scalars(0), arrays.scalars(11)), (10, None, None));
             assert!(!arrays.is_empty());
             all
         };
@@ -201,15 +207,15 @@ mod tests {
         let mut expected = vec![vec![1, 2, 3], vec![4], vec![5, 6, 7], vec![8, 9, 10], vec![11]];
         expected.extend([(12..18).collect(), (18..24).collect::<Vec<u32>>()]);
         expected.extend(behind.clone());
-        assert_eq!(of(3), expected);
+        assert_eq!(scalars_of_rows(3), expected);
         let mut expected = vec![vec![1, 2], vec![4], vec![5, 6], vec![8, 9], vec![11]];
         expected.extend([vec![12, 13, 14, 15], vec![18, 19, 21, 22]]);
         expected.extend(behind.clone());
-        assert_eq!(of(2), expected);
+        assert_eq!(scalars_of_rows(2), expected);
         let mut expected = vec![vec![1], vec![4], vec![5], vec![8], vec![11]];
         expected.extend([vec![12, 13], vec![18, 21]]);
         expected.extend(behind);
-        assert_eq!(of(1), expected);
+        assert_eq!(scalars_of_rows(1), expected);
         assert!(Arrays::default().is_empty());
     }
 

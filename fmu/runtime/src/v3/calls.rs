@@ -1,4 +1,4 @@
-//! The functions of FMI 3.0 with the states in which each may be called, and what differs from FMI 2.0.
+//! The functions of FMI 3.0 with the states in which each may be called, and the differences from FMI 2.0.
 
 use super::host::Host;
 use super::references::{scalar_reference, type_of, wrong_reference};
@@ -8,12 +8,8 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::version::Version;
 
-pub(super) const fn both(name: &'static str, allowed: u16) -> Call {
-    Call::new(name, allowed)
-}
-
-pub(super) const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
-    Call::new(name, allowed).of(c_type)
+pub(super) const fn typed(c_type: CType, name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed).with_type(c_type)
 }
 
 /// Restricts a call to Co-Simulation.
@@ -26,48 +22,48 @@ const fn me(call: Call) -> Call {
     call.only_in(Interface::ModelExchange)
 }
 
-/// Instance states in which values can be got and set.
+/// Instance states in which values can be read and set.
 pub(super) const GET: u16 = ANY;
 pub(super) const SET: u16 = I | M | S | E | C;
 
-/// The functions that one operation of an instance has several of, and those that are the C interface's own.
+/// Functions of FMI 3.0 with the instance states that allow them, as far as they are not in [`Version`].
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {
     use super::*;
-    pub static SET_DEBUG_LOGGING:   Call = both("fmi3SetDebugLogging", ANY | CONFIGURATION);
-    pub static GET_FLOAT64:         Call = of(CType::Real, "fmi3GetFloat64", GET | INTERMEDIATE);
-    pub static GET_INT32:           Call = of(CType::Integer, "fmi3GetInt32", GET);
-    pub static GET_INT64:           Call = of(CType::Enumeration, "fmi3GetInt64", GET);
-    pub static GET_BOOLEAN:         Call = of(CType::Boolean, "fmi3GetBoolean", GET);
-    pub static SET_FLOAT64:         Call = of(CType::Real, "fmi3SetFloat64", SET | INTERMEDIATE);
-    pub static SET_INT32:           Call = of(CType::Integer, "fmi3SetInt32", SET);
-    pub static SET_INT64:           Call = of(CType::Enumeration, "fmi3SetInt64", SET);
-    pub static SET_BOOLEAN:         Call = of(CType::Boolean, "fmi3SetBoolean", SET);
-    pub static GET_UINT64:          Call = of(CType::Size, "fmi3GetUInt64", GET | CONFIGURATION);
-    pub static SET_UINT64:          Call = of(CType::Size, "fmi3SetUInt64", SET | CONFIGURATION);
-    // The same where there is a structural parameter, which is an integer in the table.
-    pub static GET_SIZE:            Call = of(CType::Integer, "fmi3GetUInt64", GET | CONFIGURATION);
-    pub static SET_SIZE:            Call = of(CType::Integer, "fmi3SetUInt64", CONFIGURATION);
-    pub static NUMBER_OF_DEPENDENCIES: Call = of(CType::Real, "fmi3GetNumberOfVariableDependencies", ANY);
-    pub static DEPENDENCIES:        Call = of(CType::Real, "fmi3GetVariableDependencies", ANY);
-    pub static GET_STATE:           Call = both("fmi3GetFMUState", ANY);
-    pub static FREE_STATE:          Call = both("fmi3FreeFMUState", ANY | CONFIGURATION | FATAL);
-    pub static SERIALIZED_SIZE:     Call = both("fmi3SerializedFMUStateSize", ANY);
-    pub static SERIALIZE:           Call = both("fmi3SerializeFMUState", ANY);
-    pub static DESERIALIZE:         Call = both("fmi3DeserializeFMUState", ANY);
-    pub static ADJOINT_DERIVATIVE:  Call = both("fmi3GetAdjointDerivative", M | RUN);
-    pub static ENTER_CONFIGURATION: Call = both("fmi3EnterConfigurationMode", I);
-    pub static EXIT_CONFIGURATION:  Call = both("fmi3ExitConfigurationMode", CONFIGURATION);
-    pub static EVALUATE_DISCRETE_STATES: Call = both("fmi3EvaluateDiscreteStates", M | E);
-    // The standard has the two numbers in fewer states; fmusim 0.8 asks in continuous-time mode.
-    pub static NUMBER_OF_INDICATORS: Call = me(both("fmi3GetNumberOfEventIndicators", ANY | CONFIGURATION));
-    pub static NUMBER_OF_STATES:    Call = me(both("fmi3GetNumberOfContinuousStates", ANY | CONFIGURATION));
-    pub static ENTER_STEP:          Call = cs(both("fmi3EnterStepMode", E));
+    pub static SET_DEBUG_LOGGING:   Call = Call::new("fmi3SetDebugLogging", ANY | CONFIGURATION);
+    pub static GET_FLOAT64:         Call = typed(CType::Real, "fmi3GetFloat64", GET | INTERMEDIATE);
+    pub static GET_INT32:           Call = typed(CType::Integer, "fmi3GetInt32", GET);
+    pub static GET_INT64:           Call = typed(CType::Enumeration, "fmi3GetInt64", GET);
+    pub static GET_BOOLEAN:         Call = typed(CType::Boolean, "fmi3GetBoolean", GET);
+    pub static SET_FLOAT64:         Call = typed(CType::Real, "fmi3SetFloat64", SET | INTERMEDIATE);
+    pub static SET_INT32:           Call = typed(CType::Integer, "fmi3SetInt32", SET);
+    pub static SET_INT64:           Call = typed(CType::Enumeration, "fmi3SetInt64", SET);
+    pub static SET_BOOLEAN:         Call = typed(CType::Boolean, "fmi3SetBoolean", SET);
+    pub static GET_UINT64:          Call = typed(CType::Size, "fmi3GetUInt64", GET | CONFIGURATION);
+    pub static SET_UINT64:          Call = typed(CType::Size, "fmi3SetUInt64", SET | CONFIGURATION);
+    // The same functions for structural parameters, which are integers in the table.
+    pub static GET_SIZE:            Call = typed(CType::Integer, "fmi3GetUInt64", GET | CONFIGURATION);
+    pub static SET_SIZE:            Call = typed(CType::Integer, "fmi3SetUInt64", CONFIGURATION);
+    pub static NUMBER_OF_DEPENDENCIES: Call = typed(CType::Real, "fmi3GetNumberOfVariableDependencies", ANY);
+    pub static DEPENDENCIES:        Call = typed(CType::Real, "fmi3GetVariableDependencies", ANY);
+    pub static GET_STATE:           Call = Call::new("fmi3GetFMUState", ANY);
+    pub static FREE_STATE:          Call = Call::new("fmi3FreeFMUState", ANY | CONFIGURATION | FATAL);
+    pub static SERIALIZED_SIZE:     Call = Call::new("fmi3SerializedFMUStateSize", ANY);
+    pub static SERIALIZE:           Call = Call::new("fmi3SerializeFMUState", ANY);
+    pub static DESERIALIZE:         Call = Call::new("fmi3DeserializeFMUState", ANY);
+    pub static ADJOINT_DERIVATIVE:  Call = Call::new("fmi3GetAdjointDerivative", M | RUN);
+    pub static ENTER_CONFIGURATION: Call = Call::new("fmi3EnterConfigurationMode", I);
+    pub static EXIT_CONFIGURATION:  Call = Call::new("fmi3ExitConfigurationMode", CONFIGURATION);
+    pub static EVALUATE_DISCRETE_STATES: Call = Call::new("fmi3EvaluateDiscreteStates", M | E);
+    // The standard allows these two in fewer states, but fmusim 0.8 calls them in continuous-time mode.
+    pub static NUMBER_OF_INDICATORS: Call = me(Call::new("fmi3GetNumberOfEventIndicators", ANY | CONFIGURATION));
+    pub static NUMBER_OF_STATES:    Call = me(Call::new("fmi3GetNumberOfContinuousStates", ANY | CONFIGURATION));
+    pub static ENTER_STEP:          Call = cs(Call::new("fmi3EnterStepMode", E));
 }
 pub use list::*;
 
-/// FMI 3.0
+/// FMI 3.0.
 #[derive(Clone, Copy, Debug)]
 pub struct Fmi3;
 
@@ -83,29 +79,29 @@ impl Version for Fmi3 {
     const SETS_STATES: bool = true;
 
     // FMI 3.0 has no setupExperiment: fmi3EnterInitializationMode takes its arguments.
-    const SETUP_EXPERIMENT:       &'static Call = &both("fmi3EnterInitializationMode", I);
-    const ENTER_INITIALIZATION:   &'static Call = &both("fmi3EnterInitializationMode", I);
-    const EXIT_INITIALIZATION:    &'static Call = &both("fmi3ExitInitializationMode", M);
-    const TERMINATE:              &'static Call = &both("fmi3Terminate", S | E | C);
-    const RESET:                  &'static Call = &both("fmi3Reset", ANY | CONFIGURATION);
-    const SET_STATE:              &'static Call = &both("fmi3SetFMUState", ANY);
-    const DIRECTIONAL_DERIVATIVE: &'static Call = &of(CType::Real, "fmi3GetDirectionalDerivative", M | RUN);
+    const SETUP_EXPERIMENT:       &'static Call = &Call::new("fmi3EnterInitializationMode", I);
+    const ENTER_INITIALIZATION:   &'static Call = &Call::new("fmi3EnterInitializationMode", I);
+    const EXIT_INITIALIZATION:    &'static Call = &Call::new("fmi3ExitInitializationMode", M);
+    const TERMINATE:              &'static Call = &Call::new("fmi3Terminate", S | E | C);
+    const RESET:                  &'static Call = &Call::new("fmi3Reset", ANY | CONFIGURATION);
+    const SET_STATE:              &'static Call = &Call::new("fmi3SetFMUState", ANY);
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &typed(CType::Real, "fmi3GetDirectionalDerivative", M | RUN);
 
-    // Inputs have slopes by intermediate update.
-    const SET_INPUT_DERIVATIVES:  &'static Call = &cs(of(CType::Real, "fmi3SetFloat64", INTERMEDIATE));
-    const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(of(CType::Real, "fmi3GetOutputDerivatives", S | T | INTERMEDIATE));
-    const DO_STEP:                &'static Call = &cs(both("fmi3DoStep", S));
+    // In FMI 3.0 inputs get slopes by intermediate updates.
+    const SET_INPUT_DERIVATIVES:  &'static Call = &cs(typed(CType::Real, "fmi3SetFloat64", INTERMEDIATE));
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(typed(CType::Real, "fmi3GetOutputDerivatives", S | T | INTERMEDIATE));
+    const DO_STEP:                &'static Call = &cs(Call::new("fmi3DoStep", S));
 
-    const ENTER_EVENT:            &'static Call = &both("fmi3EnterEventMode", S | C);
-    const NEW_DISCRETE_STATES:    &'static Call = &both("fmi3UpdateDiscreteStates", E);
-    const ENTER_CONTINUOUS_TIME:  &'static Call = &me(both("fmi3EnterContinuousTimeMode", E));
-    const COMPLETED_STEP:         &'static Call = &me(both("fmi3CompletedIntegratorStep", C));
-    const SET_TIME:               &'static Call = &me(both("fmi3SetTime", C));
-    const SET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi3SetContinuousStates", C));
-    const GET_DERIVATIVES:        &'static Call = &me(both("fmi3GetContinuousStateDerivatives", M | E | C | T));
-    const GET_EVENT_INDICATORS:   &'static Call = &me(both("fmi3GetEventIndicators", M | E | C | T));
-    const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi3GetContinuousStates", M | E | C | T));
-    const GET_NOMINALS:           &'static Call = &me(both("fmi3GetNominalsOfContinuousStates", ANY));
+    const ENTER_EVENT:            &'static Call = &Call::new("fmi3EnterEventMode", S | C);
+    const NEW_DISCRETE_STATES:    &'static Call = &Call::new("fmi3UpdateDiscreteStates", E);
+    const ENTER_CONTINUOUS_TIME:  &'static Call = &me(Call::new("fmi3EnterContinuousTimeMode", E));
+    const COMPLETED_STEP:         &'static Call = &me(Call::new("fmi3CompletedIntegratorStep", C));
+    const SET_TIME:               &'static Call = &me(Call::new("fmi3SetTime", C));
+    const SET_CONTINUOUS_STATES:  &'static Call = &me(Call::new("fmi3SetContinuousStates", C));
+    const GET_DERIVATIVES:        &'static Call = &me(Call::new("fmi3GetContinuousStateDerivatives", M | E | C | T));
+    const GET_EVENT_INDICATORS:   &'static Call = &me(Call::new("fmi3GetEventIndicators", M | E | C | T));
+    const GET_CONTINUOUS_STATES:  &'static Call = &me(Call::new("fmi3GetContinuousStates", M | E | C | T));
+    const GET_NOMINALS:           &'static Call = &me(Call::new("fmi3GetNominalsOfContinuousStates", ANY));
 
     fn token<M: Model>(layout: Layout) -> &'static str {
         M::table().token(layout)

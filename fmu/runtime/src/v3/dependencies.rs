@@ -18,7 +18,7 @@ struct Dependency {
     independent_element: usize,
 }
 
-/// Dependencies of a variable.
+/// Returns the dependencies of a variable.
 fn dependencies<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,
@@ -28,7 +28,7 @@ fn dependencies<M: Model>(
     let scalars = match &host.arrays {
         None => std::slice::from_ref(&reference),
         Some(arrays) => arrays
-            .of(reference)
+            .scalars(reference)
             .ok_or_else(|| call.error(wrong_variable::<M>(arrays, reference)))?,
     };
     let mut all = Vec::new();
@@ -58,7 +58,7 @@ fn dependencies<M: Model>(
     Ok(all)
 }
 
-/// Number of dependencies of a variable.
+/// Returns the number of dependencies of a variable.
 pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
     instance: fmi3Instance,
     valueReference: fmi3ValueReference,
@@ -74,7 +74,8 @@ pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
     }
 }
 
-/// Dependencies of a variable: initial ones before the end of initialization mode, then the present ones.
+/// Returns the dependencies of a variable: those of its initial value until the end of initialization mode,
+/// then the present ones.
 pub unsafe fn fmi3GetVariableDependencies<M: Model>(
     instance: fmi3Instance,
     dependent: fmi3ValueReference,

@@ -11,7 +11,7 @@ use crate::model::Model;
 use crate::variable::{is_finite, text as number};
 use crate::version::Version;
 
-/// Derivative of the unknowns along a direction of the knowns.
+/// Computes the derivative of the unknowns in a direction of the knowns.
 pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
     instance: fmi3Instance,
     unknowns: *const fmi3ValueReference,
@@ -34,7 +34,8 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
             check_numbers(call, "nSensitivity", nSensitivity, unknowns.len())?;
             let seed = array(call, "seed", seed, nSeed)?;
             let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
-            // the independent variable, on which nothing depends but by states and inputs, is left out of the knowns
+            // The independent variable is left out of the knowns, because everything depends on it only
+            // through states and inputs.
             let time = time_reference::<M>();
             if !knowns.contains(&time) {
                 return component
@@ -48,7 +49,8 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
     }
 }
 
-/// Derivative of a weighted sum of the unknowns by each known: column by column, each a directional derivative.
+/// Computes the derivative of a weighted sum of the unknowns with respect to each known, each as a
+/// directional derivative.
 pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
     instance: fmi3Instance,
     unknowns: *const fmi3ValueReference,

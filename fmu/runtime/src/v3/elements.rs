@@ -1,4 +1,4 @@
-//! Arrays of an instance: the scalars behind value references of the host, and counts of values.
+//! Translates value references of the host to scalars, and checks numbers of values.
 
 use std::borrow::Cow;
 
@@ -11,7 +11,7 @@ use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::{Dimension, Value};
 
-/// There is a value for each reference: all variables are scalars.
+/// Checks that there is one value for each reference, if all variables are scalars.
 #[inline]
 pub(super) fn check_count(call: &Call, references: usize, values: usize) -> Result<(), Fault> {
     if references == values {
@@ -22,7 +22,7 @@ pub(super) fn check_count(call: &Call, references: usize, values: usize) -> Resu
     )))
 }
 
-/// Refuses a derivative with a wrong number of scalars.
+/// Checks the number of scalars of a derivative.
 pub(super) fn check_numbers(
     call: &Call,
     name: &str,
@@ -35,7 +35,7 @@ pub(super) fn check_numbers(
     Err(call.error(format_args!("{name} = {given} (allowed: {expected})")))
 }
 
-/// The scalars behind value references of the host's.
+/// Returns the scalars of the host's value references.
 pub(super) fn scalars_of<'a, M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
@@ -47,7 +47,7 @@ pub(super) fn scalars_of<'a, M: Model>(
     }
 }
 
-/// The scalars behind variables, if they pass in the C type that the call is for.
+/// Returns the scalars of array variables, which must have the C type of the call.
 pub(super) fn expand<M: Model>(
     arrays: &Arrays,
     call: &Call,
@@ -55,7 +55,7 @@ pub(super) fn expand<M: Model>(
 ) -> Result<Vec<u32>, Fault> {
     let mut scalars = Vec::with_capacity(references.len());
     for reference in references {
-        match arrays.of(*reference) {
+        match arrays.scalars(*reference) {
             Some(all) if call.c_type.is_none_or(|t| t == arrays.c_type(*reference)) => {
                 scalars.extend_from_slice(all);
             }
@@ -79,7 +79,7 @@ pub(super) fn wrong_variable<M: Model>(arrays: &Arrays, reference: u32) -> Strin
     }
 }
 
-/// There is a value for each element.
+/// Checks that there is one value for each element.
 pub(super) fn check_elements<M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
@@ -106,19 +106,19 @@ pub(super) fn check_elements<M: Model>(
     )))
 }
 
-/// Resizes the host's arrays after a change of structural parameters.
+/// Updates the sizes of the host's arrays after a change of structural parameters.
 pub(super) fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     let Component { instance, host, .. } = component;
     if let Some(arrays) = &mut host.arrays {
         **arrays = Arrays::new::<M>(&instance.parameters);
-        let all = host.required_variables.iter().filter_map(|reference| arrays.of(*reference));
+        let all = host.required_variables.iter().filter_map(|reference| arrays.scalars(*reference));
         host.required = all.flatten().copied().collect();
         host.set = Vec::with_capacity(host.required.len());
     }
 }
 
-/// Sets what is sized by changed structural parameters to its start values. If a host had set other values, the FMU logs
-/// that they are lost.
+/// Resets everything that is sized by changed structural parameters to its start values. If the host had set
+/// other values, a warning says that they are lost.
 pub(super) fn start_resized<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,

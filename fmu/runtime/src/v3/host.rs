@@ -4,28 +4,24 @@ use super::arrays::Arrays;
 use super::types::*;
 use crate::model::Model;
 
-/// Data that an instance of FMI 3.0 keeps about its host.
+/// Data about the host that an instance of FMI 3.0 needs.
 pub struct Host<M: Model> {
     pub(super) environment: fmi3InstanceEnvironment,
     pub(super) intermediate_update: fmi3IntermediateUpdateCallback,
     pub(super) early_return_allowed: bool,
-    /// The variables that the host wants within steps.
     pub(super) required: Vec<fmi3ValueReference>,
     /// Present phase of an intermediate update.
     pub(super) phase: Phase,
-    /// The inputs at the end of the piece that comes, as far as they are set.
+    /// Values of the inputs at the end of the next part of the step, as far as they are set.
     pub(super) ends: M::Inputs,
-    /// Inputs that are set.
     pub(super) set: Vec<fmi3ValueReference>,
-    /// Room for event indicators.
+    /// Memory for event indicators.
     pub(super) indicators: Vec<f64>,
-    /// The scalars behind the variables that it knows, if these are not the scalars.
     pub(super) arrays: Option<Box<Arrays>>,
-    /// The variables that it wants within steps, as it knows them.
+    /// The variables that the host requires within steps, by its own references.
     pub(super) required_variables: Vec<fmi3ValueReference>,
 }
 
-/// Phases of an intermediate update, by the calls that a host may make.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Phase {
     Set,

@@ -1,5 +1,7 @@
 //! Instances of FMI 3.0: instantiation, changes of mode, events, and their end.
 
+// The standard documents these names.
+#![allow(missing_docs)]
 #![allow(unsafe_code)]
 
 use std::panic::catch_unwind;
@@ -17,7 +19,7 @@ use crate::c_abi::{
     self, Log, Logger, array, c_string, free_component, new_component, null, on, on_allowed,
     on_start, place, text,
 };
-use crate::call::{CType, Events, Fault, InstanceState, Interface, Severity};
+use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity};
 use crate::extent::Extent;
 use crate::instance::Instance;
 use crate::log::Filter;
@@ -25,12 +27,12 @@ use crate::model::Model;
 use crate::table::Layout;
 use crate::version::Version;
 
-/// "3.0"
+/// Returns "3.0".
 pub fn fmi3GetVersion() -> fmi3String {
     c"3.0".as_ptr()
 }
 
-/// Chooses what is logged; why calls fail is logged always.
+/// Selects what is logged. Failures are always logged.
 pub unsafe fn fmi3SetDebugLogging<M: Model>(
     instance: fmi3Instance,
     loggingOn: fmi3Boolean,
@@ -44,7 +46,8 @@ pub unsafe fn fmi3SetDebugLogging<M: Model>(
             for category in array(call, "categories", categories, nCategories)? {
                 names.push(text(*category).ok_or_else(|| null(call, "categories[]"))?);
             }
-            let filter = Filter::of(&names, M::table()).map_err(|why| call.error(why))?;
+            let filter =
+                Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))?;
             component.log.filter =
                 if loggingOn == 0 { Filter::ERRORS } else { filter.with_errors() };
             Ok(())
@@ -52,7 +55,8 @@ pub unsafe fn fmi3SetDebugLogging<M: Model>(
     }
 }
 
-/// The host's logger. In a message '#' begins a reference to a variable, unless there are two.
+/// Wraps the host's logger. The character '#' begins a reference to a variable in a message, so that it is
+/// doubled.
 fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) -> Option<Logger> {
     let logger = logger?;
     Some(Box::new(move |status, category, message| unsafe {
@@ -64,7 +68,7 @@ fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) 
     }))
 }
 
-/// Makes an instance. On failure it returns NULL and logs the reason.
+/// Creates an instance by `make`. On failure it returns NULL and logs the reason.
 unsafe fn instantiate<M: Model>(
     function: &str,
     (name, token, resources): (fmi3String, fmi3String, fmi3String),
@@ -97,8 +101,12 @@ unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Returns the layout of the variables, scalars or arrays, in the model description with this token, and the part of the
-/// variables that it has. Fails if the token or the instance's name is not acceptable.
+/// Returns the layout of the variables in the model description with this token, scalars or arrays, and the
+/// part of the variables that it contains.
+///
+/// # Errors
+///
+/// If the token or the instance's name is not acceptable.
 fn check_token<M: Model>(
     name: Option<String>,
     token: Option<String>,
@@ -122,7 +130,6 @@ fn check_token<M: Model>(
     }
 }
 
-/// An instance whose host integrates.
 pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
     instanceName: fmi3String,
     instantiationToken: fmi3String,
@@ -145,7 +152,6 @@ pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
     }
 }
 
-/// An instance that integrates itself.
 pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     instanceName: fmi3String,
     instantiationToken: fmi3String,
@@ -167,7 +173,7 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
             (instanceName, instantiationToken, resourcePath),
             (instanceEnvironment, logMessage),
             |arrays| {
-                let call = &both("fmi3InstantiateCoSimulation", 0);
+                let call = &Call::new("fmi3InstantiateCoSimulation", 0);
                 let required = array(
                     call,
                     "requiredIntermediateVariables",
@@ -207,7 +213,7 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
     }
 }
 
-/// There is no Scheduled Execution.
+/// Returns NULL, because there is no Scheduled Execution.
 pub unsafe fn fmi3InstantiateScheduledExecution<M: Model>(
     instanceName: fmi3String,
     instantiationToken: fmi3String,
@@ -230,12 +236,11 @@ pub unsafe fn fmi3InstantiateScheduledExecution<M: Model>(
     }
 }
 
-/// Frees an instance; NULL is fine.
 pub unsafe fn fmi3FreeInstance<M: Model>(instance: fmi3Instance) {
     unsafe { free_component::<M, Fmi3>(instance) }
 }
 
-/// Sets times and tolerance and enters initialization mode; all variables can be read from here on.
+/// Sets times and tolerance and enters initialization mode, from which on all variables can be read.
 pub unsafe fn fmi3EnterInitializationMode<M: Model>(
     instance: fmi3Instance,
     toleranceDefined: fmi3Boolean,
@@ -254,7 +259,7 @@ pub unsafe fn fmi3EnterInitializationMode<M: Model>(
     }
 }
 
-/// Leaves initialization mode: parameters are fixed, and events or steps follow.
+/// Leaves initialization mode: parameters are fixed from here on, and event mode or steps follow.
 pub unsafe fn fmi3ExitInitializationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on_start::<M, Fmi3>(instance, Fmi3::EXIT_INITIALIZATION, |component| {
@@ -263,7 +268,6 @@ pub unsafe fn fmi3ExitInitializationMode<M: Model>(instance: fmi3Instance) -> fm
     }
 }
 
-/// Enters event mode.
 pub unsafe fn fmi3EnterEventMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, Fmi3::ENTER_EVENT, |component| {
@@ -272,12 +276,10 @@ pub unsafe fn fmi3EnterEventMode<M: Model>(instance: fmi3Instance) -> fmi3Status
     }
 }
 
-/// Ends the simulation; values can still be read.
 pub unsafe fn fmi3Terminate<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe { on::<M, Fmi3>(instance, Fmi3::TERMINATE, |component| component.instance.terminate()) }
 }
 
-/// Resets the instance to its state after instantiation.
 pub unsafe fn fmi3Reset<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, Fmi3::RESET, |component| {
@@ -297,7 +299,7 @@ pub unsafe fn fmi3EnterConfigurationMode<M: Model>(instance: fmi3Instance) -> fm
     }
 }
 
-/// Back to where it came from.
+/// Leaves configuration mode.
 pub unsafe fn fmi3ExitConfigurationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, &EXIT_CONFIGURATION, |component| {
@@ -306,13 +308,13 @@ pub unsafe fn fmi3ExitConfigurationMode<M: Model>(instance: fmi3Instance) -> fmi
     }
 }
 
-/// Nothing is left to be evaluated: fmi3UpdateDiscreteStates does all.
+/// Does nothing, because fmi3UpdateDiscreteStates evaluates everything.
 pub unsafe fn fmi3EvaluateDiscreteStates<M: Model>(instance: fmi3Instance) -> fmi3Status {
     let call = &EVALUATE_DISCRETE_STATES;
     unsafe { on::<M, Fmi3>(instance, call, |component| component.instance.check(call).map(|_| ())) }
 }
 
-/// Does what is due at the event.
+/// Handles the events that are due.
 pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
     instance: fmi3Instance,
     discreteStatesNeedUpdate: *mut fmi3Boolean,

@@ -1,5 +1,7 @@
 //! Model Exchange: continuous states, their derivatives, and event indicators.
 
+// The standard documents these names.
+#![allow(missing_docs)]
 #![allow(unsafe_code)]
 
 use super::calls::*;
@@ -11,7 +13,6 @@ use crate::instance::Instance;
 use crate::model::Model;
 use crate::version::Version;
 
-/// Enters continuous-time mode.
 pub unsafe fn fmi3EnterContinuousTimeMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| {
@@ -20,8 +21,8 @@ pub unsafe fn fmi3EnterContinuousTimeMode<M: Model>(instance: fmi3Instance) -> f
     }
 }
 
-/// The host has made a step and will not go back behind it. No past is kept, so
-/// `noSetFMUStatePriorToCurrentPoint` changes nothing.
+/// Accepts a step of the host's integrator. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has
+/// no effect.
 pub unsafe fn fmi3CompletedIntegratorStep<M: Model>(
     instance: fmi3Instance,
     _noSetFMUStatePriorToCurrentPoint: fmi3Boolean,
@@ -41,14 +42,13 @@ pub unsafe fn fmi3CompletedIntegratorStep<M: Model>(
     }
 }
 
-/// The present time.
 pub unsafe fn fmi3SetTime<M: Model>(instance: fmi3Instance, time: fmi3Float64) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, Fmi3::SET_TIME, |component| component.instance.set_time(time))
     }
 }
 
-/// The states as the host has integrated them.
+/// Sets the continuous states that the host has integrated.
 pub unsafe fn fmi3SetContinuousStates<M: Model>(
     instance: fmi3Instance,
     continuousStates: *const fmi3Float64,
@@ -71,7 +71,8 @@ pub unsafe fn fmi3SetContinuousStates<M: Model>(
     }
 }
 
-/// Fills the host's array with something of each state by `body`, which knows the most that there can be.
+/// Fills an array of the host with one value per state by `body`, which uses the largest possible number of
+/// states.
 unsafe fn fill_states<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
@@ -94,7 +95,7 @@ unsafe fn fill_states<M: Model>(
     }
 }
 
-/// Fills the host's array by `body`.
+/// Fills an array of the host by `body`.
 unsafe fn fill<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
@@ -108,7 +109,7 @@ unsafe fn fill<M: Model>(
     }
 }
 
-/// The derivatives of the states, in the order of the model description.
+/// Computes the derivatives of the states, in the order of the model description.
 pub unsafe fn fmi3GetContinuousStateDerivatives<M: Model>(
     instance: fmi3Instance,
     derivatives: *mut fmi3Float64,
@@ -118,7 +119,7 @@ pub unsafe fn fmi3GetContinuousStateDerivatives<M: Model>(
     unsafe { fill_states::<M>(instance, Fmi3::GET_DERIVATIVES, into, Instance::derivatives) }
 }
 
-/// Functions that cross zero at events.
+/// Computes the event indicators, which change sign at events.
 pub unsafe fn fmi3GetEventIndicators<M: Model>(
     instance: fmi3Instance,
     eventIndicators: *mut fmi3Float64,
@@ -128,7 +129,7 @@ pub unsafe fn fmi3GetEventIndicators<M: Model>(
     unsafe { fill::<M>(instance, Fmi3::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
 }
 
-/// The states, in the order of the model description.
+/// Reads the states, in the order of the model description.
 pub unsafe fn fmi3GetContinuousStates<M: Model>(
     instance: fmi3Instance,
     continuousStates: *mut fmi3Float64,
@@ -140,7 +141,6 @@ pub unsafe fn fmi3GetContinuousStates<M: Model>(
     }
 }
 
-/// The states' orders of magnitude.
 pub unsafe fn fmi3GetNominalsOfContinuousStates<M: Model>(
     instance: fmi3Instance,
     nominals: *mut fmi3Float64,
@@ -166,7 +166,6 @@ unsafe fn tell<M: Model>(
     }
 }
 
-/// Returns the number of event indicators.
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Model>(
     instance: fmi3Instance,
     nEventIndicators: *mut usize,
@@ -179,7 +178,6 @@ pub unsafe fn fmi3GetNumberOfEventIndicators<M: Model>(
     unsafe { tell::<M>(instance, &NUMBER_OF_INDICATORS, into, count) }
 }
 
-/// Returns the number of continuous states.
 pub unsafe fn fmi3GetNumberOfContinuousStates<M: Model>(
     instance: fmi3Instance,
     nContinuousStates: *mut usize,

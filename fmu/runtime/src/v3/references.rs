@@ -1,17 +1,17 @@
-//! Value references of FMI 3.0: the types that they pass in, and the variables behind those of the table.
+//! Value references of FMI 3.0: their types, and the variables that follow those of the table.
 
 use crate::call::CType;
 use crate::model::Model;
 use crate::table::Scalar;
 use crate::variable::{Causality, Kind, Variable};
 
-/// Value reference of a scalar: its place among the scalars, from 1.
+/// Returns the value reference of a scalar: its position among the scalars, from 1.
 #[inline]
 pub(super) fn scalar_reference<M: Model>(scalar: &Scalar<M>) -> u32 {
     scalar.index + 1
 }
 
-/// The C type in which FMI 3.0 passes a scalar.
+/// Returns the C type of a scalar in FMI 3.0.
 #[inline]
 pub(crate) fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
     match scalar.c_type {
@@ -22,7 +22,7 @@ pub(crate) fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
     }
 }
 
-/// Name of a type in FMI 3.0.
+/// Returns the name of a type in FMI 3.0.
 pub(super) fn type_name(c_type: CType) -> &'static str {
     match c_type {
         CType::Real => "Float64",
@@ -61,7 +61,7 @@ pub(super) fn wrong_reference<M: Model>(
     }
 }
 
-/// A variable behind those of the table.
+/// A variable that is not in the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extra {
     /// The independent variable.
@@ -70,7 +70,7 @@ pub enum Extra {
     Indicator(usize),
 }
 
-/// The extra variable of a value reference.
+/// Returns the extra variable of a value reference.
 #[inline]
 pub(super) fn extra<M: Model>(reference: u32) -> Option<Extra> {
     let beyond = (reference as usize).checked_sub(M::table().scalars.len() + 1)?;
@@ -80,14 +80,14 @@ pub(super) fn extra<M: Model>(reference: u32) -> Option<Extra> {
     }
 }
 
-/// The names of the extra variables, in the order of their value references.
+/// Returns the names of the extra variables, in the order of their value references.
 pub fn extra_names<M: Model>() -> Vec<String> {
     let indicators = 1..=M::table().about.event_indicators;
     let indicators = indicators.map(|n| format!("event_indicator[{n}]"));
     std::iter::once("time".to_string()).chain(indicators).collect()
 }
 
-/// The value reference of the independent variable, which the first indicator's follows.
+/// Returns the value reference of the independent variable; the event indicators follow.
 pub fn time_reference<M: Model>() -> u32 {
     M::table().scalars.len() as u32 + 1
 }
@@ -97,7 +97,8 @@ fn extra_name<M: Model>(reference: u32) -> Option<String> {
     extra_names::<M>().into_iter().nth(place as usize)
 }
 
-/// Returns true if hosts may get or set a variable within a step; an input that follows others has no end value of its own.
+/// Returns true if hosts may read or set a variable within a step. An input that follows from others cannot
+/// be set, because it has no end value of its own.
 pub fn has_intermediate_update<M: Model>(variable: &Variable<M>) -> bool {
     matches!(variable.causality, Causality::Input | Causality::Output)
         && variable.c_type() == CType::Real

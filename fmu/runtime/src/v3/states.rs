@@ -1,5 +1,7 @@
 //! Saved states.
 
+// The standard documents these names.
+#![allow(missing_docs)]
 #![allow(unsafe_code)]
 
 use super::calls::*;
@@ -12,7 +14,7 @@ use crate::model::Model;
 use crate::snapshot;
 use crate::version::Version;
 
-/// Saves the state, into the handle that is there or into a new one.
+/// Saves the state into the existing handle, or into a new one if it is NULL.
 pub unsafe fn fmi3GetFMUState<M: Model>(
     instance: fmi3Instance,
     FMUState: *mut fmi3FMUState,
@@ -25,7 +27,7 @@ pub unsafe fn fmi3GetFMUState<M: Model>(
     }
 }
 
-/// Takes a saved state, this instance's or another's, in any instance state.
+/// Restores a saved state of this or another instance, in any instance state.
 pub unsafe fn fmi3SetFMUState<M: Model>(
     instance: fmi3Instance,
     FMUState: fmi3FMUState,
@@ -40,7 +42,7 @@ pub unsafe fn fmi3SetFMUState<M: Model>(
     }
 }
 
-/// Frees a saved state and clears the handle; NULL is fine.
+/// Frees a saved state and sets the handle to NULL; NULL is allowed.
 pub unsafe fn fmi3FreeFMUState<M: Model>(
     instance: fmi3Instance,
     FMUState: *mut fmi3FMUState,
@@ -49,7 +51,6 @@ pub unsafe fn fmi3FreeFMUState<M: Model>(
     unsafe { on::<M, Fmi3>(instance, call, |_| free_state::<M, Fmi3>(call, "FMUState", FMUState)) }
 }
 
-/// Returns the size of a saved state in bytes.
 pub unsafe fn fmi3SerializedFMUStateSize<M: Model>(
     instance: fmi3Instance,
     FMUState: fmi3FMUState,
@@ -65,7 +66,6 @@ pub unsafe fn fmi3SerializedFMUStateSize<M: Model>(
     }
 }
 
-/// Writes a saved state to the host's bytes.
 pub unsafe fn fmi3SerializeFMUState<M: Model>(
     instance: fmi3Instance,
     FMUState: fmi3FMUState,
@@ -81,7 +81,6 @@ pub unsafe fn fmi3SerializeFMUState<M: Model>(
     }
 }
 
-/// Makes a saved state from bytes.
 pub unsafe fn fmi3DeserializeFMUState<M: Model>(
     instance: fmi3Instance,
     serializedState: *const fmi3Byte,

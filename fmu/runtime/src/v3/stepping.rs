@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::variable::is_finite;
 use crate::version::Version;
 
-/// Steps follow.
+/// Leaves event mode, so that steps can follow.
 pub unsafe fn fmi3EnterStepMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, &ENTER_STEP, |component| {
@@ -25,7 +25,7 @@ pub unsafe fn fmi3EnterStepMode<M: Model>(instance: fmi3Instance) -> fmi3Status 
     }
 }
 
-/// The derivatives of some outputs.
+/// Computes the time derivatives of outputs.
 pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
     instance: fmi3Instance,
     valueReferences: *const fmi3ValueReference,
@@ -44,8 +44,9 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
                 None => check_count(call, nValueReferences, nValues)?,
                 Some(arrays) => {
                     let each = references.iter().zip(orders.iter());
-                    let each = each
-                        .flat_map(|(r, order)| vec![*order; arrays.of(*r).map_or(0, <[u32]>::len)]);
+                    let each = each.flat_map(|(r, order)| {
+                        vec![*order; arrays.scalars(*r).map_or(0, <[u32]>::len)]
+                    });
                     let each: Vec<i32> = each.collect();
                     scalars = Cow::Owned(expand::<M>(arrays, call, references)?);
                     orders = Cow::Owned(each);
@@ -63,14 +64,15 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
     }
 }
 
-/// Answer of the host to an intermediate update.
+/// Result of an intermediate update by the host.
 #[derive(Clone, Copy)]
 struct Wish {
-    /// Time of an early return that the host requested.
+    /// Time of the early return that the host requests, s.
     early_return: Option<f64>,
 }
 
-/// Lets the host look into a step, at `time`. No reference into the instance lives meanwhile: the host calls back.
+/// Calls the host's intermediateUpdate at `time`. No reference into the instance exists during the call,
+/// because the host calls the FMU from it.
 unsafe fn intermediate_update<M: Model>(
     instance: fmi3Instance,
     time: f64,
@@ -118,7 +120,6 @@ unsafe fn intermediate_update<M: Model>(
     Ok(Wish { early_return: Some(at).filter(|_| requested != 0 && can_return) })
 }
 
-/// Targets of a step's results.
 #[derive(Clone, Copy)]
 struct Answers {
     event: *mut fmi3Boolean,
@@ -128,7 +129,11 @@ struct Answers {
 }
 
 impl Answers {
-    /// Answers as they are before the step, as far as there is a place for them; or which place is missing.
+    /// Initialises the results before the step.
+    ///
+    /// # Errors
+    ///
+    /// If a pointer is NULL.
     unsafe fn begin(&self, call: &Call, time: f64) -> Result<(), Fault> {
         let Answers { event, terminate, early, last } = *self;
         let flags = [
@@ -152,8 +157,9 @@ impl Answers {
     }
 }
 
-/// Makes one step. The step stops at an event if the host allows early return. It then sets `eventHandlingNeeded`, as
-/// it does for an event at its end. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has no effect.
+/// Makes one step. If the host allows early return, the step stops at an event and sets
+/// `eventHandlingNeeded`, which is also set for an event at the end of the step. The FMU keeps no past, so
+/// `noSetFMUStatePriorToCurrentPoint` has no effect.
 pub unsafe fn fmi3DoStep<M: Model>(
     instance: fmi3Instance,
     currentCommunicationPoint: fmi3Float64,
@@ -211,8 +217,8 @@ unsafe fn stepped<M: Model>(
     log.report_step_warning(instance);
 }
 
-/// Makes one step with intermediate updates: at its beginning, when the host may set inputs for its end and request
-/// early return, and at its end.
+/// Makes one step with intermediate updates: at its start, when the host may set the inputs for its end and
+/// request an early return, and at its end.
 unsafe fn step_looked_into<M: Model>(
     instance: fmi3Instance,
     at: f64,
@@ -239,7 +245,7 @@ unsafe fn step_looked_into<M: Model>(
     if ramps != fmi3OK {
         return ramps;
     }
-    // Anywhere in the step; before it begins is at once, and so is NaN.
+    // The return time may be anywhere in the step; a time before its start, and NaN, mean immediately.
     let (mut is_early, mut moves) = (false, true);
     let placed = unsafe {
         on::<M, Fmi3>(instance, call, |component| {

@@ -1,5 +1,8 @@
-//! Values of variables: get and set by type, also within steps. Clocks and binary variables have no values.
+//! Reading and setting variables by type, also within steps. There are no values for clocks and binary
+//! variables.
 
+// The standard documents these names.
+#![allow(missing_docs)]
 #![allow(unsafe_code)]
 
 use super::calls::*;
@@ -15,7 +18,7 @@ use crate::table::Scalar;
 use crate::variable::{Access, Value};
 use crate::version::Version;
 
-/// The values of all references, each turned into its C type by `as_c`.
+/// Reads the variables of all references and converts each value to its C type by `as_c`.
 #[inline]
 unsafe fn get<M: Model, T>(
     instance: fmi3Instance,
@@ -46,7 +49,7 @@ unsafe fn get<M: Model, T>(
     }
 }
 
-/// The values of all elements of arrays, `count` of them.
+/// Reads all elements of array variables, which must be `count`.
 #[cold]
 fn array_values<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -92,7 +95,8 @@ fn extra_value<M: Model>(
     }
 }
 
-/// Within a step hosts may get and set what they said before, when it is the time for it.
+/// Checks that a variable may be read or set within a step: the host must have required it at instantiation,
+/// and `phase` must be the present phase of the intermediate update.
 #[cold]
 pub(super) fn check_intermediate<M: Model>(
     component: &Component<M, Fmi3>,
@@ -120,7 +124,7 @@ pub(super) fn check_intermediate<M: Model>(
     Ok(())
 }
 
-/// Sets all references, each from its C type by `from_c`, or says why one can't be.
+/// Sets the variables of all references; each value is converted from its C type by `from_c`.
 #[inline]
 unsafe fn set<M: Model, T: Copy>(
     instance: fmi3Instance,
@@ -147,7 +151,7 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Sets all elements of arrays.
+/// Sets all elements of array variables.
 #[cold]
 fn set_arrays<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -170,7 +174,7 @@ fn set_arrays<M: Model>(
     Ok(())
 }
 
-/// Within a step: what inputs are at the end of the piece that comes.
+/// Sets inputs within a step: their values at the end of the next part of the step.
 #[cold]
 fn set_ends<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -202,8 +206,9 @@ fn set_ends<M: Model>(
     Ok(())
 }
 
-/// Functions that get or set variables of a type by `$access`, with a conversion from or to the C type.
-macro_rules! of_type {
+/// Defines functions that read or set variables of one type by `$access`, with a conversion to or from the C
+/// type.
+macro_rules! accessors {
     ($($(#[$doc:meta])* $name:ident($values:ty): $access:ident, $call:expr, $convert:expr;)*) => {$(
         $(#[$doc])*
         pub unsafe fn $name<M: Model>(
@@ -219,27 +224,24 @@ macro_rules! of_type {
     )*};
 }
 
-of_type! {
-    /// Reads reals.
+accessors! {
     fmi3GetFloat64(*mut fmi3Float64): get, &GET_FLOAT64, Value::real;
-    /// Reads integers.
     fmi3GetInt32(*mut fmi3Int32): get, &GET_INT32, Value::integer;
-    /// Reads enumerations.
     fmi3GetInt64(*mut fmi3Int64): get, &GET_INT64, |value| value.integer().map(i64::from);
-    /// Reads Booleans: 0 or 1.
+    /// Reads Booleans as 0 or 1.
     fmi3GetBoolean(*mut fmi3Boolean): get, &GET_BOOLEAN, |value| value.boolean().map(u8::from);
-    /// Sets reals.
     fmi3SetFloat64(*const fmi3Float64): set, &SET_FLOAT64, Value::Real;
-    /// Sets integers.
     fmi3SetInt32(*const fmi3Int32): set, &SET_INT32, Value::Integer;
-    /// Sets enumerations. 0 is not an item of any.
+    /// Sets enumerations. A value that does not fit an i32 becomes 0, which is not an item of any
+    /// enumeration.
     fmi3SetInt64(*const fmi3Int64): set, &SET_INT64, |n| Value::Integer(i32::try_from(n).unwrap_or(0));
-    /// Sets Booleans: everything but 0 is true.
+    /// Sets Booleans; every value except 0 is true.
     fmi3SetBoolean(*const fmi3Boolean): set, &SET_BOOLEAN, |b| Value::Boolean(b != 0);
 }
 
-/// Gets or sets variables of a type that no variable has: fine when there are none.
-fn of_no_variable<M: Model>(
+/// Checks the arguments of a function for a type that no variable has: it succeeds without references and
+/// otherwise fails.
+fn check_no_variable<M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
     references: &[fmi3ValueReference],
@@ -257,8 +259,8 @@ fn of_no_variable<M: Model>(
     }
 }
 
-/// The same as a call.
-unsafe fn call_of_no_variable<M: Model>(
+/// Performs a function for a type that no variable has.
+unsafe fn access_no_variable<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
     (references, count): (*const fmi3ValueReference, usize),
@@ -267,12 +269,12 @@ unsafe fn call_of_no_variable<M: Model>(
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
-            of_no_variable(component, call, references, value_count)
+            check_no_variable(component, call, references, value_count)
         })
     }
 }
 
-/// Reads structural parameters, which there are with arrays.
+/// Reads structural parameters, which exist only in the layout with arrays.
 pub unsafe fn fmi3GetUInt64<M: Model>(
     instance: fmi3Instance,
     valueReferences: *const fmi3ValueReference,
@@ -285,7 +287,7 @@ pub unsafe fn fmi3GetUInt64<M: Model>(
         on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
             if component.host.arrays.is_none() {
-                return of_no_variable(component, call, references, nValues);
+                return check_no_variable(component, call, references, nValues);
             }
             let found = array_values(component, call, references, nValues)?;
             let places = array_mut(call, "values", values, nValues)?;
@@ -300,7 +302,7 @@ pub unsafe fn fmi3GetUInt64<M: Model>(
     }
 }
 
-/// Sets structural parameters, which there are with arrays.
+/// Sets structural parameters, which exist only in the layout with arrays.
 pub unsafe fn fmi3SetUInt64<M: Model>(
     instance: fmi3Instance,
     valueReferences: *const fmi3ValueReference,
@@ -313,9 +315,9 @@ pub unsafe fn fmi3SetUInt64<M: Model>(
         on_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
             if component.host.arrays.is_none() {
-                return of_no_variable(component, call, references, nValues);
+                return check_no_variable(component, call, references, nValues);
             }
-            // More than the largest integer is more than any size may be.
+            // A value above the largest integer is above the largest size.
             let size = |n: &u64| Value::Integer(i32::try_from(*n).unwrap_or(i32::MAX));
             let values = array(call, "values", values, nValues)?;
             let values: Vec<_> = values.iter().map(size).collect();
@@ -324,10 +326,10 @@ pub unsafe fn fmi3SetUInt64<M: Model>(
     }
 }
 
-/// Functions for types that no variable has.
-macro_rules! of_no_variable {
+/// Defines functions for types that no variable has.
+macro_rules! accessors_without_variables {
     ($($name:ident($value:ty), $allowed:expr;)*) => {$(
-        /// No variable is of this type.
+        /// Succeeds without references and otherwise fails, because no variable has this type.
         pub unsafe fn $name<M: Model>(
             instance: fmi3Instance,
             valueReferences: *const fmi3ValueReference,
@@ -335,14 +337,14 @@ macro_rules! of_no_variable {
             _values: $value,
             nValues: usize,
         ) -> fmi3Status {
-            static CALL: Call = both(stringify!($name), $allowed);
+            static CALL: Call = Call::new(stringify!($name), $allowed);
             let references = (valueReferences, nValueReferences);
-            unsafe { call_of_no_variable::<M>(instance, &CALL, references, nValues) }
+            unsafe { access_no_variable::<M>(instance, &CALL, references, nValues) }
         }
     )*};
 }
 
-of_no_variable! {
+accessors_without_variables! {
     fmi3GetFloat32(*mut fmi3Float32), GET;
     fmi3GetInt8(*mut i8), GET;
     fmi3GetUInt8(*mut u8), GET;
@@ -359,7 +361,7 @@ of_no_variable! {
     fmi3SetString(*const fmi3String), SET;
 }
 
-/// No variable is binary.
+/// Succeeds without references and otherwise fails, because no variable is binary.
 pub unsafe fn fmi3GetBinary<M: Model>(
     instance: fmi3Instance,
     valueReferences: *const fmi3ValueReference,
@@ -368,13 +370,13 @@ pub unsafe fn fmi3GetBinary<M: Model>(
     _values: *mut fmi3Binary,
     nValues: usize,
 ) -> fmi3Status {
-    static CALL: Call = both("fmi3GetBinary", GET);
+    static CALL: Call = Call::new("fmi3GetBinary", GET);
     unsafe {
-        call_of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
+        access_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
     }
 }
 
-/// No variable is binary.
+/// Succeeds without references and otherwise fails, because no variable is binary.
 pub unsafe fn fmi3SetBinary<M: Model>(
     instance: fmi3Instance,
     valueReferences: *const fmi3ValueReference,
@@ -383,31 +385,31 @@ pub unsafe fn fmi3SetBinary<M: Model>(
     _values: *const fmi3Binary,
     nValues: usize,
 ) -> fmi3Status {
-    static CALL: Call = both("fmi3SetBinary", SET);
+    static CALL: Call = Call::new("fmi3SetBinary", SET);
     unsafe {
-        call_of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
+        access_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
     }
 }
 
-/// Functions for clocks, of which there are none.
-macro_rules! of_no_clock {
+/// Defines functions for clocks, of which there are none.
+macro_rules! clock_functions {
     ($($name:ident($($argument:ident: $type:ty),*);)*) => {$(
-        /// There are no clocks.
+        /// Succeeds without references and otherwise fails, because there are no clocks.
         pub unsafe fn $name<M: Model>(
             instance: fmi3Instance,
             valueReferences: *const fmi3ValueReference,
             nValueReferences: usize,
             $($argument: $type),*
         ) -> fmi3Status {
-            static CALL: Call = both(stringify!($name), ANY);
+            static CALL: Call = Call::new(stringify!($name), ANY);
             let _ = ($($argument,)*);
             let references = (valueReferences, nValueReferences);
-            unsafe { call_of_no_variable::<M>(instance, &CALL, references, nValueReferences) }
+            unsafe { access_no_variable::<M>(instance, &CALL, references, nValueReferences) }
         }
     )*};
 }
 
-of_no_clock! {
+clock_functions! {
     fmi3GetClock(values: *mut fmi3Clock);
     fmi3SetClock(values: *const fmi3Clock);
     fmi3GetIntervalDecimal(intervals: *mut fmi3Float64, qualifiers: *mut fmi3IntervalQualifier);
@@ -420,13 +422,13 @@ of_no_clock! {
     fmi3SetShiftFraction(counters: *const fmi3UInt64, resolutions: *const fmi3UInt64);
 }
 
-/// There are no model partitions.
+/// Fails, because there are no model partitions.
 pub unsafe fn fmi3ActivateModelPartition<M: Model>(
     instance: fmi3Instance,
     _clockReference: fmi3ValueReference,
     _activationTime: fmi3Float64,
 ) -> fmi3Status {
-    static CALL: Call = both("fmi3ActivateModelPartition", ANY);
+    static CALL: Call = Call::new("fmi3ActivateModelPartition", ANY);
     unsafe {
         on_allowed::<M, Fmi3>(instance, &CALL, |_| {
             Err(CALL.error("this FMU has no Scheduled Execution"))
