@@ -104,7 +104,7 @@ for number in ("050", "100"):
              "gyro_z": np.degrees(sweep["omega"])}
     pd.DataFrame(table).to_csv(f"bench_{number}.csv", index=False)
 """,
-    "book/reader_test.md": RECORDING
+    "book/readers.md": RECORDING
     + "\nimport shutil; shutil.move('torque_bench.csv', 'bench.csv')\n",
     "book/first_check.md": """
 import shutil, zipfile

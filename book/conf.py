@@ -56,7 +56,7 @@ html_theme_options = {
     "footer_end": [],
 }
 
-PARTS = "index readers tutorials howto reference explanation developers"
+PARTS = "index tutorials howto reference explanation developers"
 CONTENTS = [f"book/{name}" for name in PARTS.split()]
 """Pages whose lists of links are the book's table of contents."""
 
