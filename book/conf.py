@@ -75,6 +75,25 @@ def add_toctrees(app: Sphinx, docname: str, source: list[str]) -> None:
     source[0] += "\n" + "\n".join(trees)
 
 
+RULES = ROOT / "harness" / "check" / "src" / "rules"
+RULE = re.compile(r'rule\("([\w.]+)", (\w+), "((?:\\.|[^"\\])*)", "((?:\\.|[^"\\])*)"')
+
+
+def add_rules(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Add the rules of `hubslosh check`, from their tables in Rust, to the page of the check."""
+    if docname != "book/check":
+        return
+    for version in ("2.0", "3.0"):
+        text = (RULES / f"fmi{version[0]}.rs").read_text()
+        rules = RULE.findall(text)
+        if len(rules) != text.count('    rule("'):
+            raise ValueError(f"fmi{version[0]}.rs: RULE in conf.py does not find every rule")
+        source[0] += f"\n## The rules for FMI {version}\n\n| rule | what must hold | source | |\n"
+        source[0] += "| --- | --- | --- | --- |\n"
+        for name, severity, title, origin in rules:
+            source[0] += f"| `{name}` | {title} | {origin} | {severity.lower()} |\n"
+
+
 def mathml(html: HTML5Translator, node: nodes.math | nodes.math_block) -> None:
     """Write an equation as MathML, which browsers draw without a script."""
     is_block = isinstance(node, nodes.math_block)
@@ -92,4 +111,5 @@ def mathml(html: HTML5Translator, node: nodes.math | nodes.math_block) -> None:
 def setup(app: Sphinx) -> None:
     """Connect the functions above."""
     app.connect("source-read", add_toctrees)
+    app.connect("source-read", add_rules)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
