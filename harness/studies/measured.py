@@ -33,7 +33,6 @@ from rotary_branch import STYLE, Panel
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(__file__).resolve().parent / "measured"
 RESULTS = DATA / "results.csv"
-BEFORE = DATA / "before.csv"
 PLAN = ROOT / "harness" / "campaigns" / "bench_as_built.toml"
 BOOK = ROOT / "book"
 PAGE = BOOK / "measured.md"
@@ -704,28 +703,6 @@ def name_of(row: Row) -> str:
     return f"{row.quantity}{unit}{' †' if row.rule == 2 else ''}"
 
 
-def changes(rows: list[Row]) -> dict[str, str]:
-    """Return how many comparisons passed by the first rules, and the table of before and now.
-
-    ``before.csv`` has the verdicts of a pendulum and of s and κ by the first rules, and reasons.
-    """
-    data = pd.read_csv(BEFORE, comment="#", keep_default_na=False)
-    passed = {(row.experiment, row.quantity): row.passed for row in rows}
-    cells = []
-    for experiment, quantity, pendulum, model, now, reason in data.itertuples(index=False):
-        verdict = passed[experiment, now or quantity]
-        words = [pendulum, model, "pass" if verdict else "fail"]
-        words = ["**fail**" if word == "fail" else word for word in words]
-        cells.append((f"{experiment}: {quantity}", *words, reason))
-    head = ("comparison", "pendulum", "s and κ, first rules", "now", "reason")
-    return {
-        "before": markdown(head, cells),
-        "passed_before": str((data["pendulum"] == "pass").sum()),
-        "passed_by_first_rules": str((data["model"] == "pass").sum()),
-        "count_before": str(len(data)),
-    }
-
-
 def with_band(value: float, band: float) -> str:
     """Return a number and what it may be off by."""
     if band < 1e-12:
@@ -770,9 +747,7 @@ def page(rows: list[Row], cfd: list[tuple[float, float, float]]) -> str:
     )
     of = {kind: [row for row in rows if row.kind == kind] for kind in KINDS}
     put = {
-        **changes(rows),
         "verdict": verdict(rows),
-        "passed": verdict(rows).removesuffix(" comparisons"),
         "experiments": str(len({row.experiment for row in rows})),
         "failures": str(sum(not row.passed for row in rows)),
         "results": results,
