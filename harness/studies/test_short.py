@@ -208,14 +208,14 @@ def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
 
 
 def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Five twins of HubSlosh in book/any_fmu_method.md: 17 of 20 intervals hold the truth.
+    """Five twins of HubSlosh in book/identification_method.md: 17 of 20 intervals hold the truth.
 
     Chance makes 17 or more of 20 of 95 % in 98 of 100 cases; seeds are fixed. Stated deviations
     are within a factor of two of the page's medians: inertia and friction are drawn within 30 %.
     """
     case = identify_twins.CASES["Hub"]
     case.fmu = os.fspath(fmu)
-    page = BOOK.joinpath("any_fmu_method.md").read_text(encoding="utf-8")
+    page = BOOK.joinpath("identification_method.md").read_text(encoding="utf-8")
     inside, stated = 0, {}
     for seed in range(1, 6):
         twin = case.make(default_rng(seed))
