@@ -121,8 +121,8 @@ def slowed(depth: float) -> float:
 
 
 def test_tilt_slows_slosh_along_the_slope() -> None:
-    """The change at half a radius of book/liquid_accuracy.md, to its printed digit."""
-    text = " ".join(lines("liquid_accuracy.md"))
+    """The change at half a radius of book/liquid.md, to its printed digit."""
+    text = " ".join(lines("liquid.md"))
     shallow = re.search(r"Here it is −([\d.]+) % at a depth of half a radius", text)
     assert slowed(0.5) == pytest.approx(float(shallow[1]), abs=0.05)
 
@@ -131,7 +131,7 @@ def test_tilt_slows_slosh_along_the_slope() -> None:
 def test_tilt_slows_slosh_of_deeper_liquid() -> None:
     """The two other changes of the page, to their printed digits."""
     deeper = re.search(
-        r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid_accuracy.md"))
+        r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid.md"))
     )
     found = [slowed(depth) for depth in (1.0, 2.0)]
     assert found == pytest.approx([float(deeper[1]), float(deeper[2])], abs=0.5)
@@ -183,7 +183,7 @@ def test_errors_of_work_and_precision(
 
 
 def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Seed 1 with the good gyro, all rows of the table in book/flight_accuracy.md.
+    """Seed 1 with the good gyro, all rows of the table in book/flight.md.
 
     Beyond the printed digits estimates may differ by 0.1 of their standard deviations, and these by
     5 %: far below what decides an interval.
@@ -191,7 +191,7 @@ def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
     spacecraft = os.fspath(fmu.with_name("Spacecraft.fmu"))
     truth, found, _ = flight_twin.twin(1, "good", os.fspath(program), spacecraft, tmp_path)
     assert found["fits"] and found["converged"]
-    page = lines("flight_accuracy.md")
+    page = lines("flight.md")
     start = page.index("| | truth | good gyro | MEMS gyro |") + 2
     rows = page[start : page.index("", start)]
     assert len(rows) == 8
