@@ -14,13 +14,34 @@ create_exception!(
     hubslosh,
     FmuError,
     PyException,
-    "An error, with the FMU's own message if it has one."
+    "Error in the arguments of a call, of an FMU or of the program ``hubslosh``.
+
+The message says what is wrong, where, and what is allowed; an FMU's own message is part of it.
+
+Examples
+--------
+>>> import hubslosh
+>>> hubslosh.simulate(parameters={'tank.h': -1}, stop=1)
+Traceback (most recent call last):
+hubslosh.FmuError: fmi2ExitInitializationMode returned fmi2Error: tank.h = -1.0 m (allowed: 0.0001 m to 100.0 m)
+"
 );
 create_exception!(
     hubslosh,
     FmuWarning,
     PyUserWarning,
-    "A warning of an FMU, such as parameters beyond the known range of its model."
+    "Warning of an FMU or of the program ``hubslosh``, such as parameters outside the range of its model.
+
+Examples
+--------
+Make warnings errors:
+
+>>> import warnings
+>>> import hubslosh
+>>> with warnings.catch_warnings():
+...     warnings.simplefilter('error', hubslosh.FmuWarning)
+...     run = hubslosh.simulate(stop=1)
+"
 );
 
 /// An error of the host as one of Python.

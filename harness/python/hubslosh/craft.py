@@ -406,7 +406,7 @@ class Craft:
             try:
                 if isinstance(one, FmuError):
                     raise one
-                said = one.prepare()
+                said = one._prepare()
             except FmuError as error:
                 problems.append(f"tank {key[0]}: {error}")
                 continue

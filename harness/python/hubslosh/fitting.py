@@ -17,14 +17,30 @@ ITERATIONS = 30
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """H(s) = B(s)/A(s), s in rad/s, coefficients from the highest power down; A begins with 1."""
+    """A transfer function H(s) = B(s)/A(s), s in rad/s, as `fit` returns it.
+
+    Attributes
+    ----------
+    numerator : ndarray, shape (m + 1,)
+        Coefficients of B for m zeros, from the highest power of s down.
+    denominator : ndarray, shape (n + 1,)
+        Coefficients of A for n poles, from the highest power of s down; the first is 1.
+    fit : float
+        Fit to the data, %: ``100 (1 − |H_data − H| / |H_data − mean(H_data)|)`` with norms over
+        all frequencies. 100 is perfect.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hubslosh import TransferFunction
+    >>> hub = TransferFunction(np.array([2.5]), np.array([1.0, 0.1]), fit=99.0)
+    >>> hub.poles
+    array([-0.1+0.j])
+    """
 
     numerator: NDArray[np.float64]
-    """Coefficients of B."""
     denominator: NDArray[np.float64]
-    """Coefficients of A; the first is 1."""
     fit: float
-    """``100 (1 − |H_data − H| / |H_data − mean H_data|)``, %: 100 is perfect."""
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -37,26 +53,92 @@ class TransferFunction:
         return _sorted(np.roots(self.numerator))
 
     def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
-        """Return H at frequencies in Hz."""
+        """Return the frequency response H(2πj · frequency).
+
+        Parameters
+        ----------
+        frequency : array_like, shape (n,)
+            Frequencies, Hz.
+
+        Returns
+        -------
+        ndarray of complex, shape (n,)
+            H at each frequency, in the unit of the data that was fitted.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from hubslosh import TransferFunction
+        >>> hub = TransferFunction(np.array([2.5]), np.array([1.0, 0.1]), fit=99.0)
+        >>> abs(hub.response([0.0, 1.0])).round(3)
+        array([25.   ,  0.398])
+        """
         s = 2j * np.pi * np.atleast_1d(floats(frequency))
         return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
     def to_control(self) -> Any:
-        """Return a ``control.TransferFunction``; needs the package control."""
+        """Convert to python-control.
+
+        Returns
+        -------
+        control.TransferFunction
+            The same transfer function.
+
+        Raises
+        ------
+        FmuError
+            If the package control is not installed.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from hubslosh import TransferFunction
+        >>> hub = TransferFunction(np.array([2.5]), np.array([1.0, 0.1]), fit=99.0)
+        >>> float(hub.to_control().dcgain())
+        25.0
+        """
         return control_package().TransferFunction(self.numerator, self.denominator)
 
 
 def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunction:
     """Fit a transfer function to a frequency response.
 
-    * ``response``: A table with the columns ``frequency`` (Hz), ``real`` and ``imag``, as
-      `frequency_response` returns it.
-    * ``poles``, ``zeros``: Numbers of poles and zeros. From torque to rate a hub with one slosh
-      mode has three and two; its zeros are the antiresonance, its pair of poles the resonance.
+    The fit is least squares over all frequencies by Levenberg–Marquardt, started from the
+    Sanathanan–Koerner iteration. Use a band in which the coherence is near 1. Unstable poles are
+    not prevented, and a real pole far below the band is poorly determined.
 
-    Least squares over all frequencies (Levenberg–Marquardt), starting from the Sanathanan–Koerner
-    iteration. The poles may become unstable. Use a band in which the coherence is near 1; a real
-    pole far below the band is poorly determined.
+    Parameters
+    ----------
+    response : DataFrame
+        Frequency response with the columns ``frequency`` (Hz), ``real`` and ``imag``, as
+        `frequency_response` returns it.
+    poles : int
+        Number of poles. A hub with one slosh mode has three from torque to rate; the complex
+        pair is the resonance.
+    zeros : int
+        Number of zeros, at most ``poles``. A hub with one slosh mode has two: the antiresonance.
+
+    Returns
+    -------
+    TransferFunction
+        Coefficients and the quality of the fit.
+
+    Raises
+    ------
+    FmuError
+        If a column is missing or not finite, a number of poles or zeros is not allowed, or the
+        frequencies are fewer than the unknowns.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> import hubslosh
+    >>> frequency = np.linspace(0.5, 2, 50)
+    >>> lag = 2.5 / (2j * np.pi * frequency + 0.1)
+    >>> data = pd.DataFrame({"frequency": frequency, "real": lag.real, "imag": lag.imag})
+    >>> hubslosh.fit(data, poles=1, zeros=0).poles.round(6)
+    array([-0.1+0.j])
     """
     from scipy.optimize import least_squares
 

@@ -49,7 +49,7 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "sector": ("inner_radius", "radius", "angle", "height"),
     "step": (),
 }
-"""Shapes and their dimensions, m; ``angle`` in degrees. ``step``: a file of a CAD system, m."""
+"""Shapes and their dimensions, m; ``angle`` in degrees."""
 
 _MASSLESS = 1e-6
 """Part of the liquid's mass below which a mode is one without displacement."""
@@ -59,26 +59,44 @@ _EQUAL = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class LiquidModes:
-    """Slosh modes of a tank at a fill, as `liquid_modes` gives them.
+    """Slosh modes of a tank at one fill, as `liquid_modes` returns them.
 
-    Axes: origin O of the tank's shape (see `liquid_modes`), z against the specific force. Without
-    tilt these are the tank's own.
+    All axes have their origin at O of the tank's shape (see `liquid_modes`) and z along the
+    specific force. If the specific force is along the tank's z, they are the tank's own axes.
+
+    Attributes
+    ----------
+    mass : float
+        Mass of the liquid, kg.
+    center : tuple of float
+        Centre of mass of the liquid, m.
+    surface : float
+        Height of the free surface, m.
+    gravity : float
+        Magnitude of the specific force, m/s².
+    lid_inertia : ndarray, shape (3, 3)
+        Inertia about O of the liquid under a rigid lid in a tank that rotates, kg·m².
+    all : DataFrame
+        A row for each mode, with the columns of `modes`.
+    error : DataFrame
+        Relative differences of ``frequency`` and ``mass`` of each mode between two meshes.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> box = {"box": {"length": 1.0, "width": 0.6, "height": 1.0}}
+    >>> found = hubslosh.liquid_modes(box, 0.5, modes=2, resolution=4)
+    >>> round(found.mass), found.modes["frequency"].round(2).tolist()
+    (300, [0.85, 1.14])
     """
 
     mass: float
-    """Mass of the liquid, kg."""
     center: tuple[float, float, float]
-    """Centre of mass of the liquid, m."""
     surface: float
-    """Height of the free surface, m."""
     gravity: float
-    """Specific force, m/s²."""
     lid_inertia: "np.ndarray"
-    """Inertia of the liquid under a lid about O, without its displacement, 3×3, kg·m²."""
     all: "pd.DataFrame" = field(repr=False)
-    """A row per mode, with the columns of `modes`."""
     error: "pd.DataFrame" = field(repr=False)
-    """Relative difference of frequency and mass of each mode between two meshes."""
 
     def __repr__(self) -> str:
         """Return the liquid and its first modes."""
@@ -88,21 +106,22 @@ class LiquidModes:
 
     @property
     def modes(self) -> "pd.DataFrame":
-        """A row per mode, by frequency.
+        """Slosh modes as pendulums, a row for each, by frequency.
 
-        Columns: ``frequency`` (Hz) and ``mass`` (kg); ``direction`` of the mass's motion, degrees
-        from x towards y, −90 to 90; ``length`` of the pendulum and heights of ``bob`` and ``hinge``
-        (m). ``arm`` is the distance of the mass's line of motion from the vertical through O (m),
-        ``twist`` the inertia about that vertical that the mode moves (kg·m²). Modes without
-        displacement have a mass of about 0, and no direction, bob, hinge and arm.
+        Columns: ``frequency`` (Hz); slosh ``mass`` (kg); ``direction`` of the motion of the slosh
+        mass, deg from x towards y, -90 to 90; ``length`` of the pendulum (m); heights of ``bob``
+        and ``hinge`` (m); ``arm``, distance of the line on which the slosh mass moves from the
+        vertical through O (m); ``twist``, inertia about this vertical that the mode moves (kg·m²).
+        A mode that only twists has a mass of about 0; its direction, bob, hinge and arm are NaN.
         """
         return self.all
 
     @cached_property
     def rest(self) -> dict[str, float]:
-        """Mass (kg) that no mode moves, and its height (m), for motions along x and along y.
+        """Mass that no mode moves, kg, and its height, m, for motions along x and along y.
 
-        Each direction has a sum of its own: a mass that swings along y alone is rigid along x.
+        Keys: ``m_0_x``, ``H_0_x``, ``m_0_y``, ``H_0_y``. The directions differ because a slosh
+        mass that swings only along y is rigid along x.
         """
         found = {}
         for name, part in (("x", _cos(self.all)), ("y", _sin(self.all))):
@@ -114,10 +133,35 @@ class LiquidModes:
         return found
 
     def table(self, direction: str = "y", modes: int = 1) -> "dict[str, Value]":
-        """Return the modes along x or y as HubSlosh's ``slosh.table``.
+        """Return the modes along x or y as ``slosh.table`` of HubSlosh.
 
-        The tank stands on the hub with this direction tangential, and with O at the distance
-        `tank.r` from the axis. Modes that move along both directions are refused.
+        The tank stands on the hub with this direction tangential and O at the distance ``tank.r``
+        from the axis of the hub.
+
+        Parameters
+        ----------
+        direction : str
+            "x" or "y".
+        modes : int
+            Number of modes, at most 10.
+
+        Returns
+        -------
+        dict
+            Values in SI units by the names of HubSlosh's parameters.
+
+        Raises
+        ------
+        FmuError
+            If a mode moves along x and y at once, or an argument is not allowed.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> box = {"box": {"length": 1.0, "width": 0.6, "height": 1.0}}
+        >>> found = hubslosh.liquid_modes(box, 0.5, modes=2, resolution=4)
+        >>> round(found.table("y")["slosh.table.length[1]"], 2)
+        0.19
         """
         if direction not in ("x", "y"):
             raise FmuError(f"direction is x or y, not {direction!r}")
@@ -159,20 +203,45 @@ class LiquidModes:
         modes: int | None = None,
         position: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> "dict[str, Value]":
-        """Return the liquid as tank ``number`` (1 to 4) of Spacecraft, for `simulate`, `Loop`, ….
+        """Return the liquid as a tank of an FMU, for `simulate`, `Loop` and others.
 
-        * ``model``: Spacecraft, or SloshTank, which has one tank.
-
-        * ``modes``: Number of modes, 1 to 3; the heaviest come first. By default 3, or all modes
-          with displacement.
-        * ``position``: Position of O in body axes, m; the axes are parallel.
-
-        Each mode is planar, with its own direction; damping ratios are 0. The bobs hang at r_n from
-        the liquid's centre, which the tank's axis passes through. A rigid body completes mass,
-        centre and inertia of the liquid under a lid::
+        Each mode is planar with its own direction, and its damping ratio is 0. The tank's axis
+        passes through the centre of mass of the liquid; the bobs are at r_n from this centre. A
+        rigid body completes mass m, centre and inertia J of the liquid under a rigid lid::
 
             m_0 = m − Σ m_n,   m_0 r_0 = −Σ m_n r_n,
             J_0 = J − Σ m_n (|r_n|² 1 − r_n⊗r_n) − m_0 (|r_0|² 1 − r_0⊗r_0)
+
+        Parameters
+        ----------
+        number : int
+            Number of the tank on Spacecraft, 1 to 4.
+        model : str
+            "Spacecraft", or "SloshTank", which has one tank.
+        modes : int, optional
+            Number of modes, 1 to 3; those with the largest slosh masses are kept. By default 3,
+            or all modes that have a slosh mass if they are fewer.
+        position : sequence of float, shape (3,)
+            Position of O in body axes, m. The tank's axes are parallel to the body axes.
+
+        Returns
+        -------
+        dict
+            Values in SI units by the names of the FMU's parameters.
+
+        Raises
+        ------
+        FmuError
+            If an argument is not allowed.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> box = {"box": {"length": 1.0, "width": 0.6, "height": 1.0}}
+        >>> found = hubslosh.liquid_modes(box, 0.5, modes=2, resolution=4)
+        >>> values = found.parameters(position=(0, 0, 0.2))
+        >>> values["tank[1].modes"], round(values["tank[1].mass[1]"])
+        (2, 142)
         """
         if model not in SIX_AXES:
             raise FmuError(f"parameters are for {' and '.join(SIX_AXES)}, not for {model!r}")
@@ -235,20 +304,53 @@ def liquid_modes(
     specific_force: float | Sequence[float] = 9.80665,
     resolution: int = 16,
 ) -> LiquidModes:
-    """Return the slosh modes of a tank of any shape by finite elements in three dimensions.
+    """Find the slosh modes of a tank of any shape by finite elements in three dimensions.
 
-    * ``shape``: One of `SHAPES` with its dimensions, ``{"horizontal_cylinder": {"radius": 0.5,
-      "length": 2}}``. O is the middle of the lowest plane or point of the upright shape; for a
-      sector, the point where its axis meets the floor (x bisects the sector). A lying cylinder's
-      axis is x. ``{"step": "tank.step"}`` reads the inside of a tank as a solid, with O and axes
-      as in the file, m.
-    * ``fill``: Height of the surface above the lowest point along the specific force, m, or
-      ``"60%"`` of the volume.
-    * ``density``: kg/m³.
-    * ``specific_force``: Specific force along the tank's z, or its three components in the tank's
-      axes, m/s². For a tank at rest it is gravity, upwards.
-    * ``resolution``: Elements across the surface of the finer of two meshes. Their difference gives
-      `LiquidModes.error`. A call takes 5 to 60 s.
+    A call takes 5 to 60 s. `tank` is faster for bodies of revolution and boxes along their axis.
+    Needs ``pip install hubslosh[fem]``.
+
+    Parameters
+    ----------
+    shape : mapping
+        One shape with its dimensions, m, such as
+        ``{"horizontal_cylinder": {"radius": 0.5, "length": 2}}``: ``cylinder`` (radius, height),
+        ``horizontal_cylinder`` (radius, length; its axis is x), ``sphere`` (radius), ``box``
+        (length, width, height along x, y, z), ``sector`` (inner_radius, radius, angle in deg,
+        height; x bisects it). O is the lowest point or the middle of the lowest plane; of a
+        sector, the point where its axis meets the floor. ``{"step": "tank.step"}`` reads the
+        inside of a tank as a solid from a CAD file, m, with O and axes as in the file.
+    fill : float or str
+        Height of the surface above the lowest point along the specific force, m, or ``"60%"`` of
+        the volume.
+    density : float
+        Density of the liquid, kg/m³.
+    modes : int
+        Number of modes, 1 to 40.
+    specific_force : float or sequence of float, shape (3,)
+        Specific force along the tank's z, or its components in the tank's axes, m/s². For a tank
+        at rest it points upwards and has the magnitude of gravity.
+    resolution : int
+        Number of elements across the surface, 4 to 40, in the finer of two meshes. The
+        difference of the meshes is `LiquidModes.error`.
+
+    Returns
+    -------
+    LiquidModes
+        Mass properties and modes of the liquid.
+
+    Raises
+    ------
+    FmuError
+        If an argument is not allowed, gmsh or scikit-fem is not installed, or no mesh can be
+        made of the liquid.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> box = {"box": {"length": 1.0, "width": 0.6, "height": 1.0}}
+    >>> found = hubslosh.liquid_modes(box, "50%", modes=2, resolution=4)
+    >>> found.modes["direction"].round().abs().tolist()
+    [0.0, 90.0]
     """
     import pandas as pd
 

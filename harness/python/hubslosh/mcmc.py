@@ -1,8 +1,4 @@
-"""The posterior of an identification by Markov chain Monte Carlo, as a check of its intervals.
-
-emcee (Foreman-Mackey et al., PASP 125, 2013) samples the likelihood that ``hubslosh identify``
-maximises, with the noise that it has estimated. ``pip install emcee`` brings emcee.
-"""
+"""The posterior of an identification by Markov chain Monte Carlo, as a check of its intervals."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -33,16 +29,56 @@ def posterior(
     seed: int = 1,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Sample the posterior of a result of `identify` with ``free=``.
+    """Sample the posterior of the unknowns that `identify` has estimated with ``free=``.
 
-    * ``found``: The result. The arguments of `identify` are repeated unchanged.
-    * ``walkers``: Number of walkers, at least twice the number of unknowns; by default four times.
-    * ``steps``: Steps of each walker; the first ``burn`` are dropped. The walkers start from the
-      normal distribution of the result.
+    emcee (Foreman-Mackey et al., PASP 125, 2013) samples the likelihood that `identify`
+    maximises, with the noise that it has estimated. Each step simulates the recordings once for
+    each walker. Needs the package emcee.
 
-    Returns a row for each sample and a column for each unknown; ``table.quantile([0.025, 0.975])``
-    gives 95 % intervals. ``.attrs["autocorrelation"]`` has the chains' correlation times in steps.
-    If ``steps - burn`` is less than ten correlation times, the intervals are rough.
+    Parameters
+    ----------
+    found : Identification
+        Result of `identify`. The walkers start from its normal distribution.
+    data, *arguments, fmu, free, inputs, outputs, prior, settings
+        Arguments of the call of `identify` that has given ``found``, unchanged.
+    walkers : int, optional
+        Number of walkers, at least twice the number of unknowns; by default four times.
+    steps : int
+        Number of steps of each walker.
+    burn : int
+        Number of first steps that are dropped.
+    seed : int
+        Seed of the random numbers; the same seed gives the same samples.
+    program : str or Path, optional
+        The program ``hubslosh``; by default the one that comes with this package.
+
+    Returns
+    -------
+    DataFrame
+        A row for each of ``(steps - burn) * walkers`` samples and a column for each unknown, SI
+        units. ``table.quantile([0.025, 0.975])`` gives 95 % intervals.
+        ``.attrs["autocorrelation"]`` has the correlation time of each unknown in steps; if
+        ``steps - burn`` is less than ten of them, the intervals are rough.
+
+    Raises
+    ------
+    FmuError
+        If emcee is not installed, ``found`` was not found with ``free=``, or an unknown is not
+        determined.
+
+    Examples
+    --------
+    Two seconds of a free decay from a known angle; a useful chain has 300 steps or more:
+
+    >>> import hubslosh
+    >>> bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
+    >>> run = hubslosh.simulate(parameters=bench, stop=4, step=0.05, outputs="omega")
+    >>> question = {"fmu": "HubSlosh", "free": {"friction.b": 0.03}, "outputs": ["omega"],
+    ...             "settings": bench}
+    >>> found = hubslosh.identify(run, **question)
+    >>> samples = hubslosh.posterior(found, run, **question, walkers=4, steps=5, burn=3)
+    >>> len(samples), list(samples.columns)
+    (8, ['friction.b'])
     """
     try:
         import emcee

@@ -45,21 +45,40 @@ def mode_errors(
     below: float | None = None,
     fmu: str | Path = "HubSlosh",
 ) -> pd.DataFrame:
-    """Return the errors of the force on HubSlosh's tank with fewer modes than ``slosh.modes``.
+    """Return the error of the slosh force on HubSlosh's tank for each number of modes.
 
-    * ``parameters``: Parameters of HubSlosh, as for `simulate`. ``slosh.modes`` is the reference,
-      by default 10.
-    * ``below``: Upper end of the band, Hz; by default 1.5 times the first mode's frequency.
+    The reference is the force of all ``slosh.modes``. An impulse excites every frequency equally;
+    a control loop does not, so use the column ``band`` for loops.
 
-    Returns a row for each number of modes, with the columns
+    Parameters
+    ----------
+    parameters : mapping, str or Path, optional
+        Parameters of HubSlosh, as for `simulate`. ``slosh.modes`` is 10 by default.
+    below : float, optional
+        Upper end of the band, Hz; by default 1.5 times the frequency of the first mode.
+    fmu : str or Path
+        Name of the FMU, or its file.
 
-    * ``impulse``: the error of the force after an impulse of the tank, over the largest force of
-      the reference (4.24 of the thesis);
-    * ``band``: the largest error below ``below`` of force over acceleration, over the liquid's
-      mass.
+    Returns
+    -------
+    DataFrame
+        A row for each number of modes, with the relative errors ``impulse`` (largest error of
+        the force after an impulse of the tank, over the largest force; equation 4.24 of Rubaga's
+        thesis) and ``band`` (largest error of force over acceleration below ``below``, over the
+        mass of the liquid). ``.attrs["needed"]`` has the number of modes for errors of 5 % and
+        1 %, ``.attrs["below"]`` the end of the band, Hz.
 
-    ``.attrs["needed"]`` has the numbers of modes for 5 % and 1 % of each. The impulse excites every
-    frequency equally. A loop does not: use `band` for loops.
+    Raises
+    ------
+    FmuError
+        If no mode moves, or a parameter is refused.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> table = hubslosh.mode_errors({"slosh.modes": 3})
+    >>> table.attrs["needed"]["band"][0.05]
+    1
     """
     settings: dict[str, Quantity] = {"slosh.modes": 10} | dict(parameters_of(parameters))
     with Plant(fmu, settings) as plant:

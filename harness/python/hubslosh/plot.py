@@ -59,7 +59,37 @@ def _label(table: pd.DataFrame, name: str) -> str:
 def time_histories(
     run: pd.DataFrame, *names: str, axes: "Sequence[Axes] | None" = None, label: str | None = None
 ) -> "Sequence[Axes]":
-    """Draw columns of a run over time, one above the other; by default all of them."""
+    """Draw columns of a run over time, one above the other.
+
+    Parameters
+    ----------
+    run : DataFrame
+        Table with the column ``time`` (s), as `simulate` returns it.
+    *names : str
+        Columns to draw; by default all of them.
+    axes : sequence of matplotlib Axes, optional
+        Axes to draw into, one for each column; by default those of a new figure.
+    label : str, optional
+        Name of this run in the legend.
+
+    Returns
+    -------
+    sequence of matplotlib Axes
+        One for each column.
+
+    Raises
+    ------
+    FmuError
+        If a column is missing, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> run = hubslosh.simulate(parameters={"init.slosh_angle": 0.1}, stop=2)
+    >>> axes = hubslosh.plot.time_histories(run, "omega", "slosh_angle")
+    >>> [ax.get_ylabel() for ax in axes]
+    ['omega (rad/s)', 'slosh_angle (rad)']
+    """
     check_table(run, "what is drawn")
     columns = list(names) or [str(c) for c in run.columns if c != "time"]
     _check(run, ["time", *columns])
@@ -76,7 +106,35 @@ def time_histories(
 
 
 def path(run: pd.DataFrame, ax: "Axes | None" = None, label: str | None = None) -> "Axes":
-    """Draw the slosh mass's path from above: ``slosh_angle`` over ``slosh_angle_radial``, deg."""
+    """Draw the path of HubSlosh's slosh mass seen from above, in degrees.
+
+    Parameters
+    ----------
+    run : DataFrame
+        Table with the columns ``slosh_angle`` and ``slosh_angle_radial`` (rad).
+    ax : matplotlib Axes, optional
+        Axes to draw into; by default those of a new figure.
+    label : str, optional
+        Name of this run in the legend.
+
+    Returns
+    -------
+    matplotlib Axes
+        The axes: radial angle along x, tangential angle along y.
+
+    Raises
+    ------
+    FmuError
+        If a column is missing, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> start = {"slosh.model": "spherical", "init.slosh_angle": 0.1}
+    >>> run = hubslosh.simulate(parameters=start, stop=2)
+    >>> hubslosh.plot.path(run).get_xlabel()
+    'radial angle (deg), positive outwards'
+    """
     _check(run, ["slosh_angle", "slosh_angle_radial"])
     ax = _subplots(1)[0] if ax is None else ax
     color = COLORS[len(ax.lines) % len(COLORS)]
@@ -98,10 +156,38 @@ def bode(
 ) -> "Sequence[Axes]":
     """Draw gain and phase of frequency responses, one above the other.
 
-    Estimates of `frequency_response` are dots with their standard deviation; linear models, of
-    their first input to their first output, are lines over the same band. Without an estimate the
-    band goes from a fifth of the lowest pole or zero to five times the highest, at most to half the
-    sampling rate.
+    Estimates are dots with their standard deviation. Linear models are lines over the band of the
+    estimates; without an estimate, from a fifth of the lowest pole or zero to five times the
+    highest, but not above half the sampling rate.
+
+    Parameters
+    ----------
+    *responses : DataFrame or LinearModel
+        Estimates of `frequency_response`, and linear models, of which the response from the first
+        input to the first output is drawn.
+    labels : sequence of str, optional
+        Name of each response in the legend.
+    axes : sequence of two matplotlib Axes, optional
+        Axes for gain and phase; by default those of a new figure.
+
+    Returns
+    -------
+    sequence of matplotlib Axes
+        Axes of the gain (SI units) and of the phase (deg).
+
+    Raises
+    ------
+    FmuError
+        If a response is neither, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> model = hubslosh.linearize(
+    ...     parameters={"friction.model": "viscous"}, inputs="tau_cmd", outputs="omega")
+    >>> gain, phase = hubslosh.plot.bode(model, labels=["bench"])
+    >>> phase.get_xlabel()
+    'frequency (Hz)'
     """
     frames = [r for r in responses if isinstance(r, pd.DataFrame)]
     for frame in frames:
@@ -127,8 +213,8 @@ def bode(
                 low = min(frame["frequency"].min() for frame in frames)
                 high = max(frame["frequency"].max() for frame in frames)
             else:
-                low, high = band(*models)
-            line = frequencies(response, low, high)
+                low, high = _band(*models)
+            line = _frequencies(response, low, high)
             h = response.response(line)[:, 0, 0]
             # above the dots, which would hide it
             style: dict[str, Any] = {"color": color, "linewidth": 1.2, "zorder": 3}
@@ -147,7 +233,7 @@ def bode(
     return gain, phase
 
 
-def band(*models: "LinearModel") -> tuple[float, float]:
+def _band(*models: "LinearModel") -> tuple[float, float]:
     """Return the band of the models' poles and zeros, Hz, from a fifth of the lowest one on."""
     from scipy.linalg import eigvals
 
@@ -168,7 +254,7 @@ def band(*models: "LinearModel") -> tuple[float, float]:
     return min(low, high / 100), high
 
 
-def frequencies(model: "LinearModel", low: float, high: float) -> np.ndarray:
+def _frequencies(model: "LinearModel", low: float, high: float) -> np.ndarray:
     """Return 2000 frequencies between two, Hz, and more about each lightly damped pole."""
     line = [np.geomspace(low, high, 2000)]
     for mode in model.modes(0.3).itertuples():
@@ -184,11 +270,38 @@ def margins(
     parameters: Mapping[str, Any] | None = None,
     axes: "Sequence[Axes] | None" = None,
 ) -> "Sequence[Axes]":
-    """Draw gain (dB) and phase of a `Loop`'s gain with all its crossings, a colour per command.
+    """Draw the loop gain of a loop with all its crossings, and its margins in the title.
 
-    Each loop is drawn with the others closed, as `hubslosh.margins` takes it, which this calls.
-    Gain crossings are dots, phase crossings squares. Labels give the smallest margins and those
-    near slosh. The gain is drawn down to -80 dB, or to the smallest gain margin.
+    The loop gain at each command has its own colour and is taken while the other loops are
+    closed, as `hubslosh.margins` does. Gain crossings are dots and phase crossings squares; the
+    smallest margins and those near slosh modes have labels.
+
+    Parameters
+    ----------
+    loop : Loop, LinearModel or system of python-control
+        The loop, as for `hubslosh.margins`.
+    parameters : mapping, optional
+        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+    axes : sequence of two matplotlib Axes, optional
+        Axes for gain and phase; by default those of a new figure.
+
+    Returns
+    -------
+    sequence of matplotlib Axes
+        Axes of the gain (dB, down to -80 dB or the smallest gain margin) and of the phase (deg).
+
+    Raises
+    ------
+    FmuError
+        If `hubslosh.margins` refuses the loop, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "viscous"})
+    >>> gain, phase = hubslosh.plot.margins(loop)
+    >>> gain.get_title().partition(",")[0]
+    'phase margin 45°'
     """
     from .stability import _broken_at, margins_and_gain
 
@@ -197,7 +310,7 @@ def margins(
     known = table.loc[table["frequency"] > 0, "frequency"]
     gain, phase = _subplots(2, sharex=True) if axes is None else axes
     lows, highs = zip(
-        *(band(_broken_at(loop_gain, i)) for i in range(len(loop_gain.D))), strict=True
+        *(_band(_broken_at(loop_gain, i)) for i in range(len(loop_gain.D))), strict=True
     )
     low = min(known.min() / 5 if len(known) else np.inf, max(lows))
     high = max(known.max() * 2 if len(known) else 0, min(highs))
@@ -207,7 +320,7 @@ def margins(
     for i in range(len(loop_gain.D)):
         one = _broken_at(loop_gain, i)
         name = one.inputs[0] if one.inputs else "loop gain"
-        line = frequencies(one, low, high)
+        line = _frequencies(one, low, high)
         h = one.response(line)[:, 0, 0]
         angle = np.degrees(np.unwrap(np.angle(h)))
         angle -= 360 * np.round((np.median(angle[: max(len(angle) // 4, 1)]) + 90) / 360)
@@ -297,10 +410,40 @@ def closed_loop(
     axes: "Sequence[Axes] | None" = None,
     label: str | None = None,
 ) -> "Sequence[Axes]":
-    """Draw attitude, rates and torques of a run of `hubslosh.closed_loop`, in degrees.
+    """Draw attitude (deg), rates (deg/s) and torques (N·m) of a run in a closed loop.
 
-    Spacecraft has roll, pitch and yaw from its quaternion, HubSlosh the hub's angle. With
-    ``reference`` the figure also has the remaining rotation about each axis.
+    The attitude of Spacecraft is drawn as roll, pitch and yaw, the attitude of HubSlosh as the
+    angle of the hub.
+
+    Parameters
+    ----------
+    run : DataFrame
+        Table of `hubslosh.closed_loop`.
+    reference : DataFrame, optional
+        Commanded attitude over ``time``, with ``q[1]`` to ``q[4]`` or ``theta`` (rad). With it the
+        remaining rotation is drawn too.
+    axes : sequence of matplotlib Axes, optional
+        Axes to draw into, one for each quantity; by default those of a new figure.
+    label : str, optional
+        Name of this run in the legend.
+
+    Returns
+    -------
+    sequence of matplotlib Axes
+        One for each quantity that the run has.
+
+    Raises
+    ------
+    FmuError
+        If the run has no such quantity, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"init.theta": 0.1})
+    >>> axes = hubslosh.plot.closed_loop(loop.simulate(stop=5.0))
+    >>> [ax.get_ylabel() for ax in axes]
+    ['attitude (deg)', 'rate (deg/s)', 'torque (N·m)']
     """
     from .attitude import NAMES, angles, error
 
@@ -353,11 +496,40 @@ def closed_loop(
 def monte_carlo(
     table: pd.DataFrame, *columns: str, axes: "Sequence[Axes] | None" = None, at: float = 0.95
 ) -> "Sequence[Axes]":
-    """Draw the share of runs below each value, of each result of `hubslosh.monte_carlo`.
+    """Draw the cumulative distribution of results of a Monte Carlo study.
 
-    * ``columns``: Results to draw; by default all numbers that the function ``outcome`` returned,
-      not the drawn values; of a table that was read from a file, all without dot and bracket in
-      their names. A vertical line and a band show the quantile ``at`` with its 95 % interval.
+    A vertical line and a band show a quantile with its 95 % interval.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Result of `hubslosh.monte_carlo`, or its file ``runs.csv``.
+    *columns : str
+        Results to draw; by default all numbers that ``outcome`` has returned. Of a file these are
+        the columns without a dot or bracket in their names.
+    axes : sequence of matplotlib Axes, optional
+        Axes to draw into, one for each result; by default those of a new figure.
+    at : float
+        Probability of the quantile, between 0 and 1.
+
+    Returns
+    -------
+    sequence of matplotlib Axes
+        One for each result.
+
+    Raises
+    ------
+    FmuError
+        If the table has no such column or no results, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> runs = hubslosh.monte_carlo(
+    ...     {"tank.h": (0.05, 0.1)}, 20, outcome=lambda values: {"volume": 0.02 * values["tank.h"]})
+    >>> (ax,) = hubslosh.plot.monte_carlo(runs)
+    >>> ax.get_xlabel()
+    'volume'
     """
     from .sampling import quantiles
 
@@ -388,7 +560,22 @@ def monte_carlo(
 
 
 def save(figure: "Figure", path: "str | Path") -> None:
-    """Write a figure; the same figure gives the same bytes, as SVG too."""
+    """Write a figure so that the same figure gives the same bytes, as SVG too.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+        The figure, such as ``axes[0].figure``.
+    path : str or Path
+        File in a format of matplotlib, such as .png, .svg or .pdf.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> run = hubslosh.simulate(parameters={"init.slosh_angle": 0.1}, stop=2)
+    >>> axes = hubslosh.plot.time_histories(run, "omega")
+    >>> hubslosh.plot.save(axes[0].figure, "rate.svg")
+    """
     import matplotlib
 
     metadata = {"Date": None} if str(path).endswith(".svg") else None

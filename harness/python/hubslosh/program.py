@@ -24,16 +24,49 @@ def campaign(
     progress: Progress = None,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Simulate a plan with the program ``hubslosh`` and return its table of runs.
+    """Simulate the runs of a plan and return their table, as ``hubslosh campaign`` does.
 
-    * ``plan``: A TOML file, the name of a built-in plan, or the TOML text itself (several lines).
-    * ``out``: Directory for runs, tables and report.html; by default dist/ and the plan's name.
-      Stored runs are reused, unless ``force``.
-    * ``progress``: Shows a line on stderr, by default on a terminal and in a notebook; or a
-      function that takes the line.
+    Parameters
+    ----------
+    plan : str or Path
+        A TOML file, the name of a built-in plan such as ``"thesis"``, or the text of a plan.
+        A text is recognised by its line breaks.
+    out : str or Path, optional
+        Directory for runs, tables and report.html. By default ``dist/NAME`` with the name of the
+        plan; a text needs ``out``.
+    model : str or Path
+        Name of the FMU, or its file.
+    force : bool
+        Simulate all runs. Otherwise runs are reused that the directory has from the same plan
+        and FMU.
+    progress : bool or callable, optional
+        True shows a line on stderr, which is the default on a terminal and in a notebook; a
+        function receives the line as text.
+    program : str or Path, optional
+        The program ``hubslosh``; by default the one that comes with this package.
 
-    Returns ``runs.csv``: a row per run with its settings and results. ``.attrs["directory"]`` is
-    the directory.
+    Returns
+    -------
+    DataFrame
+        Content of ``runs.csv``: a row for each run with its settings and results.
+        ``.attrs["directory"]`` is the directory.
+
+    Raises
+    ------
+    FmuError
+        If the plan is wrong or a run is refused; the message is that of the program.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> plan = '''
+    ... profile = "pulse:amplitude=0.05,start=1,width=1,duration=10"
+    ... [vary]
+    ... slosh.model = ["linear", "spherical"]
+    ... '''
+    >>> runs = hubslosh.campaign(plan, "two-pulses")
+    >>> len(runs), (runs.attrs["directory"] / "report.html").is_file()
+    (2, True)
     """
     path = find_program(program)
     with temporary.folder() as folder:
@@ -62,17 +95,56 @@ def analyse(
     progress: Progress = None,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Analyse recordings of a bench with ``hubslosh analyse``, and return its table of runs.
+    """Find resonance, antiresonance and fit of recordings of a bench, by ``hubslosh analyse``.
 
-    * ``recordings``: Files, as `read_recording` reads them, with torque and one to three rates.
-    * ``out``: Directory for runs, tables and report.html.
-    * ``columns``: Columns of the signals, with units, such as
-      ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``.
-    * ``settings``: Known parameters of the bench by FMU name, ``{"tank.h": 0.1}``.
-    * ``arguments``: Further flags of the command.
-    * ``progress``: As `campaign` has it.
+    Parameters
+    ----------
+    recordings : str, Path or sequence of them
+        Files, as `read_recording` reads them, with torque and one to three rates.
+    out : str or Path
+        Directory for runs, tables and report.html.
+    *arguments : str
+        Further flags of ``hubslosh analyse``.
+    columns : str, optional
+        Columns of the signals, with units, such as
+        ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``.
+    settings : dict, optional
+        Known parameters of the bench by their names in the FMU, such as ``{"tank.h": 0.1}``.
+    fmu : str or Path
+        Name of the FMU, or its file.
+    progress : bool or callable, optional
+        As for `campaign`.
+    program : str or Path, optional
+        The program ``hubslosh``; by default the one that comes with this package.
 
-    Returns ``runs.csv``, as `campaign` does; the model of a recording is ``recording``.
+    Returns
+    -------
+    DataFrame
+        Content of ``runs.csv``: a row for each recording, as for `campaign`, with ``recording``
+        as its model. ``.attrs["directory"]`` is ``out``.
+
+    Raises
+    ------
+    FmuError
+        If a recording cannot be read or analysed; the message is that of the program.
+
+    Examples
+    --------
+    A simulated sweep takes the place of a recording:
+
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> import hubslosh
+    >>> time, growth = np.arange(0, 60, 0.02), np.log(3.5 / 1.25) / 60
+    >>> sweep = 0.1 * np.sin(2 * np.pi * 1.25 * np.expm1(growth * time) / growth)
+    >>> run = hubslosh.simulate(
+    ...     inputs=pd.DataFrame({"time": time, "tau_cmd": sweep}), outputs=["tau_cmd", "omega"])
+    >>> run.to_csv("sweep.csv", index=False)
+    >>> runs = hubslosh.analyse(
+    ...     "sweep.csv", "sweep", "--profile", "exp-sweep:f0=1.25,f1=3.5,duration=60",
+    ...     "--model", "linear")
+    >>> runs["model"].tolist()
+    ['recording', 'linear']
     """
     files = [recordings] if isinstance(recordings, str | Path) else list(recordings)
     flags = ["--columns", columns] if columns else []
@@ -86,20 +158,38 @@ def analyse(
 
 @dataclass(frozen=True)
 class Estimated:
-    """An estimated number, in SI units."""
+    """An estimate of one number with its uncertainty, in SI units.
+
+    Attributes
+    ----------
+    value : float
+        Estimate, in ``unit``.
+    std : float
+        Standard deviation from all sources of error: noise and tolerances of known parameters.
+    std_noise : float
+        Standard deviation from the noise only.
+    interval : tuple of float
+        Ends of the 95 % interval. The upper end is None if the recording does not limit the
+        number from above.
+    unit : str
+        SI unit as FMI writes it, such as ``kg.m2``.
+    determined : bool
+        True if the interval has both ends and ``std`` is below half the value.
+
+    Examples
+    --------
+    >>> from hubslosh import Estimated
+    >>> estimate = Estimated(0.32, 0.01, 0.008, (0.30, 0.34), "kg.m2")
+    >>> estimate.interval, estimate.determined
+    ((0.3, 0.34), True)
+    """
 
     value: float
-    """The estimate, in `unit`."""
     std: float
-    """Standard deviation from all sources of error."""
     std_noise: float
-    """Standard deviation from the noise alone."""
     interval: tuple[float, float | None]
-    """95 % interval; None: the recording sets no upper end."""
     unit: str
-    """SI unit, as FMI writes it, such as ``kg.m2``."""
     determined: bool = True
-    """True if the interval has both ends and the standard deviation is below half the value."""
 
 
 Method = Literal["bench", "friction", "decay"]
@@ -108,32 +198,60 @@ Method = Literal["bench", "friction", "decay"]
 
 @dataclass(frozen=True)
 class Identification:
-    """Result of ``hubslosh identify``; `all` is its result.json."""
+    """Result of `identify`; ``print`` shows the verdict and the estimates.
+
+    Attributes
+    ----------
+    parameters : dict of str to Estimated
+        Estimates of parameters of the FMU, by name.
+    measurement : dict of str to Estimated
+        Estimates that are not parameters of the FMU: delay, scale and bias of the gyro;
+        frequency and damping ratio of a free decay.
+    model : str or None
+        Chosen slosh model, if the method chooses one.
+    settings : dict of str to str
+        Settings of the FMU for which the parameters were estimated.
+    converged : bool
+        True if the search ended at a minimum.
+    fits : bool or None
+        True if the residual is noise. If it is False, the model is invalidated and no interval
+        can be trusted. None if the method does not test it.
+    verdict : tuple of str
+        Verdict in words, a sentence each.
+    all : dict
+        Content of the file that ``hubslosh identify --out`` writes.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
+    >>> run = hubslosh.simulate(parameters=bench, stop=4, step=0.05, outputs="omega")
+    >>> found = hubslosh.identify(
+    ...     run, free={"friction.b": 0.03}, outputs=["omega"], settings=bench)
+    >>> found.converged, round(found.parameters["friction.b"].value, 4)
+    (True, 0.0379)
+    """
 
     parameters: dict[str, Estimated]
-    """Estimates of the FMU's parameters, by name."""
     measurement: dict[str, Estimated]
-    """Delay, gyro scale and bias; frequency and damping of a free decay."""
     model: str | None
-    """The chosen slosh model, of a method that has one."""
     settings: dict[str, str]
-    """Settings of the FMU that belong to the parameters."""
     converged: bool
-    """True if the search ended at a minimum."""
     fits: bool | None
-    """True if the model fits: the residual is the gyro's noise. If False, the model is
-    invalidated and no interval can be trusted. None: not tested."""
     verdict: tuple[str, ...]
-    """The verdict in words."""
     all: dict[str, Any]
-    """The whole result.json."""
 
     @property
     def covariance(self) -> pd.DataFrame:
-        """Covariance of the unknowns of ``free=``, their names as index and columns, SI units.
+        """Covariance of the unknowns of ``free=`` from noise only, SI units, by name.
 
-        It is that of the noise; `Estimated.std` includes tolerances too.
-        `uncertain` converts it to its own parameters: ``covariance=found``.
+        `Estimated.std` also includes tolerances. `uncertain` takes the whole result as
+        ``covariance=found`` and converts it to its own parameters.
+
+        Raises
+        ------
+        FmuError
+            If the result was found without ``free=``.
         """
         if "covariance" not in self.all:
             raise FmuError("a result of identify has a covariance if it was found with free=")
@@ -201,31 +319,69 @@ def identify(
     progress: Progress = None,
     program: str | Path | None = None,
 ) -> Identification:
-    """Estimate an FMU's parameters from recordings, with the program ``hubslosh identify``.
+    """Estimate parameters of an FMU from recordings, by ``hubslosh identify``.
 
-    * ``data``: A table, or a file as `read_recording` reads it, with the columns ``time`` (s),
-      ``tau_cmd`` (N·m) and ``omega`` (rad/s), or others by the flag ``--columns``.
-    * ``model``: The slosh model.
-    * ``arguments``: Further flags of the command.
-    * ``fmu``: The name of an FMU of this package, or the file of a HubSlosh.
-    * ``out``: File for the result, .json.
-    * ``progress``: Shows the search in a line on stderr, by default on a terminal and in a
-      notebook; or a function that takes the line.
+    Without ``free`` the unknowns are those of the slosh bench, and ``method`` says what was
+    recorded. With ``free`` any FMU is fitted by output error, also one of another maker.
+    ``{n: e.value for n, e in found.parameters.items()} | found.settings`` are parameters for
+    `simulate`, and so is the file: ``simulate(parameters="result.json")``.
 
-    The parameters with ``settings`` simulate the bench:
-    ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
-    ``simulate(parameters="result.json")``.
+    Parameters
+    ----------
+    data : DataFrame, str, Path or sequence of them
+        Tables, or files as `read_recording` reads them, with the columns ``time`` (s),
+        ``tau_cmd`` (N·m) and ``omega`` (rad/s); ``--columns`` among the ``arguments`` names
+        other columns.
+    model : str, optional
+        Slosh model to try, or several, such as ``"linear,spherical"``; by default frozen, linear,
+        planar and spherical. Not with ``free``.
+    *arguments : str
+        Further flags of ``hubslosh identify``.
+    method : str
+        Kind of recordings. "bench": torque and rate of the slosh bench. "friction": torque and
+        rate with an empty tank. "decay": ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or
+        ``omega`` without torque. Not with ``free``.
+    fmu : str or Path
+        Name of an FMU of this package, or its file.
+    free : mapping, optional
+        Unknowns: Real parameters and start values of the FMU with a start, ``{"mu": 1.0}``, or
+        with start and bounds, ``{"mu": (1.0, 0.1, 5.0)}``, SI units. ``"x0@each"`` has its own
+        value in each recording.
+    inputs, outputs : sequence of str
+        With ``free``: columns of the data, by the names of the FMU's inputs and outputs.
+    prior : mapping, optional
+        With ``free``: mean and standard deviation of unknowns that are known from elsewhere.
+    settings : mapping, optional
+        Values of other parameters.
+    out : str or Path, optional
+        File for the result, .json.
+    progress : bool or callable, optional
+        As for `campaign`.
+    program : str or Path, optional
+        The program ``hubslosh``; by default the one that comes with this package.
 
-    * ``method``: The kind of recordings. "bench": torque and rate of the slosh bench. "friction":
-      the same with an empty tank. "decay": ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or
-      ``omega`` without torque; `all` has its frequency and damping.
+    Returns
+    -------
+    Identification
+        Estimates with intervals, and the verdict about the fit.
 
-    * ``free``: Unknowns of any FMU, for ``fmu`` of other makers too. They are Real parameters and
-      start values with a start, ``{"mu": 1.0}``, or with start and bounds, ``{"mu": (1.0, 0.1,
-      5.0)}``. ``"x0@each"`` has a value of its own in each recording.
-    * ``inputs``, ``outputs``: Columns of the data, by the FMU's names.
-    * ``prior``: Mean and standard deviation of an unknown.
-    * ``settings``: Values of other parameters.
+    Raises
+    ------
+    FmuError
+        If arguments contradict each other, a recording cannot be used, or the search fails; a
+        model that does not fit is not an error.
+
+    Examples
+    --------
+    A simulated decay takes the place of a recording:
+
+    >>> import hubslosh
+    >>> bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
+    >>> run = hubslosh.simulate(parameters=bench, stop=4, step=0.05, outputs="omega")
+    >>> found = hubslosh.identify(
+    ...     run, free={"friction.b": 0.03}, outputs=["omega"], settings=bench)
+    >>> found.converged, round(found.parameters["friction.b"].value, 4)
+    (True, 0.0379)
     """
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("--method is given as method=")

@@ -36,19 +36,43 @@ DEEPEST = 8
 def read_recording(
     path: str | Path, columns: str | None = None, *, rate: float | None = None
 ) -> "pd.DataFrame":
-    """Read a recording: time (s) from any clock, and the signals that the file has, in SI units.
+    r"""Read the file of a logger as a table in SI units with the time from its first sample.
 
-    * ``path``: Text in columns, Parquet, MATLAB's .mat (5 and 7.3, with timetables), HDF5, TDMS,
-      MDF4 or Excel's .xlsx. Other kinds than text and plain Parquet need
-      ``pip install hubslosh[recordings]``.
-    * ``columns``: Columns of the signals, with units, as ``--columns`` of the program has them:
-      ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``. A signal that is not named is read from the
-      column of its own name.
-    * ``rate``: Rows a second, of a file without times.
+    Parameters
+    ----------
+    path : str or Path
+        Text in columns, Parquet, MATLAB's .mat (5 and 7.3, with timetables), HDF5, TDMS, MDF4 or
+        Excel's .xlsx. Kinds other than text and plain Parquet need
+        ``pip install hubslosh[recordings]``.
+    columns : str, optional
+        Columns of the signals with their units, such as
+        ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``. A signal that is not named here is read
+        from the column with its own name.
+    rate : float, optional
+        Sampling rate, Hz, of a file without times.
 
-    Returns a table with ``time``, ``tau_cmd``, ``omega`` and others by name, NaN where a row has no
-    value. ``.attrs["units"]`` are their units, ``.attrs["notes"]`` says what was read and how:
-    columns, units that the file does not state, a clock's origin.
+    Returns
+    -------
+    DataFrame
+        The signals by name: ``time`` (s), ``tau_cmd`` (N·m), ``omega`` (rad/s) and others; NaN
+        where a row has no value. ``.attrs["units"]`` has their units. ``.attrs["notes"]`` says
+        how the file was read: columns, units that the file does not state, origin of the clock.
+
+    Raises
+    ------
+    FmuError
+        If the file cannot be read, has no such column or a unit is not known; the message says
+        what was found instead.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import hubslosh
+    >>> _ = Path("bench.csv").write_text("t_ms,rate\n0,1.5\n20,1.8\n")
+    >>> hubslosh.read_recording("bench.csv", "time=t_ms:ms,omega=rate:deg/s").round(4)
+       time   omega
+    0  0.00  0.0262
+    1  0.02  0.0314
     """
     import pandas as pd
 

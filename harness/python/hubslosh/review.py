@@ -89,48 +89,91 @@ class Point:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Review:
-    """Result of `Craft.review`; ``print`` gives the answer in at most 20 lines."""
+    """Result of `Craft.review`; ``print`` shows the verdict and its reasons in at most 20 lines.
+
+    Attributes
+    ----------
+    craft : Craft
+        The craft that was reviewed.
+    fills : tuple of str
+        Fills in words.
+    at : ndarray, shape (n,)
+        Fills as numbers, in ``unit``.
+    unit : str
+        Unit of ``at``: "%" of the volume, or "kg" of liquid.
+    uncertain : tuple of Uncertain
+        Uncertain quantities, each with its ``name``, its range as ``text`` and the ``ends`` of
+        the range at each fill.
+    family : tuple of LinearModel
+        Linear model of the craft at each fill, from commands to measurements. All have the same
+        states; at a fill where a mode is missing, its states are zero.
+    nominal : tuple of Point
+        Nominal point at each fill, with its ``loop``, ``margins`` and loop ``gain``.
+    points : DataFrame
+        A row for each point: ``kind`` ("nominal", "one at a time", "draw" or "search"), ``fill``
+        (index), ``stable``, ``modulus_margin``, ``phase_margin`` (deg), ``gain_up`` and
+        ``gain_down`` (dB), ``delay_margin`` (s), ``growth`` (1/s, of the closed loop's least
+        stable pole), ``distance`` (modulus margin, or minus the growth rate if unstable), and the
+        share of each uncertain quantity: -1 low end, 0 nominal, 1 high end. Margins of an
+        unstable point are NaN.
+    slosh : DataFrame
+        A row for each nominal fill, loop and slosh mode that shows in the loop gain, with the
+        columns of `hubslosh.stabilisation.resonances`.
+    worst : Point
+        Point with the least distance, which a search has found.
+    confirmation : Confirmation
+        Simulation of the nonlinear FMU at the worst point.
+    suggestion : Suggestion
+        A notch or roll-off that raises the smallest margin, with its cost in phase.
+    warnings : tuple of str
+        Warnings about the tanks, each for one of the fills where it applies.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hubslosh
+    >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=1, nu=0.9e-6)}
+    >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
+    >>> gains = np.hstack([2 * 10 * np.eye(3), 80 * np.eye(3)])
+    >>> review = craft.review(gains, 0.1, ["30%", "50%"], draws=5)
+    >>> len(review.unstable()), review.modes()
+    (0, {'main mode 1': 'gain- and phase-stabilised'})
+    >>> review.stabilisation()
+    ['main mode 1: gain- and phase-stabilised.']
+    >>> review.bands()["phase_margin_low"].round().tolist()
+    [60.0, 59.0]
+    >>> list(review.worst_values())
+    ['tank[1].zeta[1]', 'tank[1].frequency[1]']
+    >>> review.save("review.html"), len(review.html()) > 100_000
+    (None, True)
+    """
 
     craft: "Craft"
-    """The craft that was reviewed."""
     fills: tuple[str, ...]
-    """Fills in words."""
     at: Vector
-    """Fills as numbers, in ``unit``."""
     unit: str
-    """Unit of ``at``: "%" of the volume, or "kg" of liquid."""
     uncertain: tuple[Uncertain, ...]
-    """Uncertain quantities."""
     family: tuple[LinearModel, ...]
-    """Linear model of the craft at each fill, from commands to measurements. All have the same
-    states, also those of modes that a fill does not have."""
     nominal: tuple[Point, ...]
-    """Nominal point at each fill, with its margins and loop gain."""
     points: pd.DataFrame
-    """A row for each point: ``kind`` ("nominal", "one at a time", "draw" or "search"), ``fill``
-    (index), ``stable``, ``modulus_margin``, ``phase_margin`` (deg), ``gain_up`` and ``gain_down``
-    (dB), ``delay_margin`` (s), ``growth`` (1/s, of the closed loop's least stable pole),
-    ``distance`` (modulus margin, or minus the growth rate of an unstable loop), and the share of
-    each uncertain quantity: -1 low end, 0 nominal, 1 high end. An unstable point has no margins:
-    NaN."""
     slosh: pd.DataFrame
-    """A row for each nominal fill, loop and slosh mode that shows in the loop gain: see
-    `hubslosh.stabilisation.resonances`."""
     worst: Point
-    """Point with the least distance; a search has led to it."""
     confirmation: Confirmation
-    """Simulation of the nonlinear FMU at the worst point."""
     suggestion: Suggestion
-    """A notch or roll-off that raises the smallest margin, with its cost in phase."""
     warnings: tuple[str, ...] = field(default=())
-    """Warnings about the tanks, each for one of the fills where it applies."""
 
     def bands(self) -> pd.DataFrame:
-        """Return the least and largest value of each margin at each fill, over all stable points.
+        """Return the range of each margin at each fill, over all stable points.
 
-        Columns: ``fill`` (index), ``at`` (see `at`), ``unstable`` (number of unstable points),
-        ``points`` (number of all), and for each margin ``…_low``, ``…_nominal`` and ``…_high``.
-        They are NaN where no point, or for ``…_nominal`` the nominal one, is stable.
+        Returns
+        -------
+        DataFrame
+            A row for each fill: ``fill`` (index), ``at`` (in `unit`), ``points`` and ``unstable``
+            (numbers of all and of unstable points), and for each margin of `points` the columns
+            ``…_low``, ``…_nominal`` and ``…_high``. They are NaN if no point is stable, or for
+            ``…_nominal`` if the nominal point is unstable.
+
         """
         names = ["modulus_margin", "phase_margin", "gain_up", "gain_down", "delay_margin"]
         groups = self.points.groupby("fill")
@@ -145,14 +188,25 @@ class Review:
         return table
 
     def unstable(self) -> pd.DataFrame:
-        """Return the rows of `points` that are unstable, the fastest growth first."""
+        """Return the rows of `points` that are unstable, the fastest growth first.
+
+        Returns
+        -------
+        DataFrame
+            Rows with the columns of `points`; none if every point is stable.
+        """
         rows = self.points[~self.points["stable"]]
         return rows.sort_values("growth", ascending=False, kind="stable")
 
     def modes(self) -> dict[str, str]:
         """Return how each slosh mode is stabilised, in words, by its name; unstable ones first.
 
-        At a fill the worst verdict of all commands counts.
+        At each fill the worst verdict over all commands counts.
+
+        Returns
+        -------
+        dict of str to str
+            Such as ``{"main mode 1": "phase-stabilised"}``.
         """
         found = []
         for mode, rows in self.slosh.groupby("mode", sort=False):
@@ -183,7 +237,13 @@ class Review:
         return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
     def stabilisation(self) -> list[str]:
-        """Return how the slosh modes are stabilised, a line for modes with the same words."""
+        """Return `modes` as sentences, one for all modes that are stabilised in the same way.
+
+        Returns
+        -------
+        list of str
+            Sentences, unstable modes first.
+        """
         modes: dict[str, list[str]] = {}
         for mode, how in self.modes().items():
             modes.setdefault(how, []).append(mode)
@@ -217,7 +277,13 @@ class Review:
         )
 
     def worst_values(self) -> dict[str, float]:
-        """Return the parameters at the worst point that differ from the nominal ones."""
+        """Return the parameters at the worst point that differ from the nominal ones.
+
+        Returns
+        -------
+        dict of str to float
+            Values in SI units by the names of the FMU's parameters.
+        """
         found: dict[str, float] = {}
         for quantity, share in zip(self.uncertain, self.worst.shares, strict=True):
             if share:
@@ -238,13 +304,30 @@ class Review:
         return ", ".join(words)
 
     def html(self) -> str:
-        """Return the page: answer, figures, tables. It needs no network, and prints on paper."""
+        """Return the report as a page with verdict, figures and tables; needs matplotlib.
+
+        Returns
+        -------
+        str
+            HTML that contains everything it needs, so that it works without a network.
+        """
         from .review_page import page
 
         return page(self)
 
     def save(self, path: str | Path) -> None:
-        """Write the page, .html. Needs matplotlib."""
+        """Write the report as a page; needs matplotlib.
+
+        Parameters
+        ----------
+        path : str or Path
+            File, .html.
+
+        Raises
+        ------
+        FmuError
+            If the name does not end in .html, or the file cannot be written.
+        """
         write_file(path, ".html", self.html)
 
     def __str__(self) -> str:

@@ -24,12 +24,29 @@ SIX_AXES = ("Spacecraft", "SloshTank")
 
 @dataclass(frozen=True, eq=False)
 class Tank:
-    """A tank at a fill, as `tank` gives it."""
+    """A tank at one fill with its slosh modes, as `tank` returns it.
+
+    ``print`` shows the liquid and the first modes; a notebook shows the picture.
+
+    Attributes
+    ----------
+    all : dict
+        Content of the file that ``hubslosh tank --out`` writes: ``m_liq`` (kg), ``z_cg`` (m),
+        ``I_eff_cg`` (kg·m²), ….
+    gravity : float
+        Specific force along the tank's axis, m/s².
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    >>> found = hubslosh.tank(sphere, "50%", gravity=0.5)
+    >>> round(found.mass, 1), round(found.all["z_cg"], 3)
+    (135.4, 0.25)
+    """
 
     all: dict[str, Any]
-    """Result that ``hubslosh tank --out`` writes: ``m_liq`` (kg), ``z_cg``, ``I_eff_cg``, …"""
     gravity: float
-    """m/s² along the tank's axis."""
     _solved: Any = field(repr=False)
     _question: "Question" = field(repr=False)
 
@@ -39,7 +56,7 @@ class Tank:
 
     @cached_property
     def picture(self) -> str:
-        """Tank, free surface and mode shapes, SVG; a notebook shows it."""
+        """Picture of tank, free surface and mode shapes, SVG."""
         return str(self._solved.picture())
 
     @property
@@ -49,10 +66,12 @@ class Tank:
 
     @cached_property
     def modes(self) -> "pd.DataFrame":
-        """A row per mode.
+        """Slosh modes as pendulums, a row for each.
 
-        ``frequency`` (Hz), ``mass`` (kg), ``length``, heights of ``bob`` and ``hinge`` (m),
-        ``wave`` at the wall per pendulum angle (m/rad).
+        Columns: ``frequency`` (Hz), ``mass`` (kg), ``length`` of the pendulum (m), heights of
+        ``bob`` and ``hinge`` above the tank's zero (m), ``wave`` height at the wall per pendulum
+        angle (m/rad). With a viscosity also the damping ratio ``zeta`` and its interval from
+        ``zeta_low`` to ``zeta_high``.
         """
         import numpy as np
         import pandas as pd
@@ -82,7 +101,24 @@ class Tank:
         return self.picture
 
     def save(self, path: str | Path) -> None:
-        """Write the picture, .svg."""
+        """Write the picture.
+
+        Parameters
+        ----------
+        path : str or Path
+            File, .svg.
+
+        Raises
+        ------
+        FmuError
+            If the name does not end in .svg, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> hubslosh.tank(sphere, "50%").save("sphere.svg")
+        """
         write_file(path, ".svg", lambda: self.picture)
 
     def parameters(
@@ -94,15 +130,44 @@ class Tank:
         axis: Sequence[float] | None = None,
         rigid: bool = False,
     ) -> "dict[str, Value]":
-        """Return it under the names of an FMU's parameters, for `simulate`, `Loop` and the others.
+        """Return the tank as parameters of an FMU, for `simulate`, `Loop` and others.
 
-        * ``model``: Spacecraft, with the ``number`` of the tank, 1 to 4; SloshTank; or HubSlosh, a
-          table of modes. Damping ratios and centring stiffnesses are there if `tank` was given
-          viscosity and surface tension. Raises FmuWarning where a formula leaves its range.
-        * ``position``: Position of the tank's zero (of a ``shape`` its lowest point), body axes, m.
-        * ``axis``: Direction of the tank's axis, upwards, in body axes; by default z.
-        * ``rigid``: The same liquid without slosh, at its centre, with the inertia that it has
-          under a lid. Not of HubSlosh.
+        Damping ratios and centring stiffnesses are included if `tank` was given viscosity and
+        surface tension. Warns with FmuWarning if a formula is used outside its range.
+
+        Parameters
+        ----------
+        model : str
+            "Spacecraft", "SloshTank", or "HubSlosh", which has a table of modes.
+        number : int
+            Number of the tank on Spacecraft, 1 to 4.
+        position : sequence of float, shape (3,), optional
+            Position of the tank's zero (of a ``shape`` its lowest point), body axes, m. Not for
+            HubSlosh.
+        axis : sequence of float, shape (3,), optional
+            Upward direction of the tank's axis in body axes, of any length; by default z. Not
+            for HubSlosh.
+        rigid : bool
+            Return the liquid without slosh, at its centre of mass, with the inertia that it has
+            under a rigid lid. Not for HubSlosh.
+
+        Returns
+        -------
+        dict
+            Values in SI units by the names of the FMU's parameters.
+
+        Raises
+        ------
+        FmuError
+            If an argument is not allowed.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> values = hubslosh.tank(sphere, "50%").parameters(number=2, position=(0, 0, 0.2))
+        >>> values["tank[2].position[3]"], values["tank[2].modes"]
+        (0.2, 3)
         """
         placed = {"position": position, "axis": axis}
         for name, value in placed.items():
@@ -151,7 +216,7 @@ class Tank:
             return {"tank[1].I_z": 0.0}
         return self._parameters("Spacecraft")
 
-    def prepare(self) -> list[str]:
+    def _prepare(self) -> list[str]:
         """Compute the parameters of Spacecraft, if it has modes, and return warnings."""
         if not self.all["modes"]:
             return list(self._solved.warnings())
@@ -231,17 +296,48 @@ def tank(
     sigma: float | None = None,
     contact_angle: float | None = None,
 ) -> Tank:
-    """Return masses, lengths and hinges of a tank's slosh modes, by linear potential flow.
+    """Find the slosh modes of a tank that is a body of revolution or a box.
 
-    * ``source``: A tank file (.toml), or what stands in one: ``{"density": 1010, "shape":
-      {"sphere": {"radius": 0.4}}}``. The page on tanks has every shape.
-    * ``fill``: Height above the lowest point, m, or ``"60%"`` of the volume.
-    * ``fill_mass``: Mass of the liquid instead of ``fill``, kg.
-    * ``modes``: Number of modes.
-    * ``gravity``: Specific force along the axis, m/s², for frequencies and damping.
-    * ``nu``: Kinematic viscosity, m²/s, for damping ratios.
-    * ``sigma``: Surface tension, N/m, for centring stiffnesses; they go into `Tank.parameters`.
-    * ``contact_angle``: Contact angle of the liquid at the wall, degrees.
+    The modes follow from linear potential flow in the tank's contour. `liquid_modes` finds those
+    of other shapes.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        A tank file (.toml), or a dict with its content, such as
+        ``{"density": 1010, "shape": {"sphere": {"radius": 0.4}}}``. The book's page on tanks has
+        every shape.
+    fill : float or str, optional
+        Height of the surface above the lowest point, m, or ``"60%"`` of the volume.
+    fill_mass : float, optional
+        Mass of the liquid, kg, instead of ``fill``.
+    modes : int
+        Number of modes.
+    gravity : float
+        Specific force along the tank's axis, m/s², for frequencies and damping.
+    nu : float, optional
+        Kinematic viscosity, m²/s, for damping ratios.
+    sigma : float, optional
+        Surface tension, N/m, for the centring stiffnesses in `Tank.parameters`.
+    contact_angle : float, optional
+        Contact angle of the liquid at the wall, deg.
+
+    Returns
+    -------
+    Tank
+        Mass, modes and picture of the liquid.
+
+    Raises
+    ------
+    FmuError
+        If the drawing, the fill or a number is not allowed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    >>> hubslosh.tank(sphere, "50%", gravity=0.5, nu=0.9e-6).modes["frequency"].round(3).tolist()
+    [0.222, 0.409, 0.519]
     """
     if (fill is None) == (fill_mass is None):
         raise FmuError('give the fill: a height in m, "60%" of the volume, or fill_mass in kg')

@@ -455,16 +455,33 @@ def _reduced(M: Matrix, first: int, counts: list[int]) -> tuple[Matrix, list[int
 
 @dataclass(frozen=True, eq=False)
 class WorstCase:
-    """Smallest real Δ found that takes a loop to the limit of stability; see `worst_case`."""
+    """Smallest Δ found that brings a loop to the limit of stability.
+
+    `UncertainModel.worst_case` returns it.
+
+    Attributes
+    ----------
+    delta : dict of str to float
+        Δ by name; ±1 is the end of a range. Empty if none was found.
+    size : float
+        Largest magnitude in Δ; inf if none was found.
+    frequency : float
+        Frequency of the oscillation that neither grows nor decays, Hz.
+    parameters : dict of str to float
+        Uncertain parameters at this Δ, by name, SI units.
+
+    Examples
+    --------
+    >>> from hubslosh import WorstCase
+    >>> case = WorstCase({"craft.mass": -2.0}, 2.0, 0.3, {"craft.mass": 800.0})
+    >>> case.mu
+    0.5
+    """
 
     delta: "dict[str, float]"
-    """Δ by name; ±1 is the end of a range."""
     size: float
-    """Largest magnitude in Δ; inf if none was found."""
     frequency: float
-    """Frequency of the oscillation that neither grows nor decays, Hz."""
     parameters: "dict[str, float]"
-    """The uncertain parameters there, by name."""
 
     @property
     def mu(self) -> float:
@@ -484,31 +501,77 @@ class WorstCase:
 
 @dataclass(frozen=True, eq=False)
 class UncertainModel:
-    """A linear fractional transformation y = F_u(M, Δ) u of Spacecraft; see `uncertain`.
+    """Spacecraft with uncertain parameters as a linear fractional transformation y = F_u(M, Δ) u.
 
-    Δ is diagonal and real: each of ``deltas`` in ``counts`` copies, ``|δ| ≤ 1``. The parameters are
-    ``center`` + ``spread`` · δ.
+    `uncertain` and `Craft.uncertain` return it. Δ is diagonal and real; it has each of ``deltas``
+    in ``counts`` copies, ``|δ| ≤ 1``. The parameters are ``center`` + ``spread`` · δ.
+
+    Attributes
+    ----------
+    M : LinearModel
+        The certain part. Its inputs are the outputs of Δ, then u; its outputs are the inputs of
+        Δ, then y.
+    spread : DataFrame
+        Change of each parameter (row) with each δ (column), SI units.
+    center : dict of str to float
+        Parameters at Δ = 0, SI units.
+    counts : tuple of int
+        Number of copies of each δ in Δ.
+    model : str or Path
+        Name of the FMU, or its file.
+    given : dict
+        Parameters of the FMU at its operating point.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.8), modes=1, nu=0.9e-6)}
+    >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
+    >>> model = craft.uncertain("50%", {"main.frequency[1]": "10%", "main.zeta[1]": "interval"})
+    >>> model.deltas, model.order
+    (('tank[1].frequency[1]', 'tank[1].zeta[1]'), 6)
+
+    Parameters and linear model at the upper end of the frequency's range:
+
+    >>> end = {"tank[1].frequency[1]": 1.0}
+    >>> model.delta(end).tolist(), round(model.values(end)["tank[1].frequency[1]"], 4)
+    ([1.0, 0.0], 0.2403)
+    >>> model.at(end).modes()["frequency"].round(4).tolist()
+    [0.2673, 0.2681]
+    >>> model.parameters(end)["tank[1].modes"]
+    1
+
+    A loop with a delay of 1 s is stable, but not for every value within the ranges:
+
+    >>> import numpy as np
+    >>> loop = craft.loop(np.hstack([20 * np.eye(3), 80 * np.eye(3)]), 0.1, "50%", delay=1.0)
+    >>> round(model.worst_case(loop).size, 3)
+    0.787
+    >>> model.closed(loop, [0.1, 0.2]).shape, model.mu_upper(loop, [0.1, 0.2]) < 1
+    ((2, 6, 6), array([ True,  True]))
+
+    Files for other tools:
+
+    >>> model.to_mat("model.mat"), model.to_json("model.json")
+    (None, None)
+    >>> model.as_dict()["repetition"], model.to_control().nstates
+    ([4, 2], 10)
     """
 
     M: LinearModel
-    """Inputs: those of Δ, then u. Outputs: those to Δ, then y."""
     spread: "pd.DataFrame"
-    """Change of each parameter (rows) with each δ (columns), SI units."""
     center: "dict[str, float]"
-    """Parameters at Δ = 0."""
     counts: tuple[int, ...]
-    """Number of copies of each δ in Δ."""
     model: str | Path
-    """The FMU: a name such as "Spacecraft", or a file."""
     given: "dict[str, Quantity]"
-    """Parameters of the FMU at its point."""
     _craft: _Craft
     _values: "dict[str, float]"
     _X_0: Matrix
 
     @property
     def deltas(self) -> tuple[str, ...]:
-        """Names in Δ: those of parameters, or principal axes of a covariance."""
+        """Names of the δ: parameters with ranges, then ``axis[n]`` for axes of a covariance."""
         return tuple(str(name) for name in self.spread.columns)
 
     @property
@@ -526,7 +589,24 @@ class UncertainModel:
         )
 
     def delta(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
-        """Return Δ as a vector, from numbers by name (others are 0) or in their order."""
+        """Return the δ as a vector.
+
+        Parameters
+        ----------
+        delta : mapping or array_like, shape (len(deltas),)
+            Numbers by the names in `deltas`, where missing ones are 0; or in the order of
+            `deltas`. ±1 is the end of a range.
+
+        Returns
+        -------
+        ndarray, shape (len(deltas),)
+            The numbers in the order of `deltas`.
+
+        Raises
+        ------
+        FmuError
+            If a name is not among `deltas`, or the numbers are too few, too many or not finite.
+        """
         if isinstance(delta, Mapping):
             if unknown := [name for name in delta if name not in self.deltas]:
                 hint = did_you_mean(unknown[0], self.deltas)
@@ -538,15 +618,37 @@ class UncertainModel:
         return found
 
     def values(self, delta: Mapping[str, float] | ArrayLike) -> "dict[str, float]":
-        """Return the uncertain parameters at Δ, by name."""
+        """Return the uncertain parameters at Δ.
+
+        Parameters
+        ----------
+        delta : mapping or array_like
+            Δ, as for `delta`.
+
+        Returns
+        -------
+        dict of str to float
+            Values in SI units by name.
+        """
         change = self.spread.to_numpy() @ self.delta(delta)
         return {name: self.center[name] + float(x)
                 for name, x in zip(self.spread.index, change, strict=True)}  # fmt: skip
 
     def at(self, delta: Mapping[str, float] | ArrayLike) -> LinearModel:
-        """Return the model at Δ, in the FMU's states without those that norms determine.
+        """Return the linear model at Δ.
 
-        It equals `linearize` with `parameters` but for rounding.
+        It equals `linearize` with `parameters` except for rounding. Components of quaternions and
+        of the bobs' directions that follow from their norms are not among its states.
+
+        Parameters
+        ----------
+        delta : mapping or array_like
+            Δ, as for `delta`.
+
+        Returns
+        -------
+        LinearModel
+            The model from u to y.
         """
         width, (A, B, C, D) = self.order, self.M
         D_x = np.repeat(self.delta(delta), self.counts)
@@ -587,11 +689,22 @@ class UncertainModel:
     ) -> "dict[str, Quantity]":
         """Return the parameters of Spacecraft at Δ, for `linearize` and `simulate`.
 
-        commanded: without torque, for a `Loop` that commands it.
+        Force and torque are set to hold the acceleration of the operating point, and the damping
+        forces keep their value there. The rigid liquid changes with masses and heights of the
+        bobs; if its own inertia would become negative, as in a sphere, the inertia of the dry
+        craft is reduced instead.
 
-        Force and torque give the acceleration of the point; the drag keeps its value there. The
-        rigid liquid changes with masses and heights of the bobs; where its own inertia would be
-        negative, as in a sphere, the dry craft's is less instead.
+        Parameters
+        ----------
+        delta : mapping or array_like
+            Δ, as for `delta`.
+        commanded : bool
+            Leave the torque out, for a `Loop` that commands it.
+
+        Returns
+        -------
+        dict
+            Values in SI units by the names of the FMU's parameters.
         """
         craft, values = self._craft, self._values | self.values(delta)
         new: dict[str, Quantity] = dict(self.given)
@@ -633,9 +746,26 @@ class UncertainModel:
         return K
 
     def closed(self, loop: Loop, frequency: ArrayLike) -> NDArray[np.complex128]:
-        """Return what Δ sees of the closed loop at frequencies in Hz: frequencies × Δ × Δ.
+        """Return the frequency response of the closed loop from the outputs of Δ to its inputs.
 
-        The hold's images around the sampling rate are left out.
+        The images of the hold around the sampling rate are left out.
+
+        Parameters
+        ----------
+        loop : Loop
+            Loop that measures y and commands u, with a linear controller.
+        frequency : array_like, shape (n,)
+            Frequencies, Hz.
+
+        Returns
+        -------
+        ndarray of complex, shape (n, order, order)
+            The matrix of which µ is taken at each frequency.
+
+        Raises
+        ------
+        FmuError
+            If the loop has other signals or a nonlinear controller.
         """
         K = self._controller(loop)
         w = TURN * np.atleast_1d(floats(frequency))
@@ -650,23 +780,57 @@ class UncertainModel:
         return found
 
     def mu_upper(self, loop: Loop, frequency: ArrayLike) -> Matrix:
-        """Return an upper bound of µ of the closed loop at each frequency in Hz.
+        """Return an upper bound of µ of the closed loop at each frequency.
 
-        By D and G scalings (Fan, Tits and Doyle 1991), diagonal, with each copy as a real number
-        of its own: a superset of Δ. With several copies the bound may be several times µ: 2.37 for
-        0.67 in the book's example. A bound below 1 shows that no Δ within the ranges destabilises
-        the loop at this frequency; a bound above 1 certifies nothing, see `worst_case`. A grid may
-        miss a narrow peak.
+        A bound below 1 shows that no Δ within the ranges destabilises the loop at this frequency;
+        a bound above 1 shows nothing, see `worst_case`. A grid of frequencies may miss a narrow
+        peak. The bound is by D and G scalings (Fan, Tits and Doyle 1991) that are diagonal, so
+        that the copies of a δ may differ; with several copies it may be several times µ: 2.37
+        instead of 0.67 in the book's example.
+
+        Parameters
+        ----------
+        loop : Loop
+            Loop that measures y and commands u, with a linear controller.
+        frequency : array_like, shape (n,)
+            Frequencies, Hz.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Upper bounds of µ.
+
+        Raises
+        ------
+        FmuError
+            If the loop has other signals or a nonlinear controller.
         """
         return np.array([mu_upper(N) for N in self.closed(loop, frequency)])
 
     def worst_case(self, loop: Loop, largest: float = 3.0) -> WorstCase:
-        """Return the smallest real Δ that a search finds at the limit of stability of a loop.
+        """Search the smallest real Δ that brings a loop to the limit of stability.
 
         The sampled loop is exact, delay included. From each lightly damped pole the search follows
-        the sign of the pole's derivatives by δ, up to ``|δ| = largest``, until the signs repeat.
-        Damping ratios stay at 0 or above. Any Δ found is a lower bound of µ; one that is not found
-        is no proof.
+        the signs of the pole's derivatives by the δ, until the signs repeat. Damping ratios stay
+        at 0 or above. A Δ that is found gives a lower bound of µ; a search that finds none proves
+        nothing.
+
+        Parameters
+        ----------
+        loop : Loop
+            Loop that measures y and commands u, with a linear controller.
+        largest : float
+            Largest ``|δ|`` to search.
+
+        Returns
+        -------
+        WorstCase
+            Δ, its size and the frequency of the oscillation.
+
+        Raises
+        ------
+        FmuError
+            If the loop is unstable at Δ = 0, has other signals or a nonlinear controller.
         """
         K = self._controller(loop)
         check_ranges(largest=largest)
@@ -747,7 +911,15 @@ class UncertainModel:
         return complex(poles[np.argmin(np.abs(poles - pole))])
 
     def as_dict(self) -> "dict[str, Any]":
-        """Return matrices, names, block structure and ranges, as `to_mat` and `to_json` write."""
+        """Return the content of the files that `to_mat` and `to_json` write.
+
+        Returns
+        -------
+        dict
+            Matrices ``A``, ``B``, ``C``, ``D`` of M, ``size_of_delta``, names of ``states``,
+            ``inputs`` and ``outputs``, the blocks of Δ (``deltas``, ``repetition``, ``middle``,
+            ``radius``), ``parameters`` with ``center``, ``low`` and ``high``, and ``spread``.
+        """
         M, width = self.M, self.order
         ends = {name: [self.center[name] - x, self.center[name] + x]
                 for name, x in zip(self.spread.index, np.abs(self.spread).sum(axis=1),
@@ -769,13 +941,35 @@ class UncertainModel:
         }  # fmt: skip
 
     def to_mat(self, path: str | Path) -> None:
-        """Write M, the blocks of Δ, names and ranges as .mat (version 5); see `read_lft.m`."""
+        """Write M, the blocks of Δ, names and ranges for MATLAB or Octave; see `read_lft.m`.
+
+        Parameters
+        ----------
+        path : str or Path
+            File, .mat (version 5).
+
+        Raises
+        ------
+        FmuError
+            If the name does not end in .mat, or the file cannot be written.
+        """
         from .files import to_mat
 
         to_mat(self, path)
 
     def to_json(self, path: str | Path) -> None:
-        """Write the same as `to_mat` as .json."""
+        """Write the content of `as_dict` as JSON.
+
+        Parameters
+        ----------
+        path : str or Path
+            File, .json.
+
+        Raises
+        ------
+        FmuError
+            If the name does not end in .json, or the file cannot be written.
+        """
         from .files import write_file
 
         every = {key: value.tolist() if hasattr(value, "tolist") else value
@@ -783,9 +977,17 @@ class UncertainModel:
         write_file(path, ".json", lambda: json.dumps(every, indent=1, ensure_ascii=False) + "\n")
 
     def to_control(self) -> Any:
-        """Return M as ``control.StateSpace``, signals of Δ first; needs the package control.
+        """Convert M to python-control; dots in names become underscores.
 
-        Dots of names become underscores.
+        Returns
+        -------
+        control.StateSpace
+            M, with the signals of Δ first.
+
+        Raises
+        ------
+        FmuError
+            If the package control is not installed.
         """
         M = self.M
         named = [tuple(name.replace(".", "_") for name in of)
@@ -842,24 +1044,56 @@ def uncertain(
     sigmas: float = 2.0,
     model: str | Path = "Spacecraft",
 ) -> UncertainModel:
-    """Return Spacecraft at rest with uncertain parameters, as (M, Δ); exact, not fitted.
+    """Return a linear model of Spacecraft with uncertain parameters, exact for every value.
 
-    * ``parameters``: Those of the FMU, as for `linearize`: craft, tanks, force. The craft must be
-      free and at rest, its tanks axially symmetric.
-    * ``ranges``: (low, high) in SI units, or ``"5%"`` of the value on both sides, by name:
-      ``tank[1].frequency[1]`` (Hz, tank held, under the thrust that acts; the bob's height and the
-      share of a centring stiffness stay),
-      ``.zeta[1]``, ``.mass[1]`` and ``.bob[1]`` (its height on the axis; the liquid's mass, centre
-      and inertia stay), ``craft.mass``, ``craft.Jxx``, … and ``craft.r[1]``, … of the dry craft,
-      and ``acceleration``, a factor of the acceleration at which force and torque hold the craft,
-      1 as it is. Dry mass and inertia change at that acceleration. Warns if the craft turns faster
-      and faster at it; `Craft.uncertain` trims it.
-    * ``covariance``: A table with the names of ``ranges`` as index and columns, or what `identify`
-      found with ``free=``. Δ then has the principal axes of its correlations, ±``sigmas`` standard
-      deviations long. Parameters of the FMU (``tank[1].length[1]``, ``hinge``, ``m_0``, …) are
-      converted to first order at the acceleration of the point. Unknowns of a record alone (biases,
-      states at its start) are left out.
-    * ``inputs``, ``outputs``: Of force and torque; of q and omega.
+    The craft must be free and at rest, and its tanks axially symmetric. Warns with FmuWarning if
+    its thrust turns the craft faster and faster; `Craft.uncertain` trims it first.
+
+    Uncertain parameters are ``tank[1].frequency[1]`` (Hz, of the mode in a tank that is held, under
+    the thrust that acts; the height of the bob and the share of a centring stiffness stay),
+    ``tank[1].zeta[1]``, ``tank[1].mass[1]`` and ``tank[1].bob[1]`` (height of the slosh mass on the
+    axis; mass, centre and inertia of the liquid stay), ``craft.mass``, ``craft.Jxx``, …,
+    ``craft.r[1]``, … of the dry craft, and ``acceleration``, a factor of the acceleration that
+    force and torque give the craft. Mass and inertia change at constant acceleration.
+
+    Parameters
+    ----------
+    parameters : mapping, str or Path, optional
+        Parameters of Spacecraft, as for `linearize`: craft, tanks, force.
+    ranges : mapping, optional
+        Range of each uncertain parameter by name: (low, high) in SI units, or a share such as
+        ``"5%"`` of the value on both sides.
+    inputs : str or sequence of str
+        Inputs u: components of force and torque, or "force" and "torque" for all three.
+    outputs : str or sequence of str
+        Outputs y: components of q and omega.
+    covariance : DataFrame or Identification, optional
+        Covariance with names of uncertain parameters as index and columns, SI units. Or a result
+        of `identify` with ``free=``, whose parameters (``tank[1].length[1]``, ``hinge``, ``m_0``,
+        …) are converted to first order; its biases and initial states are left out. Δ then has
+        the principal axes of the correlations.
+    sigmas : float
+        Length of the axes of the covariance on both sides, standard deviations.
+    model : str or Path
+        Name of the FMU, or its file.
+
+    Returns
+    -------
+    UncertainModel
+        The certain part M and Δ.
+
+    Raises
+    ------
+    FmuError
+        If the craft is not of this kind, or a name or a range is not allowed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> craft = {"craft.mass": 900.0, "craft.Jxx": 400.0, "tanks": 0}
+    >>> model = hubslosh.uncertain(craft, {"craft.Jxx": "10%"}, "torque[1]", "omega[1]")
+    >>> model.at({"craft.Jxx": 1.0}).B.round(6).tolist()
+    [[0.002273]]
     """
     import pandas as pd
 

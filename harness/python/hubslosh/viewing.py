@@ -23,12 +23,28 @@ HEIGHT = 760
 
 @dataclass(frozen=True)
 class View:
-    """A page that shows a run; a notebook shows it below the cell that it is the value of."""
+    """A page that shows a run in 3-D, as `view` returns it.
+
+    A notebook shows the page if it is the value of a cell.
+
+    Attributes
+    ----------
+    html : str
+        The page. It contains everything that it needs, so that it works without a network.
+    path : Path or None
+        File of the page, if `view` was given ``out``.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> run = hubslosh.simulate(parameters={"init.slosh_angle": 0.1}, stop=2)
+    >>> page = hubslosh.view(run, "run.html")
+    >>> page.path.name
+    'run.html'
+    """
 
     html: str = field(repr=False)
-    """The page: it needs nothing else, no network either."""
     path: Path | None = None
-    """Path of the page, if ``out`` was given."""
 
     def _repr_html_(self) -> str:
         """Return it in a frame of its own, which IPython shows."""
@@ -38,7 +54,16 @@ class View:
         )
 
     def open(self) -> None:
-        """Show it in the web browser."""
+        """Show the page in the web browser.
+
+        Without a file the page is written to a temporary one first.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> run = hubslosh.simulate(parameters={"init.slosh_angle": 0.1}, stop=2)
+        >>> hubslosh.view(run).open()  # doctest: +SKIP
+        """
         path = self.path
         if path is None:
             handle, name = tempfile.mkstemp(prefix="hubslosh-", suffix=".html")
@@ -61,22 +86,47 @@ def view(
 ) -> View:
     """Show a run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
 
-    * ``run``: A table, as ``simulate`` and ``closed_loop`` return it, or a file of ``hubslosh
-      run``.
-    * ``out``: Also write the page to this .html file.
-    * ``model``, ``parameters``: FMU and parameters of the run; by default those in the table's
-      ``.attrs`` or in the file.
-    * ``tanks``: Files of tanks (the format of ``hubslosh tank``) to draw them by, in their order or
-      by number from 1.
-    * ``start``, ``stop``: Ends of the part to show, s.
+    Nothing is simulated: the page draws the columns of the run. A run of HubSlosh needs ``theta``
+    or ``omega``, ``slosh_angle`` and ``slosh_angle_radial``; its second and later modes are drawn
+    if the run has ``slosh.q_radial[n]`` and ``slosh.q_tangential[n]``. A run of Spacecraft needs
+    ``q[1]`` to ``q[4]``, and for each tank the slosh angles or the directions ``p``, for draining
+    tanks also ``liquid``. `simulate` and `closed_loop` record these columns by default.
 
-    Nothing is simulated. The table of HubSlosh needs ``theta`` or ``omega``, ``slosh_angle`` and
-    ``slosh_angle_radial``; that of Spacecraft ``q[1]`` to ``q[4]``. Tanks need slosh angles or the
-    directions ``p``, draining tanks also ``liquid``. ``simulate`` and ``closed_loop`` record these
-    by default. HubSlosh's modes after the first are drawn if the table has ``slosh.q_radial[n]``
-    and ``slosh.q_tangential[n]``.
+    Parameters
+    ----------
+    run : DataFrame, str or Path
+        Table of a run, as `simulate` and `closed_loop` return it, or a file of ``hubslosh run``.
+    out : str or Path, optional
+        Also write the page to this .html file.
+    model : str or Path, optional
+        FMU of the run; by default the model in ``.attrs`` of the table, or in the file.
+    parameters : mapping, optional
+        Parameters of the run in addition to those in ``.attrs`` of the table, or in the file.
+    tanks : sequence or mapping of files
+        Tank files (as for ``hubslosh tank``) with the contours to draw, in the order of the
+        tanks, or by the number of the tank from 1.
+    start, stop : float, optional
+        Ends of the part to show, s.
+    program : str or Path, optional
+        The program ``hubslosh``; by default the one that comes with this package.
 
-    Raises FmuError with the columns that are missing.
+    Returns
+    -------
+    View
+        The page; a notebook shows it.
+
+    Raises
+    ------
+    FmuError
+        If columns are missing; the message names them. If a file cannot be read or written.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> run = hubslosh.simulate(parameters={"init.slosh_angle": 0.1}, stop=2)
+    >>> page = hubslosh.view(run, stop=1.0)
+    >>> len(page.html) > 100_000
+    True
     """
     path = find_program(program)
     if out is not None and Path(out).suffix != ".html":

@@ -147,7 +147,7 @@ def test_every_plot_has_what_it_promises(fmu: Path) -> None:
     drawn, high = gain.lines[0].get_ydata(), np.abs(line - poles[-1]) < 0.05
     peak = abs(model.response(np.linspace(poles[-1] - 0.05, poles[-1] + 0.05, 100_001))).max()
     assert drawn[high].max() == pytest.approx(peak, rel=1e-3)
-    assert plot.band(model.sampled(0.1))[1] == 5.0
+    assert plot._band(model.sampled(0.1))[1] == 5.0
 
     loop = hubslosh.Loop([[0.4, 0.6]], 0.1, fmu, viscous, delay=0.02)
     gain, phase = plot.margins(loop)

@@ -119,9 +119,11 @@ def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path
 DOCTESTS = """
 import doctest, importlib, pkgutil, hubslosh
 found = doctest.TestResults(0, 0)
-for info in pkgutil.iter_modules(hubslosh.__path__, "hubslosh."):
-    if not info.name.rpartition(".")[2].startswith("_"):
-        more = doctest.testmod(importlib.import_module(info.name), globs={})
+names = [info.name for info in pkgutil.iter_modules(hubslosh.__path__, "hubslosh.")]
+every = [getattr(hubslosh, name) for name in hubslosh.__all__]  # imports the compiled names
+for name in ["hubslosh", *names]:
+    if not name.rpartition(".")[2].startswith("_"):
+        more = doctest.testmod(importlib.import_module(name), globs={})
         found = doctest.TestResults(found.failed + more.failed, found.attempted + more.attempted)
 assert not found.failed and found.attempted > 100, found
 """
