@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import native, temporary
 from .arguments import caller, floats, vector
-from .fmu import Fmu, FmuError, FmuWarning, Quantity
+from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import OperatingPoint, rotation, trim
@@ -571,7 +571,7 @@ class Craft:
         self,
         fill: Fill,
         *,
-        parameters: Mapping[str, Quantity] | None = None,
+        parameters: Parameters | None = None,
         trimmed: bool = True,
         rigid: bool = False,
         detach: bool = False,
@@ -633,7 +633,7 @@ class Craft:
             warnings.warn(text, FmuWarning, stacklevel=2)
         return point.parameters
 
-    def trim(self, fill: Fill, parameters: Mapping[str, Quantity] | None = None) -> OperatingPoint:
+    def trim(self, fill: Fill, parameters: Parameters | None = None) -> OperatingPoint:
         """Return the operating point at a fill; ``print`` says which accelerations are left.
 
         The thrust acts through the centre of mass, as after trimming: O, and with it the thrust,
@@ -672,7 +672,7 @@ class Craft:
     def _point(
         self,
         fill: Fill,
-        parameters: Mapping[str, Quantity] | None,
+        parameters: Parameters | None,
         *,
         trimmed: bool = True,
         **options: Any,
@@ -682,7 +682,7 @@ class Craft:
         return self._realised(every, modes, trimmed=trimmed), late
 
     def _given(
-        self, fill: Fill, parameters: Mapping[str, Quantity] | None, **options: Any
+        self, fill: Fill, parameters: Parameters | None, **options: Any
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
         """Return untrimmed parameters, quantities of slosh modes and the delay, or None."""
         every = self._untrimmed(fill, **options)
@@ -693,8 +693,8 @@ class Craft:
 
     def _realised(
         self,
-        every: Mapping[str, Quantity],
-        modes: Mapping[str, Quantity],
+        every: Parameters,
+        modes: Parameters,
         factors: Mapping[str, float] | None = None,
         *,
         trimmed: bool = True,
@@ -877,7 +877,7 @@ class Craft:
         inputs: Sequence[str] | str = "torque",
         outputs: Sequence[str] | str = ("q", "omega"),
         *,
-        parameters: Mapping[str, Quantity] | None = None,
+        parameters: Parameters | None = None,
         rigid: bool = False,
     ) -> LinearModel:
         """Return the linear model at a fill, at rest under thrust and trimmed, see `trim`.
@@ -929,7 +929,7 @@ class Craft:
         command: Sequence[str] | str = "torque",
         latency: int = 0,
         delay: float = 0.0,
-        parameters: Mapping[str, Quantity] | None = None,
+        parameters: Parameters | None = None,
         rigid: bool = False,
         mass_flow: Any = None,
         between: Sequence[float | str] = ("2%", "98%"),
@@ -1008,7 +1008,7 @@ class Craft:
         command: Sequence[str] | str = "torque",
         latency: int = 0,
         delay: float = 0.0,
-        parameters: Mapping[str, Quantity] | None = None,
+        parameters: Parameters | None = None,
     ) -> "Review":
         """Return the design review of a linear sampled controller over fills.
 
@@ -1083,10 +1083,10 @@ class Craft:
     def uncertain(
         self,
         fill: Fill,
-        ranges: Mapping[str, Sequence[float] | str],
+        ranges: Mapping[str, Any],
         *,
         outputs: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
-        parameters: Mapping[str, Quantity] | None = None,
+        parameters: Parameters | None = None,
         **options: Any,
     ) -> "UncertainModel":
         """Return the trimmed craft at a fill with uncertain parameters; see `hubslosh.uncertain`.

@@ -4,7 +4,7 @@ import atexit
 import difflib
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,6 +16,7 @@ __all__ = [
     "Fmu",
     "FmuError",
     "FmuWarning",
+    "Parameters",
     "Quantity",
     "Value",
     "did_you_mean",
@@ -34,6 +35,10 @@ INTEGERS = range(-(2**31), 2**31)
 
 Quantity = Value | tuple[float, str]
 """A value, or a number with its unit, such as ``(50, "mm")``."""
+
+Parameters = Mapping[str, Any]
+"""Values of variables by name, each a `Quantity`. The type says Any because mypy takes a dict of
+numbers and texts for ``dict[str, object]``."""
 
 
 class DefinedUnit(str):
@@ -272,8 +277,8 @@ class Fmu:
         Returns
         -------
         Variable
-            Its description: ``name``, ``reference``, ``kind``, ``causality``, ``variability``,
-            ``unit``, ``start`` and ``description``.
+            Its ``name``, ``reference``, ``kind``, ``causality``, ``variability``, ``unit``,
+            ``start`` and others.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """The linear model of an FMU at a point, from its own directional derivatives."""
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import MOST_STATES, check_ranges, floats, names_of
-from .fmu import Fmu, FmuError, Quantity
+from .fmu import Fmu, FmuError, Parameters
 from .operating_point import is_spacecraft, warn_of_rotation
 from .plant import Instance
 from .simulation import parameters_of
@@ -385,7 +385,7 @@ _PADE = [
 
 def linearize(
     model: str | Path = "HubSlosh",
-    parameters: Mapping[str, Quantity] | str | Path | None = None,
+    parameters: Parameters | str | Path | None = None,
     inputs: Sequence[str] | str | None = None,
     outputs: Sequence[str] | str | None = None,
     *,

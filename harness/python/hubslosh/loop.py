@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .arguments import column_of, floats, names_of, not_numbers, out_of_range
 from .feedback import Feedback, Linear
-from .fmu import Fmu, FmuError, Quantity, did_you_mean
+from .fmu import Fmu, FmuError, Parameters, did_you_mean
 from .linearization import LinearModel, linearize, split_delay
 from .plant import TORQUE, Plant
 from .run import Run
@@ -76,7 +76,7 @@ class Loop:
     controller: Any
     period: float
     model: str | Path = "HubSlosh"
-    parameters: Mapping[str, Quantity] | str | Path | None = None
+    parameters: Parameters | str | Path | None = None
     measured: Sequence[str] | str = ("theta", "omega")
     command: Sequence[str] | str = TORQUE
     latency: int = 0
@@ -209,7 +209,7 @@ class Loop:
         cycles, rest = split_delay(self.delay, self.period)
         return cycles + int(self.latency), rest
 
-    def plant(self, parameters: Mapping[str, Quantity] | None = None) -> LinearModel:
+    def plant(self, parameters: Parameters | None = None) -> LinearModel:
         """Return the FMU's linear model from commands to measurements, in continuous time.
 
         Parameters
@@ -239,9 +239,7 @@ class Loop:
         every = parameters_of(self.parameters) | parameters_of(parameters)
         return linearize(self.model, every, command, measured)
 
-    def gain(
-        self, parameters: Mapping[str, Quantity] | None = None, *, more_delay: float = 0.0
-    ) -> LinearModel:
+    def gain(self, parameters: Parameters | None = None, *, more_delay: float = 0.0) -> LinearModel:
         """Return the loop gain L from commands round to commands; the loop closes with u = -L u.
 
         It is exact at the sampling instants, delay included.
@@ -292,7 +290,7 @@ class Loop:
     def simulate(
         self,
         stop: float,
-        parameters: Mapping[str, Quantity] | None = None,
+        parameters: Parameters | None = None,
         *,
         reference: pd.DataFrame | None = None,
         inputs: pd.DataFrame | None = None,
@@ -440,7 +438,7 @@ def closed_loop(
     period: float,
     stop: float,
     model: str | Path = "HubSlosh",
-    parameters: Mapping[str, Quantity] | str | Path | None = None,
+    parameters: Parameters | str | Path | None = None,
     *,
     measured: Sequence[str] | str = ("theta", "omega"),
     command: Sequence[str] | str = TORQUE,

@@ -70,9 +70,11 @@ def posterior(
     --------
     Two seconds of a free decay from a known angle; a useful chain has 300 steps or more:
 
+    >>> import numpy as np
     >>> import hubslosh
     >>> bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
     >>> run = hubslosh.simulate(parameters=bench, stop=4, step=0.05, outputs="omega")
+    >>> run["omega"] += np.random.default_rng(1).normal(0, 1e-5, len(run))  # noise of a gyro
     >>> question = {"fmu": "HubSlosh", "free": {"friction.b": 0.03}, "outputs": ["omega"],
     ...             "settings": bench}
     >>> found = hubslosh.identify(run, **question)

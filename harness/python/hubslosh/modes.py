@@ -1,13 +1,12 @@
 """Number of slosh modes that a model needs: the force's error against the number of modes."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .fmu import FmuError, Quantity
+from .fmu import FmuError, Parameters, Quantity
 from .plant import Plant
 from .simulation import parameters_of
 
@@ -41,7 +40,7 @@ def mode_responses(
 
 
 def mode_errors(
-    parameters: Mapping[str, Quantity] | str | Path | None = None,
+    parameters: Parameters | str | Path | None = None,
     below: float | None = None,
     fmu: str | Path = "HubSlosh",
 ) -> pd.DataFrame:

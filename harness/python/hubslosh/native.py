@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib import import_module
 from importlib.machinery import ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -29,21 +30,52 @@ def _built() -> Any:
 
 
 try:
-    from . import _native
+    import_module("._native", __package__)
 except ImportError:
     if source_tree() is None:
         raise
-    _native = _built()
+    sys.modules[f"{__package__}._native"] = _built()
 
-Fmu, Instance, Variable = _native.Fmu, _native.Instance, _native.Variable
-FmuError = _native.FmuError
-"""Error in the arguments of a call, of an FMU or of the program ``hubslosh``."""
-FmuWarning = _native.FmuWarning
-"""Python warning that passes on a warning of an FMU or of the program ``hubslosh``."""
-Model = _native.Model
-destination, put, read_parameters = _native.destination, _native.put, _native.read_parameters
-read_recording = _native.read_recording
-History = _native.History
-check_interpolation = _native.check_interpolation
-communication_points, pairing = _native.communication_points, _native.pairing
-Liquid, Tank, solve, table = _native.Liquid, _native.Tank, _native.solve, _native.table
+from ._native import (  # noqa: E402
+    Fmu,
+    FmuError,
+    FmuWarning,
+    History,
+    Instance,
+    Liquid,
+    Model,
+    Solved,
+    Tank,
+    Variable,
+    check_interpolation,
+    communication_points,
+    destination,
+    pairing,
+    put,
+    read_parameters,
+    read_recording,
+    solve,
+    table,
+)
+
+__all__ = [
+    "Fmu",
+    "FmuError",
+    "FmuWarning",
+    "History",
+    "Instance",
+    "Liquid",
+    "Model",
+    "Solved",
+    "Tank",
+    "Variable",
+    "check_interpolation",
+    "communication_points",
+    "destination",
+    "pairing",
+    "put",
+    "read_parameters",
+    "read_recording",
+    "solve",
+    "table",
+]

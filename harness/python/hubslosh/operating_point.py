@@ -4,7 +4,7 @@ Otherwise the craft would turn faster and faster, and a linear model would hold 
 """
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import caller
-from .fmu import Fmu, FmuWarning, Quantity
+from .fmu import Fmu, FmuWarning, Parameters, Quantity
 from .plant import Plant
 
 Vector = NDArray[np.float64]
@@ -101,9 +101,7 @@ def _row(values: Vector) -> str:
     return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
 
 
-def trim(
-    model: str | Path, parameters: Mapping[str, Quantity], tanks: Sequence[str] = ()
-) -> OperatingPoint:
+def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -> OperatingPoint:
     """Return Spacecraft with O moved across the thrust, until that acts through the centre of mass.
 
     A craft without thrust, or on a pivot, stays as it is.

@@ -15,7 +15,7 @@ import numpy as np
 from . import native
 from .arguments import floats
 from .feedback import Feedback
-from .fmu import Fmu, FmuError, Quantity
+from .fmu import Fmu, FmuError, Parameters, Quantity
 
 TORQUE = "tau_cmd"
 """The input that carries the torque, N·m."""
@@ -238,7 +238,7 @@ class Plant(Instance):
     def __init__(
         self,
         fmu: Path | str,
-        settings: Mapping[str, Quantity] | None = None,
+        settings: Parameters | None = None,
         *,
         tolerance: float | None = None,
         start: float = 0.0,
@@ -458,7 +458,7 @@ def drive(
     fmu: Path | str,
     time: Sequence[float] | np.ndarray,
     torque: Sequence[float] | np.ndarray,
-    settings: Mapping[str, Quantity] | None = None,
+    settings: Parameters | None = None,
     *,
     slope: Sequence[float] | np.ndarray | None = None,
     tolerance: float | None = None,

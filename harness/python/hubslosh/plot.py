@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     from .linearization import LinearModel
 
@@ -559,13 +559,13 @@ def monte_carlo(
     return axes
 
 
-def save(figure: "Figure", path: "str | Path") -> None:
+def save(figure: "Figure | SubFigure", path: "str | Path") -> None:
     """Write a figure so that the same figure gives the same bytes, as SVG too.
 
     Parameters
     ----------
     figure : matplotlib Figure
-        The figure, such as ``axes[0].figure``.
+        The figure, such as ``axes[0].figure``; of a part, the whole figure.
     path : str or Path
         File in a format of matplotlib, such as .png, .svg or .pdf.
 
@@ -580,4 +580,4 @@ def save(figure: "Figure", path: "str | Path") -> None:
 
     metadata = {"Date": None} if str(path).endswith(".svg") else None
     with matplotlib.rc_context({"svg.hashsalt": "hubslosh"}):
-        figure.savefig(path, metadata=metadata)
+        figure.figure.savefig(path, metadata=metadata)

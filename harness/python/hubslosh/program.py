@@ -90,7 +90,7 @@ def analyse(
     out: str | Path,
     *arguments: str,
     columns: str | None = None,
-    settings: dict[str, object] | None = None,
+    settings: Mapping[str, object] | None = None,
     fmu: str | Path = "HubSlosh",
     progress: Progress = None,
     program: str | Path | None = None,
@@ -108,7 +108,7 @@ def analyse(
     columns : str, optional
         Columns of the signals, with units, such as
         ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``.
-    settings : dict, optional
+    settings : mapping, optional
         Known parameters of the bench by their names in the FMU, such as ``{"tank.h": 0.1}``.
     fmu : str or Path
         Name of the FMU, or its file.
@@ -166,11 +166,12 @@ class Estimated:
         Estimate, in ``unit``.
     std : float
         Standard deviation from all sources of error: noise and tolerances of known parameters.
+        Infinite if the recording does not determine the number.
     std_noise : float
         Standard deviation from the noise only.
     interval : tuple of float
-        Ends of the 95 % interval. The upper end is None if the recording does not limit the
-        number from above.
+        Ends of the 95 % interval. An end is infinite if the recording does not limit the number
+        on this side.
     unit : str
         SI unit as FMI writes it, such as ``kg.m2``.
     determined : bool
@@ -187,9 +188,20 @@ class Estimated:
     value: float
     std: float
     std_noise: float
-    interval: tuple[float, float | None]
+    interval: tuple[float, float]
     unit: str
     determined: bool = True
+
+    @classmethod
+    def _read(cls, found: Mapping[str, Any]) -> "Estimated":
+        """Return an estimate from result.json, where infinite numbers are null."""
+        ends = zip(found["interval"], (-np.inf, np.inf), strict=True)
+        low, high = (limit if end is None else float(end) for end, limit in ends)
+        spread = {
+            name: np.inf if found[name] is None else float(found[name])
+            for name in ("std", "std_noise")
+        }
+        return cls(**{**found, **spread, "interval": (low, high)})
 
 
 Method = Literal["bench", "friction", "decay"]
@@ -223,13 +235,15 @@ class Identification:
 
     Examples
     --------
+    >>> import numpy as np
     >>> import hubslosh
     >>> bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
     >>> run = hubslosh.simulate(parameters=bench, stop=4, step=0.05, outputs="omega")
+    >>> run["omega"] += np.random.default_rng(1).normal(0, 1e-5, len(run))  # noise of a gyro
     >>> found = hubslosh.identify(
     ...     run, free={"friction.b": 0.03}, outputs=["omega"], settings=bench)
-    >>> found.converged, round(found.parameters["friction.b"].value, 4)
-    (True, 0.0379)
+    >>> found.fits, round(found.parameters["friction.b"].value, 3)
+    (True, 0.038)
     """
 
     parameters: dict[str, Estimated]
@@ -375,13 +389,15 @@ def identify(
     --------
     A simulated decay takes the place of a recording:
 
+    >>> import numpy as np
     >>> import hubslosh
     >>> bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
     >>> run = hubslosh.simulate(parameters=bench, stop=4, step=0.05, outputs="omega")
+    >>> run["omega"] += np.random.default_rng(1).normal(0, 1e-5, len(run))  # noise of a gyro
     >>> found = hubslosh.identify(
     ...     run, free={"friction.b": 0.03}, outputs=["omega"], settings=bench)
-    >>> found.converged, round(found.parameters["friction.b"].value, 4)
-    (True, 0.0379)
+    >>> found.fits, round(found.parameters["friction.b"].value, 3)
+    (True, 0.038)
     """
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("--method is given as method=")
@@ -411,10 +427,7 @@ def identify(
         ]
         loaded: dict[str, Any] = call(path, "identify", [kind, *files, *flags], progress)
     estimates = {
-        kind: {
-            name: Estimated(**e | {"interval": tuple(e["interval"])})
-            for name, e in loaded[kind].items()
-        }
+        kind: {name: Estimated._read(found) for name, found in loaded[kind].items()}
         for kind in ("parameters", "measurement")
     }
     return Identification(

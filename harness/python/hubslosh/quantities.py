@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .fmu import Fmu, FmuError, Quantity
+from .fmu import Fmu, FmuError, Parameters, Quantity
 from .plant import Plant
 
 TURN = 2 * np.pi
@@ -59,7 +59,7 @@ def full_name(name: str, tanks: Iterable[str]) -> str:
     return f"tank[{number}]{name.removeprefix(tank)}"
 
 
-def full_names(given: Mapping[str, Quantity], tanks: Iterable[str]) -> dict[str, Quantity]:
+def full_names(given: Parameters, tanks: Iterable[str]) -> dict[str, Quantity]:
     """Return values by full names; a quantity that is given under both of its names is refused."""
     tanks, found = list(tanks), dict[str, Quantity]()
     for name, value in given.items():
@@ -85,7 +85,7 @@ def moves_the_bob(name: str) -> str:
 class Modes:
     """Slosh modes of Spacecraft's parameters, whose quantities can be read and changed."""
 
-    def __init__(self, model: str | Path, given: Mapping[str, Quantity]) -> None:
+    def __init__(self, model: str | Path, given: Parameters) -> None:
         """Take the parameters of an FMU; nothing is computed before it is asked for."""
         self.model, self.fmu, self.given = model, Fmu.open(model), dict(given)
 
@@ -212,8 +212,8 @@ def rigid_rest(
 
 def changed(
     model: str | Path,
-    given: Mapping[str, Quantity],
-    values: Mapping[str, Quantity],
+    given: Parameters,
+    values: Parameters,
     factors: Mapping[str, float] | None = None,
 ) -> dict[str, Quantity]:
     """Return parameters of Spacecraft with quantities of slosh modes, by full names, changed.

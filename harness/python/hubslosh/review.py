@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .arguments import MOST_FILLS, MOST_WORK, check_ranges
 from .files import write_file
-from .fmu import Fmu, FmuError, FmuWarning, Quantity, did_you_mean
+from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity, did_you_mean
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import rotation
@@ -379,7 +379,7 @@ def review(
     uncertain: Mapping[str, Any] | None,
     draws: int,
     seed: int,
-    parameters: Mapping[str, Quantity] | None = None,
+    parameters: Parameters | None = None,
     **options: Any,
 ) -> Review:
     """Return the review of a loop; see `Craft.review`."""
@@ -496,7 +496,7 @@ class _Space:
         damping: str,
         frequency: str,
         uncertain: Any,
-        parameters: Mapping[str, Quantity] | None,
+        parameters: Parameters | None,
         options: dict[str, Any],
     ) -> "_Space":
         """Check the arguments of a review, and solve its tanks."""
@@ -652,7 +652,7 @@ def _frequencies(
 
 def _quantities(
     loops: Sequence[Loop],
-    given: Sequence[Mapping[str, Quantity]],
+    given: Sequence[Parameters],
     ranges: Mapping[str, tuple[str, Any]],
 ) -> list[Uncertain]:
     """Return the quantities whose ranges were given, by full names; given: untrimmed parameters."""
@@ -704,7 +704,7 @@ def _problem(loop: Loop, of: OfMode) -> str:
     return Modes(loop.model, loop.parameters).problem(of)  # type: ignore[arg-type]
 
 
-def _nominal(fmu: Fmu, loop: Loop, untrimmed: Mapping[str, Quantity], name: str) -> float | None:
+def _nominal(fmu: Fmu, loop: Loop, untrimmed: Parameters, name: str) -> float | None:
     """Return the nominal value; None if this fill does not have the mode."""
     if name == DELAY:
         return float(loop.delay)

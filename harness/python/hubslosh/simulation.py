@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from . import native
 from .arguments import column_of, names_of, not_numbers
-from .fmu import INTEGERS, Fmu, FmuError, Quantity, did_you_mean
+from .fmu import INTEGERS, Fmu, FmuError, Parameters, Quantity, did_you_mean
 from .plant import TORQUE, Plant
 from .run import Run
 from .tables import read_parameters
@@ -42,7 +42,7 @@ class History:
 
 def simulate(
     model: str | Path = "HubSlosh",
-    parameters: Mapping[str, Quantity] | str | Path | None = None,
+    parameters: Parameters | str | Path | None = None,
     inputs: pd.DataFrame | None = None,
     stop: float | None = None,
     step: float | None = None,
@@ -183,7 +183,7 @@ def table_of(
     columns: dict[str, Real],
     wanted: NDArray[np.bool_] | None,
     model: str | Path,
-    parameters: Mapping[str, Quantity],
+    parameters: Parameters,
 ) -> Run:
     """Return the wanted rows of a run (None: all) as its table."""
     table = Run(columns, copy=False)
@@ -196,7 +196,7 @@ def table_of(
 
 
 def parameters_of(
-    parameters: Mapping[str, Quantity] | str | Path | None,
+    parameters: Parameters | str | Path | None,
 ) -> dict[str, Quantity]:
     """Return parameters by name; a text or a path is a file of them."""
     if isinstance(parameters, str | Path):
@@ -214,7 +214,7 @@ def parameters_of(
 def outputs_of(
     fmu: Fmu,
     outputs: Sequence[str] | str | None,
-    parameters: Mapping[str, Quantity],
+    parameters: Parameters,
     problems: list[str],
 ) -> list[str]:
     """Return the variables to record; those of ``None`` are all outputs and what `view` needs."""
@@ -326,7 +326,7 @@ def _hint(name: str, known: Sequence[str]) -> str:
 
 def check_parameters(
     fmu: Fmu,
-    parameters: Mapping[str, Quantity],
+    parameters: Parameters,
     histories: Mapping[str, History],
     problems: list[str],
 ) -> None:

@@ -1,14 +1,14 @@
 """Margins of a loop: every gain and phase crossing, however narrow."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .fmu import FmuError, Quantity
+from .fmu import FmuError, Parameters
 from .linearization import LinearModel, eigenvectors, mode_table
 from .loop import Loop, _from_control
 from .native import Model
@@ -134,9 +134,7 @@ def _decibel(value: float) -> str:
     return "none upwards" if value > 0 else "none downwards"
 
 
-def margins(
-    loop: Loop | LinearModel | Any, parameters: Mapping[str, Quantity] | None = None
-) -> Margins:
+def margins(loop: Loop | LinearModel | Any, parameters: Parameters | None = None) -> Margins:
     """Return every gain and phase crossing of a loop, its margins, and whether it is stable.
 
     No frequency grid decides what is found: poles and zeros bound slope and curvature of the
@@ -174,7 +172,7 @@ def margins(
 
 
 def margins_and_gain(
-    loop: Any, parameters: Mapping[str, Quantity] | None = None
+    loop: Any, parameters: Parameters | None = None
 ) -> tuple[Margins, LinearModel]:
     """Return what `margins` finds, and the loop gain."""
     if isinstance(loop, Loop):

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import check_ranges, floats, names_of, out_of_range
-from .fmu import FmuError, Quantity, did_you_mean
+from .fmu import FmuError, Parameters, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
 from .operating_point import warn_of_rotation
@@ -145,7 +145,7 @@ def _rigid(mass: float, center: Matrix, own: Matrix) -> Matrix:
 
 
 def _read(
-    model: str | Path, parameters: Mapping[str, Quantity], held: tuple[Matrix, Matrix] | None = None
+    model: str | Path, parameters: Parameters, held: tuple[Matrix, Matrix] | None = None
 ) -> _Craft:
     """Return the craft as its FMU has it; under the accelerations of another one if they are held.
 
@@ -293,7 +293,7 @@ OF_TANK = re.compile(r"tank\[\d\]\.(m_0|H_0|I_0|I_z|(mass|length|frequency|hinge
 
 
 def _converted(
-    model: str | Path, given: Mapping[str, Quantity], craft: _Craft, table: "pd.DataFrame"
+    model: str | Path, given: Parameters, craft: _Craft, table: "pd.DataFrame"
 ) -> tuple["pd.DataFrame", list[str]]:
     """Return the derivatives of uncertain parameters by those of the FMU, and what forbids them."""
     import pandas as pd
@@ -1035,8 +1035,8 @@ def _unknown(name: str, values: Mapping[str, float]) -> str:
 
 
 def uncertain(
-    parameters: Mapping[str, Quantity] | str | Path | None,
-    ranges: Mapping[str, Sequence[float] | str] | None = None,
+    parameters: Parameters | str | Path | None,
+    ranges: Mapping[str, Any] | None = None,
     inputs: Sequence[str] | str = "torque",
     outputs: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
     *,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from . import temporary
 from .arguments import check_table
 from .command import call, find_program
-from .fmu import DefinedUnit, Fmu, FmuError, Quantity, fmu_path
+from .fmu import DefinedUnit, Fmu, FmuError, Parameters, Quantity, fmu_path
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,7 +78,7 @@ def view(
     out: str | Path | None = None,
     *,
     model: str | Path | None = None,
-    parameters: Mapping[str, Quantity] | None = None,
+    parameters: Parameters | None = None,
     tanks: Sequence[str | Path] | Mapping[int, str | Path] = (),
     start: float | None = None,
     stop: float | None = None,
