@@ -63,7 +63,7 @@ const HARNESS: [(&str, &[&str]); 14] = [
         &["files", "formulas", "host", "names", "signals", "analysis", "experiments", "report"],
     ),
     ("hubslosh-tank", &["formulas", "names"]),
-    ("hubslosh-native", &["files", "host", "hubslosh-tank", "signals"]),
+    ("hubslosh-native", &["analysis", "files", "host", "hubslosh-tank", "signals"]),
     (
         "hubslosh",
         &[

@@ -27,14 +27,9 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import environment
-
-try:
-    import fcntl
-except ModuleNotFoundError:  # Windows: nothing is locked there
-    fcntl = None  # type: ignore[assignment]
 
 try:
     import cloudpickle
@@ -49,7 +44,7 @@ try:
 
     import hubslosh
     import hubslosh.native
-    from hubslosh.store import read_manifest
+    from hubslosh.native import Store
 except ModuleNotFoundError as missing:
     environment.run_again_in("cluster", missing)
 
@@ -128,67 +123,6 @@ def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
     if len(times) != run["steps"] + 1 or times[-1] != run["stop"]:
         return f"file incomplete, {len(times)} rows of {run['steps'] + 1}"
     return None
-
-
-class Folder:
-    """A campaign's directory, held as ``hubslosh campaign`` holds it; use it in ``with``.
-
-    ``manifest.sha256`` has the SHA-256 of every stored run, the last line of a name counts.
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Make it if it is not there, and hold it."""
-        self.manifest = path / "manifest.sha256"
-        (path / "runs").mkdir(parents=True, exist_ok=True)
-        self._lock = (path / ".lock").open("a+")
-        if fcntl is not None:
-            try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                self._lock.seek(0)
-                who = self._lock.read()
-                self._lock.close()
-                raise CampaignError(f"{path} is held by another campaign: {who}") from None
-        self._lock.truncate(0)
-        self._lock.write(f"process {os.getpid()}, cluster.py")
-        self._lock.flush()
-        try:
-            self._sums = read_manifest(self.manifest) if self.manifest.exists() else {}
-            if self._sums and not self.manifest.read_bytes().endswith(b"\n"):
-                # A kill cut off the last line; the next one must not be appended to it.
-                lines = (f"{sum_}  {name}\n" for name, sum_ in self._sums.items())
-                draft = self.manifest.with_suffix(".new")
-                draft.write_text("".join(lines), encoding="utf-8", newline="\n")
-                draft.replace(self.manifest)
-        except (OSError, ValueError, hubslosh.FmuError) as error:
-            self._lock.close()
-            raise CampaignError(str(error)) from None
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Let go of it."""
-        self._lock.close()
-
-    def why_damaged(self, file: str) -> str | None:
-        """Return why a stored run cannot be trusted, or None if it can."""
-        path = self.manifest.parent / file
-        if file not in self._sums:
-            # A run of `hubslosh campaign` had a line before it had its name.
-            writer = pyarrow.parquet.ParquetFile(path).metadata.created_by
-            lost = writer.startswith("parquet-rs")
-            return f"it has no line in {self.manifest.name}, which is damaged" if lost else None
-        same = self._sums[file] == hashlib.sha256(path.read_bytes()).hexdigest()
-        return None if same else f"its SHA-256 is not that in {self.manifest.name}"
-
-    def add(self, file: str) -> None:
-        """Say of a run what was stored."""
-        sum_ = hashlib.sha256((self.manifest.parent / file).read_bytes()).hexdigest()
-        with self.manifest.open("a", newline="\n") as manifest:
-            manifest.write(f"{sum_}  {file}\n")
-        self._sums[file] = sum_
 
 
 def drive_here(
@@ -280,12 +214,15 @@ def make_runs(
 
     A run is written as soon as it comes back; then `made` hears of it.
     """
-    with Folder(harness.out) as folder:
-        return make_runs_in(folder, client, harness, made)
+    store = Store.campaign(harness.out, "cluster.py")
+    try:
+        return make_runs_in(store, client, harness, made)
+    finally:
+        store.close()
 
 
 def make_runs_in(
-    folder: Folder, client: Client, harness: Harness, made: Callable[[Run], None]
+    store: Store, client: Client, harness: Harness, made: Callable[[Run], None]
 ) -> dict[str, str]:
     """`make_runs` in a locked directory."""
     todo = harness.listing()
@@ -295,7 +232,7 @@ def make_runs_in(
         path = harness.out / run["file"]
         why = why_not_stored(path, run, todo["kept"]) if path.exists() else ""
         if why is None:
-            why = folder.why_damaged(run["file"])
+            why = store.damage(run["name"])
         if why:
             print(f"re-running {run['name']}: {why}")
         if why is not None:
@@ -350,8 +287,10 @@ def make_runs_in(
             else:
                 notes = run["notes"] | {"made_by": said}
                 whole = {name: table[name] for name in columns}
-                hubslosh.write_table(harness.out / run["file"], whole, notes)
-                folder.add(run["file"])
+                with tempfile.TemporaryDirectory() as directory:
+                    draft = Path(directory) / "run.parquet"
+                    hubslosh.write_table(draft, whole, notes)
+                    store.add(run["name"], draft.read_bytes())
                 made(run)
             bar.update(run["steps"])
     return failed

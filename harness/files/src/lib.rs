@@ -7,4 +7,5 @@ pub mod budget;
 pub mod bug;
 pub mod input;
 pub mod output;
+pub mod store;
 pub mod temporary;

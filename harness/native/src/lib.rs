@@ -1,6 +1,7 @@
 //! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and drives their instances by single calls
 //! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]). It also finds the [`crossings`]
-//! of loop gains, computes the modal parameters of [`tanks`], reads recordings and parameters, and places [`files`].
+//! of loop gains, computes the modal parameters of [`tanks`], reads recordings and parameters, places [`files`], and stores
+//! the runs of a [`study`].
 //!
 //! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
 //! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.
@@ -15,6 +16,7 @@ mod instance;
 mod numbers;
 mod run;
 mod schedule;
+mod study;
 mod tanks;
 
 /// Functions of `hubslosh._native`.
@@ -30,6 +32,8 @@ mod _native {
     use crate::instance::Instance;
     #[pymodule_export]
     use crate::schedule::{History, check_interpolation, communication_points, pairing};
+    #[pymodule_export]
+    use crate::study::{Store, uniforms};
     #[pymodule_export]
     use crate::tanks::{Liquid, Solved, Tank, solve, table};
 }

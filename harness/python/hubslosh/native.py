@@ -45,6 +45,7 @@ from ._native import (  # noqa: E402
     Liquid,
     Model,
     Solved,
+    Store,
     Tank,
     Variable,
     check_interpolation,
@@ -56,6 +57,7 @@ from ._native import (  # noqa: E402
     read_recording,
     solve,
     table,
+    uniforms,
 )
 
 __all__ = [
@@ -67,6 +69,7 @@ __all__ = [
     "Liquid",
     "Model",
     "Solved",
+    "Store",
     "Tank",
     "Variable",
     "check_interpolation",
@@ -78,4 +81,5 @@ __all__ = [
     "read_recording",
     "solve",
     "table",
+    "uniforms",
 ]

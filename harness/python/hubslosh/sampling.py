@@ -13,6 +13,7 @@ import numpy as np
 
 from .arguments import check_numbers, check_table, floats, names_of, out_of_range
 from .fmu import FmuError
+from .native import uniforms
 from .progress import Line, Progress
 from .store import Store, encoded
 
@@ -30,17 +31,43 @@ FAILED = "refused"
 
 
 def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]:
-    """Return the values of one run, counted from 0; see `monte_carlo`.
+    """Return the values of one run of `monte_carlo`.
 
-    They depend only on the seed, the run and the names up to each value, not on the number of runs.
+    They depend only on the seed, the run and the names up to each value, not on the number of
+    runs. A uniform distribution gives the numbers that a plan with the same ``[random]`` draws.
+
+    Parameters
+    ----------
+    ranges : mapping
+        Range of each name, as in `monte_carlo`.
+    run : int
+        Number of the run, counted from 0.
+    seed : int, default 1
+        Seed of the study.
+
+    Returns
+    -------
+    dict
+        Values by name, in the order of ``ranges``.
+
+    Raises
+    ------
+    FmuError
+        If a range is not one of those that are allowed, or a number is out of range.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> hubslosh.draw({"tank.h": (0.04, 0.14), "slosh.model": ["linear", "planar"]}, run=0)
+    {'tank.h': 0.09583574388883317, 'slosh.model': 'linear'}
     """
     if wrong := _wrong(ranges) + out_of_range(run=run, seed=seed):
         raise FmuError("; ".join(wrong))
-    random = np.random.default_rng([int(seed), int(run)])
-    return {name: _value(name, of, random.random()) for name, of in ranges.items()}
+    shares = iter(uniforms(int(seed), int(run), len(ranges)))
+    return {name: _value(of, next(shares)) for name, of in ranges.items()}
 
 
-def _value(name: str, of: Range, share: float) -> Any:
+def _value(of: Range, share: float) -> Any:
     """Return the value that a uniform number in [0, 1) stands for."""
     if hasattr(of, "ppf"):
         value = of.ppf(share)
@@ -86,28 +113,61 @@ def monte_carlo(
 ) -> "pd.DataFrame":
     """Draw random values, make a run with each draw, and return a row for each run.
 
-    * ``ranges``: Ranges by name: (low, high) for a uniform distribution, a list of values, or a
-      frozen distribution of ``scipy.stats``. A run's values depend only on seed and number: 400
-      runs begin with the same 200. Items of a list keep their type.
-    * ``outcome``: A function of the values (by name) that makes the run and returns numbers by
-      name. Without it the table has only the draws. Of a `Craft` the names of its methods hold:
-      ``craft.loop(law, period, fill, parameters=values)`` takes ``NTO.frequency[1]``, ``delay``, ….
-    * ``folder``: Makes the study resumable. Each run is stored as soon as it is done, and the same
-      call continues a stopped study, even after kill -9. Stored runs are verified by their SHA-256
-      in ``manifest.sha256`` and by the seed. A run that was changed from outside raises FmuError
-      with its name and the difference. ``runs.csv`` is written at the end. One process at a time
-      holds the folder; other processes and other studies are refused. The function is not compared:
-      use another folder if you change it.
-    * ``client``: Client of dask.distributed; its workers need this package. Without a client the
-      study uses ``workers`` threads, by default one per core. `simulate` and loops with a linear
-      controller run in parallel; a controller in Python runs on one core at a time.
-    * ``progress``: Shows a line on stderr with finished runs and remaining time, by default on a
-      terminal and in a notebook; or a function that takes the line.
+    Parameters
+    ----------
+    ranges : mapping
+        Range of each name: (low, high) for a uniform distribution, a list of values, or a frozen
+        distribution of ``scipy.stats``. A run's values depend only on seed and number: 400 runs
+        begin with the same 200. Items of a list keep their type.
+    runs : int
+        Number of runs.
+    seed : int, default 1
+        Seed of the draws.
+    outcome : callable, optional
+        Function of the drawn values (a dict by name) that makes the run and returns numbers by
+        name. By default the table has only the draws. The parameters of a `Craft`, such as
+        ``NTO.frequency[1]`` and ``delay``, may be names of ranges:
+        ``craft.loop(law, period, fill, parameters=values)`` takes them.
+    folder : path, optional
+        Folder that makes the study resumable. Each run is stored as soon as it is done, and the
+        same call continues a stopped study, even after kill -9. Stored runs are verified by their
+        SHA-256 in ``manifest.sha256`` and by the seed. A run that was changed from outside is
+        simulated again, and a warning says why. ``runs.csv`` is written at the end. One process
+        at a time holds the folder. The function is not compared: use another folder if you change
+        it.
+    client : distributed.Client, optional
+        Client of Dask; its workers need this package. Without a client the study uses threads.
+    workers : int, optional
+        Number of threads, by default one per core. `simulate` and loops with a linear controller
+        run in parallel; a controller in Python runs on one core at a time.
+    progress : bool or callable, optional
+        Shows a line on stderr with finished runs and remaining time, by default on a terminal and
+        in a notebook; or a function that takes the line.
 
-    Returns a table with the columns ``run``, the names of the ranges, and the names of the
-    outcomes. If the FMU refuses a run, its outcomes are NaN, and the column ``refused`` has the
-    reason. Any other exception ends the study; stored runs stay. ``.attrs["drawn"]`` names the
-    drawn columns. `quantiles` summarises the table.
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each run with the columns ``run``, the names of the ranges, and the names of the
+        outcomes. If the FMU refuses a run, its outcomes are NaN, and the column ``refused`` has
+        the reason. ``.attrs["drawn"]`` names the drawn columns. `quantiles` summarises the table.
+
+    Raises
+    ------
+    FmuError
+        If an argument is wrong, the FMU refuses every run, another process holds the folder, or
+        the folder belongs to another study or to a campaign, or its manifest is damaged. Any
+        other exception of ``outcome`` ends the study, too; stored runs stay.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> table = hubslosh.monte_carlo(
+    ...     {"tank.h": (0.05, 0.12)}, 20, outcome=lambda drawn: {"twice": 2 * drawn["tank.h"]}
+    ... )
+    >>> table.shape
+    (20, 3)
+    >>> bool((table["twice"] == 2 * table["tank.h"]).all())
+    True
     """
     from .short import ShortTable
 
@@ -300,14 +360,39 @@ def quantiles(
 ) -> "pd.DataFrame":
     """Return quantiles of a study's results with their confidence intervals.
 
-    * ``table``: Result of `monte_carlo`; runs with NaN are left out.
-    * ``columns``: Results; by default all columns except ``run``.
-    * ``at``, ``confidence``: Quantiles, and the probability of their intervals.
+    The true quantile lies between ``low`` and ``high`` with at least the probability
+    ``confidence``, for any distribution of the results (binomial; Conover, Practical Nonparametric
+    Statistics, section 3.2). The bounds are infinite if there are too few runs.
 
-    Returns a table with ``result``, ``quantile``, ``value`` (linear between order statistics),
-    ``low``, ``high`` and the number of ``runs``. The true quantile lies between ``low`` and
-    ``high`` with at least ``confidence``, for any distribution (binomial; Conover, Practical
-    Nonparametric Statistics, section 3.2). They are infinite if there are too few runs.
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Result of `monte_carlo`; runs with NaN are left out.
+    columns : str or sequence of str, optional
+        Names of results, by default all columns of numbers except ``run``.
+    at : sequence of float, default (0.05, 0.5, 0.95, 0.99)
+        Quantiles, between 0 and 1.
+    confidence : float, default 0.95
+        Probability of the intervals.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each result and quantile: ``result``, ``quantile``, ``value`` (linear between
+        order statistics), ``low``, ``high`` and the number of ``runs``.
+
+    Raises
+    ------
+    FmuError
+        If a column is not in the table, or a number is out of range.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> table = hubslosh.monte_carlo({"tank.h": (0.05, 0.12)}, 200)
+    >>> found = hubslosh.quantiles(table, at=[0.5])
+    >>> bool(found["low"][0] < 0.085 < found["high"][0])
+    True
     """
     from scipy.stats import binom
 

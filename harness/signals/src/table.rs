@@ -210,9 +210,11 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     parquet_file::metadata(path).with_context(|| format!("{} cannot be used", path.display()))
 }
 
-/// The library that wrote a Parquet file, as the file says.
-pub fn writer(path: &Path) -> Option<String> {
-    parquet_file::writer(path).ok()?
+/// Returns true if HubSlosh wrote a table in Parquet. The file names our library, which importers in other languages do
+/// not use.
+pub fn is_ours(path: &Path) -> bool {
+    let writer = parquet_file::writer(path).ok().flatten();
+    writer.is_none_or(|writer| writer.starts_with("parquet-rs"))
 }
 
 /// Names of the columns of a file.

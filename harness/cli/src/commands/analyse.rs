@@ -74,13 +74,13 @@ impl AnalyseArgs {
             "no [[run]] of the plan has recording = \"FILE\"; hubslosh campaign --plan simulates it"
         );
         let campaign = Campaign { plan, force: false, jobs: self.runs.jobs, compare: None, out };
-        let folder = campaign.take()?;
+        let store = campaign.take()?;
         ensure!(
             !campaign.holds_another() || self.out.is_some(),
             "{} holds the results of another plan: --out DIRECTORY puts these elsewhere",
             campaign.out.display()
         );
-        campaign::drive(&fmu, &campaign, folder, Vec::new())
+        campaign::drive(&fmu, &campaign, store, Vec::new())
     }
 
     /// The plan of the command line: every recording as a run with its torque's amplitude, simulated with every model.

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use experiments::campaign::{CURVES, Campaign, Folder, seek_onset};
+use experiments::campaign::{CURVES, Campaign, seek_onset};
 use experiments::plan::{self, Plan, Sweeps};
 use experiments::progress::Progress;
 use files::budget;
+use files::store::Store;
 use host::causality::Causality;
 use host::fmu::Fmu;
 use host::guard;
@@ -111,7 +112,7 @@ impl CampaignArgs {
             ensure!(table.is_file(), "--compare {}: it has no runs.csv", other.display());
         }
         campaign.plan.cases(fmu.description())?; // a wrong plan replaces nothing
-        let folder = campaign.take()?;
+        let store = campaign.take()?;
         // the directory without flags belongs to the campaign without flags
         let own = campaign.out == Path::new(DEFAULT_CAMPAIGN);
         if campaign.holds_another() && !own && !self.replace {
@@ -126,7 +127,7 @@ impl CampaignArgs {
                 "{out} held the campaign of another plan; its tables and report are replaced"
             ));
         }
-        drive(&fmu, &campaign, folder, Vec::new())
+        drive(&fmu, &campaign, store, Vec::new())
     }
 
     /// The directory for these flags: that of the default campaign, or one named by what differs.
@@ -181,7 +182,7 @@ impl CampaignArgs {
 }
 
 /// Carries a campaign out and leaves tables and report, which begins with `chapters`.
-pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapter>) -> Result<()> {
+pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter>) -> Result<()> {
     let cases = campaign.plan.cases(fmu.description())?;
     let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();
     let courses = cases.iter().map(|case| case.run().course_bytes()).max().unwrap_or(0);
@@ -195,14 +196,14 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapt
     let jobs = jobs.min(rows.len());
     guard::allow((jobs * largest * 4 + kept) as u64 + jobs as u64 * courses);
     let bar = progress::of_runs()?;
-    let results = campaign.execute(fmu, &folder, &|news| progress::show(&bar, news))?;
+    let results = campaign.execute(fmu, &store, &|news| progress::show(&bar, news))?;
     bar.finish_and_clear();
     let mut files = campaign.tables(fmu, &results)?;
     files.push(("plan.toml", campaign.plan.text.clone().into_bytes()));
     let telling = report::campaign::run_to_view(&results);
     let shown = match telling {
         Some(run) => {
-            Some(view::of_stored(fmu.description(), &folder.run(&run.case.name), &run.case.name)?)
+            Some(view::of_stored(fmu.description(), &store.run(&run.case.name), &run.case.name)?)
         }
         None => None,
     };
@@ -212,7 +213,7 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder, chapters: Vec<Chapt
         report::campaign::page(campaign, fmu, &results, view, chapters).into_bytes(),
     ));
     files.extend(shown.map(|page| ("view.html", page.into_bytes())));
-    folder.publish(files)?;
+    store.publish(files)?;
     let (all, reused) = results.counts();
     let recorded = results.recordings();
     done!("{} runs simulated, {reused} reused", all - reused - recorded);

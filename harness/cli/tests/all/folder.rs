@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use analysis::random::Random;
-use experiments::campaign::{CURVES, Folder, MANIFEST};
+use experiments::campaign::CURVES;
 use files::output::sha256;
+use files::store::{CAMPAIGN, MANIFEST, Store};
 use pack::packed_for_tests;
 
 /// `hubslosh campaign` on a plan of this text, into `directory`/c; what is temporary goes to
@@ -183,7 +184,7 @@ fn a_second_campaign_in_a_directory_hears_who_holds_it() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "title = \"Second\"\nprofile = \"sine:duration=0.2\"\n";
-    let first = Folder::take(&directory.join("c"), "the plan \"First\"").unwrap();
+    let first = Store::take(&directory.join("c"), CAMPAIGN, "the plan \"First\"", None).unwrap();
     let done = campaign(directory, plan).output().unwrap();
     let (_, error) = said(&done);
     assert_eq!(done.status.code(), Some(1), "{error}");

@@ -2,19 +2,18 @@
 //!
 //! A stored run is reused, whichever program wrote it, if three conditions hold.
 //! `runs/<name>.parquet` is complete, its metadata (Parquet key-value pairs) contain the run's
-//! [recipe](store::recipe), and its hash is the manifest's ([`Folder`]). All tables follow from the
+//! [recipe](recipe::recipe), and its hash is the manifest's ([`Store`]). All tables follow from the
 //! run's [columns](STORED), so another importer that writes the columns and metadata of
 //! [`Campaign::list`] gets the same tables.
 //!
 //! The analysis is that of the thesis's bench. For an FMU without the bench's variables, all
 //! outputs are stored, and `runs.csv` has the settings of each run.
 
-mod folder;
 mod onset;
 mod outcome;
+mod recipe;
 pub mod recorded;
 mod rows;
-mod store;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -23,6 +22,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Result, anyhow};
 use files::budget;
 use files::output::sha256;
+use files::store::{CAMPAIGN, Store};
 use host::causality::Causality;
 use host::description::{ModelDescription, Type, Value};
 use host::fmu::Fmu;
@@ -32,14 +32,14 @@ use names::hubslosh::{
 };
 use rayon::prelude::*;
 use serde_json::json;
-use signals::table;
+use signals::table::{self, Table};
 
-pub use self::folder::{Folder, MANIFEST};
 pub use self::onset::seek_onset;
 pub use self::outcome::{
     Curve, Doubt, Ending, Estimate, History, Outcome, Passing, Range, Record, SloshPath, Totals,
     WAVE,
 };
+use self::recipe::{Stored, Unusable};
 pub use self::rows::{FeatureRow, MadeFrom};
 use crate::plan::{Case, Plan};
 use crate::progress::Progress;
@@ -196,8 +196,8 @@ pub struct Results {
 
 impl Campaign {
     /// Locks the directory for this campaign.
-    pub fn take(&self) -> Result<Folder> {
-        Folder::take(&self.out, &format!("the plan \"{}\"", self.plan.title))
+    pub fn take(&self) -> Result<Store> {
+        Store::take(&self.out, CAMPAIGN, &format!("the plan \"{}\"", self.plan.title), None)
     }
 
     /// Simulates all runs that are not stored yet and analyses all of them. Stores the runs in the
@@ -209,7 +209,7 @@ impl Campaign {
     pub fn execute(
         &self,
         fmu: &Fmu,
-        folder: &Folder,
+        store: &Store,
         watch: &(dyn Fn(Progress) + Sync),
     ) -> Result<Results> {
         let cases = self.plan.cases(fmu.description())?;
@@ -233,7 +233,7 @@ impl Campaign {
             }
         };
         let done = |(i, case)| {
-            let done = self.done(fmu, case, folder, watch, &warn)?;
+            let done = self.done(fmu, case, store, watch, &warn)?;
             Ok(if keeps_curves(i, cases.len()) { done } else { done.without_curves() })
         };
         let results: Result<Vec<Done>> =
@@ -311,7 +311,7 @@ impl Campaign {
             }
             runs.push(json!({
                 "name": case.name,
-                "file": folder::file_of(&case.name),
+                "file": CAMPAIGN.file_of(&case.name),
                 "varied": self.plan.varied().into_iter().zip(&case.varied).collect::<BTreeMap<_, _>>(),
                 "settings": settings,
                 "profile": case.profile,
@@ -322,7 +322,7 @@ impl Campaign {
                 "steps": run.steps(),
                 "tolerance": run.tolerance,
                 "hold": run.hold,
-                "notes": store::recipe(fmu, &case, &kept),
+                "notes": recipe::recipe(fmu, &case, &kept),
             }));
         }
         Ok(json!({
@@ -349,7 +349,7 @@ impl Campaign {
         &self,
         fmu: &Fmu,
         case: &Case,
-        folder: &Folder,
+        store: &Store,
         watch: &(dyn Fn(Progress) + Sync),
         warn: &(dyn Fn(&Case, String) + Sync),
     ) -> Result<Done> {
@@ -358,7 +358,10 @@ impl Campaign {
             outcome.warnings.iter().for_each(|warning| warn(case, warning.clone()));
         };
         let columns = stored_columns(fmu.description(), run.input.as_deref());
-        let recipe = store::recipe(fmu, case, &columns);
+        let recipe = recipe::recipe(fmu, case, &columns);
+        let put = |table: &Table, notes: &BTreeMap<String, String>| {
+            store.add(&case.name, |path| table.write(path, notes))
+        };
         // before a simulation that may take hours
         let work = match is_bench(fmu.description()) && case.recording.is_none() {
             true => outcome::check_work(&case.torque, run.step, run.steps() + 1),
@@ -379,7 +382,7 @@ impl Campaign {
             let read = recorded::table(case, recorded, &mut |line| watch(Progress::Note(line)));
             let analysed = read.and_then(|(step, table)| {
                 outcome::check_work(&case.torque, step, table.rows())?;
-                folder.store(&case.name, &table, &recipe)?;
+                put(&table, &recipe)?;
                 let run = Run { step, ..run };
                 Outcome::of(case, &run, &mut instance, &table, false)
             });
@@ -389,34 +392,35 @@ impl Campaign {
             );
         }
         let sensors = Sensors::new(&case.sensors, fmu.description(), &case.settings, case.step)?;
-        let path = folder.path().join(folder::file_of(&case.name));
-        if !self.force && folder.lacks(&case.name) {
-            watch(Progress::Note(store::because(case, "its file is missing")));
-        }
-        let there = match self.force || !path.exists() {
-            true => None,
-            false => folder
-                .check(&case.name)
-                .and_then(|sum| {
-                    let stored = store::stored(&path, &run, &recipe, (&columns, &sensors))?;
-                    Ok((stored, sum))
-                })
-                .map_err(|why| watch(Progress::Note(store::because(case, &why))))
-                .ok(),
+        let path = store.run(&case.name);
+        let stored = |sum| {
+            let stored = recipe::stored(&path, &run, &recipe, (&columns, &sensors))?;
+            Ok((stored, sum))
         };
+        let there = match self.force {
+            true => Ok(None),
+            false => store
+                .check(&case.name, table::is_ours)
+                .map_err(Unusable::Damaged)
+                .and_then(|sum| sum.map(stored).transpose()),
+        };
+        let there = there.unwrap_or_else(|why| {
+            watch(Progress::Note(recipe::because(case, &why)));
+            None
+        });
         let reused = there.is_some();
         let table = match there {
-            Some((store::Stored { table, lacks_sensors }, sum)) => {
+            Some((Stored { table, lacks_sensors }, sum)) => {
                 watch(Progress::Steps(run.steps() as u64));
-                if !folder.lists(&case.name) {
-                    watch(Progress::Note(store::unverified(case)));
+                if !store.lists(&case.name) {
+                    watch(Progress::Note(recipe::unverified(case)));
                 }
                 if lacks_sensors {
                     let table = sensors.recorded(table, columns.len(), &case.name, case.step)?;
-                    folder.store(&case.name, &table, &table::metadata(&path)?)?;
+                    put(&table, &table::metadata(&path)?)?;
                     table
                 } else {
-                    folder.adopt(&case.name, sum)?;
+                    store.adopt(&case.name, sum)?;
                     table
                 }
             }
@@ -436,7 +440,7 @@ impl Campaign {
                     Ok(table) => table,
                     Err(error) => return Ok(Done::Failed(error)),
                 };
-                folder.store(&case.name, &table, &recipe)?;
+                put(&table, &recipe)?;
                 table
             }
         };

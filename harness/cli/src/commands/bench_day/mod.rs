@@ -226,12 +226,12 @@ pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> R
     let stem = stem.file_name().unwrap_or_default();
     let out = out.unwrap_or_else(|| Path::new("dist").join(stem));
     let campaign = Campaign { plan, force: false, jobs, compare: None, out };
-    let folder = campaign.take()?;
+    let store = campaign.take()?;
     if let Some(bearing) = bearing {
         let text = bearing.json()?;
         output::write(&campaign.out.join("friction.json"), text.as_bytes())?;
     }
-    drive(&fmu, &campaign, folder, chapters)?;
+    drive(&fmu, &campaign, store, chapters)?;
     ensure!(
         problems.is_empty(),
         "{} recordings could not be used; the report says why",

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use files::store::{Damage, MANIFEST};
 use host::fmu::Fmu;
 
-use super::{Case, MANIFEST};
+use crate::plan::Case;
 use crate::run::{self, Run};
 use crate::sensors::Sensors;
 use signals::table::{self, Table};
@@ -62,32 +63,56 @@ pub struct Stored {
     pub lacks_sensors: bool,
 }
 
+/// Reason why a stored run is simulated again.
+#[derive(Debug, thiserror::Error)]
+pub enum Unusable {
+    /// It is not what was stored.
+    #[error(transparent)]
+    Damaged(Damage),
+    /// It cannot be read.
+    #[error("file incomplete")]
+    Incomplete,
+    /// It ends early, or late.
+    #[error("file incomplete, {rows} rows of {expected}")]
+    Rows {
+        /// Rows of the file.
+        rows: usize,
+        /// Rows of the whole run.
+        expected: usize,
+    },
+    /// It has readings of sensors that the plan does not have.
+    #[error("it has sensors")]
+    Sensors,
+    /// It has another recipe.
+    #[error("{0}")]
+    Differs(String),
+}
+
 /// Returns the stored run if it is complete and has this recipe, otherwise the reason.
 pub fn stored(
     path: &Path,
     run: &Run,
     recipe: &BTreeMap<String, String>,
     (columns, sensors): (&[String], &Sensors),
-) -> Result<Stored, String> {
-    const INCOMPLETE: &str = "file incomplete";
-    let found = table::metadata(path).map_err(|_| INCOMPLETE.to_string())?;
+) -> Result<Stored, Unusable> {
+    let found = table::metadata(path).map_err(|_| Unusable::Incomplete)?;
     if let Some(why) = difference(&found, recipe) {
-        return Err(why);
+        return Err(Unusable::Differs(why));
     }
     if found.contains_key("sensors") && !recipe.contains_key("sensors") {
-        return Err("it has sensors".into());
+        return Err(Unusable::Sensors);
     }
-    let there = table::names(path).map_err(|_| INCOMPLETE.to_string())?;
+    let there = table::names(path).map_err(|_| Unusable::Incomplete)?;
     let lacks_sensors = sensors.columns().iter().any(|column| !there.contains(column));
     let mut names: Vec<&str> = columns.iter().map(String::as_str).collect();
     if lacks_sensors {
         let needs = sensors.needs().into_iter().filter(|name| !columns.iter().any(|c| c == name));
         names.extend(needs);
     }
-    let table = Table::read(path, &names).map_err(|_| INCOMPLETE.to_string())?;
+    let table = Table::read(path, &names).map_err(|_| Unusable::Incomplete)?;
     let last = table.column("time").and_then(|time| time.last()).copied();
     if table.rows() != run.steps() + 1 || last != Some(run.stop) {
-        return Err(format!("{INCOMPLETE}, {} rows of {}", table.rows(), run.steps() + 1));
+        return Err(Unusable::Rows { rows: table.rows(), expected: run.steps() + 1 });
     }
     Ok(Stored { table, lacks_sensors })
 }
@@ -140,7 +165,7 @@ fn difference(
 }
 
 /// States why a stored run cannot be reused.
-pub fn because(case: &Case, why: &str) -> String {
+pub fn because(case: &Case, why: &Unusable) -> String {
     format!("re-running {}: {why}", case.name)
 }
 

@@ -1,0 +1,712 @@
+//! A folder of stored runs that one program holds at a time: the directory of a campaign, or of a study by Python's
+//! `monte_carlo`.
+//!
+//! ```text
+//! plan.toml, features.csv, …, report.html   of a campaign: published together when the last run is there
+//! study.json, runs.csv                      of a study: seed and ranges from the start; the table with the last run
+//! runs/NAME.parquet, runs/000017.json       a run, under its name when it is whole
+//! manifest.sha256                           SHA-256 of all of these, as `sha256sum --check` reads it
+//! .lock                                     locked, with who holds the folder
+//! .unfinished/                              what is being written; removed at the start and the end
+//! ```
+//!
+//! A run's line is added to the manifest before its file gets its final name. A stored run that differs from the last
+//! line with its name is therefore damaged. A run without a line comes from another program; if HubSlosh wrote it, the
+//! manifest is damaged.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File, TryLockError};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::input;
+use crate::output::{self, sha256, sha256_of};
+use crate::temporary::{self, Registered};
+
+/// Folder of the stored runs.
+pub const RUNS: &str = "runs";
+/// The hashes of all files.
+pub const MANIFEST: &str = "manifest.sha256";
+const LOCK: &str = ".lock";
+const UNFINISHED: &str = ".unfinished";
+/// The table of all runs.
+const TABLE: &str = "runs.csv";
+
+/// What the runs of a folder belong to.
+#[derive(Debug)]
+pub struct Kind {
+    /// Noun in messages.
+    name: &'static str,
+    /// Noun with its article, as who does not know the kind reads it.
+    noun: &'static str,
+    /// The file that defines which runs there are.
+    definition: &'static str,
+    /// Ending of a run's file.
+    ending: &'static str,
+    /// Advice if the folder is taken.
+    elsewhere: &'static str,
+    /// Returns true for names of files that are published with the last run. No other file is removed, whatever the
+    /// manifest lists.
+    is_published: fn(&str) -> bool,
+}
+
+/// The runs of a plan.
+pub const CAMPAIGN: &Kind = &Kind {
+    name: "campaign",
+    noun: "a campaign",
+    definition: "plan.toml",
+    ending: "parquet",
+    elsewhere: "put this campaign elsewhere (--out DIRECTORY)",
+    is_published: |name| {
+        let features = name.strip_prefix("features").and_then(|rest| rest.strip_suffix(".csv"));
+        matches!(name, "plan.toml" | "report.html" | TABLE | "view.html")
+            || features.is_some_and(|rest| rest.chars().all(|c| c.is_alphanumeric() || c == '_'))
+    },
+};
+
+/// The runs of `monte_carlo`.
+pub const STUDY: &Kind = &Kind {
+    name: "study",
+    noun: "a study of monte_carlo",
+    definition: "study.json",
+    ending: "json",
+    elsewhere: "give another folder",
+    is_published: |name| name == TABLE,
+};
+
+impl Kind {
+    /// Name of a run's file in the folder.
+    pub fn file_of(&self, run: &str) -> String {
+        format!("{RUNS}/{run}.{}", self.ending)
+    }
+
+    /// Returns true if a folder has a definition or runs of this kind.
+    fn owns(&self, path: &Path) -> bool {
+        let runs = fs::read_dir(path.join(RUNS)).into_iter().flatten().flatten();
+        let is_run = |file: &Path| file.extension().is_some_and(|ending| ending == self.ending);
+        path.join(self.definition).exists() || runs.map(|run| run.path()).any(|run| is_run(&run))
+    }
+}
+
+/// Reason why a stored run cannot be reused.
+#[derive(Debug, thiserror::Error)]
+pub enum Damage {
+    /// It was stored, and is not there.
+    #[error("its file is missing")]
+    Missing,
+    /// It is not what was stored.
+    #[error("its SHA-256 is not that in {MANIFEST}; it is damaged, or another program replaced it")]
+    Changed,
+    /// Nothing tells what was stored.
+    #[error("it has no line in {MANIFEST}, which is damaged; nothing verifies the run")]
+    Unlisted,
+    /// It cannot be read.
+    #[error("{0}")]
+    Unreadable(anyhow::Error),
+}
+
+/// Text of a definition, and the check of a definition that is in the folder already.
+#[derive(Clone, Copy)]
+pub struct Definition<'a> {
+    /// Content of the definition's file.
+    pub text: &'a str,
+    /// Fails if this text defines other runs.
+    pub compare: &'a dyn Fn(&str) -> Result<()>,
+}
+
+/// A locked folder; dropping this unlocks it.
+#[derive(Debug)]
+pub struct Store {
+    path: PathBuf,
+    kind: &'static Kind,
+    unfinished: PathBuf,
+    /// Files that are in the manifest, but not in the folder.
+    lost: BTreeSet<String>,
+    /// True if the folder had no manifest, so that all runs come from other programs.
+    is_new: bool,
+    manifest: Mutex<Manifest>,
+    process: u32,
+    _registered: Registered,
+    _lock: File,
+}
+
+/// The hashes of the files, by name, and the manifest file.
+#[derive(Debug)]
+struct Manifest {
+    /// `None` after publication, and after a line that could not be written.
+    file: Option<File>,
+    sums: BTreeMap<String, String>,
+}
+
+/// Returns the file's lines in the format of `sha256sum`.
+fn lines(sums: &BTreeMap<String, String>) -> String {
+    sums.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect()
+}
+
+/// Returns the last hash of each name. A line that a kill has cut off does not count.
+///
+/// # Errors
+/// Another line is not in the format of a manifest.
+fn sums(text: &str) -> Result<BTreeMap<String, String>> {
+    let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+    let pair = |(row, line): (usize, &str)| {
+        let is_hash = |sum: &str| {
+            sum.len() == 64 && sum.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+        };
+        let pair = line.split_once("  ").filter(|(sum, name)| is_hash(sum) && !name.is_empty());
+        let (sum, name) = pair.with_context(|| {
+            let shown: String = line.chars().take(SHOWN).collect();
+            format!("line {} is {shown:?} (allowed: SHA-256, two spaces, name)", row + 1)
+        })?;
+        Ok((name.to_string(), sum.to_string()))
+    };
+    whole.lines().enumerate().map(pair).collect()
+}
+
+/// Number of characters of a damaged line in a message.
+const SHOWN: usize = 120;
+
+/// Returns true if nothing was ever stored in a folder.
+fn has_no_runs(path: &Path) -> bool {
+    match fs::read_dir(path.join(RUNS)) {
+        Ok(mut runs) => runs.next().is_none(),
+        Err(error) => error.kind() == ErrorKind::NotFound,
+    }
+}
+
+/// Reads a folder's manifest. `is_used`: a program has locked the folder before.
+///
+/// # Errors
+/// Nothing verifies the stored runs: the manifest is damaged, or it is missing although the folder is used.
+fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>> {
+    let place = path.join(MANIFEST);
+    let read = || -> Result<BTreeMap<String, String>> {
+        if fs::symlink_metadata(&place).is_err() {
+            ensure!(!is_used, "it is missing");
+            return Ok(BTreeMap::new());
+        }
+        sums(&input::text(&place)?)
+    };
+    match read() {
+        Err(error) if !has_no_runs(path) => Err(error.context(format!(
+            "{} is damaged, so nothing verifies the stored runs; restore it, or remove {} to \
+             simulate all runs again",
+            place.display(),
+            path.join(RUNS).display()
+        ))),
+        sums => Ok(sums.unwrap_or_default()),
+    }
+}
+
+impl Definition<'_> {
+    /// Checks that a folder defines these runs or nothing at all.
+    fn check(&self, path: &Path, kind: &Kind) -> Result<()> {
+        let place = path.join(kind.definition);
+        if place.exists() {
+            let text = input::text(&place);
+            return (self.compare)(
+                &text.with_context(|| format!("{} cannot be read", place.display()))?,
+            );
+        }
+        ensure!(
+            has_no_runs(path) && !path.join(TABLE).exists(),
+            "{} has {TABLE} or {RUNS}/ but no {definition}: it is not the folder of {}, or \
+             {definition} was removed; {}",
+            path.display(),
+            kind.noun,
+            kind.elsewhere,
+            definition = kind.definition
+        );
+        Ok(())
+    }
+}
+
+impl Store {
+    /// Creates the folder if it does not exist, and locks it. Other programs that want to lock it get `about` as the
+    /// reason. The definition of a campaign is published with its tables, so it has none here.
+    ///
+    /// # Errors
+    /// Another program has locked the folder, it belongs to runs of another kind or of another definition, or its
+    /// manifest is damaged. Nothing in it has changed then, except for the lock.
+    pub fn take(
+        path: &Path,
+        kind: &'static Kind,
+        about: &str,
+        definition: Option<Definition>,
+    ) -> Result<Store> {
+        let other = if kind.name == CAMPAIGN.name { STUDY } else { CAMPAIGN };
+        ensure!(!other.owns(path), "{} holds {}; {}", path.display(), other.noun, kind.elsewhere);
+        if let Some(definition) = &definition {
+            definition.check(path, kind)?;
+        }
+        output::directory(&path.join(RUNS))?;
+        let traces = [LOCK, kind.definition, TABLE, "report.html"];
+        let is_used = traces.iter().any(|name| path.join(name).exists());
+        let lock = hold(path, kind, about)?;
+        let listed = read_manifest(path, is_used)?;
+        let place = path.join(MANIFEST);
+        let is_new = !place.exists();
+        let unfinished = path.join(UNFINISHED);
+        if unfinished.exists() {
+            fs::remove_dir_all(&unfinished)
+                .with_context(|| format!("{} cannot be removed", unfinished.display()))?;
+        }
+        output::directory(&unfinished)?;
+        let registered = temporary::register(&unfinished);
+        let (found, lost): (BTreeMap<_, _>, BTreeMap<_, _>) =
+            listed.into_iter().partition(|(name, _)| path.join(name).is_file());
+        let text = lines(&found);
+        if fs::read(&place).ok().is_none_or(|there| there != text.as_bytes()) {
+            output::write(&place, text.as_bytes())?;
+        }
+        let file = File::options().append(true).create(true).open(&place);
+        let file = file.with_context(|| format!("{} cannot be written", place.display()))?;
+        let store = Store {
+            path: path.to_path_buf(),
+            kind,
+            unfinished,
+            lost: lost.into_keys().collect(),
+            is_new,
+            manifest: Mutex::new(Manifest { file: Some(file), sums: found }),
+            process: std::process::id(),
+            _registered: registered,
+            _lock: lock,
+        };
+        if let Some(definition) = definition {
+            // another program may have defined its runs before the lock
+            definition.check(path, kind)?;
+            let text = definition.text.as_bytes();
+            let is_there = fs::read(path.join(kind.definition)).is_ok_and(|there| there == text);
+            match is_there {
+                true => store.list(kind.definition, sha256(text))?,
+                false => store.write(kind.definition, |draft| output::write(draft, text))?,
+            }
+        }
+        Ok(store)
+    }
+
+    /// Path of the folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Path of a run's file.
+    pub fn run(&self, run: &str) -> PathBuf {
+        self.path.join(self.kind.file_of(run))
+    }
+
+    /// Returns true if a run is in the manifest.
+    pub fn lists(&self, run: &str) -> bool {
+        self.manifest().sums.contains_key(&self.kind.file_of(run))
+    }
+
+    /// Returns the SHA-256 of a stored run, or `None` if it was never stored. A run without a line in the manifest is
+    /// accepted if the folder is new, or if `is_ours` does not recognise its file as one of HubSlosh.
+    ///
+    /// # Errors
+    /// The file is not the stored one.
+    pub fn check(
+        &self,
+        run: &str,
+        is_ours: impl FnOnce(&Path) -> bool,
+    ) -> Result<Option<String>, Damage> {
+        let sum = self.look(run, is_ours, |path| {
+            let sum = sha256_of(input::open(path)?)?;
+            Ok((sum.clone(), sum))
+        })?;
+        Ok(sum)
+    }
+
+    /// Returns the bytes of a stored run that only HubSlosh writes, or `None` if it was never stored.
+    ///
+    /// # Errors
+    /// The file is not the stored one.
+    pub fn read(&self, run: &str) -> Result<Option<Vec<u8>>, Damage> {
+        let read = |path: &Path| {
+            let bytes = input::bytes(path)?;
+            Ok((sha256(&bytes), bytes))
+        };
+        self.look(run, |_| true, read)
+    }
+
+    /// Returns what `read` finds in the file of a stored run, if the SHA-256 that it returns too is the stored one.
+    fn look<T>(
+        &self,
+        run: &str,
+        is_ours: impl FnOnce(&Path) -> bool,
+        read: impl FnOnce(&Path) -> Result<(String, T)>,
+    ) -> Result<Option<T>, Damage> {
+        let (file, path) = (self.kind.file_of(run), self.run(run));
+        if fs::symlink_metadata(&path).is_err() {
+            return if self.lost.contains(&file) { Err(Damage::Missing) } else { Ok(None) };
+        }
+        let read = read(&path).with_context(|| format!("{} cannot be read", path.display()));
+        let (found, content) = read.map_err(Damage::Unreadable)?;
+        match self.manifest().sums.get(&file) {
+            Some(sum) if *sum != found => Err(Damage::Changed),
+            None if !self.is_new && is_ours(&path) => Err(Damage::Unlisted),
+            _ => Ok(Some(content)),
+        }
+    }
+
+    /// Adds a run that another program has stored to the manifest.
+    pub fn adopt(&self, run: &str, sum: String) -> Result<()> {
+        self.list(&self.kind.file_of(run), sum)
+    }
+
+    /// Stores a run, which `write` writes to the path that it gets. It is on the disk when this returns.
+    pub fn add(&self, run: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+        let stored = self.write(&self.kind.file_of(run), write);
+        stored.with_context(|| format!("{} cannot be stored", self.run(run).display()))
+    }
+
+    /// Writes a file: its line in the manifest first, then the file under its name.
+    fn write(&self, file: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+        let place = self.path.join(file);
+        input::check_replaceable(&place)?;
+        let draft = self.unfinished.join(place.file_name().unwrap_or_default());
+        write(&draft)?;
+        self.list(file, sha256(&fs::read(&draft)?))?;
+        output::put(&draft, &place)
+    }
+
+    /// Publishes files by name, and the manifest. Removes files that were published earlier and are not now.
+    pub fn publish(self, files: Vec<(&str, Vec<u8>)>) -> Result<()> {
+        for (name, bytes) in &files {
+            let place = self.path.join(name);
+            // a plan that is executed in its own place is not rewritten
+            if !input::bytes(&place).is_ok_and(|there| there == *bytes) {
+                input::check_replaceable(&place)?;
+            }
+        }
+        let mut manifest = self.manifest();
+        let is_published = self.kind.is_published;
+        let kept = manifest.sums.iter().filter(|(name, _)| !is_published(name));
+        let is_ours =
+            |name: &str| Path::new(name).starts_with(RUNS) || name == self.kind.definition;
+        let kept = kept.filter(|(name, _)| is_ours(name));
+        let mut sums: BTreeMap<String, String> =
+            kept.map(|(name, sum)| (name.clone(), sum.clone())).collect();
+        sums.extend(files.iter().map(|(name, bytes)| (name.to_string(), sha256(bytes))));
+        let text = lines(&sums).into_bytes();
+        // a full disk is detected before any file is replaced
+        let all = files.into_iter().chain([(MANIFEST, text)]);
+        let names = all.map(|(name, bytes)| {
+            let wrote = output::write(&self.unfinished.join(name), &bytes);
+            let place = self.path.join(name);
+            wrote.with_context(|| format!("{} cannot be published", place.display()))?;
+            Ok(name)
+        });
+        let names = names.collect::<Result<Vec<_>>>()?;
+        // Windows does not rename a file to the name of an open file
+        drop(manifest.file.take());
+        let gone =
+            manifest.sums.keys().filter(|name| is_published(name) && !sums.contains_key(*name));
+        let publish = || -> Result<()> {
+            for name in gone {
+                let _ = fs::remove_file(self.path.join(name));
+            }
+            for name in names {
+                output::put(&self.unfinished.join(name), &self.path.join(name))?;
+            }
+            Ok(())
+        };
+        temporary::uninterrupted(publish)?;
+        #[cfg(unix)] // the names, too; elsewhere a directory is not a file
+        let _ = File::open(&self.path).and_then(|directory| directory.sync_all());
+        manifest.sums = sums;
+        Ok(())
+    }
+
+    fn manifest(&self) -> std::sync::MutexGuard<'_, Manifest> {
+        self.manifest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds a line to the manifest.
+    fn list(&self, file: &str, sum: String) -> Result<()> {
+        let mut manifest = self.manifest();
+        if manifest.sums.get(file) == Some(&sum) {
+            return Ok(());
+        }
+        let line = format!("{sum}  {file}\n");
+        let name = self.path.join(MANIFEST);
+        let name = name.display();
+        let place = manifest.file.as_mut();
+        let place = place.with_context(|| format!("{name} is closed, or could not be written"))?;
+        let added = place.write_all(line.as_bytes()).and_then(|()| place.sync_data());
+        if added.is_err() {
+            // no other line may follow an incomplete line
+            manifest.file = None;
+        }
+        added.with_context(|| format!("{name} cannot be written"))?;
+        manifest.sums.insert(file.to_string(), sum);
+        Ok(())
+    }
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        // a fork has the store from the process that took it
+        if std::process::id() == self.process {
+            let _ = fs::remove_dir_all(&self.unfinished);
+        }
+    }
+}
+
+/// Locks a folder.
+fn hold(path: &Path, kind: &Kind, about: &str) -> Result<File> {
+    let place = path.join(LOCK);
+    let name = place.display();
+    ensure!(!place.exists() || place.is_file(), "{name} is not a regular file; remove it");
+    let open = File::options().create(true).write(true).truncate(false).open(&place);
+    let mut lock = open.with_context(|| format!("{name} cannot be written"))?;
+    match lock.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            // Windows does not allow reading a locked file
+            let who = fs::read_to_string(&place).unwrap_or_default();
+            let who = who.trim();
+            let since = place.metadata().and_then(|file| file.modified()).ok();
+            let age = since.and_then(|since| since.elapsed().ok()).unwrap_or_default().as_secs();
+            bail!(
+                "{} is held by another {}{}{who}, for {age} s; wait for its end, or {}",
+                path.display(),
+                kind.name,
+                if who.is_empty() { "" } else { ": " },
+                kind.elsewhere
+            );
+        }
+        Err(TryLockError::Error(error)) => {
+            return Err(error).with_context(|| format!("{name} cannot be locked"));
+        }
+    }
+    lock.set_len(0)?;
+    write!(lock, "process {}, {about}", std::process::id())
+        .with_context(|| format!("{name} cannot be written"))?;
+    Ok(lock)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CAMPAIGN, Damage, Definition, Kind, MANIFEST, STUDY, Store};
+    use crate::output::sha256;
+    use anyhow::{Result, ensure};
+    use std::fs;
+    use std::path::Path;
+
+    const KINDS: [&Kind; 2] = [CAMPAIGN, STUDY];
+
+    fn same(text: &str) -> Result<()> {
+        ensure!(text == "A", "another definition");
+        Ok(())
+    }
+
+    /// A folder of this kind; a study is defined by "A".
+    fn take(path: &Path, kind: &'static Kind) -> Result<Store> {
+        let definition = Definition { text: "A", compare: &same };
+        Store::take(path, kind, "here", (kind.name == STUDY.name).then_some(definition))
+    }
+
+    impl Store {
+        fn add_text(&self, run: &str, text: &str) {
+            self.add(run, |path| Ok(fs::write(path, text)?)).unwrap();
+        }
+
+        /// Checks a run; files of other programs begin with "other".
+        fn check_text(&self, run: &str) -> Result<Option<String>, Damage> {
+            self.check(run, |path| !fs::read_to_string(path).unwrap().starts_with("other"))
+        }
+    }
+
+    #[test]
+    fn one_program_holds_a_folder_and_the_next_hears_of_it() {
+        for kind in KINDS {
+            let directory = tempfile::tempdir().unwrap();
+            let held = take(directory.path(), kind).unwrap();
+            let error = take(directory.path(), kind).unwrap_err().to_string();
+            let who =
+                format!("held by another {}: process {}, here", kind.name, std::process::id());
+            assert!(error.contains(&who) && error.contains(kind.elsewhere), "{error}");
+            drop(held);
+            take(directory.path(), kind).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_stored_run_is_what_was_stored_or_the_manifest_says_so() {
+        for kind in KINDS {
+            let directory = tempfile::tempdir().unwrap();
+            let folder = take(directory.path(), kind).unwrap();
+            folder.add_text("a", "1");
+            folder.add_text("b", "1");
+            folder.add_text("b", "2");
+            assert!(folder.check_text("a").unwrap().is_some());
+            assert_eq!(folder.read("b").unwrap().unwrap(), b"2");
+            assert!(
+                folder.check_text("c").unwrap().is_none() && folder.read("c").unwrap().is_none()
+            );
+            drop(folder);
+            let path = directory.path().join(kind.file_of("b"));
+            fs::write(&path, "3").unwrap();
+            let folder = take(directory.path(), kind).unwrap();
+            for damage in [folder.check_text("b").map(drop), folder.read("b").map(drop)] {
+                assert!(matches!(damage, Err(Damage::Changed)), "{damage:?}");
+            }
+            fs::write(&path, "2").unwrap();
+            assert!(folder.check_text("b").is_ok());
+            // another program's run, verified from then on
+            let other = directory.path().join(kind.file_of("c"));
+            fs::write(&other, "other").unwrap();
+            assert!(matches!(folder.read("c"), Err(Damage::Unlisted)));
+            folder.adopt("c", folder.check_text("c").unwrap().unwrap()).unwrap();
+            fs::write(&other, "other, changed").unwrap();
+            assert!(matches!(folder.check_text("c"), Err(Damage::Changed)));
+        }
+    }
+
+    #[test]
+    fn the_folder_of_another_kind_or_of_another_definition_is_refused_and_left_alone() {
+        let cases = [
+            (CAMPAIGN, "study.json", "holds a study of monte_carlo; put this campaign elsewhere"),
+            (CAMPAIGN, "runs/000000.json", "holds a study of monte_carlo"),
+            (STUDY, "plan.toml", "holds a campaign; give another folder"),
+            (STUDY, "runs/a.parquet", "holds a campaign; give another folder"),
+            (STUDY, "runs.csv", "has runs.csv or runs/ but no study.json"),
+            (STUDY, "runs/000000.json", "has runs.csv or runs/ but no study.json"),
+            (STUDY, "study.json", "another definition"),
+        ];
+        for (kind, name, words) in cases {
+            let directory = tempfile::tempdir().unwrap();
+            let place = directory.path().join(name);
+            fs::create_dir_all(place.parent().unwrap()).unwrap();
+            fs::write(&place, "{}").unwrap();
+            let error = format!("{:#}", take(directory.path(), kind).unwrap_err());
+            assert!(error.contains(words), "{error}");
+            assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+            assert_eq!(fs::read_dir(place.parent().unwrap()).unwrap().count(), 1);
+        }
+    }
+
+    #[test]
+    fn a_damaged_manifest_is_an_error_or_its_runs_are_not_verified() {
+        let directory = tempfile::tempdir().unwrap();
+        let take = || take(directory.path(), CAMPAIGN);
+        let folder = take().unwrap();
+        for run in ["a", "b", "c"] {
+            folder.add_text(run, "1");
+        }
+        drop(folder);
+        let place = directory.path().join(MANIFEST);
+        let good = fs::read_to_string(&place).unwrap();
+        let lines: Vec<&str> = good.split_inclusive('\n').collect();
+        let zeros = "0".repeat(64);
+        let wrong_hash = lines[0].replace(&lines[0][..64], &zeros);
+        // content of the manifest, and words of the error or the unverified runs
+        type Expected<'a> = Result<&'a [&'a str], &'a str>;
+        let cases: [(Vec<u8>, Expected); 11] = [
+            (Vec::new(), Ok(&["a", "b", "c"])),
+            (lines[1..].concat().into(), Ok(&["a"])),
+            (good.as_bytes()[..good.len() - 5].to_vec(), Ok(&["c"])),
+            (good.replace("  runs/b", " runs/b").into(), Err("line 2 is ")),
+            (good.replacen('\n', "\nxx\n", 1).into(), Err("line 2 is \"xx\"")),
+            (good.replacen(&good[..9], "not a sum", 1).into(), Err("line 1 is \"not a sum")),
+            (good.to_uppercase().into(), Err("line 1 is ")),
+            ([b"\xff", good.as_bytes()].concat(), Err("byte 1 is not UTF-8")),
+            (format!("{good}{wrong_hash}").into(), Ok(&["a"])),
+            (format!("{wrong_hash}{good}").into(), Ok(&[])),
+            (good.replace('\n', "\r\n").into(), Ok(&[])),
+        ];
+        for (bytes, expected) in cases {
+            let text = String::from_utf8_lossy(&bytes).into_owned();
+            fs::write(&place, bytes).unwrap();
+            match (take(), expected) {
+                (Err(error), Err(words)) => {
+                    let error = format!("{error:#}");
+                    assert!(error.contains(words), "{error}");
+                    assert!(error.contains("nothing verifies the stored runs"), "{error}");
+                    assert_eq!(String::from_utf8_lossy(&fs::read(&place).unwrap()), text);
+                }
+                (Ok(folder), Ok(unverified)) => {
+                    let wrong =
+                        ["a", "b", "c"].into_iter().filter(|run| folder.check_text(run).is_err());
+                    assert_eq!(wrong.collect::<Vec<_>>(), unverified, "{text}");
+                }
+                (took, _) => panic!("{text}: {took:?}"),
+            }
+        }
+        fs::remove_file(&place).unwrap();
+        let error = format!("{:#}", take().unwrap_err());
+        assert!(error.contains("it is missing") && error.contains("remove"), "{error}");
+        fs::create_dir(&place).unwrap();
+        let error = format!("{:#}", take().unwrap_err());
+        assert!(error.contains("it is a directory"), "{error}");
+        // without runs there is nothing to verify
+        fs::remove_dir(&place).unwrap();
+        fs::remove_dir_all(directory.path().join("runs")).unwrap();
+        take().unwrap();
+    }
+
+    #[test]
+    fn a_run_that_is_in_the_manifest_and_not_in_the_directory_is_missing() {
+        let directory = tempfile::tempdir().unwrap();
+        let take = || take(directory.path(), CAMPAIGN).unwrap();
+        take().add_text("a", "1");
+        fs::remove_file(directory.path().join("runs/a.parquet")).unwrap();
+        let folder = take();
+        assert!(matches!(folder.check_text("a"), Err(Damage::Missing)));
+        assert!(folder.check_text("b").unwrap().is_none());
+        folder.add_text("a", "1");
+        assert!(folder.check_text("a").is_ok() && folder.lists("a"));
+    }
+
+    #[test]
+    fn a_line_that_was_cut_off_is_none_and_the_next_start_writes_the_manifest_anew() {
+        let directory = tempfile::tempdir().unwrap();
+        let take = || take(directory.path(), CAMPAIGN).unwrap();
+        take().add_text("a", "1");
+        let place = directory.path().join(MANIFEST);
+        let text = fs::read_to_string(&place).unwrap();
+        let gone = text.replace("runs/a", "runs/gone");
+        fs::write(&place, format!("{gone}{text}{}", &text[..70])).unwrap();
+        drop(take());
+        assert_eq!(fs::read_to_string(&place).unwrap(), text);
+    }
+
+    #[test]
+    fn what_is_published_is_in_the_manifest_and_what_is_not_is_gone() {
+        let directory = tempfile::tempdir().unwrap();
+        let publish = |files: Vec<(&str, Vec<u8>)>| {
+            take(directory.path(), CAMPAIGN).unwrap().publish(files).unwrap()
+        };
+        publish(vec![("plan.toml", b"A".to_vec()), ("features.csv", b"1".to_vec())]);
+        publish(vec![("plan.toml", b"B".to_vec()), ("runs.csv", b"2".to_vec())]);
+        let text = fs::read_to_string(directory.path().join(MANIFEST)).unwrap();
+        assert_eq!(text, format!("{}  plan.toml\n{}  runs.csv\n", sha256(b"B"), sha256(b"2")));
+        let names = fs::read_dir(directory.path()).unwrap();
+        let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, [".lock", MANIFEST, "plan.toml", "runs", "runs.csv"]);
+    }
+
+    #[test]
+    fn what_is_no_campaigns_is_left_alone_whatever_the_manifest_says() {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path().join("out");
+        fs::create_dir(&out).unwrap();
+        let others = [directory.path().join("precious.csv"), out.join("notes.txt")];
+        for place in &others {
+            fs::write(place, "mine").unwrap();
+        }
+        let sum = sha256(b"mine");
+        let names = ["../precious.csv", "notes.txt", "features_old.csv", "../features.csv"];
+        fs::write(out.join("features_old.csv"), "an older campaign's").unwrap();
+        let lines: String = names.iter().map(|name| format!("{sum}  {name}\n")).collect();
+        fs::write(out.join(MANIFEST), lines).unwrap();
+        take(&out, CAMPAIGN).unwrap().publish(vec![("plan.toml", b"A".to_vec())]).unwrap();
+        assert!(others.iter().all(|place| place.exists()));
+        assert!(!out.join("features_old.csv").exists());
+    }
+}
