@@ -130,9 +130,7 @@ def test_tilt_slows_slosh_along_the_slope() -> None:
 @pytest.mark.whole
 def test_tilt_slows_slosh_of_deeper_liquid() -> None:
     """The two other changes of the page, to their printed digits."""
-    deeper = re.search(
-        r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid.md"))
-    )
+    deeper = re.search(r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid.md")))
     found = [slowed(depth) for depth in (1.0, 2.0)]
     assert found == pytest.approx([float(deeper[1]), float(deeper[2])], abs=0.5)
 
