@@ -39,20 +39,20 @@ use experiments::campaign::Campaign;
 use experiments::plan::Plan;
 use files::bug;
 use host::guard::{self, Cause, Limits, Output};
-use terminal::Terminal;
+use terminal::{GLOBAL, Terminal};
 
-/// Packs FMUs, checks them, simulates campaigns and reports.
+/// Simulates propellant slosh by FMUs, identifies their parameters from recordings, and packs and checks FMUs.
 ///
-/// `cargo run --release` without a subcommand packs dist/HubSlosh.fmu, simulates the 22 sine sweeps of Rubaga's thesis
-/// with a linear and a spherical liquid, and writes dist/campaign/report.html and features.csv.
+/// In the project's source, `cargo run --release` without a subcommand packs dist/HubSlosh.fmu, simulates the 22 sine
+/// sweeps of Rubaga's thesis with a linear and a spherical liquid, and writes dist/campaign/report.html and features.csv.
 #[derive(Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Cli {
-    /// Time that one call of an FMU may take, s (of check: see its --limit).
-    #[arg(long, global = true, hide_short_help = true, value_name = "SECONDS", default_value_t = guard::CALL.as_secs_f64())]
+    /// Longest time that one call of an FMU may take, s. The command check has --limit instead.
+    #[arg(long, global = true, help_heading = GLOBAL, hide_short_help = true, value_name = "SECONDS", default_value_t = guard::CALL.as_secs_f64())]
     call_limit: f64,
-    /// Memory that an FMU may take in run and campaign, MiB.
-    #[arg(long, global = true, hide_short_help = true, value_name = "MIB", default_value_t = guard::MEMORY >> 20)]
+    /// Memory that an FMU may use in the commands run, campaign and analyse, MiB.
+    #[arg(long, global = true, help_heading = GLOBAL, hide_short_help = true, value_name = "MIB", default_value_t = guard::MEMORY >> 20)]
     memory: u64,
     /// Understands the command line, and does nothing: for the tests of examples.
     #[arg(long, hide = true)]
@@ -107,9 +107,8 @@ impl Cli {
 /// Meaning of the exit codes.
 const EXIT_CODES: &str = "Exit codes:\n  \
     0  done, or the reader of its output has closed the pipe\n  \
-    1  it failed; stderr says what was wrong, where, and what is allowed (of check: errors were \
-    found; with --strict: warnings were)\n  \
-    2  the command line was not understood (of check: no selected rule was checked)";
+    1  an error, which stderr explains; of check: the FMU has errors; with --strict: there was a warning\n  \
+    2  the command line was not understood; of check: no selected rule could be checked";
 
 #[derive(Subcommand)]
 enum Command {

@@ -10,18 +10,21 @@ use clap::ColorChoice;
 use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
 use host::guard;
 
+/// Heading of the options that every command has, in its help.
+pub const GLOBAL: &str = "Global options";
+
 /// Options for output.
 #[derive(Clone, Copy, Default, clap::Args)]
 #[group(skip)]
 pub struct Terminal {
-    /// Print results, warnings and errors alone: no progress, and no lines about what was written.
-    #[arg(long, short, global = true)]
+    /// Prints only results, warnings and errors: no progress, and no lines about files that were written.
+    #[arg(long, short, global = true, help_heading = GLOBAL)]
     quiet: bool,
-    /// Exit with 1 if there was a warning.
-    #[arg(long, global = true)]
+    /// Exits with code 1 if there was a warning.
+    #[arg(long, global = true, help_heading = GLOBAL)]
     strict: bool,
-    /// Colours of messages; `auto`: on a terminal, unless NO_COLOR is set.
-    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    /// Colours of messages. `auto` uses colours on a terminal unless the environment variable NO_COLOR is set.
+    #[arg(long, global = true, help_heading = GLOBAL, value_name = "WHEN", default_value = "auto")]
     color: ColorChoice,
     /// Internal: prints progress and results as JSON text sequences (RFC 7464), for the Python package.
     #[arg(long, global = true, hide = true)]

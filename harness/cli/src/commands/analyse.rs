@@ -11,10 +11,10 @@ use signals::recording::Columns;
 
 use super::{RunsArgs, bench_day, campaign, open, setting};
 
-/// Analyses recordings of a bench as `campaign` analyses its runs, and compares them with the model's runs under the same torque.
+/// Analyses recordings of a bench like runs of a campaign, and compares them with simulations under the same torque.
 ///
-/// A recording has torque and one to three rates: time (s), tau_cmd (N·m), omega (rad/s), and perhaps omega_x and omega_y;
-/// --columns takes other names and units. It leaves the tables and the report of a campaign.
+/// A recording has torque and one to three rates: time (s), tau_cmd (N·m), omega (rad/s), and optionally omega_x and
+/// omega_y; --columns names other columns and units. The command writes the tables and the report of a campaign.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     hubslosh analyse bench_050.csv bench_100.csv --columns time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s\n  \
@@ -23,31 +23,32 @@ use super::{RunsArgs, bench_day, campaign, open, setting};
     hubslosh analyse --bench-day tuesday --out dist/tuesday\n\n\
     In a plan a [[run]] with recording = \"FILE\" (and columns = \"…\") is read; it is simulated too.")]
 pub struct AnalyseArgs {
-    /// Recordings: text in columns or Parquet; .mat, HDF5, TDMS, MDF4, .xlsx by the Python package.
+    /// Recordings: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python package is installed.
     #[arg(value_name = "RECORDING", required_unless_present_any = ["plan", "bench_day"])]
     recordings: Vec<PathBuf>,
-    /// Columns of the recordings for the signals, with units.
+    /// Columns of the recordings for the signals, with units. A signal that is not named here is read from the column
+    /// with its own name.
     #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
     columns: Columns,
-    /// The torque that was commanded; its amplitude is taken from the recording.
+    /// Torque profile that was commanded. The amplitude is read from the recording.
     #[arg(long, value_name = "PROFILE", default_value = "exp-sweep:f0=1.25,f1=3.5,duration=2700")]
     profile: String,
     /// Slosh models to simulate for comparison with the recordings.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear,spherical")]
     model: Vec<String>,
-    /// Sets what is known of the bench by its FMU name: tank.h, tank.d, hub.I, friction.b.
+    /// Sets a known parameter of the bench by its name in the FMU, such as tank.h, tank.d, hub.I or friction.b.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// A plan with recordings instead.
+    /// Plan that names the recordings, in place of recordings in the command line.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["recordings", "columns", "profile", "model", "settings"])]
     plan: Option<String>,
-    /// Directory of a day's recordings with their list, day.toml: friction runs, free decays, gyro at rest and sweeps in
-    /// one report.
+    /// Directory with the recordings of a day and their list, day.toml. One report then covers friction runs, free
+    /// decays, the gyro at rest and sweeps.
     #[arg(long, value_name = "DIRECTORY", conflicts_with_all = ["recordings", "columns", "profile", "model", "settings", "plan"])]
     bench_day: Option<PathBuf>,
     #[command(flatten)]
     pub runs: RunsArgs,
-    /// Directory for runs, tables and report.html [default: dist/ and the first recording's or the plan's name].
+    /// Directory for runs, tables and report.html [default: dist/ and the name of the first recording or of the plan].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
 }

@@ -20,49 +20,53 @@ use crate::terminal;
 
 /// Options for fitting any FMU.
 #[derive(clap::Args)]
-#[command(next_help_heading = "Any FMU")]
+#[command(next_help_heading = "Options for any FMU")]
 pub struct AnyFmuArgs {
-    /// Real parameters and start values of any FMU that are estimated, with bounds (else the FMU's min and max). NAME@each: every
-    /// recording has its own. scale(NAME): the error of an input's or output's scale, 0 is exact.
+    /// Unknowns: Real parameters and start values of the FMU, each with a start and optionally bounds [default bounds:
+    /// min and max of the FMU]. NAME@each has its own value in each recording. scale(NAME) is the relative error of the
+    /// scale of an input or output; 0 is exact.
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
-    /// Prior of an unknown: mean and standard deviation.
+    /// Prior knowledge of an unknown: its mean and standard deviation.
     #[arg(long, value_name = "NAME=MEAN:STD,…")]
     prior: Vec<String>,
-    /// Standard deviations of known values, included in the intervals: any value that is set, relative (0.5% or 0.005) or
-    /// absolute (5mm; ±0.1 in the variable's unit), and scales of inputs, outputs and clock, scale(NAME), scale(time). 0 is exact.
+    /// Standard deviations of known values, which widen the intervals: of a value that is set, relative (0.5% or 0.005)
+    /// or absolute (5mm; ±0.1 in the unit of the variable); of the scale of an input or output, scale(NAME); of the
+    /// clock, scale(time). 0 is exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
-    /// Inputs that the recordings drive.
+    /// Inputs of the FMU that the recordings drive.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     inputs: Vec<String>,
-    /// Inputs that are held from row to row; the others are interpolated linearly.
+    /// Inputs that are held from row to row. The other inputs are interpolated linearly.
     #[arg(long, value_name = "NAME,…", requires = "inputs")]
     held: Vec<String>,
-    /// Outputs that were recorded.
+    /// Outputs of the FMU that were recorded.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     outputs: Vec<String>,
-    /// A sensor among the outputs that is not a variable of the FMU, as `hubslosh run --sensor` has it; its scale, bias and delay are
-    /// taken as known, its noise is estimated. One for each flag.
+    /// Recorded output that is not a variable of the FMU, as a sensor of `hubslosh run --sensor`. Its scale, bias and
+    /// delay are known; its noise is estimated. The flag may be repeated.
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…", requires = "free")]
     sensors: Vec<Sensor>,
-    /// Outputs whose sensor has a bias, in each recording another one; STD: what is known of it.
+    /// Outputs whose sensor has a bias, which differs from recording to recording; STD is its prior standard deviation.
     #[arg(long, value_name = "OUTPUT[=STD],…")]
     bias: Vec<String>,
-    /// Three outputs read by an instrument with three axes, whose scales and alignment (rad) are estimated; SCALE and ANGLE are what
-    /// is known of them.
+    /// Three outputs of one instrument with three axes, whose scales and misalignments (rad) are estimated; SCALE and
+    /// ANGLE are their prior standard deviations.
     #[arg(long, value_name = "A,B,C=SCALE:ANGLE", requires = "free")]
     triad: Vec<String>,
-    /// The noise of every output drifts: white noise and a Gauss–Markov bias.
+    /// Models the noise of every output as white noise plus a Gauss–Markov bias, because it drifts.
     #[arg(long)]
     drift: bool,
-    /// The host steps the FMU (Model Exchange) with this relative tolerance, in place of the FMU's own solver.
+    /// Integrates the FMU by the host (Model Exchange) with this relative tolerance [without a number: 1e-8], instead of
+    /// by the FMU's own solver.
     #[arg(long, value_name = "TOLERANCE", requires = "free", num_args = 0..=1, default_missing_value = "1e-8")]
     exchange: Option<f64>,
-    /// Relative tolerance that the FMU's own solver is given [default: the FMU's own].
+    /// Relative tolerance of the FMU's own solver [default: the FMU's own].
     #[arg(long, value_name = "TOLERANCE", conflicts_with = "exchange")]
     solver_tolerance: Option<f64>,
-    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit [default: 8].
+    /// Number of random starts within the bounds, which are tried if the search from the first start ends at no good fit
+    /// [default: 8].
     #[arg(long, value_name = "NUMBER")]
     tries: Option<usize>,
 }

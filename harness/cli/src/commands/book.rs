@@ -7,20 +7,20 @@ use pack::book;
 
 use crate::{fmu, terminal};
 
-/// Builds the documentation from the project's source, and opens it in the web browser: a static site with search that needs no
-/// network.
+/// Builds the documentation and opens it in the web browser.
 ///
-/// Sphinx builds it. The first time, its packages are downloaded (70 MB). The Python package does not contain the book: there the
-/// command prints the address at which it can be read.
+/// It is a static site, whose search works without a network. Sphinx builds it from the project's source; the first time
+/// its packages are downloaded (70 MB). The Python package does not contain the book: its command prints the address at
+/// which the book can be read.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh book\n  hubslosh book --no-open\n  hubslosh book --out site"
 )]
 pub struct BookArgs {
-    /// Writes the book to this directory, and opens no browser [default: dist/book].
+    /// Directory for the book; no browser is opened [default: dist/book].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
-    /// Prints the path of the first page and opens no browser.
+    /// Prints the path of the first page, and opens no browser.
     #[arg(long)]
     no_open: bool,
 }

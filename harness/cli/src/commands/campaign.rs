@@ -17,55 +17,54 @@ use report::campaign::Chapter;
 use super::{DEFAULT_CAMPAIGN, RunsArgs, open, setting, view};
 use crate::{progress, terminal};
 
-/// Simulates a plan's runs, or the sine sweeps of Rubaga's thesis at several fills and amplitudes,
-/// analyses them and reports.
+/// Simulates all runs of a plan, analyses them and writes a report; by default the sine sweeps of Rubaga's thesis.
 ///
-/// Stored runs of the same model, binary, parameters and profile are reused.
+/// Runs are stored, and reused if model, binary, parameters and profile are the same.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct CampaignArgs {
-    /// Plan: a TOML file, or the name of a built-in plan (below).
+    /// Plan: a TOML file, or the name of one of the built-in plans below.
     #[arg(
         long,
         value_name = "FILE",
         conflicts_with_all = ["model", "fills", "amplitudes", "sweep", "settings", "tolerance"]
     )]
     plan: Option<String>,
-    /// Print the runs as JSON for another program to simulate, and simulate none.
+    /// Prints the runs as JSON and simulates none, so that another program can simulate them.
     #[arg(long)]
     list: bool,
-    /// Slosh models, by name.
+    /// Slosh models of the sweeps.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_values = plan::MODELS)]
     model: Vec<String>,
-    /// Fills, m.
+    /// Fills of the sweeps, m.
     #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = plan::FILLS)]
     fills: Vec<f64>,
-    /// Torque amplitudes, N·m.
+    /// Torque amplitudes of the sweeps, N·m.
     #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = plan::AMPLITUDES)]
     amplitudes: Vec<f64>,
-    /// Growth of the frequency from 1.25 to 3.5 Hz in 2700 s.
+    /// How the frequency of the sweeps grows from 1.25 to 3.5 Hz in 2700 s.
     #[arg(long, value_enum, default_value = "exponential")]
     sweep: Sweep,
-    /// Sets a parameter or an input by its FMU name: a number in SI or with a unit of the variable (50mm); enumerations by
-    /// name or number.
+    /// Sets a parameter or an input by its name in the FMU. A number is in SI units or has a unit of the variable (50mm);
+    /// an item of an enumeration is given by name or number.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
     #[arg(long, value_name = "NUMBER")]
     tolerance: Option<f64>,
-    /// Simulate again what is stored already.
+    /// Simulates all runs, also those that are stored.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
     pub runs: RunsArgs,
-    /// Directory for runs, tables and report.html [default: dist/campaign, with flags that change
-    /// the campaign dist/campaign_ and these flags, with --plan dist/ and the plan's name].
+    /// Directory for runs, tables and report.html [default: dist/campaign; if flags change the campaign, dist/campaign_
+    /// and these flags; with --plan, dist/ and the name of the plan].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
-    /// Directory of another campaign, with which the report compares this one run by run.
+    /// Directory of another campaign, whose runs the report compares with the runs of this campaign.
     #[arg(long, value_name = "DIRECTORY")]
     compare: Option<PathBuf>,
-    /// Replace the tables and the report of another plan in the default directory.
+    /// Replaces the tables and the report of another plan that are in the default directory.
     #[arg(long)]
     replace: bool,
 }
@@ -76,7 +75,7 @@ const LONGEST: usize = 100;
 /// Growth of the frequency of `campaign`'s sweep.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Sweep {
-    /// Exponentially.
+    /// Exponentially in time.
     Exponential,
     /// Linearly in time.
     Linear,

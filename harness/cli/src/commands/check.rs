@@ -9,34 +9,35 @@ use files::output;
 
 use crate::{fmu, progress, terminal};
 
-/// Checks an FMU 2.0 or 3.0 against the standard and against what hosts ask for.
+/// Checks an FMU 2.0 or 3.0 against the FMI standard and against what hosts need.
 ///
-/// Looks at the archive, the description and the binaries, and calls the binary for this platform
-/// as hosts do. The exit code is 0 when there are no errors, 1 when there are, and 2 when no selected rule could be
-/// checked; warnings are only reported.
+/// The check reads archive, description and binaries, and calls the binary for this platform as hosts do. The exit code
+/// is 0 if there are no errors, 1 if there are errors, and 2 if no selected rule could be checked. Warnings do not change
+/// it, unless --strict is given.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh check dist/HubSlosh.fmu\n  \
     hubslosh check other.fmu --only zip,xml --junit check.xml\n  hubslosh check --rules")]
 pub struct CheckArgs {
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(value_name = "FMU", required_unless_present = "rules")]
     fmu: Option<PathBuf>,
-    /// Writes the report as JUnit XML, one test case for each rule.
+    /// File for the report as JUnit XML, with a test case for each rule.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Writes the report as JSON, one object for each rule; after the FMU and without FILE: prints it.
+    /// File for the report as JSON, with an object for each rule. Without a file, which must then be the last flag, the
+    /// JSON is printed.
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
     json: Option<Option<PathBuf>>,
-    /// Writes the findings as SARIF 2.1.0, for code hosts.
+    /// File for the findings as SARIF 2.1.0, which code hosts show.
     #[arg(long, value_name = "FILE")]
     sarif: Option<PathBuf>,
-    /// Rules (zip.names) or groups of rules (zip) to look at [default: all].
+    /// Rules, such as zip.names, or groups of rules, such as zip, to check [default: all].
     #[arg(long, value_name = "RULE,…", value_delimiter = ',')]
     only: Vec<String>,
-    /// Time that the calls of one rule may take, s.
+    /// Longest time that the calls of one rule may take, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     limit: f64,
-    /// Lists the rules as Markdown tables, those for FMI 2.0 and those for 3.0, and checks nothing.
+    /// Lists the rules for FMI 2.0 and FMI 3.0 as Markdown tables, and checks nothing.
     #[arg(long)]
     rules: bool,
 }

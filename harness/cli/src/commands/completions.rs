@@ -3,13 +3,13 @@
 use anyhow::Result;
 use clap::CommandFactory;
 
-/// Prints a script that completes commands and flags in a shell.
+/// Prints a script by which a shell completes commands and flags of hubslosh.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     hubslosh completions bash > ~/.local/share/bash-completion/completions/hubslosh\n  \
     hubslosh completions zsh > ~/.zfunc/_hubslosh")]
 pub struct CompletionsArgs {
-    /// Shell.
+    /// Shell that will read the script.
     #[arg(value_enum)]
     shell: clap_complete::Shell,
 }

@@ -22,7 +22,7 @@ use super::any_fmu::{AnyFmuArgs, Told};
 use super::{DEFAULT_FMU, estimates, open, setting};
 use crate::terminal;
 
-/// Predicts the uncertainty of each parameter from a planned experiment (Cramér–Rao bound).
+/// Predicts how well a planned experiment will determine each parameter (Cramér–Rao bound).
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh design --profile lin-sweep:amplitude=0.1\n  \
     hubslosh design --snr 20 --band 1.25,20\n  \
@@ -31,59 +31,59 @@ use crate::terminal;
     hubslosh design slew.csv --fmu Spacecraft --free craft.Jzz=640,tank[1].mass[1]=128 --inputs torque[3] \\\n      \
     --outputs omega[3] --noise omega[3]=1e-5")]
 pub struct DesignArgs {
-    /// Torque profile, as of `hubslosh run`.
+    /// Torque profile, as for `hubslosh run`.
     #[arg(long, value_name = "PROFILE", conflicts_with_all = ["multisine", "free"])]
     profile: Option<String>,
-    /// An odd random-phase multisine with detection lines and this peak, N·m.
+    /// Plans an odd random-phase multisine with detection lines and this peak, N·m.
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
-    /// Prints the torque of a sine whose rate has this signal-to-noise ratio, dB, in the gyro's samples: on the band, at
-    /// resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
+    /// Prints the torque amplitude of a sine for which the rate in the samples of the gyro has this signal-to-noise
+    /// ratio, dB: in the band, at resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
     #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
     snr: Option<f64>,
     /// Period of the multisine, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 100.0, conflicts_with = "profile")]
     period: f64,
-    /// Length of the multisine, s; that of a profile is its `duration=…`.
+    /// Length of the multisine, s. The length of a profile is its `duration=…`.
     #[arg(long, value_name = "SECONDS", default_value_t = 600.0, conflicts_with = "profile")]
     duration: f64,
     /// Band of the multisine, or of --snr, Hz.
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
-    /// Gives the lines the power that tells most of a linear bench as expected (D-optimal), a quarter of it spread
-    /// over all of them. A linear sweep of the same peak, band and length is compared with it, and the one that tells more is
-    /// recommended.
+    /// Distributes the power of the multisine over its lines so that the parameters of the expected bench are determined
+    /// best (D-optimal); a quarter of the power stays spread over all lines. The command compares it with a linear sweep
+    /// of the same peak, band and length, and recommends the better of both.
     #[arg(long, requires = "multisine")]
     optimal: bool,
-    /// Makes the torque as much smaller as the liquid's angle needs, rad; linear theory ends at 0.18 (a wave of 0.15 of
-    /// the radius).
+    /// Largest slosh angle, rad, to which the torque is scaled down. Linear theory holds up to 0.18, a wave of 0.15 of
+    /// the radius.
     #[arg(long, value_name = "RAD")]
     slosh_angle: Option<f64>,
-    /// Draw of the phases and the detection lines.
+    /// Seed of the random phases and detection lines.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
-    /// Sets a parameter to what is expected of the bench.
+    /// Sets a parameter to its expected value for the bench.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Delay, gyro bias and friction asymmetry are to be estimated as well.
+    /// Also predicts delay, gyro bias and friction asymmetry, because they will be estimated too.
     #[arg(long, alias = "flaws", conflicts_with = "free")]
     sensor_errors: bool,
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
-    /// Print what is found as JSON.
+    /// Prints the result as JSON.
     #[arg(long)]
     json: bool,
     /// File for the torque, .csv or .parquet.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Tables of the inputs that are planned, with --free.
+    /// Tables of the planned inputs; only with --free.
     #[arg(value_name = "DATA", requires = "free")]
     data: Vec<PathBuf>,
-    /// Noise of a row of each output, with --free.
+    /// Standard deviation of the noise in one row of each output; only with --free.
     #[arg(long, value_name = "OUTPUT=STD,…", requires = "free")]
     noise: Vec<String>,
-    /// Columns of the tables for the inputs, with units, with --free.
+    /// Columns of the tables for the inputs, with units; only with --free.
     #[arg(
         long,
         value_name = "INPUT=COLUMN[:UNIT],…",

@@ -7,13 +7,13 @@ use experiments::example::Example;
 
 use super::{DEFAULT_FMU, open};
 
-/// Writes the example that travels with the FMU (modelDescription/NAME/extra): inputs and
-/// answer.
+/// Simulates the reference example of an FMU and writes its inputs and outputs to modelDescription/NAME/extra, which
+/// travels with the FMU.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh pack && hubslosh example\n  \
     hubslosh example --fmu Spacecraft")]
 pub struct ExampleArgs {
-    /// The FMU that answers: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
 }

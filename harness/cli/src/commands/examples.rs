@@ -13,7 +13,7 @@ use crate::fmu;
     after_help = "Examples:\n  hubslosh examples\n  hubslosh examples --copy mine && python mine/0_your_own_tank/my_tank.py"
 )]
 pub struct ExamplesArgs {
-    /// Folder for a copy; it must not exist.
+    /// Folder for the copy; it must not exist yet.
     #[arg(long, value_name = "DIRECTORY")]
     copy: Option<PathBuf>,
 }

@@ -4,10 +4,11 @@ use anyhow::{Result, ensure};
 
 use crate::fmu;
 
-/// Lists the files of the FMUs that came with this command, and of those in dist.
+/// Lists the files of the FMUs that are installed with this command or in the folder dist.
 ///
-/// Options --fmu take their names: `Spacecraft-fmi3` is Spacecraft for FMI 3.0.
+/// The option --fmu of other commands takes their names, such as Spacecraft, or Spacecraft-fmi3 for FMI 3.0.
 #[derive(clap::Args)]
+#[command(after_help = "Example:\n  hubslosh fmus")]
 pub struct FmusArgs {}
 
 impl FmusArgs {

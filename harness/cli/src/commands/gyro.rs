@@ -17,18 +17,20 @@ use crate::{progress, terminal};
 /// Folder for its files.
 const DEFAULT_GYRO: &str = "dist/gyro";
 
-/// Records the gyro for hours at rest, estimates its noise from the Allan deviation and compares it
-/// with the specified noise. Leaves allan.csv and allan.svg. With --recording the same of a real gyro at rest, and
-/// whether its noise is normal, white and steady: quantiles, autocorrelation, statistics of chunks.
+/// Simulates the gyro at rest for hours and compares its Allan deviation with the specified noise; or analyses a
+/// recording of a real gyro at rest.
+///
+/// The command writes allan.csv and allan.svg. With --recording it estimates the noise of a real gyro, and tests whether
+/// this noise is normal, white and stationary by quantiles, autocorrelation and statistics of chunks.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh gyro\n  \
     hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro\n  \
     hubslosh gyro --recording rest.csv --columns time=t:ms,omega=gyro_z:deg/s --out dist/our_gyro")]
 pub struct GyroArgs {
-    /// A gyro's recording at rest: text in columns, Parquet or another kind of recording.
+    /// Recording of a gyro at rest: text in columns, Parquet or another kind of recording.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["hours", "records", "settings", "fmu"])]
     recording: Option<PathBuf>,
-    /// Columns of the recording for time and omega, with units.
+    /// Columns of the recording for the signals time and omega, with units.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",
@@ -37,28 +39,28 @@ pub struct GyroArgs {
         requires = "recording"
     )]
     columns: Columns,
-    /// Rows a second, for a recording without times.
+    /// Sampling rate of a recording without times, Hz.
     #[arg(long, value_name = "HZ", requires = "recording")]
     rate: Option<f64>,
-    /// Length of the recording's chunks, s: the thesis's 15 min.
+    /// Length of the chunks of the recording, s; in Rubaga's thesis 15 min.
     #[arg(long, value_name = "SECONDS", default_value_t = 900.0, requires = "recording")]
     chunk: f64,
     /// File for a report on the recording, .html.
     #[arg(long, value_name = "FILE", requires = "recording")]
     report: Option<PathBuf>,
-    /// Length of each record, h.
+    /// Length of each simulated record, h.
     #[arg(long, value_name = "HOURS", default_value_t = 6.0)]
     hours: f64,
-    /// Number of records; their imu.seed counts from 1.
+    /// Number of simulated records. Their imu.seed is 1, 2, ….
     #[arg(long, value_name = "NUMBER", default_value_t = 8)]
     records: usize,
-    /// Sets a parameter by its FMU name.
+    /// Sets a parameter by its name in the FMU, such as imu.arw=1e-4.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
-    /// Print what is found as JSON, of the FMU's gyro.
+    /// Prints the estimated noise of the simulated gyro as JSON.
     #[arg(long, conflicts_with = "recording")]
     json: bool,
     /// Directory for the tables and pictures.

@@ -24,9 +24,9 @@ use super::estimates::{Out, print_estimates};
 use super::{DEFAULT_FMU, open, setting};
 use crate::terminal;
 
-/// Finds parameters from recordings, and how sure they are.
+/// Estimates parameters of an FMU from recordings, with their uncertainties.
 ///
-/// Without the name of a kind of recording, `identify DATA` means `identify bench DATA`, and with --free `identify fmu DATA`.
+/// Without a kind of recording, `identify DATA` means `identify bench DATA`, and with --free `identify fmu DATA`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
@@ -41,33 +41,50 @@ pub struct IdentifyArgs {
     kind: Kind,
 }
 
+const BENCH: &str = "Example:\n  hubslosh identify bench up.csv down.csv --validate noise.csv --set tank.d=0.163 --out result.json";
+const FMU: &str = "Example:\n  hubslosh identify fmu a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 \\\n      \
+    --outputs x0,x1 --exchange --out result.json";
+const DECAY: &str =
+    "Example:\n  hubslosh identify decay decay.csv --columns wave_height=probe:mm --out decay.json";
+const FRICTION: &str =
+    "Example:\n  hubslosh identify friction ramp.csv step.csv sweep.csv --out friction.json";
+
 /// Kind of the recordings, which decides what is fitted to them.
 #[derive(clap::Subcommand)]
 enum Kind {
-    /// The slosh bench: tank, hub, bearing and sensors from torque and rate.
+    /// Fits tank, hub, bearing and sensors of the slosh bench to torque and rate.
     ///
-    /// Recordings have the columns time (s), tau_cmd (N·m) and omega (rad/s), and optionally theta (rad) of an
-    /// encoder, g_axial (m/s²), wheel_speed, omega_x and omega_y (rad/s); --columns takes other names and units.
-    /// Several are fitted together.
+    /// Recordings have the columns time (s), tau_cmd (N·m) and omega (rad/s), and optionally theta (rad) of an encoder,
+    /// g_axial (m/s²), wheel_speed, omega_x and omega_y (rad/s); --columns names other columns and units. Several
+    /// recordings are fitted together.
+    #[command(after_help = BENCH)]
     Bench(Box<BenchArgs>),
-    /// Any FMU: its free parameters and start values, from its inputs and outputs.
+    /// Fits parameters and start values of any FMU to its recorded inputs and outputs.
+    ///
+    /// --free names the unknowns.
+    #[command(after_help = FMU)]
     Fmu(Box<FmuArgs>),
-    /// A free decay: frequency and damping over the amplitude, from a signal without torque.
+    /// Estimates frequency and damping over the amplitude from a free decay, a signal without torque.
+    #[command(after_help = DECAY)]
     Decay(Box<DecayArgs>),
-    /// Friction and inertia of a bench whose liquid does not move: ramps, steps and sweeps of the torque with the tank empty.
+    /// Fits friction and inertia of a bench whose liquid does not move, such as ramps, steps and sweeps with an empty
+    /// tank.
     ///
     /// The tank counts as empty unless --set tank.h=… states the height of its liquid.
+    #[command(after_help = FRICTION)]
     Friction(Box<FrictionArgs>),
 }
 
 /// Recordings, and where the results go.
 #[derive(clap::Args)]
 struct DataArgs {
-    /// Recordings: text in columns or Parquet; .mat, HDF5, TDMS, MDF4, .xlsx by the Python package.
+    /// Recordings: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python package is installed.
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
-    /// Columns of the recordings for the signals, with units. Of the bench: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x,
-    /// omega_y; of a free decay wave_height, force, theta or omega; of an FMU its inputs and outputs.
+    /// Columns of the recordings for the signals, with units, such as time=t:ms,omega=gyro_z:deg/s. Signals of bench and
+    /// friction: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x, omega_y; of decay: time, wave_height, force,
+    /// theta, omega; of fmu: time, and inputs and outputs of the FMU. A signal that is not named here is read from the
+    /// column with its own name.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",
@@ -75,14 +92,14 @@ struct DataArgs {
         hide_default_value = true
     )]
     columns: String,
-    /// Sampling rate of a file without a time column, rows per second.
+    /// Sampling rate of a recording without times, Hz.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// Also prints each attempt of the search: its start, window and free unknowns, and why it was made, accepted or
-    /// refused.
+    /// Also prints each attempt of the search: its start, its part of the recording and its unknowns, and why it was
+    /// made, accepted or rejected.
     #[arg(long)]
     verbose: bool,
-    /// Print the result as JSON too, in place of tables and verdict.
+    /// Prints the result as JSON in place of tables and verdict; --out is written too.
     #[arg(long)]
     json: bool,
     /// File for the result, .json.
@@ -96,37 +113,37 @@ struct DataArgs {
 /// Options that state known properties of a bench and of its sensors.
 #[derive(clap::Args)]
 struct KnownArgs {
-    /// Sets what is known of the bench by its FMU name; it is then not estimated.
+    /// Sets a known parameter of the bench by its name in the FMU. It is then not estimated.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Relative standard deviations of known values, included in the intervals: torque (1%), clock (0.01%), g_axial (0.1%), tank.r
-    /// (0.4%), fluid.rho (0.3%). 0 is exact.
+    /// Relative standard deviations of known values, which widen the intervals [default:
+    /// torque=1%,clock=0.01%,g_axial=0.1%,tank.r=0.4%,fluid.rho=0.3%]. 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     tolerances: Vec<String>,
-    /// Prior of a parameter: value and standard deviation.
+    /// Prior knowledge of a parameter: its value and standard deviation.
     #[arg(long, value_name = "NAME=VALUE:STD", value_parser = known)]
     known: Vec<(String, f64, f64)>,
-    /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
+    /// Standard deviation of the scale factor of the gyro about 1. 0 means that the factor is exactly 1.
     #[arg(long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
-    /// Starts from this value instead of one found in the data.
+    /// Value from which the search starts, instead of one estimated from the data.
     #[arg(long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
     starts: Vec<(String, f64)>,
-    /// Repeats the fit from so many starts of each parameter (of tank and liquid, or of friction and inertia), one at a time from a third
-    /// to three times its estimate, and reports how many end at the same minimum.
+    /// Number of further starts for each parameter of tank and liquid, or of friction and inertia. They are between a
+    /// third and three times its estimate, one parameter at a time. The command reports how many end at the same minimum.
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     start_study: usize,
-    /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, a sampled controller's) or
-    /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
+    /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as of a sampled controller)
+    /// or smooth (band-limited, as of a sampled recording of a smooth torque) [default: the one that fits best].
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
-    /// Uses the rows between two times alone.
+    /// Uses only the rows between two times, s.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
-    /// A recording that is simulated with the result, not fitted.
+    /// Recording for validation: it is simulated with the result and not fitted.
     #[arg(long, value_name = "DATA")]
     validate: Vec<PathBuf>,
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
 }
@@ -147,7 +164,7 @@ pub struct BenchArgs {
         value_parser = ["frozen", "linear", "planar", "spherical"]
     )]
     model: Vec<String>,
-    /// Friction laws to try, the first with all slosh models, the others with the one that is chosen.
+    /// Friction laws to try: the first law with all slosh models, the others with the chosen slosh model.
     #[arg(
         long,
         value_name = "NAME,…",
@@ -156,7 +173,7 @@ pub struct BenchArgs {
         value_parser = ["none", "viscous", "stribeck_smooth", "stribeck", "lugre"]
     )]
     friction: Vec<String>,
-    /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
+    /// Estimates no delay, gyro bias or friction asymmetry, because the measurement is perfect.
     #[arg(long)]
     perfect: bool,
     /// Also estimates the time constant with which the actuator lags its command.
@@ -168,11 +185,12 @@ pub struct BenchArgs {
     /// Also estimates the relative change of the friction over a recording.
     #[arg(long)]
     friction_drift: bool,
-    /// Also estimates the damping by waves that break, slosh.zeta_breaking and slosh.breaking_steepness.
-    /// If the fit does not reach such waves, the verdict says so.
+    /// Also estimates the damping by breaking waves, slosh.zeta_breaking and slosh.breaking_steepness. If the waves in
+    /// the fit are too low for it, the verdict says so.
     #[arg(long)]
     breaking: bool,
-    /// The rate's time stamps may be early: takes a delay below zero as it comes. Else it is a sign that something is wrong.
+    /// Accepts a negative delay, because the time stamps of the rate may be early. Without this flag a negative delay
+    /// counts as a sign of an error.
     #[arg(long)]
     acausal: bool,
 }
@@ -194,7 +212,7 @@ pub struct DecayArgs {
     /// Relative standard deviation of the clock's rate, included in the intervals.
     #[arg(long = "tolerance", value_name = "clock=SIZE")]
     tolerances: Vec<String>,
-    /// Uses the rows between two times alone.
+    /// Uses only the rows between two times, s.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
 }
@@ -204,10 +222,10 @@ pub struct DecayArgs {
 pub struct FmuArgs {
     #[command(flatten)]
     data: DataArgs,
-    /// Values of the FMU that are known, NAME=VALUE, or NAME@RECORDING=VALUE for one recording.
+    /// Sets a known value of the FMU, or with NAME@RECORDING=VALUE for one recording only.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
     #[command(flatten)]

@@ -41,10 +41,10 @@ pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 /// Options of commands that make many runs.
 #[derive(clap::Args)]
 pub struct RunsArgs {
-    /// Runs at once [default: as many as the machine has cores].
+    /// Number of runs that are simulated at the same time [default: the number of cores].
     #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
     pub jobs: usize,
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
 }

@@ -11,7 +11,7 @@ use pack::{Fmi, Model, sdist, wheel};
 
 use crate::set_file;
 
-/// Builds the binary of an FMU and packs it, or the Python package with all FMUs and this command inside.
+/// Builds and packs an FMU, or the Python package as a wheel with all FMUs and this command.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  \
@@ -23,36 +23,41 @@ pub struct PackArgs {
     /// The FMU to pack.
     #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
     model: &'static Model,
-    /// Version of FMI, 2 or 3; the binary is the same.
+    /// Version of FMI, 2 or 3. The binary is the same for both.
     #[arg(long, value_name = "2|3", default_value = "2", value_parser = fmi, conflicts_with_all = ["python", "sdist"])]
     fmi: Fmi,
-    /// FMI 3.0 only: vectors and matrices are array variables, and the numbers of tanks and modes are structural parameters that
-    /// a host can set before initialization. The binary is the same.
+    /// FMI 3.0 only: makes vectors and matrices array variables, and the numbers of tanks and modes structural
+    /// parameters, which a host can set before initialization. The binary is the same.
     #[arg(long, conflicts_with_all = ["python", "sdist"])]
     arrays: bool,
-    /// Pack the Python package instead, with all FMUs and the command hubslosh inside, as a wheel.
+    /// Packs the Python package as a wheel instead of an FMU, with all FMUs and the command hubslosh inside.
     #[arg(long, conflicts_with = "model")]
     python: bool,
-    /// Wheels for these platforms alone, by their folders in an FMU; as --all-platforms otherwise.
+    /// Packs wheels only for these platforms, which are named as the folders of binaries in an FMU, such as win64 or
+    /// aarch64-linux. Like --all-platforms it needs the tools for building for other platforms.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "python", conflicts_with = "all_platforms", value_parser = platforms::platform)]
     platform: Vec<&'static Platform>,
-    /// Pack the source as an sdist instead, from which pip builds the Python package.
+    /// Packs the source as an sdist instead, from which pip builds the Python package.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
     sdist: bool,
-    /// File for the FMU, or folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist/NAME-fmi3-arrays.fmu, dist].
+    /// File for the FMU, or folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu,
+    /// dist/NAME-fmi3-arrays.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// Variables of this many tanks alone, for hosts that show every variable; the binary is the same. Spacecraft has 4.
+    /// Number of tanks whose variables the FMU has. Use it for hosts that show every variable. Spacecraft has 4 tanks;
+    /// the binary is the same.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     tanks: Option<usize>,
-    /// Variables of this many slosh modes of each tank alone; the binary is the same. Spacecraft and SloshTank have 3, HubSlosh 10.
+    /// Number of slosh modes of each tank whose variables the FMU has. Spacecraft and SloshTank have 3, HubSlosh 10; the
+    /// binary is the same.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     modes: Option<usize>,
-    /// Makes the parameters of this file (.toml, .ssv, .json) the start values of the FMU. With --tanks or --modes.
+    /// File of parameters (.toml, .ssv, .json) that become the start values of the FMU, so that a host needs to set
+    /// nothing. It needs --tanks or --modes.
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// Builds for Linux, Windows and macOS instead of this machine's platform: one FMU for all, one wheel for each. On Debian,
-    /// harness/platforms/setup installs the tools.
+    /// Builds for Linux, Windows and macOS instead of this machine's platform only: one FMU with all binaries, one wheel
+    /// for each platform. On Debian, harness/platforms/setup installs the tools.
     #[arg(long)]
     all_platforms: bool,
 }

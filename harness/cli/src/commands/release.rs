@@ -12,21 +12,23 @@ use crate::progress;
 /// Default folder of the release.
 const DEFAULT_RELEASE: &str = "dist/release";
 
-/// Builds and checks the release for all platforms. Each FMU comes in both versions of FMI with its software bill of materials
-/// (SBOM) and the report of its check. The Python package's wheels have SBOMs too; the folder keeps the wheel for Linux.
-/// SHA256SUMS lists the files in the folder, SHA256SUMS.all also the files of older versions, which are removed, and the wheels
-/// that the folder does not keep.
+/// Builds and checks the files of a release for all platforms.
+///
+/// Each FMU is built for both versions of FMI, with its software bill of materials (SBOM) and the report of its check.
+/// Wheels of the Python package have SBOMs too; the folder of the release keeps the wheel for Linux. SHA256SUMS lists the
+/// files in the folder. SHA256SUMS.all also lists wheels that the folder does not keep, and files of older versions,
+/// which are removed from it.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]
 pub struct ReleaseArgs {
-    /// One FMU; by default all FMUs and the wheels.
+    /// Releases only this FMU [default: all FMUs and the wheels].
     #[arg(long, value_name = "NAME", value_parser = pack::model)]
     model: Option<&'static Model>,
-    /// Directory for all wheels.
+    /// Directory for the wheels of all platforms.
     #[arg(long, value_name = "DIRECTORY", default_value = "dist")]
     wheels: PathBuf,
-    /// Directory for the release's files.
+    /// Directory for the files of the release.
     #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_RELEASE)]
     out: PathBuf,
 }

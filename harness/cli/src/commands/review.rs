@@ -6,20 +6,20 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-/// Reviews a controller around a craft over its fills, and writes one page: margins, slosh modes, worst case.
+/// Reviews the attitude controller of a craft over its fills and writes one page: margins, slosh modes, worst case.
 ///
-/// Needs a Python with the package hubslosh and matplotlib.
+/// It needs a Python with the packages hubslosh and matplotlib.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh review plan.toml\n  \
                   hubslosh review plan.toml --out review.html --python /usr/bin/python3")]
 pub struct ReviewArgs {
-    /// Plan with craft, controller, fills and ranges, .toml.
+    /// Plan with craft, controller, fills and ranges of uncertain parameters, .toml.
     #[arg(value_name = "PLAN")]
     plan: PathBuf,
-    /// Page to write, .html; by default the plan's name with this ending.
+    /// File for the page, .html [default: the name of the plan with .html].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Python that has the package; by default that next to this command, then python3 and python on PATH.
+    /// Python that has the package hubslosh [default: the Python next to this command, then python3 and python on PATH].
     #[arg(long, value_name = "PROGRAM")]
     python: Option<PathBuf>,
 }

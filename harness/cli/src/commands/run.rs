@@ -19,11 +19,11 @@ use report::view;
 use super::{DEFAULT_FMU, check_out, open_to_run, setting, write_out};
 use crate::{progress, set_file, terminal};
 
-/// Simulates one run: a torque history in, signals out.
+/// Simulates an FMU under a torque profile or recorded inputs, and writes its signals.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct RunArgs {
-    /// Torque profile, name:key=value,…
+    /// Torque profile with its settings, such as sine:amplitude=0.05,frequency=2.4. The profiles are listed below.
     #[arg(
         long,
         value_name = "PROFILE",
@@ -31,54 +31,59 @@ pub struct RunArgs {
         required_unless_present = "input"
     )]
     profile: Option<String>,
-    /// Histories of inputs: text in columns, Parquet or another kind of recording, with the column time. Every column with the name of an input of the
-    /// FMU drives that input, such as tau_cmd, tau_ext, g_axial, in the unit of the file (`tau_cmd [mNm]`), else of the FMU; times
-    /// without a unit are in s. tau_slope is tau_cmd's derivative until the next row.
+    /// File with histories of inputs over the column time: text in columns, Parquet or another kind of recording. Each
+    /// column with the name of an input of the FMU, such as tau_cmd, tau_ext or g_axial, drives this input. Its unit is
+    /// the unit in the file (`tau_cmd [mNm]`) or otherwise the unit of the FMU; times without a unit are in s. A column
+    /// tau_slope is the derivative of tau_cmd until the next row.
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
-    /// Pass over columns of --input that are no inputs, instead of refusing them.
+    /// Ignores columns of --input that are no inputs of the FMU. Without this flag they are an error.
     #[arg(long, requires = "input")]
     ignore_columns: bool,
-    /// Sets the parameters of a file before those of --set: `"name" = value` as TOML, SSP's .ssv, or
-    /// the .json that `hubslosh identify` writes.
+    /// File of parameters, which are set before those of --set: TOML with lines `"name" = value`, .ssv of SSP, or the
+    /// .json that `hubslosh identify` writes.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// Sets a parameter or an input by its FMU name: a number in SI or with a unit of the variable (50mm); enumerations by
-    /// name or number. Structural parameters of FMI 3.0 are set first, whatever the order.
+    /// Sets a parameter or an input by its name in the FMU. A number is in SI units or has a unit of the variable (50mm);
+    /// an item of an enumeration is given by name or number. Structural parameters of FMI 3.0 are set first, wherever
+    /// they are in the command line.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Time between the rows of the result, s. The FMU also steps to every row of --input, and to every edge and command of a profile.
+    /// Time between the rows of the result, s. It does not change the inputs: the FMU also steps to every row of --input,
+    /// and to every edge and command of a profile.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
-    /// Time between the commands of a profile that oscillates, s: lines join them, or they are held with --hold. Lines that would
-    /// differ from the profile by more than 2.5 % of its amplitude get closer commands (0.1 %).
+    /// Time between the commands of an oscillating profile, s. Lines join the commands, or each is held with --hold. If
+    /// lines would differ from the profile by more than 2.5 % of its amplitude, closer commands are used, so that they
+    /// differ by 0.1 %.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE, conflicts_with = "input")]
     sample: f64,
-    /// Stop time, s [default: the end of the torque history].
+    /// Time at which the run stops, s [default: the end of the torque history].
     #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
     #[arg(long, value_name = "NUMBER")]
     tolerance: Option<f64>,
-    /// Hold inputs from row to row, a profile from command to command, instead of joining by lines.
+    /// Holds inputs from row to row, and a profile from command to command, instead of joining the values by lines.
     #[arg(long)]
     hold: bool,
     /// Input that the profile drives [default: tau_cmd, or the FMU's only Real input].
     #[arg(long, value_name = "NAME")]
     drive: Option<String>,
-    /// Surface tension of the liquid in the tanks of Spacecraft and SloshTank, N/m, for the warning at low Bond numbers. The
-    /// density is the tank's parameter [default: water's, 0.07213].
+    /// Surface tension of the liquid in the tanks of Spacecraft and SloshTank, N/m. With the density of the tank it gives
+    /// the Bond number, and the run warns if this is low [default: 0.07213, as of water].
     #[arg(long, value_name = "N/M")]
     tension: Option<f64>,
-    /// Variables to record in addition to time and the driven inputs [default:
-    /// omega,omega_imu,slosh_angle,slosh_angle_radial; of an FMU without these all outputs and slosh
-    /// angles; what `hubslosh view` draws slosh modes after the first and draining tanks by].
+    /// Variables to record besides time and the driven inputs [default: of HubSlosh omega, omega_imu, slosh_angle and
+    /// slosh_angle_radial; of other FMUs all outputs and slosh angles; and the variables by which `hubslosh view` draws
+    /// further slosh modes and draining tanks].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
-    /// A sensor that is recorded too: sampled, late, noisy, biased, in steps (kinds below); one for each flag.
+    /// Also records a sensor with its sampling rate, delay, noise, bias and resolution. The kinds are listed below; the
+    /// flag may be repeated.
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…")]
     sensors: Vec<Sensor>,
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
     /// File for the signals, .csv or .parquet; - prints them as CSV.

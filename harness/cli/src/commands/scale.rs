@@ -7,7 +7,7 @@ use formulas::similarity::Liquid;
 
 use crate::terminal;
 
-/// Computes the flight tank that the bench represents (similarity): Bond numbers, Froude factors.
+/// Computes the flight tank that a bench represents, by equal Bond or Froude numbers.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh scale thesis\n  \
     hubslosh scale bond --flight-radius 2.0425 --flight-density 1141 --flight-tension 0.0132\n  \
@@ -15,8 +15,8 @@ use crate::terminal;
     hubslosh scale rotation --alpha 2.21 --flight-alpha 0.005\n  \
     hubslosh scale froude --lambda 25 --density-ratio 1.14")]
 pub struct ScaleArgs {
-    /// Print the numbers as JSON, SI.
-    #[arg(long, global = true)]
+    /// Prints the numbers as JSON, SI units.
+    #[arg(long, global = true, display_order = 900)]
     json: bool,
     #[command(subcommand)]
     what: Scale,
@@ -24,9 +24,13 @@ pub struct ScaleArgs {
 
 #[derive(Subcommand)]
 enum Scale {
-    /// The numbers of the thesis's section 7.2, as printed and as computed.
+    /// Repeats the numbers of section 7.2 of Rubaga's thesis, as printed and as computed.
+    #[command(after_help = "Example:\n  hubslosh scale thesis")]
     Thesis,
-    /// Bond number of an acceleration, and the flight tank that has the same.
+    /// Computes the Bond number of a tank, and the flight tank with the same Bond number.
+    #[command(
+        after_help = "Example:\n  hubslosh scale bond --flight-radius 2.0425 --flight-density 1141 --flight-tension 0.0132"
+    )]
     Bond {
         #[command(flatten)]
         bench: TankAtRest,
@@ -36,14 +40,17 @@ enum Scale {
         /// Surface tension of the liquid in flight, N/m [default: the bench's].
         #[arg(long)]
         flight_tension: Option<f64>,
-        /// Radius of the flight tank, m: gives its acceleration.
+        /// Radius of the flight tank, m. The command then computes the acceleration in flight.
         #[arg(long, conflicts_with = "flight_acceleration")]
         flight_radius: Option<f64>,
-        /// Acceleration in flight, m/s²: gives the tank's radius.
+        /// Acceleration in flight, m/s². The command then computes the radius of the flight tank.
         #[arg(long)]
         flight_acceleration: Option<f64>,
     },
-    /// Bond, Weber and Froude numbers of a moving liquid: which force rules, and how fast.
+    /// Computes Bond, Weber and Froude numbers of a moving liquid, and which force dominates.
+    #[command(
+        after_help = "Example:\n  hubslosh scale numbers --radius 0.3 --acceleration 1e-5 --velocity 0.01"
+    )]
     Numbers {
         #[command(flatten)]
         tank: TankAtRest,
@@ -51,7 +58,8 @@ enum Scale {
         #[arg(long)]
         velocity: f64,
     },
-    /// Bond numbers of a rotation, and the tanks that have the same at another one.
+    /// Computes the Bond numbers of a rotating tank, and the flight tanks with the same Bond numbers.
+    #[command(after_help = "Example:\n  hubslosh scale rotation --alpha 2.21 --flight-alpha 0.005")]
     Rotation {
         /// Density of the liquid, kg/m³.
         #[arg(long, default_value_t = scaling::ROUND_WATER.density)]
@@ -75,15 +83,16 @@ enum Scale {
         #[arg(long, default_value_t = 0.005)]
         flight_alpha: f64,
     },
-    /// Factors from the model's quantities to those of the full size.
+    /// Computes the factors from quantities of a model to quantities of the full size, by equal Froude numbers.
+    #[command(after_help = "Example:\n  hubslosh scale froude --lambda 25 --density-ratio 1.14")]
     Froude {
-        /// Length of the full size over the model's.
+        /// Length of the full size divided by the length of the model.
         #[arg(long)]
         lambda: f64,
-        /// Density of the full size's liquid over the model's.
+        /// Density of the liquid at full size divided by the density of the liquid of the model.
         #[arg(long, default_value_t = 1.0)]
         density_ratio: f64,
-        /// Acceleration of the full size over the model's.
+        /// Acceleration at full size divided by the acceleration of the model.
         #[arg(long, default_value_t = 1.0)]
         gravity_ratio: f64,
     },

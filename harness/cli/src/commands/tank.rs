@@ -9,11 +9,10 @@ use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
 
 use crate::terminal;
 
-/// Modal parameters of a tank: from a drawing and a fill to slosh masses, pendulum lengths, hinge
-/// heights, the rigid liquid and the error of all of them.
+/// Computes the slosh modes of a tank from its drawing and a fill, as pendulums with rigid liquid and their errors.
 ///
-/// By the linear potential-flow eigenproblem for any body of revolution, in closed form for boxes.
-/// Without --out it prints a table.
+/// A body of revolution is solved by linear potential flow, a box in closed form. Without --out the command prints a
+/// table.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     hubslosh tank harness/tank/examples/capsule.toml --fill 1.2\n  \
@@ -26,59 +25,59 @@ use crate::terminal;
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
 pub struct TankArgs {
-    /// The tank: density, and contour or box.
+    /// Tank file with density, and contour or box.
     #[arg(value_name = "TANK.toml")]
     tank: PathBuf,
-    /// Height of the free surface above the tank's lowest point, m; or, with a % sign, per cent of the tank's volume (up to the
-    /// end of the wall if the tank is open at the top). A full tank has no free surface and no modes.
+    /// Height of the free surface above the lowest point of the tank, m; or, with a % sign, share of the volume of the
+    /// tank (of an open tank up to the end of its wall). A full tank has no free surface and no modes.
     #[arg(long, value_name = "METRES|PERCENT%", required_unless_present_any = ["sweep", "fill_mass"])]
     fill: Option<Fill>,
-    /// Mass of the liquid, kg, at the tank's density, in place of --fill.
+    /// Mass of the liquid, kg, instead of --fill.
     #[arg(long, value_name = "KG", conflicts_with = "fill")]
     fill_mass: Option<f64>,
-    /// Several fills, m or %: a table of them (CSV). With --parameters the table of a tank that drains: of two fills
-    /// the ends, between which it places its points, otherwise the points themselves, at most 12.
+    /// Several fills, m or %, for a table over the fill (CSV). With --parameters it is the table of a tank that drains:
+    /// two fills are the ends of the table, and the command places the points between them; more fills, at most 12, are
+    /// the points.
     #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
     sweep: Vec<Fill>,
     /// Number of lateral modes, 1 to 20.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     modes: usize,
-    /// Acceleration along the tank's axis for the frequencies in table and picture, m/s². At 0 they are 0 without
-    /// surface tension (--sigma).
+    /// Acceleration along the axis of the tank, m/s², for the frequencies in table and picture. At 0 the frequencies are
+    /// 0 without surface tension (--sigma).
     #[arg(long, value_name = "NUMBER", default_value_t = 9.80665)]
     gravity: f64,
-    /// Print the result as JSON, that of --sweep too.
+    /// Prints the result as JSON, with --sweep too.
     #[arg(long, conflicts_with = "out")]
     json: bool,
     /// File for the result, JSON (CSV with --sweep).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// File for a drawing of tank, free surface and mode shapes, SVG.
+    /// File for a picture of tank, free surface and mode shapes, .svg.
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// File for the parameters under the names of an FMU's variables, .toml (for `hubslosh run
-    /// --set-file` and Python) or .ssv (SSP 1.0).
+    /// File for the modes as parameters of an FMU, .toml (for `hubslosh run --parameters` and Python) or .ssv (SSP 1.0).
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// The FMU that --parameters are for.
+    /// FMU for which --parameters writes.
     #[arg(long, value_name = "MODEL", default_value = "HubSlosh", requires = "parameters")]
     model: Model,
-    /// The tank of Spacecraft that --parameters are for, 1 to 4.
+    /// Number of the tank on Spacecraft for which --parameters writes, 1 to 4.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
-    /// Kinematic viscosity of the liquid, m2/s, for damping ratios at --gravity with their intervals. Table, --out and
-    /// --parameters have them, with --sweep at every fill [default: none, the ratios are 0].
+    /// Kinematic viscosity of the liquid, m²/s. It gives damping ratios with their intervals at --gravity, in table,
+    /// --out and --parameters, with --sweep at every fill [default: none, the ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
-    /// Surface tension, N/m, for the frequencies (in table, picture and --out at --gravity), for the centring stiffness of
-    /// --parameters and for the damping [default: none].
+    /// Surface tension, N/m, for the frequencies at --gravity, the centring stiffness in --parameters and the damping
+    /// [default: none].
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     sigma: Option<f64>,
-    /// Contact angle between surface and wall, degrees. Frequency and centring stiffness of an upright cylinder's first mode then
-    /// include the meniscus at --gravity and --sigma. 90 is a flat surface.
+    /// Contact angle between surface and wall, degrees; 90 is a flat surface. For an upright cylinder, the frequency and
+    /// the centring stiffness of the first mode then include the meniscus at --gravity and --sigma.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
-    /// Write --parameters although a centring stiffness is far outside of what its formula holds for.
+    /// Writes --parameters although a centring stiffness is far outside the range of its formula.
     #[arg(long, requires = "parameters")]
     force: bool,
 }

@@ -10,25 +10,25 @@ use experiments::run::Run;
 use super::{check_out, write_out};
 use crate::terminal;
 
-/// Writes a profile's torque alone: time (s), tau_cmd (N·m), and tau_slope (N·m/s), which is the
-/// torque's derivative until the next row.
+/// Writes the torque of a profile as a table, for a bench or another host.
 ///
-/// A host that sets value and slope at every row drives the FMU exactly as `hubslosh run` does, jumps included: every
-/// edge and command of the profile has its row, whatever --step is. The columns time and tau_cmd alone are a torque history for
-/// --input, a bench or Simulink.
+/// The columns are time (s), tau_cmd (N·m) and tau_slope (N·m/s), the derivative of tau_cmd until the next row. A host
+/// that sets torque and slope at every row drives the FMU exactly as `hubslosh run` does, jumps included, because every
+/// edge and command of the profile has its row, whatever --step is. Time and tau_cmd without the slopes are a torque
+/// history for `hubslosh run --input`, a bench or Simulink.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct TorqueArgs {
-    /// Torque profile, name:key=value,…
+    /// Torque profile with its settings, such as sine:amplitude=0.05,frequency=2.4. The profiles are listed below.
     #[arg(long, value_name = "PROFILE", required_unless_present = "profiles")]
     profile: Option<String>,
     /// Largest time between rows, s.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
     step: f64,
-    /// Time between the commands of a profile that oscillates, s, as of `hubslosh run`.
+    /// Time between the commands of an oscillating profile, s, as for `hubslosh run`.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
     sample: f64,
-    /// Hold the profile from command to command, as of `hubslosh run`: all slopes are 0.
+    /// Holds the profile from command to command, as for `hubslosh run`, so that all slopes are 0.
     #[arg(long)]
     hold: bool,
     /// Time of the last row, s [default: the end of the profile].
@@ -40,7 +40,7 @@ pub struct TorqueArgs {
     /// Lists the profiles as a Markdown table and writes nothing.
     #[arg(long)]
     profiles: bool,
-    /// Lists them as JSON.
+    /// Lists the profiles as JSON.
     #[arg(long, requires = "profiles")]
     json: bool,
 }

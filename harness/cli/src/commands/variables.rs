@@ -10,22 +10,22 @@ use serde_json::{Map, Value, json};
 use super::DEFAULT_FMU;
 use crate::{fmu, terminal};
 
-/// Lists an FMU's variables: name, causality, start, unit, range, meaning.
+/// Lists the variables of an FMU with causality, start value, unit, range and meaning.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh variables\n  hubslosh variables friction\n  \
     hubslosh variables tank --causality parameter\n  \
     hubslosh variables --fmu dist/Spacecraft.fmu --causality input")]
 pub struct VariablesArgs {
-    /// Only those whose name or meaning contains this, in upper or lower case.
+    /// Text that name or meaning of a variable must contain, in upper or lower case.
     filter: Option<String>,
-    /// Only those of this causality: input, output, parameter, calculatedParameter, local.
+    /// Lists only variables with this causality: input, output, parameter, calculatedParameter or local.
     #[arg(long, value_name = "NAME")]
     causality: Option<String>,
-    /// Print them as JSON: an object each, with the units that a value may be given in (a number in them is factor ·
-    /// value + offset).
+    /// Prints the variables as JSON, an object for each. `units` has the units in which a value may be given, with
+    /// value in this unit = factor · SI value + offset.
     #[arg(long)]
     json: bool,
-    /// The FMU: a file, or the name of one of this project.
+    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
 }

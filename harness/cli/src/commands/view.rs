@@ -15,9 +15,9 @@ use signals::table::{self, Table};
 use super::setting;
 use crate::{fmu, set_file, terminal};
 
-/// Makes a page of one run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
+/// Makes a page that shows a run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
 ///
-/// The page needs nothing else, no network either. Nothing is simulated: it shows what the table has.
+/// The page is one file that works without a network. Nothing is simulated: the page draws the columns of the run.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     hubslosh run --profile exp-sweep:amplitude=0.25 --set slosh.model=spherical --out sweep.parquet\n  \
@@ -26,29 +26,30 @@ use crate::{fmu, set_file, terminal};
     hubslosh view drain.csv --fmu SloshTank --parameters draining.toml --tank tank.toml\n  \
     hubslosh view slew.parquet --tank 1:oxidiser.toml --tank 2:fuel.toml")]
 pub struct ViewArgs {
-    /// The run: .parquet or .csv, as `hubslosh run` and `campaign` write them.
+    /// File of the run, .parquet or .csv, as `hubslosh run` and `hubslosh campaign` write it.
     #[arg(value_name = "RUN")]
     run: PathBuf,
-    /// File for the page [default: next to the run, its name with .html].
+    /// File for the page, .html [default: the name of the run with .html].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// First time, s.
+    /// Start of the part to show, s.
     #[arg(long, value_name = "SECONDS")]
     from: Option<f64>,
-    /// Last time, s.
+    /// End of the part to show, s.
     #[arg(long, value_name = "SECONDS")]
     to: Option<f64>,
-    /// Draws a tank as this file has it (the format of `hubslosh tank`), the first or that with the number: 2:fuel.toml.
+    /// Tank file, as for `hubslosh tank`, with the contour of a tank to draw. It is tank 1, or the tank whose number is
+    /// in front: 2:fuel.toml.
     #[arg(long = "tank", value_name = "[N:]TANK.toml")]
     tanks: Vec<String>,
-    /// Parameters that the run was made with, where its file does not say them, before those of --set.
+    /// File of parameters of the run, if the file of the run does not contain them. Those of --set come after them.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// A parameter that the run was made with.
+    /// Parameter of the run, if the file of the run does not contain it.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// The FMU that made the run: a file, or the name of one of this project [default: the one that the run names, or whose
-    /// variables its columns are].
+    /// FMU of the run: a file, or the name of an FMU of this project [default: the FMU that the file of the run names, or
+    /// the one that has its columns as variables].
     #[arg(long, value_name = "FILE|NAME")]
     fmu: Option<PathBuf>,
 }

@@ -209,6 +209,23 @@ fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
 }
 
 #[test]
+fn every_help_has_the_commands_own_options_first_and_an_example() {
+    let mut texts = Vec::new();
+    helps(&[], &mut texts);
+    assert!(texts.len() > 25, "{}", texts.len());
+    for (command, text) in &texts {
+        let (own, global) = text.split_once("\nGlobal options:\n").expect(command);
+        for option in ["--call-limit", "--memory", "--quiet", "--strict", "--color"] {
+            let starts = |line: &str| line.split_whitespace().any(|word| word == option);
+            let is_listed = |part: &str| part.lines().any(|l| l.starts_with("  ") && starts(l));
+            assert!(!is_listed(own) && is_listed(global), "{command}: {option}");
+        }
+        let is_example = |line: &str| line.starts_with(&format!("  hubslosh {command}"));
+        assert!(command.is_empty() || text.lines().any(is_example), "{command} has no example");
+    }
+}
+
+#[test]
 fn a_draining_tank_gets_the_damping_of_every_fill() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);

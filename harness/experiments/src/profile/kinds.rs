@@ -177,7 +177,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "sine",
-        says: "A sin 2πft: a dwell",
+        says: "A sin 2πft: a sine of constant frequency",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             parameter("frequency", 2.4, "Hz", "frequency", Allowed::Within(FREQUENCY)),
@@ -188,7 +188,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "constant",
-        says: "always the same torque",
+        says: "constant torque",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             duration(20.0),
@@ -198,7 +198,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "pulse",
-        says: "the amplitude from `start` for `width` seconds",
+        says: "amplitude for `width` seconds from `start` on, otherwise no torque",
         parameters: &[
             parameter("amplitude", 0.05, "N·m", "torque amplitude", Allowed::Any),
             time("start", 0.0, "start of the torque"),
@@ -230,7 +230,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "acceleration-step",
-        says: "inertia × acceleration from `start` for `width` seconds: what a wheel makes whose speed is ramped linearly (thesis 2.7.1)",
+        says: "inertia × acceleration for `width` seconds from `start` on, as of a wheel whose speed changes linearly (thesis 2.7.1)",
         parameters: &[
             parameter("acceleration", 0.1, "rad/s²", "acceleration", Allowed::Any),
             // hub.I + tank.m_liq tank.r² at the FMU's start values
@@ -269,7 +269,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "sine-noise",
-        says: "A sin 2πft and on it noise as of `noise`, the sum clipped at ±limit: a steady wave that shows the other modes, too (thesis 8.6.1)",
+        says: "A sin 2πft plus noise as of the profile `noise`, the sum clipped at ±limit: a steady wave, and noise that excites the other modes (thesis 8.6.1)",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude of the sine", Allowed::Any),
             parameter("frequency", 2.4, "Hz", "frequency of the sine", Allowed::Within(FREQUENCY)),

@@ -48,14 +48,14 @@ const ANGLE: Parameter = parameter(
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "gauge",
-        says: "wave at an angle on the wall of HubSlosh's tank, from radial outwards towards tangential, m",
+        says: "wave height at the wall of HubSlosh's tank, m, at an angle from radially outwards towards tangential",
         parameters: &[ANGLE],
         unit: "m",
         of: None,
     },
     Kind {
         name: "pressure",
-        says: "pressure on that wall at a height over the bottom, above that of the gas, Pa",
+        says: "pressure at the wall of HubSlosh's tank relative to the gas, Pa, at an angle and a height above the bottom",
         parameters: &[
             ANGLE,
             parameter("height", 0.0, "m", "height over the bottom", Allowed::NotNegative),
@@ -65,14 +65,14 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "camera",
-        says: "the surface in HubSlosh's tank: the plane that fits best and every mode, each as its height at the wall, m",
+        says: "surface in HubSlosh's tank: best-fitting plane and amplitude of every mode, as heights at the wall, m",
         parameters: &[],
         unit: "m",
         of: None,
     },
     Kind {
         name: "force",
-        says: "a force of the FMU, by of=NAME, N",
+        says: "force output of the FMU, named by of=NAME, N",
         parameters: &[],
         unit: "N",
         of: Some(Some(F_TANGENTIAL)),
@@ -89,14 +89,14 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "encoder",
-        says: "an angle of the FMU, by of=NAME, rad",
+        says: "angle output of the FMU, named by of=NAME, rad",
         parameters: &[],
         unit: "rad",
         of: Some(Some(THETA)),
     },
     Kind {
         name: "variable",
-        says: "any Real of any FMU, by of=NAME",
+        says: "Real variable of any FMU, named by of=NAME",
         parameters: &[],
         unit: "",
         of: Some(None),
@@ -404,7 +404,7 @@ pub fn help() -> String {
         let colon = if all.is_empty() { "" } else { ":" };
         format!("  {}{colon}{}\n      {}\n", kind.name, all.join(","), kind.says)
     });
-    let errors = format!("  each: {}\n", written(&ERRORS));
+    let errors = format!("  every sensor also has: {}\n", written(&ERRORS));
     kinds.chain([errors]).collect()
 }
 
